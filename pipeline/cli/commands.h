@@ -1,0 +1,22 @@
+#pragma once
+#include <functional>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace texmesh {
+
+/// Stable exit codes (design section 6).
+enum ExitCode : int { kExitOk = 0, kExitModelFailed = 1, kExitUsage = 2, kExitInternal = 3 };
+
+// Each adds one subcommand to `app`; when the user chose it, its callback runs and stores the exit code.
+void add_compile_command(CLI::App& app, int& exit_code);
+void add_dump_command(CLI::App& app, int& exit_code);     // command_dump.cpp
+void add_verify_command(CLI::App& app, int& exit_code);   // command_verify.cpp
+void add_unpack_command(CLI::App& app, int& exit_code);   // command_pack.cpp
+void add_pack_command(CLI::App& app, int& exit_code);     // command_pack.cpp
+void add_stages_command(CLI::App& app, int& exit_code);
+
+}  // namespace texmesh

@@ -1,0 +1,63 @@
+#pragma once
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "format/fields.h"
+#include "format/model.h"
+#include "stages/fragmentation.h"
+#include "stages/ladder.h"
+#include "stages/perceptual_values.h"
+#include "stages/simplification.h"
+
+namespace texmesh {
+
+inline constexpr int kScalesVersion = 1;
+
+enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
+template <>
+struct EnumNames<MeshCodec> {
+  static constexpr std::array<std::string_view, 4> names{"draco", "meshopt", "quantized", "none"};
+};
+
+struct ScalesOptions {
+  MeshCodec mesh_codec = MeshCodec::kDraco;
+  int draco_level = 7;        // compression level
+  int position_bits = 0;      // 0 = from the mean edge (error <= 1/4 of it)
+  int uv_bits = 0;            // 0 = from the texture sizes (error <= 1/2 texel)
+  int normal_bits = 10;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
+    v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
+    v("position_bits", s.position_bits, Range{0, 30}, "bits per position coordinate; 0 = so that the error is under 1/4 of the mean edge");
+    v("uv_bits", s.uv_bits, Range{0, 30}, "bits per texture coordinate; 0 = so that the error is under 1/2 texel");
+    v("normal_bits", s.normal_bits, Range{4, 16}, "bits per normal component");
+  }
+};
+
+struct ScaleFile {
+  int scale = 0;                     // scale number
+  std::vector<std::uint8_t> glb;     // a standalone glTF 2.0 binary with preview textures inside
+  std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
+  template <class S, class A>
+  static void archive(S& s, A& a) { a(s.scale, s.glb, s.triangles, s.vertices); }
+};
+struct ScaleFiles {
+  std::vector<ScaleFile> files;      // kept scales, S_0 first
+  int position_bits = 0, uv_bits = 0;  // as used; 0 = float
+  double position_error = 0;         // largest rounding of a coordinate, object units
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) { a(s.files, s.position_bits, s.uv_bits, s.position_error, s.notes); }
+};
+
+/// Writes every kept scale as a GLB: one node per part, one primitive per material in it, the source's materials with
+/// the previews of the planes as images (RGBA PNG where a material needs alpha). GLB image k is named "texture/<k>" for
+/// source image k. Positions are quantised on one grid for all scales, so shared vertices are bit-equal between scales.
+ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                        const std::vector<Material>& materials, const std::vector<Image>& images,
+                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,43 @@
+#pragma once
+#include <vector>
+
+#include "format/fields.h"
+#include "stages/fragmentation.h"
+
+namespace texmesh {
+
+inline constexpr int kZimVersion = 1;
+
+struct ZimOptions {
+  int difference = 24;       // neighbours that differ by this in any channel count as different
+  double weight_intensity = 0.5, weight_complexity = 0.5;      // of M (8.3)
+  double weight_eta = 1, weight_z = 1, weight_i = 1, weight_m = 1;  // of VQP (8.4), normalised to sum 1
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("difference", s.difference, Range{1, 255}, "neighbouring texels that differ by this in any channel count as different");
+    v("weight_intensity", s.weight_intensity, Range{0, 1}, "weight of (1 - I) in the masking predictor M");
+    v("weight_complexity", s.weight_complexity, Range{0, 1}, "weight of zeta in the masking predictor M");
+    v("weight_eta", s.weight_eta, Range{0, 100}, "weight of feature density in VQP");
+    v("weight_z", s.weight_z, Range{0, 100}, "weight of Z, the colour deviation, in VQP");
+    v("weight_i", s.weight_i, Range{0, 100}, "weight of I, the intensity, in VQP");
+    v("weight_m", s.weight_m, Range{0, 100}, "weight of M, the masking, in VQP");
+  }
+};
+
+/// Per plane and fragment; 0 for fragments without coverage. z, i, zeta, m are raw (8.1-8.3), 0..1; vqp (8.4) is the
+/// weighted mean of the predictors after min-max over covered fragments, with eta of scale 0 as geometry predictor.
+struct PlanePredictors {
+  std::vector<float> z, i, zeta, m, vqp;
+  template <class S, class A>
+  static void archive(S& s, A& a) { a(s.z, s.i, s.zeta, s.m, s.vqp); }
+};
+struct Predictors {
+  std::vector<PlanePredictors> planes;
+  template <class S, class A>
+  static void archive(S& s, A& a) { a(s.planes); }
+};
+
+Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels, const ZimOptions& options,
+                           const RunContext& context);
+
+}  // namespace texmesh
