@@ -1,0 +1,57 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "format/sha256.h"
+#include "pipeline/import/import.h"
+
+namespace texmesh {
+
+/// A file that a model asked for. `digest` and `bytes` are zero unless found. Becomes part of the cache key:
+/// the same requests with the same answers give the same model.
+struct FileRequest {
+  std::string uri;
+  bool found = false;
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+  friend bool operator==(const FileRequest&, const FileRequest&) = default;
+};
+
+/// Opens files beneath one folder only: openat2 with RESOLVE_BENEATH, RESOLVE_NO_SYMLINKS and
+/// RESOLVE_NO_MAGICLINKS, or, where the kernel or a sandbox has no openat2, component by component with
+/// O_NOFOLLOW. Regular files only; a FIFO does not block. What cannot be opened for want of permission counts
+/// as missing. The folder itself may be reached over symbolic links: the user named it, not the model. Not
+/// thread-safe.
+class FileResolver : public Resolver {
+ public:
+  enum class Method : std::uint8_t { kBest, kWalk };  // kWalk: as if there were no openat2
+  /// Throws InputError when `folder` is not a folder that can be opened; "" is the current one.
+  explicit FileResolver(const std::filesystem::path& folder, Method method = Method::kBest);
+  ~FileResolver() override;
+  FileResolver(const FileResolver&) = delete;
+  FileResolver& operator=(const FileResolver&) = delete;
+
+  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) override;
+
+  /// Every uri that was asked for, once, in the order of first use; refused ones as not found.
+  const std::vector<FileRequest>& requests() const { return requests_; }
+
+ private:
+  int open_beneath(const std::string& uri);
+  std::size_t record(const std::string& uri);
+
+  int folder_ = -1;
+  bool walk_ = false;
+  std::vector<FileRequest> requests_;
+  std::map<std::string, std::size_t> index_of_;
+};
+
+/// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
+/// missing, not a regular file, unreadable or longer than max_bytes.
+std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes);
+
+}  // namespace texmesh

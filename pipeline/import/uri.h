@@ -1,0 +1,30 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace texmesh {
+
+// Names of files inside models. `file` and `place` say where the name stands, for the message of an
+// InputError.
+
+/// Refuses every name that could leave the model's folder or mean something else than a file in it: empty,
+/// longer than 4096 bytes, NUL or another control character, backslash, a leading '/', a drive letter or
+/// scheme (`c:`, `http:`, `file:`), a ".." component, and names that end in a folder ("a/", "."). Throws
+/// InputError.
+void check_relative_name(std::string_view name, const std::string& file, const std::string& place);
+
+/// A glTF URI to a name: "%41" -> "A", once (a decoded '%' stays). The result passes check_relative_name;
+/// query and fragment are not split off, as glTF names files. Throws InputError for broken escapes and
+/// refused names.
+std::string decode_uri(std::string_view uri, const std::string& file, const std::string& place);
+
+bool is_data_uri(std::string_view uri);
+
+/// The bytes of "data:[<type>];base64,<text>": padding, alphabet and the unused last bits are checked, as a
+/// hostile file must not mean two things. Throws InputError, also for more than max_bytes.
+std::vector<std::uint8_t> decode_data_uri(std::string_view uri, std::uint64_t max_bytes,
+                                          const std::string& file, const std::string& place);
+
+}  // namespace texmesh
