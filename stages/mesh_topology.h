@@ -1,0 +1,40 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace texmesh {
+
+/// The undirected edges of a triangle soup, each with its half-edges. Half-edge 3 t + k runs from corner k of
+/// triangle t to its corner (k + 1) % 3. Edges are sorted by their lower, then by their higher end;
+/// half-edges by number.
+struct EdgeTable {
+  std::vector<std::uint32_t> half_edges;  // grouped by edge
+  std::vector<std::uint32_t> first;       // [edges + 1] into half_edges
+  std::size_t edge_count() const { return first.size() - 1; }
+  std::span<const std::uint32_t> edge(std::size_t e) const {
+    return std::span(half_edges).subspan(first[e], first[e + 1] - first[e]);
+  }
+};
+
+inline std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+inline std::uint32_t previous_corner(std::uint32_t corner) {
+  return corner % 3 == 0 ? corner + 2 : corner - 1;
+}
+
+/// `corner_position`: three position indices (< position_count) per triangle, all three different. O(n log
+/// n).
+EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_t position_count);
+
+/// Union-find whose sets are named by their lowest member, so that names depend on the sets alone.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count);
+  std::uint32_t find(std::uint32_t a);
+  void join(std::uint32_t a, std::uint32_t b);
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace texmesh
