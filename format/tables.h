@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "format/sha256.h"
+
 namespace texmesh {
 
 /// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising quality,
@@ -16,11 +18,12 @@ struct PlaneTables {
   // [R * F], index rung * F + fragment; 0 where the fragment is not stored:
   std::vector<std::uint32_t> size_bytes;     // of the abbreviated stream, exact
   std::vector<std::uint64_t> digest;         // first 8 bytes of the stream's SHA-256, as a big-endian number
-  std::vector<float> mse, dssim;             // over covered texels of luma (8-bit scale) | 1 - SSIM; stored in 16 bits
+  // over covered texels of luma (8-bit scale, 0..65025) | 1 - SSIM (0..2); stored as IEEE binary16:
+  std::vector<float> mse, dssim;
   // [F]:
   std::vector<std::uint32_t> covered_texels;
   std::vector<float> surface_fraction;       // of the object's surface
-  std::vector<float> z, i, zeta, m, vqp;     // 0..1, stored in 16 bits
+  std::vector<float> z, i, zeta, m, vqp;     // 0..1, stored as multiples of 1 / 65535
   std::vector<std::uint16_t> order;          // fragments that are stored, by falling importance (eta_0, surface, index)
   // [N * F], index scale * F + fragment:
   std::vector<std::uint32_t> features;       // f_i < 2^24
@@ -63,6 +66,18 @@ struct PackageTables {
 /// and throws FormatError. write(read(x)) == x; values that the file stores in 16 bits are rounded by the writer.
 std::vector<std::uint8_t> write_tables(const PackageTables& tables);
 PackageTables read_tables(std::span<const std::uint8_t> bytes);
+/// The head alone tells where each plane's section stands, so that a client can read one plane by a range.
+struct TablesSection {
+  std::uint64_t offset = 0, bytes = 0;  // within tables.bin
+  Sha256 digest{};
+};
+struct TablesHead {
+  int minor = 0;
+  std::uint64_t bytes = 0;  // of the head itself
+  std::vector<TablesSection> planes;
+};
+TablesHead read_tables_head(std::span<const std::uint8_t> bytes);  // `bytes` may stop after the head
+PlaneTables read_tables_section(const TablesHead& head, std::size_t plane, std::span<const std::uint8_t> section);
 
 /// Measured quality of scale x rung samples (design 8.11): quality.json.
 struct QualityTable {

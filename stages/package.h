@@ -38,8 +38,10 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const QualityTable& quality, double jnd, const std::string& provenance_json,
                                            const PackageOptions& options, const RunContext& context);
 
-/// Lays out and writes entries that are already final except for the offsets in manifest, index and textures.json;
-/// used by assemble_package and by `pack`, so that pack after unpack gives the same bytes.
+/// Lays out and writes entries that are already final except for the offsets in manifest and index, in
+/// streaming_order(). `entries` holds all but manifest.json, index.bin and textures.json, which are made here from the
+/// arguments (refs and offsets in them are filled in). `pack` needs no new layout: it hands the files of a tree to
+/// ContainerWriter in index order.
 std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
                                         const std::vector<PackageEntry>& entries);
 
