@@ -1,20 +1,16 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
 #include "format/fields.h"
 #include "stages/fragmentation.h"
+#include "stages/jpeg.h"
 
 namespace texmesh {
 
 inline constexpr int kLadderVersion = 1;
-
-enum class Subsampling : std::uint8_t { k420, k444 };
-template <>
-struct EnumNames<Subsampling> {
-  static constexpr std::array<std::string_view, 2> names{"420", "444"};
-};
 
 struct LadderOptions {
   std::vector<int> rungs{5, 8, 11, 18, 30, 53, 75, 86, 93, 97};  // IJG qualities, strictly rising
@@ -52,17 +48,16 @@ struct Ladder {
   static void archive(S& s, A& a) { a(s.planes); }
 };
 
-/// Encodes with libjpeg-turbo, ISLOW DCT. Huffman tables of a rung are trained on covered fragments spread over the
-/// plane plus a noise and a ramp strip; a fragment with a symbol that has no code carries tables of its own.
-/// Same bytes for any thread count.
+/// Encodes with libjpeg-turbo, ISLOW DCT; data planes (normal, ORM) and `subsampling = 444` without chroma subsampling.
+/// Huffman tables of a rung are trained on covered fragments spread over the plane, with a small admixture of the
+/// typical tables of ISO 10918-1 annex K.3, so that every symbol that baseline coding can produce has a code: no
+/// fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment has tables and a
+/// preview but no data. Throws StageError for rungs that do not rise or lie outside 1..100 and for pixels that do not
+/// fit the planes. Same bytes for any thread count.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const LadderOptions& options,
                      const RunContext& context);
 
-/// A complete JPEG from a rung's table stream and one abbreviated fragment: tables without EOI + fragment without SOI.
-std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables, std::span<const std::uint8_t> fragment);
-
-/// Decodes a complete baseline or progressive JPEG with libjpeg-turbo (ISLOW, fancy upsampling). Throws FormatError on
-/// any libjpeg error *or warning*, and when the size exceeds max_pixels.
-Pixels decode_jpeg(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels);
+/// The rung's stream of one fragment; empty when it is not stored.
+std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment);
 
 }  // namespace texmesh
