@@ -115,7 +115,7 @@ TEST(Ladder, FragmentsMeetAsInTheWholeImage) {
           }
       }
       EXPECT_EQ(inner, 0u);
-      if (subsampling == Subsampling::k444) EXPECT_EQ(ring, 0u);
+      EXPECT_TRUE(ring == 0 || subsampling == Subsampling::k420) << ring;
     }
   }
 }
@@ -165,7 +165,8 @@ TEST(Ladder, TrainedTablesBeatTypicalOnes) {
 }
 
 TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
-  // 40 flat fragments and one of noise that the training (every other or so) does not see.
+  // 40 flat fragments and one of noise, which the training does not see. libjpeg-turbo does not report a symbol without
+  // a code: its SIMD coder writes a damaged stream.
   Plane p = make_plane(41, 1, 32, 3, Content::kFlat);
   Random random{3};
   for (std::uint32_t y = 0; y < 32; ++y)
