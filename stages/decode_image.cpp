@@ -1,0 +1,282 @@
+#include "stages/decode_image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <mutex>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include "format/errors.h"
+#include "format/portable_math.h"
+#include "stages/decode_jpeg.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+const char* reader_name(ImageFormat format) {
+  switch (format) {
+    case ImageFormat::kJpeg: return "jpeg";
+    case ImageFormat::kPng: return "png";
+    case ImageFormat::kTiff: return "tiff";
+    case ImageFormat::kWebp: return "webp";
+    case ImageFormat::kExr: return "openexr";
+  }
+  return "";
+}
+
+std::string first_bytes(Bytes bytes) {
+  if (bytes.empty()) return "no bytes";
+  static constexpr char kHex[] = "0123456789abcdef";
+  std::string s = "bytes";
+  for (std::size_t i = 0; i < std::min<std::size_t>(bytes.size(), 8); ++i)
+    s += std::string(" ") + kHex[bytes[i] >> 4] + kHex[bytes[i] & 15];
+  return s;
+}
+
+void check_size(const std::string& name, std::uint64_t width, std::uint64_t height, const ImageLimits& limits) {
+  const std::string found = std::to_string(width) + " x " + std::to_string(height);
+  if (width == 0 || height == 0) throw InputError(name, "image header", "at least 1 x 1 px", found);
+  if (width > limits.max_side_px || height > limits.max_side_px)
+    throw InputError(name, "image header", "sides up to " + std::to_string(limits.max_side_px) + " px", found);
+  if (width * height > limits.max_pixels)
+    throw InputError(name, "image header", "up to " + std::to_string(limits.max_pixels) + " pixels", found);
+}
+
+std::uint32_t u24(const std::uint8_t* p) { return p[0] | p[1] << 8 | static_cast<std::uint32_t>(p[2]) << 16; }
+
+// OpenImageIO decodes WebP while opening it, so the canvas size is read here first (RFC 9649, section 2).
+void check_webp_size(const std::string& name, Bytes bytes, const ImageLimits& limits) {
+  if (bytes.size() < 30) throw InputError(name, "WebP header", "30 bytes", std::to_string(bytes.size()));
+  const std::uint8_t* p = bytes.data() + 12;
+  if (!std::memcmp(p, "VP8X", 4)) {
+    check_size(name, u24(p + 12) + 1, u24(p + 15) + 1, limits);
+    if (p[8] & 2) throw InputError(name, "WebP header", "a still image", "an animation");
+  } else if (!std::memcmp(p, "VP8L", 4)) {
+    check_size(name, ((p[10] & 0x3fu) << 8 | p[9]) + 1, ((p[12] & 0xfu) << 10 | p[11] << 2 | p[10] >> 6) + 1, limits);
+  } else if (!std::memcmp(p, "VP8 ", 4)) {
+    check_size(name, (p[14] | p[15] << 8) & 0x3fff, (p[16] | p[17] << 8) & 0x3fff, limits);
+  } else {
+    throw InputError(name, "WebP header", "a VP8, VP8L or VP8X chunk", first_bytes({p, 4}));
+  }
+}
+
+// An image file opened by the reader of its format, in memory; keep the bytes alive.
+struct OpenImage {
+  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
+  std::unique_ptr<OIIO::ImageInput> input;
+  OIIO::ImageSpec spec;
+};
+
+std::string reader_error(OIIO::ImageInput& input) {
+  std::string s = input.geterror();
+  // OpenImageIO repeats and ends messages with line feeds.
+  while (!s.empty() && (s.back() == '\n' || s.back() == ' ')) s.pop_back();
+  std::replace(s.begin(), s.end(), '\n', ' ');
+  return s.empty() ? "an error without a message" : s;
+}
+
+OpenImage open_image(const std::string& name, ImageFormat format, Bytes bytes) {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add threads.
+    OIIO::attribute("threads", 1);
+    OIIO::attribute("exr_threads", -1);
+  });
+  OpenImage open;
+  open.memory = std::make_unique<OIIO::Filesystem::IOMemReader>(bytes.data(), bytes.size());
+  open.input = OIIO::ImageInput::create(reader_name(format));
+  if (!open.input) throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  open.input->set_ioproxy(open.memory.get());
+  if (!open.input->open("memory", open.spec, config))
+    throw InputError(name, "image header", std::string("a readable ") + image_format_name(format), reader_error(*open.input));
+  return open;
+}
+
+std::uint32_t colour_channels(const OIIO::ImageSpec& spec) {
+  const auto n = static_cast<std::uint32_t>(std::max(spec.nchannels, 0));
+  if (n <= 4) return n;
+  return spec.alpha_channel == 3 ? 4 : 3;
+}
+
+std::uint8_t bits_of(const OIIO::ImageSpec& spec) {
+  switch (spec.format.basetype) {
+    case OIIO::TypeDesc::UINT8: return 8;
+    case OIIO::TypeDesc::UINT16: return 16;
+    default: return 32;
+  }
+}
+
+void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const ImageLimits& limits) {
+  check_size(name, static_cast<std::uint64_t>(std::max(spec.width, 0)),
+             static_cast<std::uint64_t>(std::max(spec.height, 0)), limits);
+  if (spec.depth > 1) throw InputError(name, "image header", "a flat image", "a volume");
+  if (spec.deep) throw InputError(name, "image header", "a flat image", "deep data");
+  if (spec.nchannels < 1 || spec.nchannels > 64)
+    throw InputError(name, "image header", "1 to 64 channels", std::to_string(spec.nchannels));
+}
+
+// Deflate cannot shrink more than 1032-fold: what claims more lies about its size, and is told so before memory is taken.
+void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
+  if (image.format != ImageFormat::kPng) return;
+  const auto bits = static_cast<std::uint64_t>(std::max(1, spec.get_int_attribute("oiio:BitsPerSample", 1)));
+  // A palette entry of one bit is the least a PNG stores per pixel, whatever the decoded channels are.
+  const std::uint64_t raw = static_cast<std::uint64_t>(image.width_px) * image.height_px * (bits < 8 ? bits : 1) / 8;
+  if (raw / 1032 > image.bytes.size())
+    throw InputError(image.name, "image header", "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
+                     std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
+}
+
+OpenImage open_checked(const Image& image) {
+  if (image.format == ImageFormat::kWebp)
+    check_webp_size(image.name, image.bytes, {std::max(image.width_px, image.height_px), std::uint64_t{image.width_px} * image.height_px});
+  OpenImage open = open_image(image.name, image.format, image.bytes);
+  if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
+      static_cast<std::uint32_t>(open.spec.height) != image.height_px || colour_channels(open.spec) != image.channels)
+    throw InputError(image.name, "image header", "the size that import had found", "another one");
+  check_plausible(image, open.spec);
+  return open;
+}
+
+// The file's own samples as T. Errors of the reader, truncation included, are InputError.
+template <class T>
+std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc type) {
+  std::vector<T> samples(static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
+  if (!open.input->read_image(0, 0, 0, static_cast<int>(image.channels), type, samples.data()) ||
+      open.input->has_error())
+    throw InputError(image.name, "pixels", std::string("a whole ") + image_format_name(image.format),
+                     reader_error(*open.input));
+  return samples;
+}
+
+std::uint8_t to_byte(double x) {
+  if (!(x > 0)) return 0;  // NaN too
+  return x >= 1 ? 255 : static_cast<std::uint8_t>(std::floor(x * 255 + 0.5));
+}
+
+double srgb_from_linear(double x) {
+  if (!(x > 0.0031308)) return 12.92 * x;
+  return x >= 1 ? 1 : 1.055 * portable::pow(x, 1 / 2.4) - 0.055;
+}
+
+std::vector<std::uint8_t> bytes_from_words(const std::vector<std::uint16_t>& words) {
+  std::vector<std::uint8_t> out(words.size());
+  for (std::size_t i = 0; i < words.size(); ++i) out[i] = static_cast<std::uint8_t>((words[i] * 255u + 32767u) / 65535u);
+  return out;
+}
+
+std::vector<std::uint8_t> bytes_from_floats(const std::vector<float>& values, std::uint32_t channels, FloatEncoding encoding) {
+  const std::uint32_t alpha = channels == 2 || channels == 4 ? channels - 1 : channels;
+  std::vector<std::uint8_t> out(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool colour = i % channels != alpha;
+    out[i] = to_byte(encoding == FloatEncoding::kSrgb && colour ? srgb_from_linear(values[i]) : values[i]);
+  }
+  return out;
+}
+
+Pixels decode_jpeg_pixels(const Image& image) {
+  Pixels pixels{image.width_px, image.height_px, image.channels, {}};
+  const std::size_t row_bytes = static_cast<std::size_t>(image.width_px) * image.channels;
+  // Reserved, not filled: memory is touched row by row, so that a header that lies costs nothing.
+  pixels.data.reserve(row_bytes * image.height_px);
+  decode_jpeg(image.name, image.bytes, [&](const std::uint8_t* row) { pixels.data.insert(pixels.data.end(), row, row + row_bytes); });
+  return pixels;
+}
+
+void check_jpeg_unchanged(const Image& image) {
+  const JpegHeader header = read_jpeg_header(image.name, image.bytes);
+  if (header.width_px != image.width_px || header.height_px != image.height_px || header.channels != image.channels)
+    throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
+}
+
+}  // namespace
+
+const char* image_format_name(ImageFormat format) {
+  switch (format) {
+    case ImageFormat::kJpeg: return "JPEG";
+    case ImageFormat::kPng: return "PNG";
+    case ImageFormat::kTiff: return "TIFF";
+    case ImageFormat::kWebp: return "WebP";
+    case ImageFormat::kExr: return "EXR";
+  }
+  return "";
+}
+
+std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> bytes) {
+  auto has = [bytes](std::size_t at, std::string_view magic) {
+    return bytes.size() >= at + magic.size() && !std::memcmp(bytes.data() + at, magic.data(), magic.size());
+  };
+  using namespace std::string_view_literals;
+  if (has(0, "\xff\xd8\xff"sv)) return ImageFormat::kJpeg;
+  if (has(0, "\x89PNG\r\n\x1a\n"sv)) return ImageFormat::kPng;
+  if (has(0, "II*\0"sv) || has(0, "MM\0*"sv) || has(0, "II+\0"sv) || has(0, "MM\0+"sv)) return ImageFormat::kTiff;
+  if (has(0, "RIFF"sv) && has(8, "WEBP"sv)) return ImageFormat::kWebp;
+  if (has(0, "\x76\x2f\x31\x01"sv)) return ImageFormat::kExr;
+  return std::nullopt;
+}
+
+Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const ImageLimits& limits) {
+  const std::optional<ImageFormat> format = sniff_image_format(bytes);
+  if (!format) throw InputError(name, "first bytes", "JPEG, PNG, TIFF, WebP or EXR", first_bytes(bytes));
+  Image image;
+  image.format = *format;
+  if (*format == ImageFormat::kJpeg) {
+    const JpegHeader header = read_jpeg_header(name, bytes);
+    check_size(name, header.width_px, header.height_px, limits);
+    image.width_px = header.width_px;
+    image.height_px = header.height_px;
+    image.channels = static_cast<std::uint8_t>(header.channels);
+    image.bits_per_channel = 8;
+  } else {
+    if (*format == ImageFormat::kWebp) check_webp_size(name, bytes, limits);
+    const OpenImage open = open_image(name, *format, bytes);
+    check_spec(name, open.spec, limits);
+    image.width_px = static_cast<std::uint32_t>(open.spec.width);
+    image.height_px = static_cast<std::uint32_t>(open.spec.height);
+    image.channels = static_cast<std::uint8_t>(colour_channels(open.spec));
+    image.bits_per_channel = bits_of(open.spec);
+  }
+  image.name = std::move(name);
+  image.bytes = std::move(bytes);
+  return image;
+}
+
+Pixels decode_image(const Image& image, FloatEncoding encoding) {
+  if (image.format == ImageFormat::kJpeg) {
+    check_jpeg_unchanged(image);
+    return decode_jpeg_pixels(image);
+  }
+  OpenImage open = open_checked(image);
+  Pixels pixels{image.width_px, image.height_px, image.channels, {}};
+  switch (bits_of(open.spec)) {
+    case 8: pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8); break;
+    case 16: pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16)); break;
+    default: pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels, encoding);
+  }
+  return pixels;
+}
+
+FloatPixels decode_float(const Image& image) {
+  FloatPixels pixels{image.width_px, image.height_px, image.channels, {}};
+  auto widen = [&pixels](const auto& samples) { pixels.data.assign(samples.begin(), samples.end()); };
+  if (image.format == ImageFormat::kJpeg) {
+    widen(decode_image(image).data);
+    return pixels;
+  }
+  OpenImage open = open_checked(image);
+  switch (bits_of(open.spec)) {
+    case 8: widen(read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8)); break;
+    case 16: widen(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16)); break;
+    default: pixels.data = read_samples<float>(image, open, OIIO::TypeDesc::FLOAT);
+  }
+  return pixels;
+}
+
+}  // namespace texmesh
