@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/model.h"
+#include "format/vec.h"
+
+namespace texmesh {
+
+/// Answers "how far is this point from the surface" exactly (point to triangle), about a million times a second.
+/// Binary tree of boxes, split at the median of the triangles' centres. Deterministic.
+class SurfaceDistance {
+ public:
+  /// Triangles index `wedge_position`, which indexes `positions`. At least one triangle.
+  SurfaceDistance(const std::vector<Vec3f>& positions, const std::vector<std::uint32_t>& wedge_position,
+                  const std::vector<Triangle>& triangles);
+  /// Distance in the positions' unit; safe to call from several threads.
+  double operator()(Vec3d p) const;
+
+ private:
+  struct Node {
+    Vec3f lo, hi;
+    std::uint32_t first = 0, count = 0;  // leaf: corners_[3 * first ..]; inner (count 0): children at first, first + 1
+  };
+  void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end, std::vector<std::uint32_t>& order,
+             const std::vector<Vec3f>& centres);
+  std::vector<Node> nodes_;
+  std::vector<Vec3f> corners_;  // three per triangle, in the order of the leaves
+};
+
+/// A point on a triangle: weights of its three corners, summing to 1.
+struct SurfaceSample {
+  std::uint32_t triangle = 0;
+  float weight[3] = {1, 0, 0};
+};
+
+/// `count` points spread over the surface in proportion to area: equal steps along the running sum of areas, weights
+/// from a low-discrepancy sequence. Deterministic; empty when no triangle has an area.
+std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
+                                          const std::vector<std::uint32_t>& wedge_position,
+                                          const std::vector<Triangle>& triangles, std::size_t count);
+
+}  // namespace texmesh

@@ -1,0 +1,171 @@
+#include "stages/simplification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "stages/collapse_engine.h"
+#include "stages/distance.h"
+#include "stages/parallel.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kErrorSamples = 8000;  // per scale and direction; rms within 1 %, the largest is a sampled one
+
+/// #{p >= i} for i = 0..scales.
+std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map) {
+  std::vector<std::uint32_t> target(static_cast<std::size_t>(scale_map.scales) + 1, 0);
+  for (std::uint8_t p : scale_map.persistence)
+    for (std::size_t i = 0; i <= std::min<std::size_t>(p, target.size() - 1); ++i) ++target[i];
+  return target;
+}
+
+std::string stop_reason(CollapseStop stop, const SimplificationOptions& options) {
+  switch (stop) {
+    case CollapseStop::kReached: return "";
+    case CollapseStop::kFewTriangles: return "min_triangles is " + std::to_string(options.min_triangles);
+    case CollapseStop::kTooFar: return "every collapse left exceeds max_error";
+    case CollapseStop::kLocked: return "no collapse is left that keeps seams, borders and orientation";
+  }
+  return "";
+}
+
+NestedScale take_scale(const CollapseEngine& engine, int scale, std::string reason) {
+  NestedScale s;
+  s.scale = scale;
+  s.collapse_count = static_cast<std::uint32_t>(engine.collapses().size());
+  engine.mesh().snapshot(s.triangles, s.triangle_source);
+  s.position_count = engine.mesh().alive_positions();
+  s.floor_reason = std::move(reason);
+  return s;
+}
+
+/// Appends the wedges of relaxed junctions that some scale uses to the mesh and renumbers the scales' triangles.
+void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<NestedScale>& scales) {
+  const auto old_count = static_cast<std::uint32_t>(mesh.wedge_count());
+  std::vector<std::uint32_t> index(engine.new_wedges().size(), 0xffffffffu);
+  for (NestedScale& scale : scales)
+    for (Triangle& t : scale.triangles)
+      for (std::uint32_t& w : t) {
+        if (w < old_count) continue;
+        std::uint32_t& id = index[w - old_count];
+        if (id == 0xffffffffu) {
+          const CollapseMesh::NewWedge& wedge = engine.new_wedges()[w - old_count];
+          id = static_cast<std::uint32_t>(mesh.wedge_count());
+          mesh.wedge_position.push_back(wedge.position);
+          auto repeat = [&](auto& values) { if (!values.empty()) { const auto value = values[wedge.source]; values.push_back(value); }; };
+          repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals), repeat(mesh.colours);
+        }
+        w = id;
+      }
+}
+
+/// Distances of points spread over one surface to another: sum of squares and largest.
+struct Deviation { double square = 0, largest = 0; std::size_t count = 0; };
+
+Deviation deviation(const Mesh& mesh, const std::vector<Triangle>& from, const SurfaceDistance& to,
+                    const RunContext& context) {
+  const std::vector<SurfaceSample> samples = sample_surface(mesh.positions, mesh.wedge_position, from, kErrorSamples);
+  std::vector<double> distance(samples.size());
+  parallel_for(context, samples.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Vec3d p;
+      for (std::size_t k = 0; k < 3; ++k)
+        p = p + to_double(mesh.positions[mesh.wedge_position[from[samples[i].triangle][k]]]) * samples[i].weight[k];
+      distance[i] = to(p);
+    }
+  });
+  Deviation d;
+  d.count = distance.size();
+  for (double x : distance) d.square += x * x, d.largest = std::max(d.largest, x);
+  return d;
+}
+
+/// Vertices of S_0 are where it deviates most from a coarser scale; about kErrorSamples of them are looked at.
+double vertex_deviation(const Mesh& mesh, const SurfaceDistance& to, const RunContext& context) {
+  const std::size_t step = mesh.positions.size() / kErrorSamples + 1, count = (mesh.positions.size() + step - 1) / step;
+  std::vector<double> distance(count);
+  parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) distance[i] = to(to_double(mesh.positions[i * step]));
+  });
+  return *std::max_element(distance.begin(), distance.end());
+}
+
+void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const RunContext& context) {
+  if (scales.size() < 2) return;
+  const SurfaceDistance original(mesh.positions, mesh.wedge_position, mesh.triangles);
+  for (std::size_t i = 1; i < scales.size(); ++i) {
+    NestedScale& scale = scales[i];
+    const SurfaceDistance coarse(mesh.positions, mesh.wedge_position, scale.triangles);
+    const Deviation there = deviation(mesh, mesh.triangles, coarse, context);
+    const Deviation back = deviation(mesh, scale.triangles, original, context);
+    const double square = (there.square + back.square) / static_cast<double>(std::max<std::size_t>(there.count + back.count, 1));
+    scale.error_rms = static_cast<float>(std::sqrt(square));
+    scale.error_max = static_cast<float>(std::max({there.largest, back.largest, vertex_deviation(mesh, coarse, context)}));
+    context.report(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scales.size()));
+  }
+}
+
+}  // namespace
+
+NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, const SimplificationOptions& options,
+                      const RunContext& context) {
+  if (scale_map.persistence.size() != mesh.mesh.positions.size())
+    throw StageError("simplification", "scale map", std::to_string(mesh.mesh.positions.size()) + " positions",
+                     std::to_string(scale_map.persistence.size()));
+  NestedScales result;
+  result.mesh = mesh.mesh;
+  result.twin = mesh.twin;
+  const std::vector<std::uint32_t> target = vertex_targets(scale_map);
+  CollapseEngine engine(mesh, scale_map, options);
+  result.scales.push_back(take_scale(engine, 0, ""));
+  std::string floor;
+  for (std::size_t i = 1; i < target.size(); ++i) {
+    floor = stop_reason(engine.run_to(target[i], static_cast<int>(i), context), options);
+    if (engine.collapses().size() > result.scales.back().collapse_count)
+      result.scales.push_back(take_scale(engine, static_cast<int>(i), floor));
+    context.report(0.7 * (1 - static_cast<double>(engine.mesh().alive_positions()) / static_cast<double>(mesh.mesh.positions.size())));
+  }
+  if (!floor.empty())
+    add_info(result.notes, "scale-floor", "scale " + std::to_string(result.scales.back().scale),
+             "the coarsest scale has " + std::to_string(result.scales.back().position_count) + " vertices where the scale map asks for " +
+                 std::to_string(target.back()) + ": " + floor);
+  result.collapses = engine.collapses();
+  append_new_wedges(engine.mesh(), result.mesh, result.scales);
+  measure_errors(result.mesh, result.scales, context);
+  return result;
+}
+
+Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
+  const Mesh& in = scales.mesh;
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<std::uint32_t> wedge(in.wedge_count(), kNone), position(in.positions.size(), kNone);
+  for (const Triangle& t : scale.triangles)
+    for (std::uint32_t w : t) wedge[w] = position[in.wedge_position[w]] = 0;
+  Mesh out;
+  out.origin = in.origin;
+  out.part_names = in.part_names;
+  for (std::size_t p = 0; p < position.size(); ++p) {
+    if (position[p] == kNone) continue;
+    position[p] = static_cast<std::uint32_t>(out.positions.size());
+    out.positions.push_back(in.positions[p]);
+  }
+  for (std::size_t w = 0; w < wedge.size(); ++w) {
+    if (wedge[w] == kNone) continue;
+    wedge[w] = static_cast<std::uint32_t>(out.wedge_position.size());
+    out.wedge_position.push_back(position[in.wedge_position[w]]);
+    auto keep = [w](const auto& from, auto& to) { if (!from.empty()) to.push_back(from[w]); };
+    keep(in.uv0, out.uv0), keep(in.uv1, out.uv1), keep(in.normals, out.normals), keep(in.colours, out.colours);
+  }
+  out.triangles.reserve(scale.triangles.size());
+  for (std::size_t i = 0; i < scale.triangles.size(); ++i) {
+    const Triangle& t = scale.triangles[i];
+    out.triangles.push_back({wedge[t[0]], wedge[t[1]], wedge[t[2]]});
+    out.triangle_material.push_back(in.triangle_material[scale.triangle_source[i]]);
+    out.triangle_part.push_back(in.triangle_part[scale.triangle_source[i]]);
+  }
+  return out;
+}
+
+}  // namespace texmesh
