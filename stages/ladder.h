@@ -20,7 +20,7 @@ struct LadderOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of the ladder, strictly rising, at most 16");
-    v("subsampling", s.subsampling, "chroma of colour textures");
+    v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
     v("training_fragments", s.training_fragments, Range{1, 256}, "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
   }

@@ -27,8 +27,8 @@ struct LutOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("allocate", s.allocate, "thesis = equation 3.2 in quality; log = the same in the logarithm of the quantiser");
-    v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i of S_0");
-    v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i of the coarsest scale");
+    v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
+    v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
     v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
     v("log_width", s.log_width, Range{0, 4}, "dg: how far feature density moves the logarithm of the quantiser");
     v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");

@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/library_versions.h"
+#include "pipeline/options.h"
+#include "pipeline/stage_table.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string s;
+  for (const std::string& n : names) s += (s.empty() ? "" : ", ") + n;
+  return s;
+}
+
+std::vector<std::string> output_names(const Stage& s) {
+  std::vector<std::string> names;
+  for (const Artefact& a : s.outputs) names.push_back(a.name);
+  return names;
+}
+
+void print_table() {
+  for (const Stage& s : stage_table())
+    std::cout << fmt::format("{:<18} v{:<4} {}\n{:<25}from {}\n", s.name, s.version, s.summary, "", joined(s.inputs));
+}
+
+void print_json() {
+  Json list = Json::array();
+  for (const Stage& s : stage_table())
+    list.push_back({{"stage", s.name}, {"version", s.version}, {"summary", s.summary}, {"inputs", s.inputs},
+                    {"outputs", output_names(s)}, {"options", s.options}, {"libraries", s.libraries}, {"stored", s.stored}});
+  std::cout << Json{{"stages", list}}.dump(2) << '\n';
+}
+
+void print_dot() {
+  std::cout << "digraph texmesh {\n  rankdir=LR;\n";
+  for (const Stage& s : stage_table())
+    for (const std::string& input : s.inputs)
+      std::cout << fmt::format("  \"{}\" -> \"{}\";\n", input.substr(0, input.find('.')), s.name);
+  std::cout << "}\n";
+}
+
+}  // namespace
+
+void add_stages_command(CLI::App& app, int& exit_code) {
+  struct Arguments {
+    bool json = false, dot = false, schema = false;
+  };
+  auto args = std::make_shared<Arguments>();
+  CLI::App* c = app.add_subcommand("stages", "Print the graph of stages that compile runs");
+  c->add_flag("--json", args->json, "As JSON");
+  c->add_flag("--dot", args->dot, "As a Graphviz graph");
+  c->add_flag("--profile-schema", args->schema, "The JSON schema of profiles (options files)");
+  c->footer("Examples:\n  texmesh stages\n  texmesh stages --dot | dot -Tsvg > stages.svg");
+  c->callback([args, &exit_code] {
+    if (args->schema) std::cout << profile_schema();
+    else if (args->json) print_json();
+    else if (args->dot) print_dot();
+    else print_table();
+    exit_code = kExitOk;
+  });
+}
+
+}  // namespace texmesh

@@ -1,0 +1,261 @@
+#include "pipeline/graph_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <set>
+#include <thread>
+
+#include "pipeline/library_versions.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kOutside = static_cast<std::size_t>(-1);
+
+/// Whether a field belongs to what a stage lists: a whole section or that very field.
+bool names_field(const std::vector<std::string>& listed, const OptionField& field) {
+  return std::any_of(listed.begin(), listed.end(),
+                     [&](const std::string& l) { return l == field.stage || l == field.path(); });
+}
+
+}  // namespace
+
+struct GraphRun::State {
+  struct Slot {                       // one artefact
+    std::size_t producer = kOutside;  // index into nodes
+    std::size_t output = 0;
+    Object object;
+    Sha256 digest{};
+    std::uint64_t bytes = 0;
+    bool known = false;               // digest stands
+    int uses_left = 0;
+    std::shared_ptr<std::recursive_mutex> mutex = std::make_shared<std::recursive_mutex>();
+  };
+  struct Node {
+    const Stage* stage = nullptr;
+    std::vector<StoredBlob> blobs;    // of a stored stage that is up to date
+    Notes notes;
+    bool done = false;
+    std::exception_ptr error;
+  };
+
+  State(const std::vector<Stage>& stages, const CompileOptions& opts, Store& st, const RunContext& ctx, StageObserver obs)
+      : options(opts), store(st), context(ctx), observer(std::move(obs)) {
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+      nodes.push_back({&stages[i], {}, {}, false, nullptr});
+      for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
+        Slot& slot = slots[stages[i].outputs[k].name];
+        slot.producer = i;
+        slot.output = k;
+      }
+    }
+    for (const Stage& s : stages)
+      for (const std::string& input : s.inputs) ++slots[input].uses_left;
+  }
+
+  void notify(const Stage& stage, StageEvent event, double fraction = 0, double seconds = 0) {
+    if (!observer) return;
+    const std::lock_guard lock(observer_mutex);
+    observer(stage, event, fraction, seconds);
+  }
+
+  Key key_of(const Stage& stage) {
+    Key key(stage.name, stage.version);
+    CompileOptions copy = options;
+    for (const OptionField& f : list_options(copy))
+      if (names_field(stage.options, f)) key.add("option " + f.path(), option_text(f));
+    for (const std::string& library : stage.libraries) key.add("library " + library, library_versions().at(library));
+    const std::lock_guard lock(mutex);
+    for (const std::string& input : stage.inputs) key.add_input(input, slots.at(input).digest, slots.at(input).bytes);
+    return key;
+  }
+
+  bool is_ready(const Stage& stage) const {
+    return std::all_of(stage.inputs.begin(), stage.inputs.end(), [&](const std::string& i) { return slots.at(i).known; });
+  }
+
+  /// The object of an artefact: at hand, from the store, or by running its stage (again).
+  Object fetch(const std::string& name) {
+    Slot* slot = nullptr;
+    {
+      const std::lock_guard lock(mutex);
+      slot = &slots.at(name);
+    }
+    const std::lock_guard own(*slot->mutex);
+    {
+      const std::lock_guard lock(mutex);
+      if (slot->object) return slot->object;
+    }
+    if (slot->producer == kOutside) throw std::logic_error("artefact " + name + " was not given");
+    Node& node = nodes[slot->producer];
+    if (node.stage->stored && !node.blobs.empty()) {
+      if (Bytes bytes = store.load(node.blobs.at(slot->output))) {
+        Object object = node.stage->outputs[slot->output].decode(*bytes);
+        const std::lock_guard lock(mutex);
+        return slot->object = std::move(object);
+      }
+    }
+    execute(node);
+    const std::lock_guard lock(mutex);
+    return slot->object;
+  }
+
+  /// Runs a stage's function on fetched inputs; leaves its objects in their slots.
+  StageOutputs execute(Node& node) {
+    const Stage& stage = *node.stage;
+    RunContext own = context;
+    own.progress = [&](double fraction) { notify(stage, StageEvent::kProgress, fraction); };
+    StageInputs inputs(options, own);
+    for (const std::string& input : stage.inputs) inputs.objects[input] = fetch(input);
+    context.check_cancelled();
+    notify(stage, StageEvent::kStarted);
+    const auto start = std::chrono::steady_clock::now();
+    StageOutputs outputs = stage.run(inputs);
+    notify(stage, StageEvent::kRan, 1, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    const std::lock_guard lock(mutex);
+    for (std::size_t k = 0; k < outputs.objects.size(); ++k) slots.at(stage.outputs[k].name).object = outputs.objects[k];
+    node.notes = outputs.notes;
+    return outputs;
+  }
+
+  void publish_digest(const std::string& name, const Sha256& digest, std::uint64_t bytes) {
+    const std::lock_guard lock(mutex);
+    Slot& slot = slots.at(name);
+    slot.digest = digest;
+    slot.bytes = bytes;
+    slot.known = true;
+  }
+
+  /// Brings one stage up to date.
+  void settle(Node& node) {
+    const Stage& stage = *node.stage;
+    const Key key = key_of(stage);
+    if (!stage.stored) {  // derived: its key stands for its bytes, and it runs when somebody fetches it
+      for (const Artefact& a : stage.outputs) publish_digest(a.name, key.digest(), 0);
+      return;
+    }
+    if (auto blobs = store.find(key.digest()); blobs && blobs->size() == stage.outputs.size() + 1) {
+      if (Bytes notes = store.load(blobs->back())) {
+        node.notes = decode_artefact<Notes>(*notes, stage.name + ".notes");
+        node.blobs = std::move(*blobs);
+        for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+          publish_digest(stage.outputs[k].name, node.blobs[k].digest, node.blobs[k].bytes);
+        notify(stage, StageEvent::kHit);
+        return;
+      }
+    }
+    StageOutputs outputs = execute(node);
+    std::vector<std::pair<std::string, Bytes>> encoded;
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+      encoded.emplace_back(stage.outputs[k].name, std::make_shared<const std::vector<std::uint8_t>>(
+                                                      stage.outputs[k].encode(outputs.objects[k].get())));
+    encoded.emplace_back(stage.name + ".notes",
+                         std::make_shared<const std::vector<std::uint8_t>>(encode_artefact(outputs.notes)));
+    store.put(key, encoded);
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k) {
+      const Sha256 digest = sha256(*encoded[k].second);
+      node.blobs.push_back({encoded[k].first, digest, encoded[k].second->size()});
+      publish_digest(stage.outputs[k].name, digest, encoded[k].second->size());
+    }
+  }
+
+  /// Counts down the uses of a stage's inputs. Derived data holds on to its own inputs until its last use is over: it
+  /// may still have to be computed from them.
+  void release_inputs(const Stage& stage) {
+    const std::lock_guard lock(mutex);
+    release_locked(stage);
+  }
+  void release_locked(const Stage& stage) {
+    for (const std::string& input : stage.inputs) {
+      Slot& slot = slots.at(input);
+      if (--slot.uses_left > 0 || slot.producer == kOutside) continue;
+      slot.object.reset();
+      const Stage& producer = *nodes[slot.producer].stage;
+      if (!producer.stored) release_locked(producer);
+    }
+  }
+
+  /// One worker: takes the first ready stage of the table until none is left.
+  void work() {
+    std::unique_lock lock(schedule);
+    for (;;) {
+      std::size_t pick = nodes.size();
+      bool any_left = false;
+      for (std::size_t i = 0; i < nodes.size() && pick == nodes.size(); ++i) {
+        if (taken.contains(i)) continue;
+        any_left = true;
+        const std::lock_guard state(mutex);
+        if (is_ready(*nodes[i].stage)) pick = i;
+      }
+      if (!any_left || failed) return;
+      if (pick == nodes.size()) {
+        if (running == 0) return;  // a cycle or an artefact nobody gives: run() reports it
+        wake.wait(lock);
+        continue;
+      }
+      taken.insert(pick);
+      ++running;
+      lock.unlock();
+      try {
+        settle(nodes[pick]);
+        if (nodes[pick].stage->stored) release_inputs(*nodes[pick].stage);
+      } catch (...) {
+        nodes[pick].error = std::current_exception();
+      }
+      lock.lock();
+      --running;
+      nodes[pick].done = !nodes[pick].error;
+      failed = failed || nodes[pick].error;
+      wake.notify_all();
+    }
+  }
+
+  const CompileOptions& options;
+  Store& store;
+  const RunContext& context;
+  StageObserver observer;
+  std::vector<Node> nodes;
+  std::map<std::string, Slot> slots;
+  std::mutex mutex, observer_mutex, schedule;
+  std::condition_variable wake;
+  std::set<std::size_t> taken;
+  int running = 0;
+  bool failed = false;
+};
+
+GraphRun::GraphRun(const std::vector<Stage>& stages, const CompileOptions& options, Store& store,
+                   const RunContext& context, StageObserver observer)
+    : state_(std::make_unique<State>(stages, options, store, context, std::move(observer))) {}
+GraphRun::~GraphRun() = default;
+
+void GraphRun::give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes) {
+  State::Slot& slot = state_->slots[artefact];
+  slot.object = std::move(object);
+  slot.digest = digest;
+  slot.bytes = bytes;
+  slot.known = true;
+}
+
+Object GraphRun::run(const std::string& wanted) {
+  ++state_->slots.at(wanted).uses_left;
+  std::vector<std::thread> workers;
+  const int extra = std::clamp(state_->context.threads, 1, 4) - 1;
+  for (int i = 0; i < extra; ++i) workers.emplace_back([this] { state_->work(); });
+  state_->work();
+  for (std::thread& w : workers) w.join();
+  for (const State::Node& node : state_->nodes)
+    if (node.error) std::rethrow_exception(node.error);
+  for (const State::Node& node : state_->nodes)
+    if (!node.done) throw std::logic_error("stage " + node.stage->name + " waits for an input that nothing gives");
+  return state_->fetch(wanted);
+}
+
+Notes GraphRun::notes() const {
+  Notes all;
+  for (const State::Node& node : state_->nodes) all.insert(all.end(), node.notes.begin(), node.notes.end());
+  return all;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,33 @@
+#include "pipeline/library_versions.h"
+
+#include <CGAL/version.h>
+#include <OpenImageIO/oiioversion.h>
+#include <draco/core/draco_version.h>
+#include <embree3/rtcore_config.h>
+#include <meshoptimizer.h>
+#include <zlib.h>
+
+#include <jconfig.h>
+
+namespace texmesh {
+
+#define TEXMESH_TEXT_(x) #x
+#define TEXMESH_TEXT(x) TEXMESH_TEXT_(x)
+
+const std::map<std::string, std::string>& library_versions() {
+  static const std::map<std::string, std::string> versions{
+      {"cgal", CGAL_VERSION_STR},
+      {"draco", draco::kDracoVersion},
+      {"embree", RTC_VERSION_STRING},
+      {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
+      {"meshoptimizer", std::to_string(MESHOPTIMIZER_VERSION)},
+      {"openimageio", OIIO_VERSION_STRING},
+      {"tinygltf", "2.7"},  // its headers carry no version
+      {"zlib", ZLIB_VERSION},
+  };
+  return versions;
+}
+
+std::string tool_version() { return TEXMESH_VERSION; }
+
+}  // namespace texmesh

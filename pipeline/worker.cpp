@@ -1,0 +1,302 @@
+// The parent's side of compiling in child processes.
+#include "pipeline/worker.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "format/errors.h"
+#include "pipeline/cli/commands.h"
+
+extern char** environ;
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+volatile sig_atomic_t g_interrupted = 0;
+
+/// Catches SIGINT and SIGTERM while workers run and gives them back afterwards.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    g_interrupted = 0;
+    struct sigaction action {};
+    action.sa_handler = [](int) { g_interrupted = 1; };
+    ::sigaction(SIGINT, &action, &old_int_);
+    ::sigaction(SIGTERM, &action, &old_term_);
+    ::signal(SIGPIPE, SIG_IGN);
+  }
+  ~InterruptGuard() {
+    ::sigaction(SIGINT, &old_int_, nullptr);
+    ::sigaction(SIGTERM, &old_term_, nullptr);
+  }
+
+ private:
+  struct sigaction old_int_ {}, old_term_ {};
+};
+
+struct Child {
+  std::size_t job = 0;
+  pid_t pid = -1;
+  int out = -1, err = -1;
+  std::string line, last_words, temporary;
+  Clock::time_point start;
+  bool timed_out = false;
+};
+
+void close_fd(int& fd) {
+  if (fd >= 0) ::close(fd);
+  fd = -1;
+}
+
+struct Pipe {
+  int read = -1, write = -1;
+  Pipe() {
+    int fds[2];
+    if (::pipe2(fds, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+    read = fds[0];
+    write = fds[1];
+  }
+};
+
+void write_all(int fd, const std::string& text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const ssize_t n = ::write(fd, text.data() + at, text.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return;  // the child is gone; its exit status says the rest
+    at += static_cast<std::size_t>(n);
+  }
+}
+
+Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits) {
+  Child child;
+  child.job = index;
+  child.temporary = job.output.empty() ? "" : job.output + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(index);
+  Pipe in, out, err;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, in.read, 0);
+  posix_spawn_file_actions_adddup2(&actions, out.write, 1);
+  posix_spawn_file_actions_adddup2(&actions, err.write, 2);
+  std::string name = "texmesh", command = "worker";
+  char* argv[] = {name.data(), command.data(), nullptr};
+  const int rc = ::posix_spawn(&child.pid, "/proc/self/exe", &actions, nullptr, argv, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  ::close(in.read);
+  ::close(out.write);
+  ::close(err.write);
+  if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
+  write_all(in.write, Json{{"input", job.input}, {"output", job.output}, {"temporary", child.temporary},
+                           {"profile", job.profile}, {"cache", job.cache}, {"strict", job.strict},
+                           {"threads", job.threads}, {"memory_bytes", limits.memory_bytes}, {"cpu_s", limits.cpu_s}}
+                          .dump());
+  ::close(in.write);
+  child.out = out.read;
+  child.err = err.read;
+  for (int fd : {child.out, child.err}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
+  child.start = Clock::now();
+  return child;
+}
+
+/// Takes what an event says about the model into its report.
+void take_event(const std::string& line, WorkerReport& report) {
+  const Json e = Json::parse(line, nullptr, false);
+  if (!e.is_object()) return;
+  const std::string event = e.value("event", "");
+  if (event == "stage-finished") {
+    ++(e.value("result", "") == "hit" ? report.stages_hit : report.stages_ran);
+  } else if (event == "result") {
+    report.package_bytes = e.value("bytes", std::uint64_t{0});
+    report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
+  } else if (event == "error") {
+    report.error_kind = e.value("kind", "");
+    report.error_file = e.value("file", "");
+    report.error_place = e.value("place", "");
+    report.error_expected = e.value("expected", "");
+    report.error_found = e.value("found", "");
+    report.error_message = e.value("message", "");
+  }
+}
+
+/// Reads what is there; false at end of file.
+bool drain(int fd, std::string& into) {
+  char buffer[65536];
+  for (;;) {
+    const ssize_t n = ::read(fd, buffer, sizeof buffer);
+    if (n > 0) into.append(buffer, static_cast<std::size_t>(n));
+    else if (n == 0) return false;
+    else if (errno != EINTR) return errno == EAGAIN;
+  }
+}
+
+void read_events(Child& child, WorkerReport& report, const EventSink& sink) {
+  if (child.out >= 0 && !drain(child.out, child.line)) close_fd(child.out);
+  for (std::size_t end; (end = child.line.find('\n')) != std::string::npos;) {
+    const std::string line = child.line.substr(0, end);
+    child.line.erase(0, end + 1);
+    take_event(line, report);
+    if (sink && line.find("\"event\":\"result\"") == std::string::npos) sink(child.job, line);
+  }
+}
+
+void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& job, std::string expected, std::string found) {
+  const InputError e(std::filesystem::path(job.input).filename().string(), "", std::move(expected), std::move(found));
+  report.error_kind = kind;
+  report.error_file = e.file();
+  report.error_expected = e.expected();
+  report.error_found = e.found();
+  report.error_message = e.what();
+}
+
+/// What the end of a child means for its model.
+void conclude(const Child& child, int status, const rusage& usage, const WorkerLimits& limits, const WorkerJob& job,
+              bool interrupted, WorkerReport& report) {
+  report.seconds = std::chrono::duration<double>(Clock::now() - child.start).count();
+  report.peak_memory_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  const bool finished = WIFEXITED(status) && WEXITSTATUS(status) == kExitOk;
+  if (finished && (report.result == ModelResult::kOk || report.result == ModelResult::kUnchanged)) return;
+  if (!child.temporary.empty()) ::unlink(child.temporary.c_str());
+  if (interrupted) {
+    report.result = ModelResult::kCancelled;
+    return;
+  }
+  report.result = ModelResult::kFailed;
+  if (!report.error_kind.empty()) {
+    if (report.error_kind == "internal") report.result = ModelResult::kInternal;
+    return;
+  }
+  if (child.timed_out) {
+    set_error(report, "resource", job, "at most " + std::to_string(limits.wall_s) + " s", "a model that takes longer");
+  } else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
+    set_error(report, "resource", job, "at most " + std::to_string(limits.cpu_s) + " s of processor time", "a model that takes more");
+  } else {
+    report.result = ModelResult::kInternal;
+    const std::string how = WIFSIGNALED(status) ? std::string("signal ") + strsignal(WTERMSIG(status))
+                                                : "exit code " + std::to_string(WEXITSTATUS(status));
+    set_error(report, "internal", job, "a worker that finishes", how + (child.last_words.empty() ? "" : ": " + child.last_words));
+  }
+}
+
+std::string error_line(const WorkerReport& r) {
+  return Json{{"event", "error"}, {"kind", r.error_kind}, {"file", r.error_file}, {"place", r.error_place},
+              {"expected", r.error_expected}, {"found", r.error_found}, {"message", r.error_message}}
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// All children of one run.
+class Pool {
+ public:
+  Pool(const std::vector<WorkerJob>& jobs, const WorkerLimits& limits, const EventSink& sink, const FinishSink& finished)
+      : jobs_(jobs), limits_(limits), sink_(sink), finished_(finished), reports_(jobs.size()) {
+    for (WorkerReport& r : reports_) r.result = ModelResult::kCancelled;
+  }
+
+  std::vector<WorkerReport> run(int parallel, bool stop_on_failure) {
+    std::size_t next = 0;
+    bool stop = false;
+    while (!children_.empty() || (next < jobs_.size() && !stop && !g_interrupted)) {
+      while (next < jobs_.size() && !stop && !g_interrupted && children_.size() < static_cast<std::size_t>(parallel)) {
+        reports_[next].result = ModelResult::kInternal;
+        children_.push_back(start_child(jobs_[next], next, limits_));
+        ++next;
+      }
+      if (g_interrupted) interrupt_children();
+      wait_for_something();
+      enforce_wall_limit();
+      if (reap() && stop_on_failure) stop = true;
+    }
+    return std::move(reports_);
+  }
+
+ private:
+  void wait_for_something() {
+    std::vector<pollfd> fds;
+    for (const Child& c : children_)
+      for (int fd : {c.out, c.err})
+        if (fd >= 0) fds.push_back({fd, POLLIN, 0});
+    ::poll(fds.data(), fds.size(), fds.empty() ? 5 : 100);
+    for (Child& c : children_) {
+      read_events(c, reports_[c.job], sink_);
+      if (c.err >= 0 && !drain(c.err, c.last_words)) close_fd(c.err);
+      if (c.last_words.size() > 2000) c.last_words.erase(0, c.last_words.size() - 2000);
+    }
+  }
+
+  void enforce_wall_limit() {
+    if (limits_.wall_s == 0) return;
+    for (Child& c : children_)
+      if (!c.timed_out && Clock::now() - c.start > std::chrono::seconds(limits_.wall_s)) {
+        c.timed_out = true;
+        ::kill(c.pid, SIGKILL);
+      }
+  }
+
+  /// SIGTERM first, so that a child can finish a write; SIGKILL after a second.
+  void interrupt_children() {
+    if (!interrupted_at_) {
+      interrupted_at_ = Clock::now();
+      for (const Child& c : children_) ::kill(c.pid, SIGTERM);
+    } else if (Clock::now() - *interrupted_at_ > std::chrono::seconds(1)) {
+      for (const Child& c : children_) ::kill(c.pid, SIGKILL);
+    }
+  }
+
+  /// Takes ended children off the list; true when one of them failed.
+  bool reap() {
+    bool failed = false;
+    for (std::size_t i = 0; i < children_.size();) {
+      Child& c = children_[i];
+      int status = 0;
+      rusage usage{};
+      if (::wait4(c.pid, &status, WNOHANG, &usage) != c.pid) {
+        ++i;
+        continue;
+      }
+      WorkerReport& report = reports_[c.job];
+      read_events(c, report, sink_);
+      if (c.err >= 0) drain(c.err, c.last_words);
+      const bool told = !report.error_kind.empty();
+      conclude(c, status, usage, limits_, jobs_[c.job], g_interrupted != 0, report);
+      if (!told && !report.error_kind.empty() && sink_) sink_(c.job, error_line(report));
+      failed = failed || (report.result != ModelResult::kOk && report.result != ModelResult::kUnchanged);
+      close_fd(c.out);
+      close_fd(c.err);
+      if (finished_) finished_(c.job, report);
+      children_.erase(children_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    return failed;
+  }
+
+  const std::vector<WorkerJob>& jobs_;
+  const WorkerLimits& limits_;
+  const EventSink& sink_;
+  const FinishSink& finished_;
+  std::vector<WorkerReport> reports_;
+  std::vector<Child> children_;
+  std::optional<Clock::time_point> interrupted_at_;
+};
+
+}  // namespace
+
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel, const WorkerLimits& limits,
+                                      bool stop_on_failure, const EventSink& sink, const FinishSink& finished) {
+  const InterruptGuard guard;
+  return Pool(jobs, limits, sink, finished).run(std::max(parallel, 1), stop_on_failure);
+}
+
+}  // namespace texmesh

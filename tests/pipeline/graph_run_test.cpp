@@ -1,0 +1,145 @@
+#include "pipeline/graph_run.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <set>
+
+namespace texmesh {
+namespace {
+
+using Text = std::string;
+
+/// A graph of text stages: left and right read the source, middle is derived, join reads all.
+struct Fake {
+  std::mutex mutex;
+  std::multiset<std::string> ran;
+  std::string left_suffix;   // changes what "left" computes without changing its key: a silent change of code
+  std::string fail;
+
+  StageOutputs text(const std::string& name, Text value) {
+    {
+      const std::lock_guard lock(mutex);
+      ran.insert(name);
+    }
+    if (fail == name) throw StageError(name, "", "success", "failure");
+    Notes notes;
+    if (name == "left") add_warning(notes, "left-note", "", value);
+    return {{object(std::move(value))}, notes};
+  }
+
+  std::vector<Stage> table() {
+    auto get = [](const StageInputs& in, const char* n) { return in.get<Text>(n); };
+    return {
+        {"left", 1, "", {"source"}, {artefact<Text>("left")}, {"ssf.scales"}, {}, true,
+         [=, this](const StageInputs& in) { return text("left", get(in, "source").substr(0, 1) + left_suffix); }},
+        {"right", 1, "", {"source"}, {artefact<Text>("right")}, {"zim"}, {"draco"}, true,
+         [=, this](const StageInputs& in) { return text("right", get(in, "source") + "R"); }},
+        {"middle", 1, "", {"left", "right"}, {{"middle", nullptr, nullptr}}, {}, {}, false,
+         [=, this](const StageInputs& in) { return text("middle", get(in, "left") + get(in, "right")); }},
+        {"join", 1, "", {"middle", "left"}, {artefact<Text>("join")}, {}, {}, true,
+         [=, this](const StageInputs& in) { return text("join", get(in, "middle") + "+" + get(in, "left")); }},
+    };
+  }
+
+  Text run(Store& store, const Text& source, const CompileOptions& options = {}, int threads = 2, Notes* notes = nullptr) {
+    ran.clear();
+    RunContext context;
+    context.threads = threads;
+    const std::vector<Stage> stages = table();
+    GraphRun graph(stages, options, store, context);
+    const std::vector<std::uint8_t> bytes(source.begin(), source.end());
+    graph.give("source", object(source), sha256(bytes), bytes.size());
+    const Object result = graph.run("join");
+    if (notes) *notes = graph.notes();
+    return *static_cast<const Text*>(result.get());
+  }
+};
+
+using Ran = std::multiset<std::string>;
+
+TEST(GraphRun, RunsEverythingOnceThenNothing) {
+  Fake fake;
+  MemoryStore store;
+  Notes first, second;
+  EXPECT_EQ(fake.run(store, "abc", {}, 2, &first), "aabcR+a");
+  EXPECT_EQ(fake.ran, (Ran{"join", "left", "middle", "right"}));
+  EXPECT_EQ(fake.run(store, "abc", {}, 2, &second), "aabcR+a");
+  EXPECT_EQ(fake.ran, Ran{});
+  EXPECT_EQ(first, second);  // notes come back from the store
+  ASSERT_EQ(first.size(), 1u);
+}
+
+TEST(GraphRun, AnEqualResultStopsTheWave) {
+  Fake fake;
+  MemoryStore store;
+  fake.run(store, "abc");
+  // "left" sees another source but gives the same text; "right" differs, so middle and join run.
+  EXPECT_EQ(fake.run(store, "axy"), "aaxyR+a");
+  EXPECT_EQ(fake.ran, (Ran{"join", "left", "middle", "right"}));
+  // An option that only "left" reads: it runs, gives the same, and nothing after it does.
+  CompileOptions options;
+  options.ssf.scales = 7;
+  EXPECT_EQ(fake.run(store, "axy", options), "aaxyR+a");
+  EXPECT_EQ(fake.ran, Ran{"left"});
+  options.ssf.band = 3;  // nobody reads it
+  fake.run(store, "axy", options);
+  EXPECT_EQ(fake.ran, Ran{});
+  options.zim.difference = 30;  // "right" lists the whole section
+  fake.run(store, "axy", options);
+  EXPECT_EQ(fake.ran, Ran{"right"});
+}
+
+TEST(GraphRun, WorksWithoutAStoreAndOnAnyNumberOfThreads) {
+  for (int threads : {1, 2, 8}) {
+    Fake fake;
+    NullStore store;
+    EXPECT_EQ(fake.run(store, "abc", {}, threads), "aabcR+a");
+    EXPECT_EQ(fake.ran, (Ran{"join", "left", "middle", "right"})) << threads;
+  }
+}
+
+TEST(GraphRun, AFailureIsReportedAndNothingAfterItRuns) {
+  Fake fake;
+  MemoryStore store;
+  fake.fail = "right";
+  EXPECT_THROW(fake.run(store, "abc"), StageError);
+  EXPECT_FALSE(fake.ran.contains("join"));
+  fake.fail = "";
+  EXPECT_EQ(fake.run(store, "abc"), "aabcR+a");
+  EXPECT_FALSE(fake.ran.contains("left"));  // its result was kept
+}
+
+TEST(GraphRun, ALostBlobIsComputedAgain) {
+  struct Forgetful : MemoryStore {
+    std::string lost;
+    std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
+      auto run = MemoryStore::find(key);
+      if (run && !run->empty() && run->front().name == lost) return std::nullopt;
+      return run;
+    }
+  } store;
+  Fake fake;
+  fake.run(store, "abc");
+  store.lost = "join";
+  EXPECT_EQ(fake.run(store, "abc"), "aabcR+a");
+  EXPECT_EQ(fake.ran, (Ran{"join", "middle"}));  // middle is never stored
+}
+
+TEST(GraphRun, CancelledBeforeAnyWork) {
+  Fake fake;
+  MemoryStore store;
+  const std::atomic<bool> cancelled{true};
+  RunContext context;
+  context.cancelled = &cancelled;
+  const std::vector<Stage> stages = fake.table();
+  const CompileOptions options;
+  GraphRun graph(stages, options, store, context);
+  graph.give("source", object(Text("abc")), sha256({}), 0);
+  EXPECT_THROW(graph.run("join"), Cancelled);
+  EXPECT_EQ(fake.ran, Ran{});
+}
+
+}  // namespace
+}  // namespace texmesh
