@@ -1,0 +1,90 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "format/model.h"
+#include "stages/decode_image.h"
+#include "stages/run_context.h"
+
+namespace texmesh::examples {
+
+/// A made scan: an organic object with the habits of photogrammetry (irregular triangles, measuring noise,
+/// holes, an atlas of many charts with black gutters, exposure that jumps at seams). The same bytes on every
+/// machine and for any number of threads.
+struct ScanOptions {
+  int triangles = 100'000;  // about
+  int texture_px = 2048;    // side of the square textures; 0 = no texture, vertex colours instead
+  int charts = 60;
+  int holes = 2;
+  double noise = 0.0002;  // measuring noise across the surface, fraction of the diagonal
+  int seed = 1;
+  bool all_textures = false;  // normal and occlusion-roughness-metallic maps beside the base colour
+  int jpeg_quality = 92;
+  int range_columns = 720, range_rows = 480;  // samples of the range-scan form
+};
+
+/// What a point of the made surface looks like.
+struct SurfaceSample {
+  Vec3d colour;       // sRGB, 0..1
+  double height = 0;  // relief too fine for the mesh, object units
+  double occlusion = 1, roughness = 0.8;
+};
+
+/// The made object: its form and its look. Pure functions of the seed.
+class ScanShape {
+ public:
+  explicit ScanShape(std::uint32_t seed);
+  /// Surface point in a unit direction from the middle; the object stands about 0.3 units high around the
+  /// origin.
+  Vec3d point(Vec3d direction) const;
+  /// Range-scan form: distance from the y axis at angle `alpha` and height `t` (0 bottom, 1 top) of
+  /// range_height().
+  double range_radius(double alpha, double t) const;
+  static constexpr double range_height() { return 0.3; }
+  /// `finest` is the size of the smallest detail to paint, object units: that of a texel.
+  SurfaceSample sample(Vec3d position, Vec3d normal, double finest) const;
+
+ private:
+  struct Lobe {
+    Vec3d centre;
+    double size, sharpness;
+  };
+  double radius(Vec3d direction) const;
+  std::uint32_t seed_;
+  double twist_, bend_, stretch_;
+  std::vector<Lobe> lobes_;
+  std::array<Vec3d, 4> palette_;
+};
+
+/// A mesh with its atlas.
+struct ScanMesh {
+  Mesh mesh;                           // one wedge per position and chart
+  std::vector<Vec3d> surface, normal;  // per position, before measuring noise
+  std::vector<std::uint32_t> chart;    // per triangle
+  std::uint32_t chart_count = 0;
+};
+ScanMesh make_scan_mesh(const ScanShape& shape, const ScanOptions& options);
+
+/// Normal and occlusion-roughness-metallic maps are empty unless asked for.
+struct ScanTextures {
+  Pixels base_colour, normal, orm;
+};
+ScanTextures paint_atlas(const ScanShape& shape, const ScanMesh& scan, const ScanOptions& options,
+                         const RunContext& context);
+
+std::vector<std::uint8_t> encode_scan_jpeg(const Pixels& pixels, int quality);
+
+/// All of it: mesh, one material, JPEG images.
+Model make_scan(const ScanOptions& options, const RunContext& context);
+
+/// The range-scan form: radii of a cylindrical scanner (0 = no sample) and the colour of every sample.
+struct MadeRangeScan {
+  std::uint32_t columns = 0, rows = 0;
+  std::vector<float> radius;
+  double height = 0;
+  Pixels colour;
+};
+MadeRangeScan make_range_scan(const ScanOptions& options, const RunContext& context);
+
+}  // namespace texmesh::examples
