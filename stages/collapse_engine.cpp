@@ -449,11 +449,17 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
       // Still the cheapest; the ring in scratch is its own.
     }
     const Neighbour chosen = neighbours_[best.slot];
-    ring.assign(1, chosen.point);
+    ring.clear();
+    for (const Neighbour& n : neighbours_) ring.push_back(n.point);
     apply(u, chosen);
     queue_.erase(u);
+    // Costs changed around u only. Farther neighbours of the target may have become free, or no longer be: the first
+    // are tried now, the second when their turn comes.
+    const std::size_t around = ring.size();
     gather(chosen.point);
-    for (const Neighbour& n : neighbours_) ring.push_back(n.point);
+    for (const Neighbour& n : neighbours_)
+      if (!queue_.contains(n.point) && std::find(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(around), n.point) == ring.begin() + static_cast<std::ptrdiff_t>(around))
+        ring.push_back(n.point);
     for (std::uint32_t p : ring) refresh(p);
   }
   return CollapseStop::kReached;

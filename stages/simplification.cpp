@@ -11,7 +11,9 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kErrorSamples = 8000;  // per scale and direction; rms within 1 %, the largest is a sampled one
+constexpr std::size_t kErrorSamples = 4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
+// A scale that was stopped before its target is left out when it has more than this share of the next finer's triangles.
+constexpr double kRepeatedShare = 0.97;
 
 /// #{p >= i} for i = 0..scales.
 std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map) {
@@ -107,6 +109,27 @@ void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const Ru
   }
 }
 
+void note_floor(NestedScales& result, const std::vector<std::uint32_t>& target, const std::string& reason) {
+  const NestedScale& last = result.scales.back();
+  if (last.position_count <= target.back()) return;
+  add_info(result.notes, "scale-floor", "scale " + std::to_string(last.scale),
+           "the coarsest scale has " + std::to_string(last.position_count) + " vertices where the scale map asks for " +
+               std::to_string(target.back()) + ": " + reason);
+}
+
+/// Leaves out trailing scales that deviate by more than max_error, and what only they use.
+void drop_far_scales(NestedScales& result, double limit) {
+  std::vector<NestedScale>& scales = result.scales;
+  while (scales.size() > 1 && scales.back().error_max > limit) scales.pop_back();
+  result.collapses.resize(scales.back().collapse_count);
+  std::uint32_t last = 0;
+  for (const NestedScale& scale : scales)
+    for (const Triangle& t : scale.triangles) last = std::max({last, t[0], t[1], t[2]});
+  Mesh& m = result.mesh;  // new wedges stand behind the input's, in the order of the scales that need them first
+  auto cut = [last](auto& values) { if (values.size() > last + 1) values.resize(last + 1); };
+  cut(m.wedge_position), cut(m.uv0), cut(m.uv1), cut(m.normals), cut(m.colours);
+}
+
 }  // namespace
 
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, const SimplificationOptions& options,
@@ -123,17 +146,17 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, co
   std::string floor;
   for (std::size_t i = 1; i < target.size(); ++i) {
     floor = stop_reason(engine.run_to(target[i], static_cast<int>(i), context), options);
-    if (engine.collapses().size() > result.scales.back().collapse_count)
+    const NestedScale& finer = result.scales.back();
+    const bool repeated = !floor.empty() && engine.mesh().alive_faces() > kRepeatedShare * static_cast<double>(finer.triangles.size());
+    if (engine.collapses().size() > finer.collapse_count && !repeated)
       result.scales.push_back(take_scale(engine, static_cast<int>(i), floor));
     context.report(0.7 * (1 - static_cast<double>(engine.mesh().alive_positions()) / static_cast<double>(mesh.mesh.positions.size())));
   }
-  if (!floor.empty())
-    add_info(result.notes, "scale-floor", "scale " + std::to_string(result.scales.back().scale),
-             "the coarsest scale has " + std::to_string(result.scales.back().position_count) + " vertices where the scale map asks for " +
-                 std::to_string(target.back()) + ": " + floor);
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
   measure_errors(result.mesh, result.scales, context);
+  drop_far_scales(result, options.max_error * engine.mesh().diagonal());
+  note_floor(result, target, floor.empty() ? "every coarser scale exceeds max_error" : floor);
   return result;
 }
 

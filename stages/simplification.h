@@ -25,7 +25,7 @@ struct SimplificationOptions {
   double persistence_weight = 0.05;  // cost x (1 + weight * p)
   double uv_weight = 0.1;            // of the UV quadric against the geometric one
   double boundary_weight = 10;       // of the border quadrics
-  double max_error = 0.05;           // a scale stops where the next collapse would cost more; of the diagonal
+  double max_error = 0.05;           // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
   int min_triangles = 100;           // no scale is asked to go below
   template <class S, class V>
   static void fields(S& s, V&& v) {
@@ -67,7 +67,8 @@ struct NestedScales {
   Mesh mesh;                         // S_0; its wedge table may be longer than the conditioned mesh's (relaxed junctions)
   std::vector<std::uint32_t> twin;   // as ConditionedMesh::twin
   std::vector<Collapse> collapses;
-  std::vector<NestedScale> scales;   // S_0 first, then coarser; scales that would repeat a mesh are left out
+  std::vector<NestedScale> scales;   // S_0 first, then coarser; scales that would repeat a mesh (within 3 % of
+                                     // the triangles) or deviate by more than max_error are left out
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) { a(s.mesh, s.twin, s.collapses, s.scales, s.notes); }
@@ -76,7 +77,8 @@ struct NestedScales {
 /// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}), seam- and
 /// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV triangle; border
 /// vertices move along the border only, seams along the seam, twins together (see facts/geometry.md, section 3).
-/// Deterministic: ties by vertex index.
+/// Deterministic: ties by place along a space-filling curve. About 5 us per removed vertex on one core.
+/// Throws StageError when the scale map is of another mesh.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, const SimplificationOptions& options,
                       const RunContext& context);
 
