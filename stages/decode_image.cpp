@@ -8,6 +8,7 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <webp/decode.h>
 
 #include "format/errors.h"
 #include "format/portable_math.h"
@@ -47,22 +48,27 @@ void check_size(const std::string& name, std::uint64_t width, std::uint64_t heig
     throw InputError(name, "image header", "up to " + std::to_string(limits.max_pixels) + " pixels", found);
 }
 
-std::uint32_t u24(const std::uint8_t* p) { return p[0] | p[1] << 8 | static_cast<std::uint32_t>(p[2]) << 16; }
+// WebP by libwebp itself: OpenImageIO 2.4 multiplies alpha into the colours whatever it is asked.
+WebPBitstreamFeatures read_webp_header(const std::string& name, Bytes bytes) {
+  WebPBitstreamFeatures features;
+  if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
+    throw InputError(name, "WebP header", "a readable one", "a damaged or truncated one");
+  if (features.has_animation) throw InputError(name, "WebP header", "a still image", "an animation");
+  return features;
+}
 
-// OpenImageIO decodes WebP while opening it, so the canvas size is read here first (RFC 9649, section 2).
-void check_webp_size(const std::string& name, Bytes bytes, const ImageLimits& limits) {
-  if (bytes.size() < 30) throw InputError(name, "WebP header", "30 bytes", std::to_string(bytes.size()));
-  const std::uint8_t* p = bytes.data() + 12;
-  if (!std::memcmp(p, "VP8X", 4)) {
-    check_size(name, u24(p + 12) + 1, u24(p + 15) + 1, limits);
-    if (p[8] & 2) throw InputError(name, "WebP header", "a still image", "an animation");
-  } else if (!std::memcmp(p, "VP8L", 4)) {
-    check_size(name, ((p[10] & 0x3fu) << 8 | p[9]) + 1, ((p[12] & 0xfu) << 10 | p[11] << 2 | p[10] >> 6) + 1, limits);
-  } else if (!std::memcmp(p, "VP8 ", 4)) {
-    check_size(name, (p[14] | p[15] << 8) & 0x3fff, (p[16] | p[17] << 8) & 0x3fff, limits);
-  } else {
-    throw InputError(name, "WebP header", "a VP8, VP8L or VP8X chunk", first_bytes({p, 4}));
-  }
+std::vector<std::uint8_t> decode_webp(const Image& image) {
+  const WebPBitstreamFeatures features = read_webp_header(image.name, image.bytes);
+  const bool alpha = features.has_alpha != 0;
+  if (static_cast<std::uint32_t>(features.width) != image.width_px ||
+      static_cast<std::uint32_t>(features.height) != image.height_px || image.channels != (alpha ? 4 : 3))
+    throw InputError(image.name, "WebP header", "the size that import had found", "another one");
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
+  const int stride = static_cast<int>(image.width_px * image.channels);
+  const std::uint8_t* end = (alpha ? WebPDecodeRGBAInto : WebPDecodeRGBInto)(image.bytes.data(), image.bytes.size(),
+                                                                            out.data(), out.size(), stride);
+  if (!end) throw InputError(image.name, "pixels", "a whole WebP", "a damaged or truncated one");
+  return out;
 }
 
 // An image file opened by the reader of its format, in memory; keep the bytes alive.
@@ -134,8 +140,6 @@ void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
 }
 
 OpenImage open_checked(const Image& image) {
-  if (image.format == ImageFormat::kWebp)
-    check_webp_size(image.name, image.bytes, {std::max(image.width_px, image.height_px), std::uint64_t{image.width_px} * image.height_px});
   OpenImage open = open_image(image.name, image.format, image.bytes);
   if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
       static_cast<std::uint32_t>(open.spec.height) != image.height_px || colour_channels(open.spec) != image.channels)
@@ -234,8 +238,14 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
     image.height_px = header.height_px;
     image.channels = static_cast<std::uint8_t>(header.channels);
     image.bits_per_channel = 8;
+  } else if (*format == ImageFormat::kWebp) {
+    const WebPBitstreamFeatures features = read_webp_header(name, bytes);
+    image.width_px = static_cast<std::uint32_t>(features.width);
+    image.height_px = static_cast<std::uint32_t>(features.height);
+    check_size(name, image.width_px, image.height_px, limits);
+    image.channels = features.has_alpha ? 4 : 3;
+    image.bits_per_channel = 8;
   } else {
-    if (*format == ImageFormat::kWebp) check_webp_size(name, bytes, limits);
     const OpenImage open = open_image(name, *format, bytes);
     check_spec(name, open.spec, limits);
     image.width_px = static_cast<std::uint32_t>(open.spec.width);
@@ -253,6 +263,7 @@ Pixels decode_image(const Image& image, FloatEncoding encoding) {
     check_jpeg_unchanged(image);
     return decode_jpeg_pixels(image);
   }
+  if (image.format == ImageFormat::kWebp) return {image.width_px, image.height_px, image.channels, decode_webp(image)};
   OpenImage open = open_checked(image);
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
   switch (bits_of(open.spec)) {
@@ -266,7 +277,7 @@ Pixels decode_image(const Image& image, FloatEncoding encoding) {
 FloatPixels decode_float(const Image& image) {
   FloatPixels pixels{image.width_px, image.height_px, image.channels, {}};
   auto widen = [&pixels](const auto& samples) { pixels.data.assign(samples.begin(), samples.end()); };
-  if (image.format == ImageFormat::kJpeg) {
+  if (image.format == ImageFormat::kJpeg || image.format == ImageFormat::kWebp) {
     widen(decode_image(image).data);
     return pixels;
   }
