@@ -58,7 +58,8 @@ void apply_limits(const Json& job) {
   struct sigaction action {};
   action.sa_handler = [](int) { g_cancelled = true; };
   ::sigaction(SIGTERM, &action, nullptr);
-  ::signal(SIGINT, SIG_IGN);  // the parent decides
+  ::signal(SIGINT, SIG_IGN);   // the parent decides
+  ::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), not a death
 }
 
 StageObserver stage_events(EventWriter& events) {

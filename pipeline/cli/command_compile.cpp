@@ -113,13 +113,8 @@ int exit_code_of(const std::vector<WorkerReport>& reports) {
   return code;
 }
 
-int run_compile(const CompileArguments& args) {
-  const CompileOptions options = gather_options(args);
-  WorkerLimits limits;
-  limits.memory_bytes = parse_bytes(args.memory, "--memory");
-  limits.cpu_s = args.cpu_s;
-  limits.wall_s = args.timeout_s;
-  const std::vector<ModelPath> models = find_models(args.inputs, args.output);
+int run_compile(const CompileArguments& args, const CompileOptions& options, const WorkerLimits& limits,
+                const std::vector<ModelPath>& models) {
   make_folders(models);
 
   const int cores = std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
@@ -174,12 +169,19 @@ void add_compile_command(CLI::App& app, int& exit_code) {
       "Every stage option can stand in a profile under the same name: {\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
       "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error. A model that fails leaves no package.");
   c->callback([args, &exit_code] {
+    CompileOptions options;
+    WorkerLimits limits;
+    std::vector<ModelPath> models;
     try {
-      exit_code = run_compile(*args);
-    } catch (const InputError& e) {  // options, profile, inputs: nothing has been compiled yet
+      options = gather_options(*args);
+      limits = {parse_bytes(args->memory, "--memory"), args->cpu_s, args->timeout_s};
+      models = find_models(args->inputs, args->output);
+    } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
       std::cerr << "texmesh compile: " << e.what() << '\n';
       exit_code = kExitUsage;
+      return;
     }
+    exit_code = run_compile(*args, options, limits, models);
   });
 }
 
