@@ -255,9 +255,9 @@ TEST_F(Hostile, SomeNonFiniteUvsAreAWarning) {
 }
 TEST_F(Hostile, DegenerateAndDuplicateFacesAreWarnings) {
   write_text(in("m.obj"), kObj + "f 1/1 1/1 2/2\n");
-  expect_warned("m.obj", "degenerate-triangles");
+  expect_warned("m.obj", "degenerate-triangle");
   write_text(in("m.obj"), kObj + "f 1/1 3/3 2/2\n");
-  expect_warned("m.obj", "duplicate-triangles");
+  expect_warned("m.obj", "duplicate-triangle");
 }
 TEST_F(Hostile, AnAccessorWithoutBoundsIsAWarning) {
   Json j = tetrahedron();
