@@ -1,0 +1,167 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/import/import.h"
+
+namespace tinygltf {
+class Model;
+}
+
+// The parts of the glTF reader (import_gltf.cpp puts them together). tinygltf turns the JSON into structures;
+// it lets dangling indices, wrapped integers and much else through, so check_document looks at every value
+// first, and bytes are only ever reached through Buffers and AccessorReader, which know their lengths.
+namespace texmesh::gltf {
+
+using Json = nlohmann::json;
+using Bytes = std::span<const std::uint8_t>;
+
+/// What every part is given. Places in messages are JSON pointers: "/accessors/3/count".
+struct Source {
+  const std::string& file;
+  Resolver& resolver;
+  const ImportOptions& options;
+  const RunContext& context;
+  Notes& notes;
+  [[noreturn]] void fail(const std::string& place, const std::string& expected,
+                         const std::string& found) const;
+  /// Adds the note unless there is one with that code.
+  void note_once(Severity severity, const std::string& code, const std::string& place,
+                 const std::string& text) const;
+};
+
+// import_gltf_container.cpp
+
+struct Container {
+  std::string_view json;
+  std::optional<Bytes> bin;  // of a GLB
+  bool is_glb = false;
+};
+/// Header and chunk lengths of a GLB checked against the file; anything else is taken for JSON.
+Container split_container(const Source& source, Bytes bytes);
+
+/// Parses after a look at the brackets alone: at most 64 levels deep (parsers recurse) and 8 million values.
+Json parse_json(const Source& source, std::string_view text);
+
+// import_gltf_check.cpp
+
+/// Checks types, ranges and indices of every property that the reader uses, takes out `extras`, and refuses
+/// versions and required extensions that the reader does not know. Notes what it leaves out (skins,
+/// animations, ...).
+void check_document(const Source& source, Json& document);
+
+// import_gltf_structure.cpp
+
+/// The checked document as tinygltf sees it, without buffers, images and extensions: nothing of it is opened
+/// or decoded by tinygltf.
+tinygltf::Model parse_structure(const Source& source, const Json& document);
+
+// import_gltf_buffers.cpp
+
+/// The bytes behind bufferViews: the BIN chunk, data: URIs and files, read at first use, with
+/// EXT_meshopt_compression undone.
+class Buffers {
+ public:
+  Buffers(const Source& source, const Json& document, std::optional<Bytes> bin);
+  /// `place` is who asks, for messages.
+  Bytes view(std::size_t index, const std::string& place);
+
+ private:
+  Bytes buffer(std::size_t index);
+  Bytes range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length, const std::string& place);
+  std::vector<std::uint8_t> decompressed(const Json& extension, const std::string& place);
+
+  const Source& source_;
+  const Json& document_;
+  std::optional<Bytes> bin_;
+  std::uint64_t decompressed_bytes_ = 0;
+  std::vector<std::optional<std::vector<std::uint8_t>>> buffers_, views_;
+};
+
+// import_gltf_meshopt.cpp
+
+enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
+enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential };
+/// count * stride bytes. Throws InputError; allocates at most in proportion to `data`.
+std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, Bytes data,
+                                         std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
+                                         MeshoptFilter filter);
+
+// import_gltf_accessors.cpp
+
+/// One accessor over checked bytes. Elements are read one by one with memcpy: alignment does not matter, and
+/// sparse accessors need no copy.
+class AccessorReader {
+ public:
+  /// Throws InputError when the elements do not lie within their bufferViews or sparse indices are not
+  /// increasing and below count. `model` and `buffers` must outlive the reader.
+  AccessorReader(const Source& source, const tinygltf::Model& model, Buffers& buffers, std::size_t index);
+  std::size_t count() const { return count_; }
+  int components() const { return components_; }
+  int component_type() const { return component_type_; }
+  /// components() floats; integers as they are, or normalised where the accessor says so.
+  void read(std::size_t element, float* out) const;
+  /// Integers count as normalised whatever the accessor says.
+  void normalize() { normalized_ = true; }
+  /// First component of an unsigned integer accessor.
+  std::uint32_t read_index(std::size_t element) const;
+
+ private:
+  const std::uint8_t* element_at(std::size_t element) const;
+
+  std::size_t count_ = 0, stride_ = 0, component_bytes_ = 0;
+  int components_ = 0, component_type_ = 0;
+  bool normalized_ = false;
+  const std::uint8_t* base_ = nullptr;  // null: zeros
+  std::vector<std::uint32_t> sparse_indices_;
+  const std::uint8_t* sparse_values_ = nullptr;
+};
+
+// import_gltf_draco.cpp
+
+using ReadFloats = std::function<void(std::size_t vertex, float* out)>;
+
+/// Vertices by attribute; an empty function is an attribute that is not there.
+struct VertexData {
+  std::size_t count = 0;
+  ReadFloats position, normal, uv0, uv1, colour;
+  int colour_components = 4;
+  std::vector<std::uint32_t> indices;  // empty with indexed == false
+  bool indexed = false;
+};
+/// KHR_draco_mesh_compression. Its counts are read from the stream's header and checked before the decoder,
+/// which allocates what a header asks for, sees it. `attributes` maps names to the stream's attribute ids;
+/// `normalized` says what the accessor of a name says.
+VertexData decode_draco(const Source& source, const std::string& place, Bytes data, const Json& attributes,
+                        const std::function<bool(const std::string& name)>& normalized);
+
+// import_gltf_primitives.cpp
+
+/// Triangles of one primitive in its mesh's space, with the vertices that they use, in the order of the file.
+struct Primitive {
+  std::vector<Triangle> triangles;
+  std::vector<Vec3f> positions, normals;
+  std::vector<Vec2f> uv0, uv1;
+  std::vector<Vec4f> colours;
+};
+bool primitive_has(const tinygltf::Model& model, std::size_t mesh, std::size_t primitive,
+                   const char* attribute);
+/// Empty for points, lines and primitives without positions.
+Primitive read_primitive(const Source& source, const Json& document, const tinygltf::Model& model,
+                         Buffers& buffers, std::size_t mesh, std::size_t primitive);
+
+// import_gltf_materials.cpp
+
+/// Appends the glTF materials that `used` names (and glTF's default material for -1) to `model`, with their
+/// images. The result gives, per entry of `used`, the index in model.materials.
+std::vector<std::uint16_t> read_materials(const Source& source, const Json& document,
+                                          const tinygltf::Model& structure, Buffers& buffers,
+                                          const std::vector<int>& used, Model& model);
+
+}  // namespace texmesh::gltf
