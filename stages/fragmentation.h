@@ -69,16 +69,28 @@ struct Fragments {
   static void archive(S& s, A& a) { a(s.scales, s.planes, s.notes); }
 };
 
-/// Grid, exact conservative coverage with the bilinear footprint (REPEAT wraps, texture transforms applied), surface
-/// area and feature counts per fragment (thesis 3.2). The grid has n <= max_fragments fragments whose sides are
-/// multiples of 16 and at least min_fragment_px where the image allows.
+/// Cuts the images that materials use into planes and fragments (thesis 3.2):
+/// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a note.
+/// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the image allows.
+/// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the texture's
+///   transform and wrap modes. Triangles whose UVs are absent or not finite cover nothing (a note says so).
+/// - Surface: each triangle's area in space, spread over fragments by its area on the texture.
+/// - Features f_i: positions with ScaleMap::crossing >= i, twins as one, counted once in every fragment in which a
+///   corner lies (a corner on the border between two fragments lies where its triangle does).
+/// - eta_i (3.1) is 0 everywhere at a scale where all covered fragments have the same count.
+/// Throws StageError when the scale map or a triangle's material does not fit. Same result for any thread count.
 Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                             const std::vector<Image>& images, const ScaleMap& scale_map,
                             const FragmentationOptions& options, const RunContext& context);
 
 /// The pixels of every plane: decoded, uncovered texels filled, edges replicated to columns x fragment_width by
-/// rows x fragment_height. Derived data, never stored: zim, ladder and lut share one copy.
+/// rows x fragment_height. Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for an
+/// image that does not decode.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context);
+
+/// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of the
+/// covered ones; those keep their value. Without any covered texel nothing changes.
+void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context);
 
 }  // namespace texmesh
