@@ -8,10 +8,9 @@
 #include <limits>
 #include <optional>
 
-#include "format/sha256.h"
 #include "pipeline/inspect/glb_document.h"
 #include "stages/decode_image.h"
-#include "stages/ladder.h"
+#include "stages/jpeg.h"
 
 namespace texmesh {
 namespace {
@@ -65,7 +64,6 @@ class GlbChecker {
     mesh_boxes_.resize(count_of("meshes"));
     each("meshes", "glb-decode", [&](std::size_t i, const Json& j) { check_mesh(i, j); });
     d_.guarded("glb-node", "/nodes", [&] { check_nodes(); });
-    facts_.images = count_of("images");
     if (d_.uses_extension("KHR_draco_mesh_compression")) facts_.codec = "draco";
     else if (d_.uses_extension("EXT_meshopt_compression")) facts_.codec = "meshopt";
     else if (d_.uses_extension("KHR_mesh_quantization")) facts_.codec = "quantized";
@@ -85,6 +83,7 @@ class GlbChecker {
 
   void check_image(std::size_t i, const Json& json) {
     const std::string place = indexed("images", i);
+    facts_.image_names.push_back(json.value("name", std::string()));
     const auto& view = d_.views()[d_.index(json, "bufferView", d_.views().size(), place)];
     if (!view.ok) return;
     const std::vector<std::uint8_t> bytes(view.data.begin(), view.data.end());

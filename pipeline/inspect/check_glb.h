@@ -12,7 +12,8 @@ namespace texmesh {
 /// What a GLB file really holds, once it has been decoded.
 struct GlbFacts {
   std::uint64_t triangles = 0, vertices = 0;  // over all primitives; vertices are counted as stored (wedges)
-  std::uint64_t primitives = 0, images = 0;
+  std::uint64_t primitives = 0;
+  std::vector<std::string> image_names;       // in order; "" where an image has no name
   std::string codec = "none";                 // none, quantized, meshopt or draco, as ScalesOptions::mesh_codec
   bool has_bounds = false;
   Vec3d bounds_min, bounds_max;               // of the decoded positions under their nodes' transforms

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "format/layout.h"
+#include "pipeline/inspect/text_table.h"
+#include "pipeline/inspect/verify_checks.h"
+
+namespace texmesh {
+namespace {
+
+std::string at(const char* array, std::size_t i, const char* member = "") {
+  return std::string("/") + array + "/" + std::to_string(i) + member;
+}
+
+bool near(double a, double b, double relative) { return std::fabs(a - b) <= relative * std::max(std::fabs(a), std::fabs(b)); }
+
+std::string number(double v) { return shortest(v, 9); }
+
+std::string text_of(const EntryRef& e) {
+  return std::to_string(e.bytes) + " bytes at " + std::to_string(e.offset) + ", " + to_hex(e.digest).substr(0, 16) + "...";
+}
+
+void check_scales(const Manifest& m, Findings& findings) {
+  for (std::size_t k = 0; k < m.scales.size(); ++k) {
+    const ManifestScale& s = m.scales[k];
+    findings.require(s.glb.path == mesh_path(s.scale), "scale", kManifestPath, at("scales", k, "/glb/path"),
+                     mesh_path(s.scale), s.glb.path);
+    if (k == 0) {
+      findings.require(s.scale == 0, "scale", kManifestPath, at("scales", k, "/scale"), "0, S_0 first", std::to_string(s.scale));
+      continue;
+    }
+    const ManifestScale& finer = m.scales[k - 1];
+    findings.require(s.scale > finer.scale, "scale", kManifestPath, at("scales", k, "/scale"),
+                     "more than " + std::to_string(finer.scale), std::to_string(s.scale));
+    findings.require(s.triangles <= finer.triangles, "scale", kManifestPath, at("scales", k, "/triangles"),
+                     "at most " + std::to_string(finer.triangles) + ", as the finer scale", std::to_string(s.triangles));
+    findings.require(s.error_rms <= s.error_max, "scale", kManifestPath, at("scales", k, "/error_rms"),
+                     "at most error_max, " + number(s.error_max), number(s.error_rms));
+  }
+}
+
+void check_steps(const Manifest& m, Findings& findings) {
+  for (std::size_t k = 0; k < m.steps.size(); ++k) {
+    const ManifestStep& step = m.steps[k];
+    const auto scale = std::find_if(m.scales.begin(), m.scales.end(), [&](const ManifestScale& s) { return s.scale == step.scale; });
+    if (!findings.require(scale != m.scales.end(), "step", kManifestPath, at("steps", k, "/scale"), "a scale of the package",
+                          std::to_string(step.scale)))
+      continue;
+    // The default rule: the finer of what the JND and an error of one pixel ask for.
+    const double enough = std::min(scale->display_px_jnd, scale->display_px_error);
+    const double up_to = k + 1 == m.steps.size() ? kAnyDisplayPx : step.up_to_px;
+    findings.require(step.up_to_px == up_to, "step", kManifestPath, at("steps", k, "/up_to_px"), number(up_to), number(step.up_to_px));
+    findings.require(step.up_to_px <= enough * (1 + 1e-5), "step", kManifestPath, at("steps", k, "/up_to_px"),
+                     "at most " + number(enough) + ", up to which S_" + std::to_string(step.scale) + " is enough", number(step.up_to_px));
+    if (k == 0) continue;
+    findings.require(step.up_to_px > m.steps[k - 1].up_to_px && step.scale < m.steps[k - 1].scale, "step", kManifestPath,
+                     at("steps", k), "a larger size and a finer scale than the step before",
+                     number(step.up_to_px) + " px, S_" + std::to_string(step.scale));
+  }
+}
+
+void check_previews(const Manifest& m, const std::map<std::string, const EntryRef*>& entries, Findings& findings) {
+  findings.require_equal(std::min<std::size_t>(m.plane_count, kMaxManifestPreviews), m.previews.size(), "reference",
+                         kManifestPath, "/previews");
+  for (std::size_t k = 0; k < m.previews.size(); ++k) {
+    const auto it = entries.find(preview_path(static_cast<std::uint32_t>(k)));
+    if (it == entries.end()) {
+      findings.add("reference", kManifestPath, at("previews", k), "an entry " + preview_path(static_cast<std::uint32_t>(k)), "none");
+      continue;
+    }
+    const EntryRef& e = *it->second;
+    findings.require(m.previews[k] == ByteRange{e.offset, e.bytes}, "reference", kManifestPath, at("previews", k),
+                     std::to_string(e.bytes) + " bytes at " + std::to_string(e.offset),
+                     std::to_string(m.previews[k].bytes) + " bytes at " + std::to_string(m.previews[k].offset));
+  }
+}
+
+/// The first picture is one range: it begins with the coarsest mesh and holds it, all previews and all table streams.
+void check_first_picture(const Manifest& m, const std::vector<EntryRef>& index, Findings& findings) {
+  if (m.scales.empty()) return;
+  const std::uint64_t begin = m.first_picture_offset, end = begin + m.first_picture_bytes;
+  findings.require_equal(m.scales.back().glb.offset, begin, "first-picture", kManifestPath, "/firstPicture/offset");
+  for (const EntryRef& e : index) {
+    const EntryKind kind = parse_entry_path(e.path).kind;
+    const bool member = e.path == m.scales.back().glb.path || kind == EntryKind::kPreview || kind == EntryKind::kTableStreams;
+    if (member)
+      findings.require(e.offset >= begin && e.bytes <= end - begin && e.offset - begin <= end - begin - e.bytes, "first-picture",
+                       kManifestPath, "/firstPicture", e.path + " inside the range", text_of(e));
+  }
+}
+
+}  // namespace
+
+void check_manifest(const Manifest& m, Findings& findings) {
+  const Vec3d size = m.bounds_max - m.bounds_min;
+  const double extent = std::max({size.x, size.y, size.z});
+  findings.require(near(m.object_height, extent, 1e-5), "manifest", kManifestPath, "/objectHeight",
+                   number(extent) + ", the largest extent of the bounds", number(m.object_height));
+  check_scales(m, findings);
+  check_steps(m, findings);
+}
+
+void check_references(const Manifest& m, const std::vector<EntryRef>& index, Findings& findings) {
+  std::map<std::string, const EntryRef*> entries;
+  for (const EntryRef& e : index) entries[e.path] = &e;
+  const auto check = [&](const EntryRef& ref, const std::string& field) {
+    const auto it = entries.find(ref.path);
+    if (it == entries.end()) findings.add("reference", kManifestPath, field, "an entry " + ref.path, "none in the index");
+    else findings.require(*it->second == ref, "reference", kManifestPath, field, text_of(*it->second) + " as in the index", text_of(ref));
+  };
+  check(m.tables, "/tables");
+  check(m.textures, "/textures");
+  check(m.quality, "/quality");
+  check(m.provenance, "/provenance");
+  for (std::size_t k = 0; k < m.scales.size(); ++k) check(m.scales[k].glb, at("scales", k, "/glb"));
+  check_previews(m, entries, findings);
+  check_first_picture(m, index, findings);
+}
+
+void check_quality(const Manifest& m, const PackageTables& tables, const QualityTable& q, Findings& findings) {
+  for (std::size_t k = 0; k < q.scales.size(); ++k)
+    findings.require(std::any_of(m.scales.begin(), m.scales.end(), [&](const ManifestScale& s) { return s.scale == q.scales[k]; }),
+                     "quality", kQualityPath, at("scales", k), "a scale of the package", std::to_string(q.scales[k]));
+  std::set<int> rungs;
+  for (const PlaneTables& t : tables.planes) rungs.insert(t.rung_quality.begin(), t.rung_quality.end());
+  if (rungs.empty()) rungs.insert(100);
+  for (std::size_t k = 0; k < q.rungs.size(); ++k)
+    findings.require(rungs.count(q.rungs[k]) > 0, "quality", kQualityPath, at("rungs", k), "a quality of the ladder", std::to_string(q.rungs[k]));
+}
+
+void check_provenance(const Manifest& m, const std::vector<TextureInfo>& textures, const Provenance& p, Findings& findings) {
+  findings.require(p.format_major == m.major && p.format_minor == m.minor, "provenance", kProvenancePath, "/format",
+                   std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
+                   std::to_string(p.format_major) + "." + std::to_string(p.format_minor));
+  const auto option = [&](const char* stage, const char* name) {
+    const auto section = p.options.find(stage);
+    if (section == p.options.end() || !section->contains(name)) return nlohmann::ordered_json();
+    return (*section)[name];
+  };
+  const auto title = option("package", "title");
+  if (title.is_string() && title != m.title)
+    findings.add("provenance", kProvenancePath, "/options/package/title", m.title + ", as the manifest", title.get<std::string>());
+  const auto jnd = option("perceptual_values", "jnd");
+  if (jnd.is_number() && jnd.get<double>() != m.jnd)
+    findings.add("provenance", kProvenancePath, "/options/perceptual_values/jnd", number(m.jnd) + ", as the manifest", jnd.dump());
+  const auto rungs = option("ladder", "rungs");
+  if (!rungs.is_array()) return;
+  for (std::size_t k = 0; k < textures.size(); ++k)
+    for (const int q : textures[k].rung_quality)
+      findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), "provenance", kProvenancePath,
+                       "/options/ladder/rungs", "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());
+}
+
+}  // namespace texmesh
