@@ -1,0 +1,214 @@
+#include "pipeline/inspect/package_tree.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "delivery/cpp/package_reader.h"
+#include "format/sha256.h"
+#include "pipeline/atomic_file.h"
+#include "pipeline/inspect/fragment_files.h"
+
+namespace texmesh {
+namespace fs = std::filesystem;
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+[[noreturn]] void fail_output(const fs::path& path, const char* expected) {
+  throw InputError(path.string(), "", expected, std::strerror(errno));
+}
+
+void sync_folder(const fs::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) fail_output(folder, "a folder");
+  const int rc = ::fsync(fd);
+  ::close(fd);
+  if (rc != 0) fail_output(folder, "a folder that can be synced");
+}
+
+void write_new_file(const fs::path& path, const Bytes& bytes) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
+  if (fd < 0) fail_output(path, "a new file");
+  std::size_t at = 0;
+  bool ok = true;
+  while (ok && at < bytes.size()) {
+    const ssize_t n = ::write(fd, bytes.data() + at, bytes.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    ok = n > 0;
+    if (ok) at += static_cast<std::size_t>(n);
+  }
+  ok = ok && ::fdatasync(fd) == 0;
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  if (!ok) fail_output(path, "a writable file");
+}
+
+bool holds_unpacked_package(const fs::path& folder) { return fs::is_regular_file(fs::symlink_status(folder / kManifestPath)); }
+
+/// A folder under a temporary name that takes its final name in publish(), or disappears with this object.
+class NewTree {
+ public:
+  NewTree(const std::string& folder, bool force) : force_(force) {
+    std::error_code ec;
+    target_ = fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
+    if (fs::exists(target_, ec)) target_ = fs::canonical(target_);
+    check_target();
+    std::string name = (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
+    if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "a writable folder");
+    tree_ = name;
+  }
+  ~NewTree() {
+    std::error_code ec;
+    if (!tree_.empty()) fs::remove_all(tree_, ec);
+  }
+  NewTree(const NewTree&) = delete;
+  NewTree& operator=(const NewTree&) = delete;
+
+  void add(const std::string& path, const Bytes& bytes) {
+    if (!is_valid_entry_path(path)) throw FormatError("package", path, "a path of the package format", "another");
+    const fs::path file = tree_ / path, folder = file.parent_path();
+    if (folders_.insert(folder).second) fs::create_directories(folder);
+    write_new_file(file, bytes);
+  }
+
+  void publish() {
+    for (const auto& e : fs::recursive_directory_iterator(tree_))
+      if (e.is_directory()) sync_folder(e.path());
+    if (::chmod(tree_.c_str(), 0755) != 0) fail_output(tree_, "a folder of one's own");
+    sync_folder(tree_);
+    check_target();
+    if (fs::exists(target_) && !fs::is_empty(target_)) {
+      // Both names stay whole at any moment: the old tree moves into the temporary name, which the destructor removes.
+      if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) fail_output(target_, "a folder that can be replaced");
+    } else {
+      if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");
+      tree_.clear();
+    }
+    sync_folder(target_.parent_path());
+  }
+
+ private:
+  void check_target() const {
+    if (!fs::exists(fs::symlink_status(target_))) return;
+    if (!fs::is_directory(target_)) throw InputError(target_.string(), "", "a folder, or nothing yet", "a file");
+    if (fs::is_empty(target_)) return;
+    if (!force_) throw InputError(target_.string(), "", "an empty folder, or nothing yet (--force replaces an unpacked package)", "a folder with files");
+    if (!holds_unpacked_package(target_))
+      throw InputError(target_.string(), "", "an unpacked package, the only thing that --force replaces", "a folder with other files");
+  }
+
+  fs::path target_, tree_;
+  std::set<fs::path> folders_;
+  bool force_;
+};
+
+/// Everything that belongs into the container, in order: manifest and index, then what the index names.
+std::vector<EntryRef> container_order(PackageReader& package) {
+  std::vector<EntryRef> entries = package.index();
+  entries.push_back(package.manifest().index);
+  std::sort(entries.begin(), entries.end(), [](const EntryRef& a, const EntryRef& b) { return a.offset < b.offset; });
+  return entries;
+}
+
+Bytes manifest_bytes(PackageReader& package) {
+  Bytes bytes = package.store().read_manifest();
+  if (sha256(bytes) != package.id()) throw FormatError(package.store().name(), kManifestPath, "a package that does not change meanwhile", "other bytes");
+  return bytes;
+}
+
+/// Reads the files of a tree, as many as there are and no more.
+class TreeFiles {
+ public:
+  explicit TreeFiles(PackageReader& package) : package_(package) {
+    for (const ContainerEntry& e : package.store().list()) sizes_[e.path] = e.bytes;
+    check_names();
+  }
+
+  Bytes entry(const EntryRef& ref) {
+    if (sizes_.count(ref.path)) return package_.entry(ref);
+    const EntryName name = parse_entry_path(ref.path);
+    if (name.kind != EntryKind::kRung) throw FormatError(ref.path, "", "a file of the tree", "none");
+    Bytes bytes = join_fragment_files(package_.tables().planes.at(name.number), name.number, name.rung,
+                                      package_.table_stream(name.number, name.rung),
+                                      [&](const std::string& path) { return file(path); });
+    if (sha256(bytes) != ref.digest) throw FormatError(ref.path, "", "fragment files that make " + to_hex(ref.digest), to_hex(sha256(bytes)));
+    return bytes;
+  }
+
+ private:
+  Bytes file(const std::string& path) {
+    const auto it = sizes_.find(path);
+    if (it == sizes_.end()) throw FormatError(path, "", "a file of the tree", "none");
+    EntryRef ref;
+    ref.path = path;
+    ref.bytes = it->second;
+    return package_.store().read(ref, 0, ref.bytes);
+  }
+
+  void check_names() {
+    std::set<std::string> named{kManifestPath, kIndexPath, kFragmentIndexPath};
+    for (const EntryRef& e : package_.index()) named.insert(e.path);
+    for (const auto& [path, bytes] : sizes_)
+      if (!named.count(path) && parse_entry_path(path).kind != EntryKind::kFragmentFile)
+        throw FormatError(path, "", "a file that the package's index names", "another");
+  }
+
+  PackageReader& package_;
+  std::map<std::string, std::uint64_t> sizes_;
+};
+
+void check_offset(const ContainerEntry& written, const EntryRef& stated) {
+  if (written.offset != stated.offset)
+    throw FormatError(stated.path, "offset", std::to_string(stated.offset) + ", as the index says", std::to_string(written.offset));
+}
+
+void check_first_picture(const Manifest& m, const Bytes& container) {
+  const bool inside = m.first_picture_offset <= container.size() && m.first_picture_bytes <= container.size() - m.first_picture_offset;
+  if (!inside || sha256(std::span(container).subspan(static_cast<std::size_t>(m.first_picture_offset),
+                                                     static_cast<std::size_t>(m.first_picture_bytes))) != m.first_picture_digest)
+    throw FormatError(kManifestPath, "/firstPicture", "a range of the container with that digest", "another");
+}
+
+}  // namespace
+
+void unpack_package(const std::string& package_path, const std::string& folder, const UnpackOptions& options) {
+  PackageReader package(open_store(package_path));
+  const Bytes manifest = manifest_bytes(package);
+  NewTree tree(folder, options.force);
+  tree.add(kManifestPath, manifest);
+  for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
+  if (options.fragment_files) {
+    const FragmentIndex index = make_fragment_files(package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
+    const std::string json = write_fragment_index(index);
+    tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
+  }
+  tree.publish();
+}
+
+void pack_folder(const std::string& folder, const std::string& package_path) {
+  PackageReader package(open_folder(folder));
+  TreeFiles files(package);
+  Bytes container;
+  ContainerWriter writer([&](std::span<const std::uint8_t> bytes) { container.insert(container.end(), bytes.begin(), bytes.end()); });
+  writer.add(kManifestPath, manifest_bytes(package));
+  const std::vector<EntryRef> order = container_order(package);
+  for (const EntryRef& e : order) {
+    writer.add(e.path, files.entry(e));
+    check_offset(writer.entries().back(), e);
+  }
+  writer.finish();
+  check_first_picture(package.manifest(), container);
+  write_file_atomically(package_path, container);
+}
+
+}  // namespace texmesh
