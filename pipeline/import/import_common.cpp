@@ -169,8 +169,9 @@ void clamp_colours(std::vector<Vec4f>& colours) {
 template <class T>
 void keep_marked(std::vector<T>& values, const std::vector<std::uint32_t>& new_index) {
   if (values.empty()) return;
+  // new_index[i] <= i; moving a string or a vector onto itself would empty it.
   for (std::size_t i = 0; i < values.size(); ++i)
-    if (new_index[i] != kNone) values[new_index[i]] = std::move(values[i]);
+    if (new_index[i] != kNone && new_index[i] != i) values[new_index[i]] = std::move(values[i]);
   values.resize(static_cast<std::size_t>(std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNone; })));
 }
 

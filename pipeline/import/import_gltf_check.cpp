@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <initializer_list>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/import/import_gltf_parts.h"
@@ -308,11 +309,15 @@ void check_node(const Item& node) {
   node.numbers("matrix", 16).numbers("rotation", 4).numbers("scale", 3).numbers("translation", 3);
 }
 
-/// extras may hold anything: nothing reads them, and copies of them would only cost memory.
-void drop_extras(Json& value) {
-  if (value.is_object()) value.erase("extras");
+/// extras may hold anything: nothing reads them, and copies of them would only cost memory. null counts as
+/// absent here, but not to tinygltf.
+void drop_extras_and_nulls(Json& value) {
+  if (value.is_object()) {
+    value.erase("extras");
+    for (auto it = value.begin(); it != value.end();) it = it->is_null() ? value.erase(it) : std::next(it);
+  }
   if (value.is_structured()) {
-    for (Json& child : value) drop_extras(child);
+    for (Json& child : value) drop_extras_and_nulls(child);
   }
 }
 
@@ -335,7 +340,7 @@ void note_what_is_left_out(const Item& root) {
 }  // namespace
 
 void check_document(const Source& source, Json& document) {
-  drop_extras(document);
+  drop_extras_and_nulls(document);
   const Item root(source, document, document, "");
   check_asset(root);
   check_extensions(root);

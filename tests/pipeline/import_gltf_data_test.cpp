@@ -38,6 +38,7 @@ TEST_P(RealScan, HasTheCountsOfItsIndex) {
   EXPECT_EQ(distinct.size(), GetParam().distinct);
   EXPECT_EQ(m.model.materials.size(), GetParam().materials);
   EXPECT_EQ(m.model.images.size(), GetParam().images);
+  for (const Image& image : m.model.images) EXPECT_GT(image.bytes.size(), 100u) << image.name;
   for (const Note& n : m.model.notes) {
     EXPECT_EQ(n.severity, Severity::kInfo) << n.code << " " << n.place << " " << n.text;
   }
