@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -64,6 +65,9 @@ class PackageReader {
 
  private:
   std::vector<std::uint8_t> read_all(const EntryRef& ref);
+  std::vector<std::uint8_t> read_paged(const PagedRef& ref);
+  void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
+  void check_plane(std::size_t plane, const PlaneTables& tables);
   const TextureInfo& texture(std::uint32_t plane);
   std::unique_ptr<PackageStore> store_;
   Manifest manifest_;
@@ -74,6 +78,7 @@ class PackageReader {
   std::optional<QualityTable> quality_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
+  std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane
 };
 
 /// Tables without their EOI, then the fragment without its SOI. FormatError when either does not look like one.
