@@ -12,37 +12,43 @@ namespace texmesh {
 inline constexpr int kSsfVersion = 1;
 
 struct SsfOptions {
-  int scales = 20;                  // smoothed copies beside the original
-  double sigma_max = 0.15;          // of a component's diagonal
-  double convergence = 0.3;         // eps_conv: sigma stops growing where the signal's range falls below this fraction
-  double band = 2.75;               // C_i = t_i (H(sigma_i) - H(band * sigma_i))
-  double contrast = 0.3;            // tau: of the response's rms
-  double component_cap = 0.25;      // persistence ends where sigma exceeds this fraction of the component's diagonal
-  double rate_cap = 10;             // w_ij <= cap * min(M_i, M_j) / h^2
-  int max_terms = 6000;             // work cap: Chebyshev terms; the largest sigmas are lowered to fit
-  double window = 1.4;              // range scans: half-width of the Gaussian's window, in sigma
+  int scales = 20;          // smoothed copies beside the original
+  double sigma_max = 0.15;  // of a component's diagonal
+  double convergence =
+      0.3;                // eps_conv: sigma stops growing where the signal's range falls below this fraction
+  double band = 2.75;     // C_i = t_i (H(sigma_i) - H(band * sigma_i))
+  double contrast = 0.3;  // tau: of the response's rms
+  double component_cap =
+      0.25;              // persistence ends where sigma exceeds this fraction of the component's diagonal
+  double rate_cap = 10;  // w_ij <= cap * min(M_i, M_j) / h^2
+  int max_terms = 6000;  // work cap: Chebyshev terms; the largest sigmas are lowered to fit
+  double window = 1.4;   // range scans: half-width of the Gaussian's window, in sigma
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
     v("sigma_max", s.sigma_max, Range{0.01, 0.5}, "largest sigma, as a fraction of a component's diagonal");
-    v("convergence", s.convergence, Range{0, 1}, "sigma stops growing where the signal's range falls below this fraction");
+    v("convergence", s.convergence, Range{0, 1},
+      "sigma stops growing where the signal's range falls below this fraction");
     v("band", s.band, Range{1.5, 6}, "ratio of the two sigmas whose difference is the band-passed signal");
     v("contrast", s.contrast, Range{0, 3}, "least contrast of a feature, in rms of the response");
-    v("component_cap", s.component_cap, Range{0.05, 1}, "persistence ends where sigma exceeds this fraction of the component");
+    v("component_cap", s.component_cap, Range{0.05, 1},
+      "persistence ends where sigma exceeds this fraction of the component");
     v("rate_cap", s.rate_cap, Range{3, 1000}, "cap of the Laplacian's rates, in 1 / (mean edge)^2");
     v("max_terms", s.max_terms, Range{100, 100000}, "most Chebyshev terms; larger sigmas are lowered to fit");
     v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
   }
 };
 
-/// The scale map (thesis 2.4, 3.1): for every position the highest scale at which it is still a feature point.
+/// The scale map (thesis 2.4, 3.1): for every position the highest scale at which it is still a feature
+/// point.
 struct ScaleMap {
-  int scales = 0;                          // scale indices run 0 (original) .. scales
-  std::vector<float> sigma;                // [scales + 1], of the largest component, object units; sigma[0] = 0
-  std::vector<std::uint8_t> persistence;   // per position, 0..scales: extrema and zero crossings (geometry)
-  std::vector<std::uint8_t> crossing;      // per position, 0..scales: zero crossings only (fragment density)
-  std::vector<float> convergence;          // [scales + 1]: (max - min) of the smoothed signal, as a fraction of S_0's
-  std::vector<std::uint32_t> crossings_at; // [scales + 1]: positions at a zero crossing of that very scale
+  int scales = 0;            // scale indices run 0 (original) .. scales
+  std::vector<float> sigma;  // [scales + 1], of the largest component, object units; sigma[0] = 0
+  std::vector<std::uint8_t> persistence;  // per position, 0..scales: extrema and zero crossings (geometry)
+  std::vector<std::uint8_t> crossing;     // per position, 0..scales: zero crossings only (fragment density)
+  std::vector<float> convergence;  // [scales + 1]: (max - min) of the smoothed signal, as a fraction of S_0's
+  std::vector<std::uint32_t> crossings_at;  // [scales + 1]: positions at a zero crossing of that very scale;
+                                            // [0]: all (mesh), samples at one of the raw grid (range)
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
@@ -50,13 +56,24 @@ struct ScaleMap {
   }
 };
 
-/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (algorithms section 8), all
-/// scales in one Chebyshev recurrence over the position graph (twins joined). Independent of skeletonization.
-/// Deterministic for any thread count.
-ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options, const RunContext& context);
+/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (algorithms section 8),
+/// all scales in one Chebyshev recurrence over the position graph (twins joined). Independent of
+/// skeletonization. Every component has a sigma ladder of its own, from its mean edge to sigma_max of its
+/// diagonal or the first sigma at which the smoothed component has shrunk to `convergence` of its extent. A
+/// scale counts for a component only while its sigma, there and on the largest component (most positions), is
+/// within component_cap of the component's diagonal: small parts are detail of the whole. Deterministic for
+/// any thread count.
+ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
+                            const RunContext& context);
 
-/// Faithful filtering of a cylindrical range scan (thesis 2.2-2.4): separable Gaussian and LoG on r(alpha, y), periodic
-/// in alpha when the grid is a full turn. `position_count` sizes the maps; positions without a sample get 0.
+/// Faithful filtering of a cylindrical range scan (thesis 2.2-2.4): separable Gaussian and LoG on r(alpha,
+/// y), periodic in alpha when the grid is a full turn, windows cut off at `window` sigma. Sigma is a length
+/// on the surface, so that unequal spacing along alpha and y counts (phi, psi); it runs from the mean spacing
+/// to sigma_max of the object's diagonal or the first sigma at which max - min of the smoothed radius falls
+/// below `convergence` of S_0's. Feature points are zero crossings alone and have no contrast rule:
+/// persistence equals crossing. Samples that are missing take no part. `position_count` sizes the maps;
+/// positions without a sample get 0. Throws StageError for a grid whose arrays or steps are wrong.
+/// Deterministic for any thread count.
 ScaleMap filter_range_scan(const RangeGrid& range, std::size_t position_count, const SsfOptions& options,
                            const RunContext& context);
 
