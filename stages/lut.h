@@ -36,9 +36,13 @@ struct LutOptions {
   }
 };
 
-/// Quality and size tables (thesis 3.3, 8.4): exact bytes and measured distortion (MSE and 1 - SSIM of luma or grey
-/// over covered texels) per rung and fragment, the digest of every stored stream, q_i and the nearest rung, d_i, D_i
-/// over 21 values of Gamma, the size model A, B, R, and the order of falling importance.
+/// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the exact
+/// bytes, the digest, MSE and 1 - SSIM of luma (or grey) over covered texels; Q_i, D_i over 21 values of Gamma (bytes of
+/// the fragments' streams, tables not counted); the order of falling importance: eta of scale 0, then surface, then
+/// index; and the size model S = A R^Q + c over the plane's rungs, c = the stored fragments' constant headers, B from
+/// (8.8) with the plane's mean VQP, not below 0.02. The model is 0 where there are fewer than two rungs or nothing is
+/// stored. `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each other, FormatError for a stream
+/// that does not decode. Same result for any thread count.
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
                            const Ladder& ladder, const LutOptions& options, const RunContext& context);
 

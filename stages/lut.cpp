@@ -1,0 +1,222 @@
+#include "stages/lut.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <string>
+
+#include "format/portable_math.h"
+#include "format/sha256.h"
+#include "stages/distortion.h"
+#include "stages/jpeg.h"
+#include "stages/parallel.h"
+
+namespace texmesh {
+namespace {
+
+constexpr int kGammas = 21;  // 0, 0.05 .. 1
+// What is the same in every abbreviated stream: SOI, SOF0 and SOS of one or three components, EOI.
+constexpr double kGreyHeader = 2 + 13 + 10 + 2, kColourHeader = 2 + 19 + 14 + 2;
+// (8.8) divides by log(100 p): singular at 0.01, negative below.
+constexpr double kLeastPredictor = 0.02;
+
+void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
+           const Ladder& ladder, const LutOptions& options) {
+  const auto fail = [](std::string place, std::string expected, std::string found) {
+    throw StageError("lut", std::move(place), std::move(expected), std::move(found));
+  };
+  const std::size_t planes = fragments.planes.size();
+  if (pixels.size() != planes || predictors.planes.size() != planes || ladder.planes.size() != planes)
+    fail("planes", std::to_string(planes) + " of each kind",
+         std::to_string(pixels.size()) + ", " + std::to_string(predictors.planes.size()) + " and " +
+             std::to_string(ladder.planes.size()));
+  for (std::size_t p = 0; p < planes; ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    const std::string place = "plane " + std::to_string(p);
+    if (predictors.planes[p].vqp.size() != plane.fragment_count())
+      fail(place + ": predictors", std::to_string(plane.fragment_count()), std::to_string(predictors.planes[p].vqp.size()));
+    if (pixels[p].width_px != plane.columns * plane.fragment_width_px ||
+        pixels[p].height_px != plane.rows * plane.fragment_height_px || pixels[p].channels != plane.channels)
+      fail(place + ": pixels", "whole fragments",
+           std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
+    for (const LadderRung& rung : ladder.planes[p].rungs)
+      if (rung.offset.size() != plane.fragment_count() + 1 || rung.offset.back() != rung.data.size())
+        fail(place + ": rung " + std::to_string(rung.quality), std::to_string(plane.fragment_count()) + " streams",
+             std::to_string(rung.offset.size()) + " offsets");
+  }
+  if (!(options.quality_min <= options.quality_max))
+    fail("quality_min", "at most quality_max", std::to_string(options.quality_min));
+}
+
+/// One value of 8 bits per texel of a fragment: what the distortion is measured on. Luma as JPEG defines it.
+std::vector<std::uint8_t> fragment_luma(const TexturePlane& plane, const Pixels& pixels, std::size_t fragment) {
+  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
+  const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * w;
+  const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * h;
+  std::vector<std::uint8_t> out(std::size_t{w} * h);
+  std::uint8_t* to = out.data();
+  for (std::uint32_t y = 0; y < h; ++y) {
+    const std::uint8_t* p = pixels.at(left, top + y);
+    for (std::uint32_t x = 0; x < w; ++x, p += plane.channels)
+      *to++ = plane.channels == 1 ? p[0] : static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
+  }
+  return out;
+}
+
+/// 255 for covered texels, 0 for the others and for the padding.
+std::vector<std::uint8_t> fragment_mask(const TexturePlane& plane, std::size_t fragment) {
+  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
+  const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * w;
+  const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * h;
+  const std::size_t stride = (std::size_t{plane.width_px} + 7) / 8;
+  std::vector<std::uint8_t> out(std::size_t{w} * h);
+  for (std::uint32_t y = 0; y < h && top + y < plane.height_px; ++y)
+    for (std::uint32_t x = 0; x < w && left + x < plane.width_px; ++x)
+      if (plane.coverage[(top + y) * stride + (left + x) / 8] >> (7 - (left + x) % 8) & 1) out[std::size_t{y} * w + x] = 255;
+  return out;
+}
+
+/// Sizes, digests and distortions of one fragment at every rung.
+void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder, std::size_t fragment,
+                      PlaneTables& out) {
+  const DistortionMeter meter(fragment_luma(plane, pixels, fragment), fragment_mask(plane, fragment),
+                              plane.fragment_width_px, plane.fragment_height_px);
+  const std::uint64_t texels = std::uint64_t{plane.fragment_width_px} * plane.fragment_height_px;
+  for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
+    const auto stream = fragment_stream(ladder.rungs[r], fragment);
+    const std::size_t at = r * plane.fragment_count() + fragment;
+    const Pixels decoded = decode_jpeg_luma(complete_jpeg(ladder.rungs[r].tables, stream), texels);
+    if (decoded.width_px != plane.fragment_width_px || decoded.height_px != plane.fragment_height_px)
+      throw StageError("lut", "fragment " + std::to_string(fragment), std::to_string(texels) + " texels",
+                       std::to_string(decoded.data.size()));
+    const Distortion distortion = meter.against(decoded.data);
+    out.size_bytes[at] = static_cast<std::uint32_t>(stream.size());
+    out.digest[at] = truncated(sha256(stream));
+    out.mse[at] = static_cast<float>(distortion.mse);
+    out.dssim[at] = static_cast<float>(std::max(distortion.dssim, 0.0));
+  }
+}
+
+/// Everything that is copied or follows from the options.
+PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors, const PlaneLadder& ladder,
+                        std::uint32_t scales, const LutOptions& options) {
+  PlaneTables out;
+  out.columns = plane.columns;
+  out.rows = plane.rows;
+  out.scales = scales;
+  for (const LadderRung& rung : ladder.rungs) {
+    out.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
+    out.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
+  }
+  const std::size_t cells = ladder.rungs.size() * plane.fragment_count();
+  out.size_bytes.resize(cells);
+  out.digest.resize(cells);
+  out.mse.resize(cells);
+  out.dssim.resize(cells);
+  out.covered_texels = plane.covered_texels;
+  out.surface_fraction = plane.surface_fraction;
+  out.z = predictors.z;
+  out.i = predictors.i;
+  out.zeta = predictors.zeta;
+  out.m = predictors.m;
+  out.vqp = predictors.vqp;
+  out.features = plane.features;
+  for (std::uint32_t s = 0; s <= scales; ++s)
+    out.quality.push_back(static_cast<float>(options.quality_fine + (options.quality_coarse - options.quality_fine) * s /
+                                                                        std::max(scales, 1u)));
+  out.allocation = static_cast<std::uint8_t>(options.allocate);
+  out.quality_width = static_cast<float>(options.quality_width);
+  out.log_width = static_cast<float>(options.log_width);
+  out.quality_min = static_cast<float>(options.quality_min);
+  out.quality_max = static_cast<float>(options.quality_max);
+  return out;
+}
+
+std::vector<std::uint16_t> importance_order(const TexturePlane& plane) {
+  std::vector<std::uint16_t> order;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    if (plane.covered_texels[f] > 0) order.push_back(static_cast<std::uint16_t>(f));
+  std::stable_sort(order.begin(), order.end(), [&](std::uint16_t a, std::uint16_t b) {
+    if (plane.eta[a] != plane.eta[b]) return plane.eta[a] > plane.eta[b];
+    return plane.surface_fraction[a] > plane.surface_fraction[b];
+  });
+  return order;
+}
+
+/// D_i(Gamma): bytes of all fragments, each at the rung nearest to its q_i.
+std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
+  std::vector<std::uint64_t> out;
+  for (std::uint32_t scale = 0; scale <= tables.scales; ++scale)
+    for (int g = 0; g < kGammas; ++g) {
+      const std::vector<float> quality = quality_of(tables, scale, g / 20.0);
+      std::uint64_t sum = 0;
+      for (std::uint16_t f : tables.order)
+        sum += tables.size_bytes[nearest_rung(tables, quality[f]) * tables.fragment_count() + f];
+      out.push_back(sum);
+    }
+  return out;
+}
+
+/// S = A R^Q + c by least squares on log (S - c) (8.7) over the plane's rungs, B from (8.8) with the plane's mean VQP.
+void fit_size_model(const TexturePlane& plane, PlaneTables& t) {
+  const std::size_t rungs = t.rung_count(), fragments = t.fragment_count();
+  if (t.order.empty() || rungs < 2) return;
+  const double header = (plane.channels == 1 ? kGreyHeader : kColourHeader) * static_cast<double>(t.order.size());
+  std::vector<double> size(rungs), q(rungs), s(rungs);
+  double mean_q = 0, mean_s = 0, predictor = 0;
+  for (std::size_t r = 0; r < rungs; ++r) {
+    for (std::uint16_t f : t.order) size[r] += t.size_bytes[r * fragments + f];
+    q[r] = t.rung_quality[r];
+    s[r] = portable::log(std::max(size[r] - header, 1.0));
+    mean_q += q[r] / static_cast<double>(rungs);
+    mean_s += s[r] / static_cast<double>(rungs);
+  }
+  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
+  double qq = 0, qs = 0, ss = 0;
+  for (std::size_t r = 0; r < rungs; ++r) {
+    qq += (q[r] - mean_q) * (q[r] - mean_q);
+    qs += (q[r] - mean_q) * (s[r] - mean_s);
+    ss += (s[r] - mean_s) * (s[r] - mean_s);
+  }
+  const double log_r = qs / qq, log_a = mean_s - log_r * mean_q;
+  double error = 0;
+  for (std::size_t r = 0; r < rungs; ++r)
+    error += std::fabs(portable::exp(log_a + log_r * q[r]) + header - size[r]) / size[r] / static_cast<double>(rungs);
+  t.model_a = static_cast<float>(portable::exp(log_a));
+  t.model_r = static_cast<float>(portable::exp(log_r));
+  t.model_b = static_cast<float>(log_r / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
+  t.model_correlation = ss > 0 ? static_cast<float>(qs / std::sqrt(qq * ss)) : 0.0f;
+  t.model_error = static_cast<float>(error);
+}
+
+}  // namespace
+
+PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
+                           const Ladder& ladder, const LutOptions& options, const RunContext& context) {
+  check(fragments, pixels, predictors, ladder, options);
+  PackageTables out;
+  std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
+    out.planes.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],
+                                     static_cast<std::uint32_t>(fragments.scales), options));
+    out.planes[p].order = importance_order(fragments.planes[p]);
+    for (std::uint16_t f : out.planes[p].order) tasks.emplace_back(p, f);
+  }
+  std::atomic<std::size_t> done{0};
+  parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto [p, f] = tasks[t];
+      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], f, out.planes[p]);
+      context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
+    }
+  });
+  parallel_for(context, out.planes.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      out.planes[p].total_bytes = total_bytes(out.planes[p]);
+      fit_size_model(fragments.planes[p], out.planes[p]);
+    }
+  });
+  return out;
+}
+
+}  // namespace texmesh
