@@ -1,0 +1,256 @@
+#include "stages/lut.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "format/archive.h"
+#include "format/sha256.h"
+#include "stages/distortion.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using testing::Random;
+
+struct Scene {
+  Fragments fragments;
+  std::vector<Pixels> pixels;
+  Predictors predictors;
+  Ladder ladder;
+};
+
+TexturePlane plane_of(std::uint32_t columns, std::uint32_t rows, std::uint32_t channels) {
+  TexturePlane p;
+  p.channels = channels;
+  p.columns = columns;
+  p.rows = rows;
+  p.fragment_width_px = 32;
+  p.fragment_height_px = 48;
+  p.width_px = columns * 32 - 5;
+  p.height_px = rows * 48 - 7;
+  p.coverage.assign((std::size_t{p.width_px} + 7) / 8 * p.height_px, 0);
+  p.covered_texels.assign(p.fragment_count(), 0);
+  for (std::uint32_t y = 0; y < p.height_px; ++y)
+    for (std::uint32_t x = 0; x < p.width_px; ++x) {
+      if (x / 32 == 1 || (x + y) % 11 == 0) continue;  // a column of empty fragments, and holes elsewhere
+      p.coverage[(std::size_t{p.width_px} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
+      ++p.covered_texels[y / 48 * columns + x / 32];
+    }
+  for (std::size_t f = 0; f < p.fragment_count(); ++f) {
+    p.surface_fraction.push_back(p.covered_texels[f] ? 0.01f * static_cast<float>(f % 3 + 1) : 0);
+    p.features.push_back(static_cast<std::uint32_t>(f * 7 % 5));
+  }
+  p.features.resize(3 * p.fragment_count());
+  const float most = 4;
+  for (std::uint32_t f : p.features) p.eta.push_back(static_cast<float>(f) / most);
+  return p;
+}
+
+Scene make_scene(LadderOptions ladder_options = {}) {
+  Scene s;
+  s.fragments.scales = 2;
+  s.fragments.planes = {plane_of(4, 3, 3), plane_of(2, 1, 1)};
+  Random random{12};
+  for (const TexturePlane& p : s.fragments.planes) {
+    Pixels pixels{p.columns * 32, p.rows * 48, p.channels, {}};
+    for (std::size_t k = 0; k < std::size_t{pixels.width_px} * pixels.height_px * p.channels; ++k)
+      pixels.data.push_back(static_cast<std::uint8_t>(80 + k / 7 % 90 + random.next() % 30));
+    s.pixels.push_back(pixels);
+  }
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, ladder_options, {});
+  return s;
+}
+
+PackageTables build(const Scene& s, const LutOptions& options = {}, int threads = 1) {
+  RunContext context;
+  context.threads = threads;
+  return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, options, context);
+}
+
+TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
+  const Scene s = make_scene();
+  const PackageTables tables = build(s);
+  ASSERT_EQ(tables.planes.size(), 2u);
+  for (std::size_t p = 0; p < 2; ++p) {
+    const PlaneTables& t = tables.planes[p];
+    ASSERT_EQ(t.rung_count(), 10u);
+    for (std::size_t r = 0; r < 10; ++r) {
+      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].tables.size());
+      for (std::size_t f = 0; f < t.fragment_count(); ++f) {
+        const auto stream = fragment_stream(s.ladder.planes[p].rungs[r], f);
+        const std::size_t at = r * t.fragment_count() + f;
+        EXPECT_EQ(t.size_bytes[at], stream.size());
+        EXPECT_EQ(t.digest[at], stream.empty() ? 0 : truncated(sha256(stream)));
+        EXPECT_EQ(stream.empty(), t.covered_texels[f] == 0);
+      }
+    }
+  }
+}
+
+TEST(Lut, DistortionIsMeasuredAndFallsWithTheRung) {
+  const Scene s = make_scene();
+  const PlaneTables t = build(s).planes[1];
+  const TexturePlane& plane = s.fragments.planes[1];
+  for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    const Pixels decoded =
+        decode_jpeg(complete_jpeg(s.ladder.planes[1].rungs[r].tables, fragment_stream(s.ladder.planes[1].rungs[r], 0)), 1 << 20);
+    double error = 0;
+    int count = 0;
+    for (std::uint32_t y = 0; y < plane.height_px; ++y)
+      for (std::uint32_t x = 0; x < 32; ++x) {
+        if (!(plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1)) continue;
+        error += std::pow(s.pixels[1].at(x, y)[0] - decoded.at(x, y)[0], 2);
+        ++count;
+      }
+    EXPECT_NEAR(t.mse[r * 2], error / count, 1e-3);
+    EXPECT_EQ(t.mse[r * 2 + 1], 0);
+    EXPECT_GT(t.dssim[r * 2], 0);
+    EXPECT_LT(t.dssim[r * 2], 1);
+    if (r == 0) continue;
+    EXPECT_LT(t.mse[r * 2], t.mse[r * 2 - 2] * 1.02);
+    EXPECT_LT(t.dssim[r * 2], t.dssim[r * 2 - 2] * 1.02);
+  }
+}
+
+TEST(Lut, OrderQualityAndTotals) {
+  const Scene s = make_scene();
+  for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis}) {
+    LutOptions options;
+    options.allocate = allocate;
+    const PlaneTables t = build(s, options).planes[0];
+    const TexturePlane& plane = s.fragments.planes[0];
+    EXPECT_EQ(t.order.size(), 9u);
+    for (std::size_t k = 1; k < t.order.size(); ++k) {
+      const auto key = [&](std::uint16_t f) {
+        return std::tuple(-plane.eta[f], -plane.surface_fraction[f], f);
+      };
+      EXPECT_LT(key(t.order[k - 1]), key(t.order[k]));
+    }
+    EXPECT_EQ(t.quality, (std::vector<float>{80, 60, 40}));
+    EXPECT_EQ(t.allocation, static_cast<int>(allocate));
+    ASSERT_EQ(t.total_bytes.size(), 3u * 21u);
+    for (std::uint32_t scale = 0; scale < 3; ++scale)
+      for (std::size_t g = 0; g < 21; ++g) {
+        const auto quality = quality_of(t, scale, static_cast<double>(g) / 20);
+        std::uint64_t sum = 0;
+        for (std::size_t f = 0; f < t.fragment_count(); ++f)
+          sum += t.size_bytes[nearest_rung(t, quality[f]) * t.fragment_count() + f];
+        EXPECT_EQ(t.total_bytes[scale * 21 + g], sum);
+        EXPECT_LE(t.total_bytes[scale * 21 + g], t.total_bytes[scale * 21 + (g == 0 ? 0 : g - 1)]);
+      }
+  }
+}
+
+TEST(Lut, SizeModelFitsAndIsAbsentForOneRung) {
+  const PlaneTables t = build(make_scene()).planes[0];
+  EXPECT_GT(t.model_correlation, 0.9f);
+  EXPECT_LT(t.model_error, 0.4f);
+  EXPECT_GT(t.model_r, 1.0f);
+  double predictor = 0;
+  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
+  EXPECT_NEAR(t.model_b, std::log(t.model_r) / std::log(100 * predictor), 1e-4);
+  double error = 0;
+  for (std::size_t r = 0; r < 10; ++r) {
+    double size = 0;
+    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
+    error += std::fabs(t.model_a * std::pow(t.model_r, t.rung_quality[r]) + 37.0 * 9 - size) / size / 10;
+  }
+  EXPECT_NEAR(t.model_error, error, 1e-3);
+
+  LadderOptions one;
+  one.rungs = {50};
+  const PlaneTables single = build(make_scene(one)).planes[0];
+  EXPECT_EQ(single.model_a, 0);
+  EXPECT_EQ(single.model_error, 0);
+}
+
+TEST(Lut, TablesPassTheirCodec) {
+  const PackageTables tables = build(make_scene());
+  const auto bytes = write_tables(tables);
+  EXPECT_EQ(write_tables(read_tables(bytes)), bytes);
+}
+
+TEST(Lut, SameTablesForAnyNumberOfThreads) {
+  const Scene s = make_scene();
+  EXPECT_EQ(encode_artefact(build(s, {}, 1)), encode_artefact(build(s, {}, 8)));
+}
+
+TEST(Lut, EmptyAndUnfitInput) {
+  EXPECT_TRUE(build({}).planes.empty());
+  Scene s = make_scene();
+  s.ladder.planes[0].rungs[3].offset.pop_back();
+  EXPECT_THROW(build(s), StageError);
+  s = make_scene();
+  s.predictors.planes.pop_back();
+  EXPECT_THROW(build(s), StageError);
+  s = make_scene();
+  s.ladder.planes[0].rungs[0].data[s.ladder.planes[0].rungs[0].data.size() / 2] = 0xff;
+  s.ladder.planes[0].rungs[0].data[s.ladder.planes[0].rungs[0].data.size() / 2 + 1] = 0xd9;
+  EXPECT_THROW(build(s), FormatError);
+  LutOptions options;
+  options.quality_min = 90;
+  options.quality_max = 50;
+  EXPECT_THROW(build(make_scene(), options), StageError);
+
+  s = make_scene();
+  for (TexturePlane& p : s.fragments.planes) {
+    std::fill(p.covered_texels.begin(), p.covered_texels.end(), 0u);
+    std::fill(p.coverage.begin(), p.coverage.end(), std::uint8_t{0});
+  }
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  const PackageTables none = build(s);
+  EXPECT_TRUE(none.planes[0].order.empty());
+  EXPECT_EQ(none.planes[0].total_bytes[0], 0u);
+  EXPECT_NO_THROW(write_tables(none));
+}
+
+TEST(Distortion, EqualOppositeAndMasked) {
+  Random random{1};
+  std::vector<std::uint8_t> source(16 * 16), mask(16 * 16, 255), other;
+  for (auto& v : source) v = static_cast<std::uint8_t>(random.next());
+  const DistortionMeter meter(source, mask, 16, 16);
+  EXPECT_EQ(meter.against(source).mse, 0);
+  EXPECT_NEAR(meter.against(source).dssim, 0, 1e-12);
+  other = source;
+  for (auto& v : other) v = static_cast<std::uint8_t>(255 - v);
+  EXPECT_GT(meter.against(other).dssim, 1);  // negative correlation
+  EXPECT_LT(meter.against(other).dssim, 2);
+
+  for (std::size_t k = 0; k < 256; ++k) mask[k] = k % 3 == 0 ? 255 : 0;
+  const DistortionMeter masked(source, mask, 16, 16);
+  EXPECT_EQ(masked.against(source).mse, 0);
+  other = source;
+  for (std::size_t k = 0; k < 256; ++k) other[k] = mask[k] ? source[k] : static_cast<std::uint8_t>(random.next());
+  EXPECT_EQ(masked.against(other).mse, 0);
+  EXPECT_NEAR(masked.against(other).dssim, 0, 1e-12);
+  other[0] = static_cast<std::uint8_t>(source[0] ^ 16);
+  EXPECT_NEAR(masked.against(other).mse, 256.0 / 86, 1e-9);
+}
+
+TEST(Distortion, AgainstTheFormulaInOneWindow) {
+  Random random{2};
+  std::vector<std::uint8_t> a(64), b(64);
+  for (std::size_t k = 0; k < 64; ++k) {
+    a[k] = static_cast<std::uint8_t>(random.next() % 200);
+    b[k] = static_cast<std::uint8_t>(a[k] + random.next() % 40);
+  }
+  double ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
+  for (std::size_t k = 0; k < 64; ++k) ma += a[k] / 64.0, mb += b[k] / 64.0;
+  for (std::size_t k = 0; k < 64; ++k) {
+    va += (a[k] - ma) * (a[k] - ma) / 64;
+    vb += (b[k] - mb) * (b[k] - mb) / 64;
+    cov += (a[k] - ma) * (b[k] - mb) / 64;
+  }
+  const double ssim = (2 * ma * mb + 6.5025) * (2 * cov + 58.5225) / ((ma * ma + mb * mb + 6.5025) * (va + vb + 58.5225));
+  const DistortionMeter meter(a, std::vector<std::uint8_t>(64, 255), 8, 8);
+  EXPECT_NEAR(meter.against(b).dssim, 1 - ssim, 1e-12);
+}
+
+}  // namespace
+}  // namespace texmesh
