@@ -1,0 +1,306 @@
+#include "stages/quality.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "format/portable_math.h"
+#include "stages/image_compare.h"
+#include "stages/parallel.h"
+#include "stages/render_view.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples of 16
+
+struct Sphere {
+  Vec3d centre;
+  double radius = 0;
+};
+
+Sphere bounding_sphere(const Mesh& mesh) {
+  if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
+  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
+  for (Vec3f p : mesh.positions)
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min<double>(lo[k], p[k]);
+      hi[k] = std::max<double>(hi[k], p[k]);
+    }
+  Sphere s{(lo + hi) * 0.5, 0};
+  for (Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
+  if (!(s.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
+  return s;
+}
+
+/// Planes that show: those that a material's base colour or emission samples.
+struct ShownPlanes {
+  std::vector<std::uint32_t> planes;                     // indices into Fragments::planes
+  std::vector<std::int32_t> base_plane, emissive_plane;  // per material: index into `planes`, -1 = none
+};
+
+ShownPlanes find_shown(const std::vector<Material>& materials, const Fragments& fragments) {
+  ShownPlanes shown;
+  auto plane_of = [&](const TextureRef& ref) -> std::int32_t {
+    for (std::uint32_t p = 0; ref.used() && p < fragments.planes.size(); ++p) {
+      const TexturePlane& plane = fragments.planes[p];
+      if (plane.image != static_cast<std::uint32_t>(ref.image) || plane.role == TextureRole::kAlpha) continue;
+      const auto at = std::find(shown.planes.begin(), shown.planes.end(), p);
+      const auto index = static_cast<std::int32_t>(at - shown.planes.begin());
+      if (at == shown.planes.end()) shown.planes.push_back(p);
+      return index;
+    }
+    return -1;
+  };
+  for (const Material& m : materials) {
+    shown.base_plane.push_back(plane_of(m.base_colour_texture));
+    shown.emissive_plane.push_back(plane_of(m.emissive_texture));
+  }
+  return shown;
+}
+
+ViewScene scene_of(const NestedScales& scales, const NestedScale& scale,
+                   const std::vector<Material>& materials, const ShownPlanes& shown,
+                   const Fragments& fragments) {
+  ViewScene scene;
+  scene.mesh = &scales.mesh;
+  scene.triangles = &scale.triangles;
+  scene.triangle_source = &scale.triangle_source;
+  scene.materials = &materials;
+  scene.base_plane = shown.base_plane;
+  scene.emissive_plane = shown.emissive_plane;
+  for (std::uint32_t p : shown.planes)
+    scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
+  return scene;
+}
+
+/// Per plane, the finest level that more than 2 % of all samples of S_0 ask for: nothing finer is kept.
+class LevelCount {
+ public:
+  explicit LevelCount(std::size_t planes) : wanted_(planes) {}
+  void add(const ViewBuffer& view) {
+    for (const ViewSample& s : view.samples) {
+      add(s.base_plane, s.base_area);
+      add(s.emissive_plane, s.emissive_area);
+    }
+  }
+  std::vector<std::uint32_t> first_levels() const {
+    std::vector<std::uint32_t> first(wanted_.size(), 0);
+    for (std::size_t p = 0; p < first.size(); ++p) {
+      std::uint64_t total = 0, finer = 0;
+      for (std::uint64_t n : wanted_[p]) total += n;
+      for (; first[p] < kMaxFirstLevel; ++first[p]) {
+        finer += wanted_[p][first[p]];
+        if (50 * finer > total) break;
+      }
+    }
+    return first;
+  }
+
+ private:
+  void add(std::int32_t plane, float area) {
+    if (plane < 0) return;
+    std::uint32_t level = 0;
+    for (float limit = 2; area > limit && level < kMaxFirstLevel; limit *= 4) ++level;
+    ++wanted_[static_cast<std::size_t>(plane)][level];
+  }
+  std::vector<std::array<std::uint64_t, kMaxFirstLevel + 1>> wanted_;
+};
+
+const std::array<float, 256>& linear_of_byte() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      const double x = static_cast<double>(i) / 255;
+      t[i] = static_cast<float>(x <= 0.04045 ? x / 12.92 : portable::pow((x + 0.055) / 1.055, 2.4));
+    }
+    return t;
+  }();
+  return table;
+}
+
+// Writes the box-filtered linear pixels of a block of the plane that starts at (x0, y0), multiples of
+// 2^level.
+void reduce_block(const Pixels& block, std::uint32_t x0, std::uint32_t y0, std::uint32_t level,
+                  MipTexture::Level& out) {
+  const auto& linear = linear_of_byte();
+  const std::uint32_t step = 1u << level;
+  const float scale = 1.f / static_cast<float>(step * step);
+  for (std::uint32_t by = 0; by < block.height_px; by += step) {
+    const std::uint32_t y = (y0 + by) >> level;
+    if (y >= out.height) break;
+    for (std::uint32_t bx = 0; bx < block.width_px; bx += step) {
+      const std::uint32_t x = (x0 + bx) >> level;
+      if (x >= out.width) break;
+      Vec3f sum;
+      for (std::uint32_t j = 0; j < step; ++j)
+        for (std::uint32_t i = 0; i < step; ++i) {
+          const std::uint8_t* c = block.at(bx + i, by + j);
+          sum = sum + (block.channels >= 3 ? Vec3f{linear[c[0]], linear[c[1]], linear[c[2]]}
+                                           : Vec3f{linear[c[0]], linear[c[0]], linear[c[0]]});
+        }
+      out.texels[static_cast<std::size_t>(y) * out.width + x] = sum * scale;
+    }
+  }
+}
+
+MipTexture empty_texture(const TexturePlane& plane, std::uint32_t first_level) {
+  MipTexture t;
+  t.width_px = plane.width_px;
+  t.height_px = plane.height_px;
+  t.first_level = first_level;
+  t.levels.resize(1);
+  MipTexture::Level& level = t.levels[0];
+  level.width = std::max(1u, (plane.width_px + (1u << first_level) - 1) >> first_level);
+  level.height = std::max(1u, (plane.height_px + (1u << first_level) - 1) >> first_level);
+  level.texels.resize(static_cast<std::size_t>(level.width) * level.height);
+  return t;
+}
+
+// A fragment of the source, cut out of the plane's pixels.
+Pixels cut(const Pixels& pixels, const TexturePlane& plane, std::uint32_t fragment) {
+  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
+  const std::uint32_t x = fragment % plane.columns * w, y = fragment / plane.columns * h;
+  Pixels out{w, h, pixels.channels, {}};
+  for (std::uint32_t row = 0; row < h; ++row)
+    out.data.insert(out.data.end(), pixels.at(x, y + row),
+                    pixels.at(x, y + row) + static_cast<std::size_t>(w) * pixels.channels);
+  return out;
+}
+
+/// A plane as it looks at one rung, or (rung == nullptr) as the source has it. Fragments that no rung stores
+/// are never looked at and stay as in the source.
+MipTexture plane_texture(const TexturePlane& plane, const Pixels& pixels, const LadderRung* rung,
+                         std::uint32_t first_level, const RunContext& context) {
+  MipTexture texture = empty_texture(plane, first_level);
+  const std::uint64_t fragment_pixels =
+      static_cast<std::uint64_t>(plane.fragment_width_px) * plane.fragment_height_px;
+  parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) {
+      const auto stream = rung ? fragment_stream(*rung, f) : std::span<const std::uint8_t>();
+      const auto index = static_cast<std::uint32_t>(f);
+      const Pixels block = stream.empty() ? cut(pixels, plane, index)
+                                          : decode_jpeg(complete_jpeg(rung->tables, stream), fragment_pixels);
+      reduce_block(block, index % plane.columns * plane.fragment_width_px,
+                   index / plane.columns * plane.fragment_height_px, first_level, texture.levels[0]);
+    }
+  });
+  build_mips(texture);
+  return texture;
+}
+
+/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest).
+std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
+  std::vector<std::size_t> out;
+  const auto n = static_cast<std::size_t>(wanted);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1);
+    if (out.empty() || k > out.back()) out.push_back(k);
+  }
+  return out;
+}
+
+struct Textures {
+  std::vector<int> quality;                    // per column of the table
+  std::vector<MipTexture> source;              // per shown plane
+  std::vector<std::vector<MipTexture>> rungs;  // [column][shown plane]
+};
+
+Textures decode_textures(const ShownPlanes& shown, const Fragments& fragments,
+                         const std::vector<Pixels>& pixels, const Ladder& ladder,
+                         const std::vector<std::uint32_t>& first, int rung_samples,
+                         const RunContext& context) {
+  Textures out;
+  for (std::size_t i = 0; i < shown.planes.size(); ++i) {
+    const std::uint32_t p = shown.planes[i];
+    out.source.push_back(plane_texture(fragments.planes[p], pixels[p], nullptr, first[i], context));
+  }
+  if (shown.planes.empty()) {
+    out.quality = {100};
+    out.rungs.resize(1);
+    return out;
+  }
+  for (std::size_t r : spread_rungs(ladder.planes[shown.planes[0]].rungs.size(), rung_samples)) {
+    out.quality.push_back(ladder.planes[shown.planes[0]].rungs[r].quality);
+    std::vector<MipTexture>& column = out.rungs.emplace_back();
+    for (std::size_t i = 0; i < shown.planes.size(); ++i) {
+      const std::uint32_t p = shown.planes[i];
+      column.push_back(
+          plane_texture(fragments.planes[p], pixels[p], &ladder.planes[p].rungs[r], first[i], context));
+    }
+  }
+  return out;
+}
+
+/// Everything that one view compares: [scale][rung]. One view at a time is in memory.
+std::vector<PictureDifference> measure_view(const std::vector<ViewScene>& scenes, const ViewCamera& camera,
+                                            const Textures& textures, std::uint32_t side,
+                                            const RunContext& context) {
+  const std::size_t rungs = textures.rungs.size();
+  const ViewBuffer finest = look_at(scenes[0], camera, side);
+  const ComparedPicture original = prepare_comparison(draw(finest, textures.source));
+  std::vector<PictureDifference> found(scenes.size() * rungs);
+  parallel_for(context, scenes.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const ViewBuffer coarser = s == 0 ? ViewBuffer{} : look_at(scenes[s], camera, side);
+      const ViewBuffer& view = s == 0 ? finest : coarser;
+      for (std::size_t r = 0; r < rungs; ++r)
+        found[s * rungs + r] = compare_pictures(original, prepare_comparison(draw(view, textures.rungs[r])));
+    }
+  });
+  return found;
+}
+
+/// Means over all covered pixels of all views.
+void fill_table(QualityTable& table, const std::vector<std::vector<PictureDifference>>& views) {
+  for (std::size_t i = 0; i < views[0].size(); ++i) {
+    PictureDifference sum;
+    for (const auto& view : views) {
+      sum.ssim += view[i].ssim;
+      sum.difference += view[i].difference;
+      sum.pixels += view[i].pixels;
+    }
+    if (sum.pixels == 0)
+      throw StageError("quality", "S_0", "pixels that show the object", "none in any view");
+    const auto n = static_cast<double>(sum.pixels);
+    table.ssim.push_back(static_cast<float>(std::clamp(sum.ssim / n, 0.0, 1.0)));
+    table.difference.push_back(static_cast<float>(std::clamp(sum.difference / n, 0.0, 1.0)));
+  }
+}
+
+}  // namespace
+
+QualityTable measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
+                             const std::vector<Material>& materials, const Fragments& fragments,
+                             const std::vector<Pixels>& pixels, const Ladder& ladder,
+                             const QualityOptions& options, const RunContext& context) {
+  const Sphere sphere = bounding_sphere(scales.mesh);
+  const ShownPlanes shown = find_shown(materials, fragments);
+  QualityTable table;
+  table.views = static_cast<std::uint32_t>(options.views);
+  table.size_px = static_cast<std::uint32_t>(options.size_px);
+  std::vector<ViewScene> scenes;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) {
+    if (k > 0 && !perceptual.kept[k]) continue;
+    table.scales.push_back(scales.scales[k].scale);
+    scenes.push_back(scene_of(scales, scales.scales[k], materials, shown, fragments));
+  }
+
+  LevelCount levels(shown.planes.size());
+  for (int v = 0; v < options.views && !shown.planes.empty(); ++v)
+    levels.add(look_at(scenes[0], camera_of(v, options.views, sphere.centre, sphere.radius), table.size_px));
+  const Textures textures =
+      decode_textures(shown, fragments, pixels, ladder, levels.first_levels(), options.rung_samples, context);
+  table.rungs = textures.quality;
+
+  std::vector<std::vector<PictureDifference>> found;
+  for (int v = 0; v < options.views; ++v) {
+    context.report((v + 1.0) / (options.views + 1.0));
+    const ViewCamera camera = camera_of(v, options.views, sphere.centre, sphere.radius);
+    found.push_back(measure_view(scenes, camera, textures, table.size_px, context));
+  }
+  fill_table(table, found);
+  return table;
+}
+
+}  // namespace texmesh
