@@ -1,0 +1,174 @@
+#include "stages/scales.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "stages/parallel.h"
+#include "stages/scale_codecs.h"
+#include "stages/scale_materials.h"
+
+namespace texmesh {
+namespace {
+
+using Json = GlbWriter::Json;
+
+/// Largest factor by which a material stretches texture coordinates, times the largest image's side.
+double largest_texture_px(const std::vector<Material>& materials, const std::vector<Image>& images, int set) {
+  constexpr double kUntextured = 4096;  // coordinates without a texture are kept as if there were one of this size
+  double largest = 0;
+  for (const Material& m : materials)
+    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture, &m.emissive_texture}) {
+      if (!t->used() || t->texcoord != set) continue;
+      const Image& image = images.at(static_cast<std::size_t>(t->image));
+      const double stretch = std::max(std::fabs(t->transform.scale.x), std::fabs(t->transform.scale.y));
+      largest = std::max(largest, stretch * std::max(image.width_px, image.height_px));
+    }
+  return largest > 0 ? largest : kUntextured;
+}
+
+bool uses_texcoord(const std::vector<Material>& materials, int set) {
+  for (const Material& m : materials)
+    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture, &m.emissive_texture})
+      if (t->used() && t->texcoord == set) return true;
+  return false;
+}
+
+/// 8 bits lose something of these colours.
+bool needs_fine_colours(const std::vector<Vec4f>& colours) {
+  auto coarse = [](float x) {
+    const float scaled = std::clamp(x, 0.0f, 1.0f) * 255;
+    return std::fabs(scaled - std::floor(scaled + 0.5f)) < 1e-3f;
+  };
+  return !std::all_of(colours.begin(), colours.end(), [&](Vec4f c) { return coarse(c.x) && coarse(c.y) && coarse(c.z) && coarse(c.w); });
+}
+
+ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials, const std::vector<Image>& images,
+                        const ScalesOptions& options) {
+  constexpr int kDracoBits = 24, kShortBits = 16;  // floats hold no more than 24; an unsigned short 16
+  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours)};
+  const bool draco = options.mesh_codec == MeshCodec::kDraco;
+  coding.write_uv[1] = !mesh.uv1.empty() && uses_texcoord(materials, 1);
+  coding.write_uv[0] = !mesh.uv0.empty();
+  if (options.mesh_codec == MeshCodec::kNone) return coding;
+  coding.position = position_grid(mesh, options, draco ? kDracoBits : kShortBits);
+  for (int set = 0; set < 2; ++set) {
+    if (!coding.write_uv[set]) continue;
+    QuantisationGrid& grid = coding.uv[set];
+    grid = uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), options, draco ? kDracoBits : kShortBits);
+    if (draco) continue;
+    const bool unit = grid.bits > 0 && grid.origin.x >= 0 && grid.origin.y >= 0 && grid.origin.x + grid.range <= 1 && grid.origin.y + grid.range <= 1;
+    grid = QuantisationGrid{};
+    if (unit) grid.bits = kShortBits;
+  }
+  return coding;
+}
+
+/// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and go.
+std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale, const QuantisationGrid& grid) {
+  std::map<std::array<std::uint16_t, 2>, ScalePrimitive> primitives;
+  for (std::size_t i = 0; i < scale.triangles.size(); ++i) {
+    const Triangle& t = scale.triangles[i];
+    if (grid.bits > 0) {
+      Vec3f at[3];
+      for (std::size_t k = 0; k < 3; ++k) at[k] = grid.place(mesh.positions[mesh.wedge_position[t[k]]]);
+      if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+    }
+    const std::uint32_t source = scale.triangle_source[i];
+    const std::array<std::uint16_t, 2> key{mesh.triangle_part[source], mesh.triangle_material[source]};
+    ScalePrimitive& p = primitives[key];
+    p.part = key[0], p.material = key[1];
+    for (std::uint32_t w : t) p.indices.push_back(w);
+  }
+  std::vector<ScalePrimitive> out;
+  std::vector<std::uint32_t> index(mesh.wedge_count(), 0xffffffffu);
+  for (auto& [key, p] : primitives) {
+    for (std::uint32_t& w : p.indices) {
+      const std::uint32_t wedge = w;
+      if (index[wedge] == 0xffffffffu) {
+        index[wedge] = static_cast<std::uint32_t>(p.wedges.size());
+        p.wedges.push_back(wedge);
+      }
+      w = index[wedge];
+    }
+    for (std::uint32_t w : p.wedges) index[w] = 0xffffffffu;
+    out.push_back(std::move(p));
+  }
+  return out;
+}
+
+Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_index) {
+  Json node{{"name", coding.mesh.part_names.at(part)}, {"mesh", mesh_index}};
+  if (coding.positions_are_indices()) {
+    const Vec3f origin = coding.position.origin;
+    const float step = coding.position.step();
+    node["translation"] = {origin.x, origin.y, origin.z};
+    node["scale"] = {step, step, step};
+  }
+  return node;
+}
+
+ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale, const std::vector<Material>& materials,
+                      const std::vector<PreviewImage>& previews) {
+  ScaleFile file;
+  file.scale = scale.scale;
+  GlbWriter writer;
+  std::size_t fallback_bytes = 0;
+  int open_part = -1;
+  for (ScalePrimitive& primitive : split_primitives(coding.mesh, scale, coding.position)) {
+    const std::uint16_t part = primitive.part, material = primitive.material;
+    CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco ? code_draco(writer, coding, primitive)
+                                                                          : code_plain(writer, coding, std::move(primitive), fallback_bytes);
+    coded.json["material"] = material;
+    file.triangles += coded.triangles;
+    file.vertices += coded.vertices;
+    if (open_part != part) {
+      open_part = part;
+      writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
+      writer.array("meshes").push_back({{"name", coding.mesh.part_names.at(part)}, {"primitives", Json::array()}});
+    }
+    writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));
+  }
+  if (file.triangles == 0)
+    throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid", std::to_string(coding.position.bits) + " bits per coordinate collapse all");
+  writer.set_fallback_buffer(fallback_bytes);
+  write_materials(writer, materials, previews, coding.write_uv[0], coding.write_uv[1]);
+  file.glb = writer.finish();
+  return file;
+}
+
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
+  double largest = 0;
+  if (grid.bits == 0) return largest;
+  for (Vec3f p : mesh.positions) {
+    const Vec3f q = grid.rounded(p);
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(static_cast<double>(q[k]) - p[k]));
+  }
+  return largest;
+}
+
+}  // namespace
+
+ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Material>& materials,
+                        const std::vector<Image>& images, const Fragments& fragments, const Ladder& ladder,
+                        const ScalesOptions& options, const RunContext& context) {
+  const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
+  const std::vector<PreviewImage> previews = preview_images(fragments, ladder);
+  std::vector<std::size_t> kept;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k)
+    if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
+  ScaleFiles result;
+  result.position_bits = coding.position.bits;
+  result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
+  result.position_error = largest_rounding(scales.mesh, coding.position);
+  result.files.resize(kept.size());
+  parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, previews);
+      context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size()));
+    }
+  });
+  return result;
+}
+
+}  // namespace texmesh
