@@ -48,6 +48,8 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
   if (t.channels == 2) at["channels"].fail("1 or 3", "2");
   t.fragment_width_px = u32(at["fragmentWidthPx"], 1, kMaxSide);
   t.fragment_height_px = u32(at["fragmentHeightPx"], 1, kMaxSide);
+  for (const char* side : {"fragmentWidthPx", "fragmentHeightPx"})  // whole MCUs even with 4:2:0
+    if (at[side].integer(1) % 16 != 0) at[side].fail("a multiple of 16", std::to_string(at[side].integer(1)));
   t.columns = u32(at["columns"], 1, 65535);
   t.rows = u32(at["rows"], 1, 65535 / t.columns);
   const auto tiles = [](std::uint64_t count, std::uint64_t side, std::uint64_t whole) {

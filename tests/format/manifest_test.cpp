@@ -125,10 +125,10 @@ TEST(Manifest, EveryFieldIsRequired) {
   const Json whole = Json::parse(write_manifest(make_manifest(3, 2)));
   for (const auto& [name, value] : whole.items()) {
     EXPECT_EQ(place_after([&, n = name](Json& j) { j.erase(n); }), "/" + name);
-    if (value.is_object())
-      for (const auto& [inner, unused] : value.items())
-        EXPECT_EQ(place_after([&, n = name, i = inner](Json& j) { j[n].erase(i); }),
-                  "/" + name + "/" + inner);
+    if (!value.is_object()) continue;
+    for (const auto& [inner, unused] : value.items()) {
+      EXPECT_EQ(place_after([&, n = name, i = inner](Json& j) { j[n].erase(i); }), "/" + name + "/" + inner);
+    }
   }
 }
 
@@ -238,6 +238,7 @@ TEST(Textures, RulesAreChecked) {
   refused("channels", [](Json& j) { j["channels"] = 2; });
   refused("columns", [](Json& j) { j["columns"] = 5; });
   refused("rows", [](Json& j) { j["rows"] = 1; });
+  refused("fragmentWidthPx", [](Json& j) { j["fragmentWidthPx"] = 255; });
   refused("rungQuality", [](Json& j) { j["rungQuality"] = Json::array(); });
   refused("rungQuality/1", [](Json& j) { j["rungQuality"][1] = 5; });
   refused("widthPx", [](Json& j) { j["widthPx"] = 0; });

@@ -1,0 +1,132 @@
+#pragma once
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/package_reader.h"
+#include "tests/format/manifest_fixture.h"
+#include "tests/format/package_fixture.h"
+
+namespace texmesh::fuzz {
+namespace detail {
+
+using Bytes = std::vector<std::uint8_t>;
+using Input = std::span<const std::uint8_t>;
+using texmesh::testing::as_bytes;
+
+inline void require(bool good, const char* what) {
+  if (good) return;
+  std::fprintf(stderr, "format fuzz: %s\n", what);
+  std::abort();
+}
+
+inline void fuzz_container(Input input) {
+  const auto source = memory_source(input);
+  Bytes again;
+  ContainerWriter writer([&](Input part) { again.insert(again.end(), part.begin(), part.end()); });
+  for (const ContainerEntry& e : read_container(*source)) {
+    check_crc(*source, e);
+    writer.add(e.path, source->read(e.offset, e.bytes));
+  }
+  writer.finish();
+  require(std::ranges::equal(again, input), "a container was accepted that its entries do not lead to");
+}
+
+inline void fuzz_manifest(Input input) {
+  const Manifest m = read_manifest(input);
+  std::string json;
+  try {
+    json = write_manifest(m);
+  } catch (const FormatError&) {
+    // Without its unknown fields it is shorter, but six digits can make two steps equal, and long numbers can
+    // fill the 16 KiB that the file's own notation did not.
+    return;
+  }
+  require(write_manifest(read_manifest(as_bytes(json))) == json, "a manifest changed by being written twice");
+}
+
+inline void fuzz_textures(Input input) {
+  const auto textures = read_textures(input);
+  require(read_textures(as_bytes(write_textures(textures))) == textures, "textures changed by being written");
+}
+
+inline void fuzz_index(Input input) {
+  const auto entries = read_index(input);
+  require(read_index(write_index(entries)) == entries, "an index changed by being written");
+}
+
+inline void fuzz_tables(Input input) {
+  const Bytes once = write_tables(read_tables(input));
+  require(write_tables(read_tables(once)) == once, "tables changed by being written twice");
+  if (input[6] == 0 && input[7] == 0)
+    require(std::ranges::equal(once, input), "tables of 1.0 have a second form");
+}
+
+inline void fuzz_quality(Input input) {
+  const QualityTable table = read_quality(input);
+  require(read_quality(as_bytes(write_quality(table))) == table, "a quality table changed by being written");
+}
+
+inline void fuzz_package(Input input) {
+  PackageReader reader(open_container(memory_source(input)));
+  for (const EntryRef& e : reader.index()) reader.entry(e);
+  for (const ManifestScale& s : reader.manifest().scales) reader.scale_glb(s.scale);
+  reader.quality();
+  for (std::uint32_t p = 0; p < reader.textures().size(); ++p) {
+    reader.preview(p);
+    const PlaneTables& t = reader.tables().planes[p];
+    for (std::uint32_t r = 0; r < t.rung_count(); ++r)
+      for (std::uint32_t f = 0; f < t.fragment_count(); ++f)
+        if (reader.fragment_range(p, r, f).bytes > 0) reader.complete_fragment(p, r, f);
+    for (std::uint32_t k = 0; k <= t.scales; ++k)
+      for (const float q : quality_of(t, k, mean_eta(t, k)))
+        require(nearest_rung(t, q) < t.rung_count(), "no such rung");
+  }
+}
+
+inline Bytes tagged(std::uint8_t kind, Input bytes) {
+  Bytes out{kind};
+  out.insert(out.end(), bytes.begin(), bytes.end());
+  return out;
+}
+
+}  // namespace detail
+
+/// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
+/// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
+/// PackageReader. Anything but an answer or a FormatError is a fault: it aborts. What is read must also be
+/// written again, unchanged where the format has one form only.
+inline void read_format(std::span<const std::uint8_t> input) {
+  using namespace detail;
+  constexpr void (*kReaders[])(Input) = {fuzz_container, fuzz_manifest, fuzz_textures, fuzz_index,
+                                         fuzz_tables,    fuzz_quality,  fuzz_package};
+  if (input.empty()) return;
+  try {
+    kReaders[input[0] % std::size(kReaders)](input.subspan(1));
+  } catch (const FormatError&) {
+  }
+}
+
+/// Well-formed inputs of every kind, made by code.
+inline std::vector<std::vector<std::uint8_t>> make_corpus() {
+  using namespace detail;
+  std::vector<Bytes> corpus;
+  for (const std::uint32_t planes : {0u, 1u, 2u}) {
+    const Bytes package = texmesh::testing::make_package(planes);
+    corpus.push_back(tagged(0, package));
+    corpus.push_back(tagged(6, package));
+    PackageReader reader(open_container(memory_source(package)));
+    corpus.push_back(tagged(1, reader.store().read_manifest()));
+    corpus.push_back(tagged(2, reader.entry(kTexturesPath)));
+    corpus.push_back(tagged(3, reader.entry(reader.manifest().index)));
+    corpus.push_back(tagged(4, reader.entry(kTablesPath)));
+    corpus.push_back(tagged(5, reader.entry(kQualityPath)));
+  }
+  corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  return corpus;
+}
+
+}  // namespace texmesh::fuzz
