@@ -19,38 +19,23 @@ std::string plane_field(std::uint32_t plane, const std::string& member) { return
 
 std::uint64_t sum(const std::vector<std::uint32_t>& v) { return std::accumulate(v.begin(), v.end(), std::uint64_t{0}); }
 
+/// Readers check that the grid covers the plane; JPEG blocks of 16 px must not straddle fragments either.
 void check_grid(const TextureInfo& t, std::size_t plane, Findings& findings) {
-  const auto check = [&](const char* what, std::uint32_t size, std::uint32_t fragment, std::uint32_t count) {
-    const bool fits = fragment > 0 && fragment % 16 == 0 && count > 0 && static_cast<std::uint64_t>(fragment) * count >= size &&
-                      static_cast<std::uint64_t>(fragment) * (count - 1) < size;
-    findings.require(fits, "texture-grid", kTexturesPath, "/" + std::to_string(plane) + "/" + what,
-                     "fragments of multiples of 16 px that just cover " + std::to_string(size) + " px",
-                     std::to_string(count) + " of " + std::to_string(fragment) + " px");
-  };
-  check("columns", t.width_px, t.fragment_width_px, t.columns);
-  check("rows", t.height_px, t.fragment_height_px, t.rows);
+  findings.require(t.fragment_width_px % 16 == 0 && t.fragment_height_px % 16 == 0, "texture-grid", kTexturesPath,
+                   "/textures/" + std::to_string(plane), "fragments with sides of multiples of 16 px",
+                   std::to_string(t.fragment_width_px) + " x " + std::to_string(t.fragment_height_px) + " px");
 }
 
-/// Fragments in `order` are exactly those that cover something, each once, and exactly those with bytes on every rung.
+/// Exactly the covered fragments are stored, by falling importance. (Readers check that `order` names those once that
+/// have bytes.)
 void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
-  const std::size_t fragments = t.fragment_count();
-  std::vector<bool> stored(fragments);
-  for (const std::uint16_t i : t.order) {
-    if (!findings.require(i < fragments && !stored[i], "tables-order", kTablesPath, plane_field(plane, "order"),
-                          "every stored fragment once", "fragment " + std::to_string(i) + (i < fragments ? " twice" : "")))
-      return;
-    stored[i] = true;
-  }
-  for (std::size_t i = 0; i < fragments; ++i) {
-    const std::string field = plane_field(plane, "fragment " + std::to_string(i));
-    findings.require((t.covered_texels[i] > 0) == stored[i], "tables-order", kTablesPath, field,
-                     stored[i] ? "covered texels, as it is stored" : "to be stored, as it is covered",
+  std::vector<bool> stored(t.fragment_count());
+  for (const std::uint16_t i : t.order) stored[i] = true;
+  for (std::size_t i = 0; i < t.fragment_count(); ++i)
+    findings.require((t.covered_texels[i] > 0) == stored[i], "tables-coverage", kTablesPath,
+                     plane_field(plane, "fragment " + std::to_string(i)),
+                     stored[i] ? "covered texels, as it is stored" : "no covered texels, as it is not stored",
                      std::to_string(t.covered_texels[i]) + " covered texels");
-    for (std::size_t r = 0; r < t.rung_count(); ++r)
-      findings.require((t.size_bytes[r * fragments + i] > 0) == stored[i], "tables-size", kTablesPath,
-                       field + ", rung " + std::to_string(r), stored[i] ? "bytes" : "0 bytes, as it is not stored",
-                       std::to_string(t.size_bytes[r * fragments + i]));
-  }
   const std::vector<float> eta = eta_of(t, 0);
   for (std::size_t k = 1; k < t.order.size(); ++k) {
     const std::size_t a = t.order[k - 1], b = t.order[k];
