@@ -13,6 +13,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Bytes = std::vector<std::uint8_t>;
 
+constexpr const char* kNoFile = "0000000000000000";
+
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
   throw FormatError(kFragmentIndexPath, place, expected, found);
 }
@@ -70,6 +72,10 @@ void check_rung_files(PackageStore& folder, const std::map<std::string, std::uin
   for (std::size_t k = 0; k < t.order.size(); ++k) {
     const std::uint32_t fragment = t.order[k], bytes = t.size_bytes[rung * t.fragment_count() + fragment];
     const std::string path = fragment_file_path(plane, rung, fragment);
+    if (bytes == 0) {
+      findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path, "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
+      continue;
+    }
     const Bytes jpeg = join_jpeg(tables, folder.read(info.rungs[rung], at, bytes));
     at += bytes;
     const auto file = files.find(path);
@@ -116,6 +122,11 @@ FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink
       FragmentIndex::Rung files;
       for (const std::uint16_t fragment : t.order) {
         const ByteRange range = package.fragment_range(plane, rung, fragment);
+        if (range.bytes == 0) {   // not stored on this rung
+          files.bytes.push_back(0);
+          files.digests.push_back(kNoFile);
+          continue;
+        }
         const Bytes jpeg = join_jpeg(tables, std::span(pack).subspan(static_cast<std::size_t>(range.offset), static_cast<std::size_t>(range.bytes)));
         files.bytes.push_back(jpeg.size());
         files.digests.push_back(short_digest(jpeg));
@@ -134,6 +145,7 @@ Bytes join_fragment_files(const PlaneTables& t, std::uint32_t plane, std::uint32
   const std::size_t head = table_stream.size() - 2;   // without EOI
   Bytes pack;
   for (const std::uint16_t fragment : t.order) {
+    if (t.size_bytes[rung * t.fragment_count() + fragment] == 0) continue;
     const std::string path = fragment_file_path(plane, rung, fragment);
     const Bytes jpeg = read_file(path);
     if (jpeg.size() < head || !std::equal(table_stream.begin(), table_stream.begin() + static_cast<std::ptrdiff_t>(head), jpeg.begin()))

@@ -18,8 +18,8 @@ inline constexpr const char* kFragmentIndexPath = "fragments.json";
 /// Bytes and digests of the fragment files of one package, in the order in which a client wants them.
 struct FragmentIndex {
   struct Rung {
-    std::vector<std::uint64_t> bytes;      // per fragment of the plane's order: of the complete JPEG
-    std::vector<std::string> digests;      // its SHA-256's first 8 bytes, 16 lower-case digits
+    std::vector<std::uint64_t> bytes;      // per fragment of the plane's order: of the complete JPEG; 0 = no file
+    std::vector<std::string> digests;      // its SHA-256's first 8 bytes, 16 lower-case digits; zeros = no file
   };
   struct Plane {
     std::vector<std::uint16_t> order;      // as PlaneTables::order

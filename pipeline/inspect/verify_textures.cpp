@@ -198,7 +198,8 @@ std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::
   std::vector<Findings> per_fragment(t.order.size());
   parallel_for(context, t.order.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k)
-      check_fragment(texture, t, rung, t.order[k], tables,
+      if (offset[k + 1] > offset[k])   // a fragment may be stored on some rungs only
+        check_fragment(texture, t, rung, t.order[k], tables,
                      pack.subspan(static_cast<std::size_t>(offset[k]), static_cast<std::size_t>(offset[k + 1] - offset[k])), per_fragment[k]);
   });
   for (Findings& f : per_fragment) findings.append(std::move(f));

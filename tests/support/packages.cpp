@@ -1,0 +1,310 @@
+#include "tests/support/packages.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "format/container.h"
+#include "format/layout.h"
+#include "format/package_writer.h"
+#include "stages/jpeg.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh::testing {
+namespace {
+
+using nlohmann::json;
+
+void put_u32(Bytes& out, std::uint32_t v) {
+  for (int k = 0; k < 4; ++k) out.push_back(static_cast<std::uint8_t>(v >> (8 * k)));
+}
+
+template <class T>
+std::size_t append(Bytes& out, const std::vector<T>& values) {
+  while (out.size() % 4) out.push_back(0);
+  const std::size_t at = out.size();
+  out.resize(at + values.size() * sizeof(T));
+  std::memcpy(out.data() + at, values.data(), values.size() * sizeof(T));
+  return at;
+}
+
+template <class T>
+std::size_t add_view(GlbParts& g, const std::vector<T>& values) {
+  const std::size_t at = append(g.binary, values);
+  g.json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", values.size() * sizeof(T)}});
+  return g.json["bufferViews"].size() - 1;
+}
+
+std::size_t add_accessor(GlbParts& g, std::size_t view, int component, const char* type, std::size_t count) {
+  g.json["accessors"].push_back({{"bufferView", view}, {"componentType", component}, {"type", type}, {"count", count}});
+  return g.json["accessors"].size() - 1;
+}
+
+/// A picture with detail that differs between its quarters.
+Pixels picture(std::uint32_t width, std::uint32_t height) {
+  Pixels p{width, height, 3, {}};
+  Random random{7};
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; ++x)
+      for (std::uint32_t c = 0; c < 3; ++c)
+        p.data.push_back(static_cast<std::uint8_t>(40 + 2 * y + c * 20 + random.next() % (x < width / 2 ? 4 : 60)));
+  return p;
+}
+
+constexpr std::uint32_t kFragments = 4, kStored = 3;
+
+TexturePlane make_plane() {
+  TexturePlane plane;
+  plane.width_px = 64, plane.height_px = 48, plane.channels = 3;
+  plane.fragment_width_px = plane.fragment_height_px = 32;
+  plane.columns = plane.rows = 2;
+  plane.grid_reason = "a test's";
+  plane.coverage.assign(8 * 48, 0xff);
+  for (std::size_t y = 32; y < 48; ++y) std::fill_n(plane.coverage.begin() + static_cast<std::ptrdiff_t>(y * 8 + 4), 4, std::uint8_t{0});
+  plane.covered_texels = {1024, 1024, 512, 0};
+  plane.surface_fraction = {0.5f, 0.25f, 0.25f, 0};
+  plane.features = {5, 9, 7, 0, 4, 4, 8, 0};
+  return plane;
+}
+
+PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
+  PlaneTables t;
+  t.columns = plane.columns, t.rows = plane.rows, t.scales = 1;
+  t.covered_texels = plane.covered_texels;
+  t.surface_fraction = plane.surface_fraction;
+  t.features = plane.features;
+  for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
+  t.order = {1, 2, 0};   // eta_0 = 0, 1, 0.5
+  t.quality = {80, 40};
+  for (const LadderRung& rung : ladder.rungs) {
+    t.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
+    t.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
+    for (std::uint32_t f = 0; f < kFragments; ++f) {
+      const std::span stream(rung.data.data() + rung.offset[f], rung.offset[f + 1] - rung.offset[f]);
+      t.size_bytes.push_back(static_cast<std::uint32_t>(stream.size()));
+      t.digest.push_back(f < kStored ? truncated(sha256(stream)) : 0);
+      t.mse.push_back(f < kStored ? 2000.0f / static_cast<float>(rung.quality) : 0);
+      t.dssim.push_back(f < kStored ? 0.25f : 0);
+    }
+  }
+  for (std::uint32_t s = 0; s <= t.scales; ++s)
+    for (int g = 0; g <= 20; ++g) {
+      const auto quality = quality_of(t, s, g / 20.0);
+      std::uint64_t bytes = 0;
+      for (const std::uint16_t f : t.order) bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[f])) * kFragments + f];
+      t.total_bytes.push_back(bytes);
+    }
+  t.model_a = 300, t.model_b = 0.5f, t.model_r = 1.02f, t.model_correlation = 0.98f, t.model_error = 0.05f;
+  return t;
+}
+
+json make_provenance() {
+  const std::string digest(64, '5');
+  return {{"version", 1},
+          {"tool", "texmesh test"},
+          {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
+          {"inputs", {{{"role", "model"}, {"sha256", digest}, {"bytes", 4321}}}},
+          {"options", {{"version", 1}, {"package", {{"title", "Two spheres"}}}, {"ladder", {{"rungs", {20, 70}}}}}},
+          {"stages", {{"ssf", 1}}},
+          {"libraries", {{"draco", "1.5.5"}}}};
+}
+
+void add_texture(PackageParts& p) {
+  const TexturePlane plane = make_plane();
+  Fragments fragments;
+  fragments.scales = 1;
+  fragments.planes = {plane};
+  LadderOptions options;
+  options.rungs = {20, 70};
+  const PlaneLadder ladder = encode_ladder(fragments, {picture(64, 64)}, options, {}).planes.at(0);
+  p.tables.planes = {make_tables(plane, ladder)};
+  p.streams[preview_path(0)] = ladder.preview;
+  for (std::uint32_t r = 0; r < 2; ++r) {
+    const LadderRung& rung = ladder.rungs[r];
+    Bytes& tables = p.streams[table_streams_path(0)];
+    tables.insert(tables.end(), rung.tables.begin(), rung.tables.end());
+    Bytes& pack = p.streams[rung_path(0, r)];
+    for (const std::uint16_t f : p.tables.planes[0].order)
+      pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f]), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f + 1u]));
+  }
+  TextureInfo t;
+  t.role = "base-colour", t.name = "ball.jpg", t.colour_space = "srgb";
+  t.width_px = 64, t.height_px = 48, t.fragment_width_px = t.fragment_height_px = 32, t.columns = t.rows = 2;
+  t.grid_reason = plane.grid_reason;
+  t.preview_width_px = ladder.preview_width_px, t.preview_height_px = ladder.preview_height_px;
+  t.rung_quality = {20, 70};
+  p.textures = {t};
+}
+
+void add_scale(PackageParts& p, int scale, const Mesh& mesh) {
+  p.meshes[scale] = make_glb(mesh, p.streams[preview_path(0)]).glb();
+  ManifestScale s;
+  s.scale = scale;
+  s.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+  s.vertices = static_cast<std::uint32_t>(mesh.wedge_count());
+  s.glb.path = mesh_path(scale);
+  s.major = true;
+  if (scale > 0) s.error_max = 0.125, s.error_rms = 0.0625, s.p95 = 0.05, s.p99 = 0.07;
+  s.display_px_jnd = scale ? 300 : kAnyDisplayPx;
+  s.display_px_error = scale ? 200 : kAnyDisplayPx;
+  s.display_px_edge = scale ? 100 : kAnyDisplayPx;
+  p.manifest.scales.push_back(s);
+}
+
+std::uint32_t read_u32(const Bytes& b, std::size_t at) {
+  return static_cast<std::uint32_t>(b[at] | b[at + 1] << 8 | b[at + 2] << 16) | static_cast<std::uint32_t>(b[at + 3]) << 24;
+}
+
+void set_u32(Bytes& b, std::size_t at, std::uint32_t v) {
+  for (std::size_t k = 0; k < 4; ++k) b[at + k] = static_cast<std::uint8_t>(v >> (8 * k));
+}
+
+ContainerEntry find_entry(const Bytes& package, const std::string& path) {
+  const auto source = memory_source(package);
+  for (const ContainerEntry& e : read_container(*source))
+    if (e.path == path) return e;
+  throw std::runtime_error("no entry " + path);
+}
+
+}  // namespace
+
+Bytes GlbParts::glb() const {
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  Bytes padded = binary;
+  padded.resize((padded.size() + 3) / 4 * 4);
+  Bytes out;
+  for (const std::uint32_t v : {0x46546c67u, 2u, static_cast<std::uint32_t>(28 + text.size() + padded.size()), static_cast<std::uint32_t>(text.size()), 0x4e4f534au}) put_u32(out, v);
+  out.insert(out.end(), text.begin(), text.end());
+  put_u32(out, static_cast<std::uint32_t>(padded.size()));
+  put_u32(out, 0x004e4942u);
+  out.insert(out.end(), padded.begin(), padded.end());
+  return out;
+}
+
+GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg) {
+  GlbParts g;
+  std::vector<Vec3f> positions;
+  for (const std::uint32_t p : mesh.wedge_position) positions.push_back(mesh.positions[p]);
+  Vec3f lo = positions.front(), hi = lo;
+  for (const Vec3f& p : positions)
+    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+  const std::size_t position = add_accessor(g, add_view(g, positions), 5126, "VEC3", positions.size());
+  g.json["accessors"][position]["min"] = {lo.x, lo.y, lo.z};
+  g.json["accessors"][position]["max"] = {hi.x, hi.y, hi.z};
+  const std::size_t uv = add_accessor(g, add_view(g, mesh.uv0), 5126, "VEC2", mesh.uv0.size());
+  const std::size_t indices = add_accessor(g, add_view(g, mesh.triangles), 5125, "SCALAR", mesh.triangles.size() * 3);
+  json primitive{{"attributes", {{"POSITION", position}, {"TEXCOORD_0", uv}}}, {"indices", indices}, {"material", 0}};
+  json material{{"pbrMetallicRoughness", json::object()}};
+  if (!jpeg.empty()) {
+    g.json["images"] = {{{"name", "texture/0"}, {"mimeType", "image/jpeg"}, {"bufferView", add_view(g, jpeg)}}};
+    g.json["textures"] = {{{"source", 0}}};
+    material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+  }
+  g.json["asset"] = {{"version", "2.0"}};
+  g.json["materials"] = {material};
+  g.json["meshes"] = {{{"primitives", {primitive}}}};
+  g.json["nodes"] = {{{"mesh", 0}}};
+  g.json["scenes"] = {{{"nodes", {0}}}};
+  g.json["scene"] = 0;
+  g.json["buffers"] = {{{"byteLength", g.binary.size()}}};
+  return g;
+}
+
+PackageParts make_package_parts() {
+  PackageParts p;
+  add_texture(p);
+  add_scale(p, 0, sphere(6, 8));
+  add_scale(p, 5, sphere(4, 6));
+  p.manifest.title = "Two spheres";
+  p.manifest.origin = {10, 20, 30};
+  p.manifest.bounds_min = {-1, -1, -1};
+  p.manifest.bounds_max = {1, 1, 1};
+  p.manifest.object_height = 2;
+  p.manifest.steps = {{200, 5}, {kAnyDisplayPx, 0}};
+  p.manifest.plane_count = 1;
+  p.quality = {{0, 5}, {20, 70}, {0.9f, 1, 0.8f, 0.9f}, {0.1f, 0, 0.2f, 0.1f}, 2, 64};
+  p.provenance = make_provenance();
+  return p;
+}
+
+Bytes PackageParts::build() const {
+  const auto bytes_of = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
+  std::vector<PackageEntry> entries;
+  entries.push_back({kTablesPath, write_tables(tables)});
+  entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
+  entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
+  for (const auto& [scale, glb] : meshes) entries.push_back({mesh_path(scale), glb});
+  for (const auto& [path, bytes] : streams) entries.push_back({path, bytes});
+  return write_package(manifest, textures, entries);
+}
+
+PackagePatcher::PackagePatcher(Bytes package) : package_(std::move(package)) { manifest_ = read_manifest(entry(kManifestPath)); }
+
+Bytes PackagePatcher::entry(const std::string& path) const {
+  const ContainerEntry e = find_entry(package_, path);
+  const auto begin = package_.begin() + static_cast<std::ptrdiff_t>(e.offset);
+  return {begin, begin + static_cast<std::ptrdiff_t>(e.bytes)};
+}
+
+PackagePatcher& PackagePatcher::patch(const std::string& path, const Bytes& bytes) {
+  const ContainerEntry e = find_entry(package_, path);
+  if (bytes.size() != e.bytes) throw std::runtime_error(path + ": another size");
+  const auto crc = static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
+  std::copy(bytes.begin(), bytes.end(), package_.begin() + static_cast<std::ptrdiff_t>(e.offset));
+  std::size_t at = read_u32(package_, package_.size() - 6);   // of the central directory
+  while (std::string(package_.begin() + static_cast<std::ptrdiff_t>(at + 46), package_.begin() + static_cast<std::ptrdiff_t>(at + 46 + path.size())) != path ||
+         package_[at + 28] != path.size())
+    at += 46u + package_[at + 28] + package_[at + 30] + package_[at + 32];
+  set_u32(package_, at + 16, crc);
+  set_u32(package_, read_u32(package_, at + 42) + 14, crc);
+  return *this;
+}
+
+PackagePatcher& PackagePatcher::edit(const std::string& path, const std::function<void(Bytes&)>& change) {
+  Bytes bytes = entry(path);
+  change(bytes);
+  return patch(path, bytes);
+}
+
+void PackagePatcher::write_manifest_entry(Manifest m) {
+  const auto slice = [&](std::uint64_t offset, std::uint64_t bytes) {
+    return std::span<const std::uint8_t>(package_).subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(bytes));
+  };
+  m.first_picture_digest = sha256(slice(m.first_picture_offset, m.first_picture_bytes));
+  std::string json = write_manifest(m);
+  const std::size_t room = entry(kManifestPath).size();
+  if (json.size() > room) throw std::runtime_error("the manifest grew");
+  json.resize(room, ' ');   // blanks after the JSON are allowed
+  patch(kManifestPath, Bytes(json.begin(), json.end()));
+}
+
+PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<EntryRef>&)>& change) {
+  Manifest m = manifest_;
+  std::vector<EntryRef> index = read_index(entry(kIndexPath));
+  for (EntryRef& e : index) e.digest = sha256(entry(e.path));
+  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables}) ref->digest = sha256(entry(ref->path));
+  for (ManifestScale& s : m.scales) s.glb.digest = sha256(entry(s.glb.path));
+  if (change) change(index);
+  Bytes written = write_index(index);
+  patch(kIndexPath, written);
+  m.index.digest = sha256(written);
+  m.index.head_digest = sha256(std::span(written).first(static_cast<std::size_t>(m.index.head_bytes)));
+  const Bytes tables = entry(kTablesPath);
+  m.tables.head_digest = sha256(std::span(tables).first(static_cast<std::size_t>(m.tables.head_bytes)));
+  write_manifest_entry(m);
+  manifest_ = m;
+  return *this;
+}
+
+PackagePatcher& PackagePatcher::seal(const std::function<void(Manifest&)>& change) {
+  seal_index({});
+  if (!change) return *this;
+  change(manifest_);
+  write_manifest_entry(manifest_);
+  return *this;
+}
+
+}  // namespace texmesh::testing
