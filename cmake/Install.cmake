@@ -1,0 +1,32 @@
+# make install, and what find_package(texmesh) finds. Component delivery (format, delivery: a client of packages) needs
+# OpenSSL, zlib and nlohmann-json; component compiler (the stages and the pipeline as libraries) all the rest. The
+# texmesh command, where it was built, is texmesh::texmesh for texmesh_add_package().
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(texmesh_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/texmesh)
+
+function(texmesh_install_component export folders)
+  foreach(folder ${folders})
+    set_target_properties(texmesh_${folder} PROPERTIES EXPORT_NAME ${folder})
+    install(TARGETS texmesh_${folder} EXPORT ${export} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/texmesh
+      FILES_MATCHING PATTERN *.h PATTERN node_modules EXCLUDE PATTERN web EXCLUDE)
+  endforeach()
+  install(EXPORT ${export} NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE ${export}.cmake)
+endfunction()
+
+texmesh_install_component(texmeshDelivery "format;delivery")
+if(TEXMESH_COMPILER)
+  texmesh_install_component(texmeshCompiler "stages;pipeline")
+  install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
+  install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(EXPORT texmeshTool NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE texmeshTool.cmake)
+endif()
+install(DIRECTORY schemas/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/schemas FILES_MATCHING PATTERN *.schema.json
+  PATTERN examples EXCLUDE)
+
+configure_package_config_file(cmake/texmeshConfig.cmake.in ${PROJECT_BINARY_DIR}/texmeshConfig.cmake
+  INSTALL_DESTINATION ${texmesh_cmake_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/texmeshConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/texmeshConfig.cmake ${PROJECT_BINARY_DIR}/texmeshConfigVersion.cmake
+  cmake/TexmeshAddPackage.cmake DESTINATION ${texmesh_cmake_dir})

@@ -1,0 +1,13 @@
+# Tests of the house itself: layers, headers, layout of the source, installation.
+set(house ${CMAKE_CURRENT_SOURCE_DIR}/house)
+add_test(NAME house_layers COMMAND ${house}/check_layers ${PROJECT_SOURCE_DIR})
+add_test(NAME house_layers_self_test COMMAND ${house}/check_layers --self-test)
+add_test(NAME house_headers COMMAND ${house}/check_headers ${PROJECT_SOURCE_DIR} ${CMAKE_CXX_COMPILER})
+add_test(NAME house_format COMMAND ${house}/check_format ${PROJECT_SOURCE_DIR})
+set_tests_properties(house_format PROPERTIES SKIP_RETURN_CODE 77)
+add_test(NAME house_text COMMAND ${house}/check_text ${PROJECT_SOURCE_DIR})
+add_test(NAME house_text_self_test COMMAND ${house}/check_text --self-test)
+if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its user
+  add_test(NAME house_install COMMAND ${house}/check_install ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/consumer
+    ${CMAKE_CURRENT_BINARY_DIR}/install ${CMAKE_COMMAND} $<TARGET_FILE:make_scan>)
+endif()
