@@ -3,7 +3,6 @@
 #include <CGAL/version.h>
 #include <OpenImageIO/oiioversion.h>
 #include <draco/core/draco_version.h>
-#include <embree3/rtcore_config.h>
 #include <meshoptimizer.h>
 #include <zlib.h>
 
@@ -18,7 +17,6 @@ const std::map<std::string, std::string>& library_versions() {
   static const std::map<std::string, std::string> versions{
       {"cgal", CGAL_VERSION_STR},
       {"draco", draco::kDracoVersion},
-      {"embree", RTC_VERSION_STRING},
       {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
       {"meshoptimizer", std::to_string(MESHOPTIMIZER_VERSION)},
       {"openimageio", OIIO_VERSION_STRING},

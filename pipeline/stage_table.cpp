@@ -138,7 +138,7 @@ std::vector<Stage> make_table() {
        {artefact<ScaleFiles>("scales")}, {"scales"}, {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, true, run_scales},
       {"quality", kQualityVersion, "scales x rungs -> measured quality of rendered samples",
        {"simplification", "perceptual_values", "import.materials", "fragmentation", "fill", "ladder"},
-       {artefact<QualityTable>("quality")}, {"quality"}, {"embree", "libjpeg-turbo"}, true, run_quality},
+       {artefact<QualityTable>("quality")}, {"quality"}, {"libjpeg-turbo"}, true, run_quality},
       {"package", kPackageVersion, "everything -> the container",
        {"simplification", "perceptual_values", "import.images", "fragmentation", "ladder", "lut", "scales", "quality", "provenance"},
        {artefact<PackageBytes>("package")}, {"package", "perceptual_values.jnd"}, {}, true, run_package},
