@@ -4,6 +4,8 @@
 
 #include "format/errors.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/text_scan.h"
+#include "pipeline/import/uri.h"
 
 namespace texmesh {
 namespace {
@@ -16,14 +18,6 @@ bool finite(Vec3f a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::i
 std::string base_name(const std::string& uri) {
   const std::size_t slash = uri.find_last_of('/');
   return slash == std::string::npos ? uri : uri.substr(slash + 1);
-}
-
-std::string lower_extension(const std::string& name) {
-  const std::size_t dot = name.find_last_of('.');
-  std::string s = dot == std::string::npos ? "" : name.substr(dot + 1);
-  for (char& c : s)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return s;
 }
 
 bool extension_fits(const std::string& extension, ImageFormat format) {
@@ -313,6 +307,7 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
 
 std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
                        const std::string& place, const ImportOptions& options) {
+  check_relative_name(uri, file_name, place);
   auto bytes = resolver.read(uri, static_cast<std::uint64_t>(options.max_file_bytes));
   if (bytes) return add_image_bytes(model, uri, std::move(*bytes), file_name, place, options);
   const std::string text = "texture " + uri + " not found; the material stays without it";

@@ -4,17 +4,10 @@
 
 #include "format/errors.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/text_scan.h"
 
 namespace texmesh {
 namespace {
-
-std::string lower_extension(const std::string& name) {
-  const std::size_t dot = name.find_last_of('.');
-  std::string s = dot == std::string::npos ? "" : name.substr(dot + 1);
-  for (char& c : s)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return s;
-}
 
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && !std::memcmp(bytes.data(), magic.data(), magic.size());

@@ -1,0 +1,113 @@
+#include "pipeline/import/text_scan.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+
+namespace texmesh {
+namespace {
+
+char lower_char(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+// from_chars leaves the value alone when it is out of range: a huge one is infinite, a tiny one is 0.
+double out_of_range(std::string_view digits, bool negative) {
+  const std::size_t e = digits.find_first_of("eE");
+  const bool tiny = e == std::string_view::npos ? digits.substr(0, 2) == "0." || digits.front() == '.'
+                                                : digits.substr(e + 1, 1) == "-";
+  const double x = tiny ? 0 : std::numeric_limits<double>::infinity();
+  return negative ? -x : x;
+}
+
+}  // namespace
+
+std::string_view trim(std::string_view s) {
+  while (!s.empty() && (is_blank(s.front()) || s.front() == '\n')) s.remove_prefix(1);
+  while (!s.empty() && (is_blank(s.back()) || s.back() == '\n')) s.remove_suffix(1);
+  return s;
+}
+
+bool same_word(std::string_view a, std::string_view b) {
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(), [](char x, char y) { return lower_char(x) == lower_char(y); });
+}
+
+std::string lower(std::string_view s) {
+  std::string out(s);
+  for (char& c : out) c = lower_char(c);
+  return out;
+}
+
+std::string lower_extension(const std::string& file_name) {
+  const std::size_t dot = file_name.find_last_of('.'), slash = file_name.find_last_of('/');
+  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
+  return lower(std::string_view(file_name).substr(dot + 1));
+}
+
+std::string_view next_token(std::string_view& rest) {
+  std::size_t begin = 0;
+  while (begin < rest.size() && is_blank(rest[begin])) ++begin;
+  std::size_t end = begin;
+  while (end < rest.size() && !is_blank(rest[end])) ++end;
+  const std::string_view token = rest.substr(begin, end - begin);
+  rest.remove_prefix(end);
+  return token;
+}
+
+bool parse_number(std::string_view token, double& value) {
+  std::string_view digits = token;
+  bool negative = false;
+  if (!digits.empty() && (digits.front() == '+' || digits.front() == '-')) {
+    negative = digits.front() == '-';
+    digits.remove_prefix(1);
+  }
+  if (digits.empty() || digits.front() == '-' || digits.front() == '+') return false;
+  double x = 0;
+  const char* end = digits.data() + digits.size();
+  const auto result = std::from_chars(digits.data(), end, x);
+  if (result.ec == std::errc::invalid_argument) return false;
+  if (result.ptr != end) {
+    if (*result.ptr != '#') return false;
+    const std::string_view special(result.ptr, static_cast<std::size_t>(end - result.ptr));
+    if (special.substr(0, 4) == "#INF") x = std::numeric_limits<double>::infinity();
+    else if (special.substr(0, 4) == "#IND" || special.substr(0, 3) == "#QN" || special.substr(0, 3) == "#SN")
+      x = std::numeric_limits<double>::quiet_NaN();
+    else return false;
+  }
+  value = result.ec == std::errc::result_out_of_range ? out_of_range(digits, negative) : negative ? -x : x;
+  return true;
+}
+
+bool parse_integer(std::string_view token, std::int64_t& value) {
+  if (!token.empty() && token.front() == '+') token.remove_prefix(1);
+  const auto result = std::from_chars(token.data(), token.data() + token.size(), value);
+  return result.ec == std::errc() && result.ptr == token.data() + token.size();
+}
+
+bool LineReader::next(std::string_view& line) {
+  if (rest_.empty()) return false;
+  ++number_;
+  // The next LF is remembered: in a file whose lines end in CR, looking for it at every line would take quadratic time.
+  const char* begin = rest_.data();
+  if (!line_feed_ || line_feed_ < begin) {
+    line_feed_ = static_cast<const char*>(std::memchr(begin, '\n', rest_.size()));
+    if (!line_feed_) line_feed_ = begin + rest_.size();
+  }
+  std::size_t end = static_cast<std::size_t>(line_feed_ - begin), skip = std::min(end + 1, rest_.size());
+  if (const void* cr = std::memchr(begin, '\r', end)) {
+    const auto at = static_cast<std::size_t>(static_cast<const char*>(cr) - begin);
+    if (at + 1 != end) skip = at + 1;  // a lone CR; otherwise CR LF
+    end = at;
+  }
+  line = rest_.substr(0, end);
+  rest_.remove_prefix(skip);
+  return true;
+}
+
+std::string quoted(std::string_view s) {
+  std::string out = "\"";
+  for (char c : s.substr(0, 60)) out += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
+  return out + (s.size() > 60 ? "...\"" : "\"");
+}
+
+}  // namespace texmesh
