@@ -1,0 +1,173 @@
+#include "stages/perceptual_values.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "format/portable_math.h"
+#include "stages/distance.h"
+#include "stages/parallel.h"
+
+namespace texmesh {
+namespace {
+
+/// Points on one scale, with the skeleton distance that stands for the size of the shape around them.
+struct SampledScale {
+  std::vector<Vec3d> points;
+  std::vector<double> radius;
+};
+
+SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius, std::size_t count) {
+  SampledScale out;
+  for (const SurfaceSample& s : sample_surface(mesh.positions, mesh.wedge_position, scale.triangles, count)) {
+    Vec3d p;
+    double r = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t position = mesh.wedge_position[scale.triangles[s.triangle][k]];
+      p = p + to_double(mesh.positions[position]) * static_cast<double>(s.weight[k]);
+      r += static_cast<double>(s.weight[k]) * radius[position];
+    }
+    out.points.push_back(p);
+    out.radius.push_back(r);
+  }
+  return out;
+}
+
+/// Nearest-rank percentile; reorders the values. 0 for none.
+double percentile(std::vector<double>& values, double percent) {
+  if (values.empty()) return 0;
+  const double rank = std::floor(percent / 100 * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Table 7.1: one scale change.
+CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k, const Skeleton& skeleton,
+                                       std::vector<std::uint32_t>& survivor) {
+  const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
+  // Backwards, so that a chain's end is known before the links that lead to it.
+  for (std::size_t i = end; i-- > begin;) survivor[scales.collapses[i].from] = survivor[scales.collapses[i].to];
+  CollapseStatistics out;
+  double sum = 0, squares = 0, least = 0, most = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::uint32_t removed = scales.collapses[i].from, left = survivor[removed];
+    const double rho = std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) / skeleton.radius[left];
+    sum += rho, squares += rho * rho;
+    least = i == begin ? rho : std::min(least, rho);
+    most = std::max(most, rho);
+  }
+  const auto n = static_cast<double>(end - begin);
+  if (end == begin) return out;
+  const double mean = sum / n;
+  out.collapses = static_cast<std::uint32_t>(end - begin);
+  out.mean = static_cast<float>(mean), out.max = static_cast<float>(most), out.min = static_cast<float>(least);
+  out.deviation = static_cast<float>(std::sqrt(std::max(squares / n - mean * mean, 0.0)));
+  out.sum = static_cast<float>(sum), out.rss = static_cast<float>(std::sqrt(squares));
+  return out;
+}
+
+/// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
+std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
+                                   const RunContext& context, PerceptualValues& out) {
+  const Mesh& mesh = scales.mesh;
+  const std::size_t n = scales.scales.size();
+  std::vector<SampledScale> sampled;
+  for (std::size_t i = 0; i + 1 < n; ++i) sampled.push_back(sample_scale(mesh, scales.scales[i], skeleton.radius, samples));
+  std::vector<double> error(n, 0);
+  for (std::size_t j = 1; j < n; ++j) {
+    const SurfaceDistance surface(mesh.positions, mesh.wedge_position, scales.scales[j].triangles);
+    for (std::size_t i = 0; i < j; ++i) {
+      std::vector<double> distance(sampled[i].points.size());
+      parallel_for(context, distance.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) distance[s] = surface(sampled[i].points[s]);
+      });
+      std::vector<double> rho(distance.size());
+      for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
+      out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
+      out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
+      if (i == 0) error[j] = percentile(distance, 95);
+    }
+    context.report(static_cast<double>(j) / static_cast<double>(n));
+  }
+  return error;
+}
+
+void find_majors(const std::vector<float>& value, std::size_t n, double jnd, std::vector<std::uint8_t>& major) {
+  for (std::size_t i = 0; i + 1 < n;) {
+    std::size_t last = i + 1;
+    while (last + 1 < n && value[i * n + last] < jnd && value[i * n + last + 1] < jnd) ++last;
+    major[last] = 1;
+    i = last;
+  }
+}
+
+void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& out) {
+  const std::size_t n = scales.scales.size();
+  out.kept = out.major;
+  out.kept[0] = out.kept[n - 1] = 1;
+  auto log_triangles = [&](std::size_t k) { return portable::log(static_cast<double>(scales.scales[k].triangles.size())); };
+  const double top = log_triangles(0), span = top - log_triangles(n - 1);
+  const double step = std::max(span / kept_scales, portable::log(2));
+  for (int m = 1; m <= kept_scales; ++m) {
+    const double want = top - step * m;
+    std::size_t nearest = 0;
+    for (std::size_t k = 1; k < n; ++k)
+      if (std::fabs(log_triangles(k) - want) < std::fabs(log_triangles(nearest) - want)) nearest = k;
+    out.kept[nearest] = 1;
+  }
+}
+
+double shortest_edge(const Mesh& mesh, const NestedScale& scale, double percent) {
+  std::vector<double> edges;
+  edges.reserve(3 * scale.triangles.size());
+  for (const Triangle& t : scale.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      edges.push_back(length(to_double(mesh.positions[mesh.wedge_position[t[k]]]) - to_double(mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]])));
+  return percentile(edges, percent);
+}
+
+float height_px(double numerator, double denominator) {
+  const double px = denominator > 0 ? numerator / denominator : kAnyHeightPx;
+  return static_cast<float>(std::min<double>(px, kAnyHeightPx));
+}
+
+void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error, const PerceptualValuesOptions& options,
+                            const std::vector<float>& value, PerceptualValues& out) {
+  Vec3f lo = scales.mesh.positions.at(0), hi = lo;
+  for (Vec3f p : scales.mesh.positions)
+    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+  out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) {
+    out.display_px_edge.push_back(height_px(out.object_height, shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile)));
+    out.display_px_error.push_back(height_px(out.object_height, error[k]));
+    out.display_px_jnd.push_back(height_px(kJndReferencePx * options.jnd, value[k]));
+    if (k == 0) continue;
+    for (std::vector<float>* px : {&out.display_px_edge, &out.display_px_error, &out.display_px_jnd})
+      (*px)[k] = std::min((*px)[k], (*px)[k - 1]);
+  }
+}
+
+}  // namespace
+
+PerceptualValues measure_perceptual_values(const NestedScales& scales, const Skeleton& skeleton,
+                                           const PerceptualValuesOptions& options, const RunContext& context) {
+  const std::size_t n = scales.scales.size(), positions = scales.mesh.positions.size();
+  if (skeleton.distance.size() != positions || skeleton.radius.size() != positions)
+    throw StageError("perceptual_values", "skeleton", std::to_string(positions) + " positions", std::to_string(skeleton.distance.size()));
+  PerceptualValues out;
+  out.step.resize(n);
+  out.p95.assign(n * n, 0), out.p99.assign(n * n, 0);
+  out.major.assign(n, 0);
+  std::vector<std::uint32_t> survivor(positions);
+  for (std::size_t p = 0; p < positions; ++p) survivor[p] = static_cast<std::uint32_t>(p);
+  for (std::size_t k = 1; k < n; ++k) out.step[k] = collapse_statistics(scales, k, skeleton, survivor);
+  const std::vector<double> error = compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
+  const std::vector<float>& value = options.statistic == PerceptualStatistic::kP99 ? out.p99 : out.p95;
+  find_majors(value, n, options.jnd, out.major);
+  choose_kept(scales, options.kept_scales, out);
+  find_displayed_heights(scales, error, options, value, out);
+  return out;
+}
+
+}  // namespace texmesh
