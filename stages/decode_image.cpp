@@ -21,11 +21,16 @@ using Bytes = std::span<const std::uint8_t>;
 
 const char* reader_name(ImageFormat format) {
   switch (format) {
-    case ImageFormat::kJpeg: return "jpeg";
-    case ImageFormat::kPng: return "png";
-    case ImageFormat::kTiff: return "tiff";
-    case ImageFormat::kWebp: return "webp";
-    case ImageFormat::kExr: return "openexr";
+    case ImageFormat::kJpeg:
+      return "jpeg";
+    case ImageFormat::kPng:
+      return "png";
+    case ImageFormat::kTiff:
+      return "tiff";
+    case ImageFormat::kWebp:
+      return "webp";
+    case ImageFormat::kExr:
+      return "openexr";
   }
   return "";
 }
@@ -39,11 +44,13 @@ std::string first_bytes(Bytes bytes) {
   return s;
 }
 
-void check_size(const std::string& name, std::uint64_t width, std::uint64_t height, const ImageLimits& limits) {
+void check_size(const std::string& name, std::uint64_t width, std::uint64_t height,
+                const ImageLimits& limits) {
   const std::string found = std::to_string(width) + " x " + std::to_string(height);
   if (width == 0 || height == 0) throw InputError(name, "image header", "at least 1 x 1 px", found);
   if (width > limits.max_side_px || height > limits.max_side_px)
-    throw InputError(name, "image header", "sides up to " + std::to_string(limits.max_side_px) + " px", found);
+    throw InputError(name, "image header", "sides up to " + std::to_string(limits.max_side_px) + " px",
+                     found);
   if (width * height > limits.max_pixels)
     throw InputError(name, "image header", "up to " + std::to_string(limits.max_pixels) + " pixels", found);
 }
@@ -65,8 +72,8 @@ std::vector<std::uint8_t> decode_webp(const Image& image) {
     throw InputError(image.name, "WebP header", "the size that import had found", "another one");
   std::vector<std::uint8_t> out(static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
   const int stride = static_cast<int>(image.width_px * image.channels);
-  const std::uint8_t* end = (alpha ? WebPDecodeRGBAInto : WebPDecodeRGBInto)(image.bytes.data(), image.bytes.size(),
-                                                                            out.data(), out.size(), stride);
+  const std::uint8_t* end = (alpha ? WebPDecodeRGBAInto : WebPDecodeRGBInto)(
+      image.bytes.data(), image.bytes.size(), out.data(), out.size(), stride);
   if (!end) throw InputError(image.name, "pixels", "a whole WebP", "a damaged or truncated one");
   return out;
 }
@@ -89,19 +96,22 @@ std::string reader_error(OIIO::ImageInput& input) {
 OpenImage open_image(const std::string& name, ImageFormat format, Bytes bytes) {
   static std::once_flag once;
   std::call_once(once, [] {
-    // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add threads.
+    // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add
+    // threads.
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
   });
   OpenImage open;
   open.memory = std::make_unique<OIIO::Filesystem::IOMemReader>(bytes.data(), bytes.size());
   open.input = OIIO::ImageInput::create(reader_name(format));
-  if (!open.input) throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
+  if (!open.input)
+    throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   open.input->set_ioproxy(open.memory.get());
   if (!open.input->open("memory", open.spec, config))
-    throw InputError(name, "image header", std::string("a readable ") + image_format_name(format), reader_error(*open.input));
+    throw InputError(name, "image header", std::string("a readable ") + image_format_name(format),
+                     reader_error(*open.input));
   return open;
 }
 
@@ -113,9 +123,12 @@ std::uint32_t colour_channels(const OIIO::ImageSpec& spec) {
 
 std::uint8_t bits_of(const OIIO::ImageSpec& spec) {
   switch (spec.format.basetype) {
-    case OIIO::TypeDesc::UINT8: return 8;
-    case OIIO::TypeDesc::UINT16: return 16;
-    default: return 32;
+    case OIIO::TypeDesc::UINT8:
+      return 8;
+    case OIIO::TypeDesc::UINT16:
+      return 16;
+    default:
+      return 32;
   }
 }
 
@@ -128,21 +141,25 @@ void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const Imag
     throw InputError(name, "image header", "1 to 64 channels", std::to_string(spec.nchannels));
 }
 
-// Deflate cannot shrink more than 1032-fold: what claims more lies about its size, and is told so before memory is taken.
+// Deflate cannot shrink more than 1032-fold: what claims more lies about its size, and is told so before
+// memory is taken.
 void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
   if (image.format != ImageFormat::kPng) return;
   const auto bits = static_cast<std::uint64_t>(std::max(1, spec.get_int_attribute("oiio:BitsPerSample", 1)));
   // A palette entry of one bit is the least a PNG stores per pixel, whatever the decoded channels are.
-  const std::uint64_t raw = static_cast<std::uint64_t>(image.width_px) * image.height_px * (bits < 8 ? bits : 1) / 8;
+  const std::uint64_t raw =
+      static_cast<std::uint64_t>(image.width_px) * image.height_px * (bits < 8 ? bits : 1) / 8;
   if (raw / 1032 > image.bytes.size())
-    throw InputError(image.name, "image header", "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
+    throw InputError(image.name, "image header",
+                     "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
                      std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
 }
 
 OpenImage open_checked(const Image& image) {
   OpenImage open = open_image(image.name, image.format, image.bytes);
   if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
-      static_cast<std::uint32_t>(open.spec.height) != image.height_px || colour_channels(open.spec) != image.channels)
+      static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
+      colour_channels(open.spec) != image.channels)
     throw InputError(image.name, "image header", "the size that import had found", "another one");
   check_plausible(image, open.spec);
   return open;
@@ -171,11 +188,13 @@ double srgb_from_linear(double x) {
 
 std::vector<std::uint8_t> bytes_from_words(const std::vector<std::uint16_t>& words) {
   std::vector<std::uint8_t> out(words.size());
-  for (std::size_t i = 0; i < words.size(); ++i) out[i] = static_cast<std::uint8_t>((words[i] * 255u + 32767u) / 65535u);
+  for (std::size_t i = 0; i < words.size(); ++i)
+    out[i] = static_cast<std::uint8_t>((words[i] * 255u + 32767u) / 65535u);
   return out;
 }
 
-std::vector<std::uint8_t> bytes_from_floats(const std::vector<float>& values, std::uint32_t channels, FloatEncoding encoding) {
+std::vector<std::uint8_t> bytes_from_floats(const std::vector<float>& values, std::uint32_t channels,
+                                            FloatEncoding encoding) {
   const std::uint32_t alpha = channels == 2 || channels == 4 ? channels - 1 : channels;
   std::vector<std::uint8_t> out(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -190,13 +209,15 @@ Pixels decode_jpeg_pixels(const Image& image) {
   const std::size_t row_bytes = static_cast<std::size_t>(image.width_px) * image.channels;
   // Reserved, not filled: memory is touched row by row, so that a header that lies costs nothing.
   pixels.data.reserve(row_bytes * image.height_px);
-  decode_jpeg(image.name, image.bytes, [&](const std::uint8_t* row) { pixels.data.insert(pixels.data.end(), row, row + row_bytes); });
+  decode_jpeg(image.name, image.bytes,
+              [&](const std::uint8_t* row) { pixels.data.insert(pixels.data.end(), row, row + row_bytes); });
   return pixels;
 }
 
 void check_jpeg_unchanged(const Image& image) {
   const JpegHeader header = read_jpeg_header(image.name, image.bytes);
-  if (header.width_px != image.width_px || header.height_px != image.height_px || header.channels != image.channels)
+  if (header.width_px != image.width_px || header.height_px != image.height_px ||
+      header.channels != image.channels)
     throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
 }
 
@@ -204,11 +225,16 @@ void check_jpeg_unchanged(const Image& image) {
 
 const char* image_format_name(ImageFormat format) {
   switch (format) {
-    case ImageFormat::kJpeg: return "JPEG";
-    case ImageFormat::kPng: return "PNG";
-    case ImageFormat::kTiff: return "TIFF";
-    case ImageFormat::kWebp: return "WebP";
-    case ImageFormat::kExr: return "EXR";
+    case ImageFormat::kJpeg:
+      return "JPEG";
+    case ImageFormat::kPng:
+      return "PNG";
+    case ImageFormat::kTiff:
+      return "TIFF";
+    case ImageFormat::kWebp:
+      return "WebP";
+    case ImageFormat::kExr:
+      return "EXR";
   }
   return "";
 }
@@ -220,7 +246,8 @@ std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> byte
   using namespace std::string_view_literals;
   if (has(0, "\xff\xd8\xff"sv)) return ImageFormat::kJpeg;
   if (has(0, "\x89PNG\r\n\x1a\n"sv)) return ImageFormat::kPng;
-  if (has(0, "II*\0"sv) || has(0, "MM\0*"sv) || has(0, "II+\0"sv) || has(0, "MM\0+"sv)) return ImageFormat::kTiff;
+  if (has(0, "II*\0"sv) || has(0, "MM\0*"sv) || has(0, "II+\0"sv) || has(0, "MM\0+"sv))
+    return ImageFormat::kTiff;
   if (has(0, "RIFF"sv) && has(8, "WEBP"sv)) return ImageFormat::kWebp;
   if (has(0, "\x76\x2f\x31\x01"sv)) return ImageFormat::kExr;
   return std::nullopt;
@@ -263,13 +290,20 @@ Pixels decode_image(const Image& image, FloatEncoding encoding) {
     check_jpeg_unchanged(image);
     return decode_jpeg_pixels(image);
   }
-  if (image.format == ImageFormat::kWebp) return {image.width_px, image.height_px, image.channels, decode_webp(image)};
+  if (image.format == ImageFormat::kWebp)
+    return {image.width_px, image.height_px, image.channels, decode_webp(image)};
   OpenImage open = open_checked(image);
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
   switch (bits_of(open.spec)) {
-    case 8: pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8); break;
-    case 16: pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16)); break;
-    default: pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels, encoding);
+    case 8:
+      pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
+      break;
+    case 16:
+      pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16));
+      break;
+    default:
+      pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels,
+                                      encoding);
   }
   return pixels;
 }
@@ -283,9 +317,14 @@ FloatPixels decode_float(const Image& image) {
   }
   OpenImage open = open_checked(image);
   switch (bits_of(open.spec)) {
-    case 8: widen(read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8)); break;
-    case 16: widen(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16)); break;
-    default: pixels.data = read_samples<float>(image, open, OIIO::TypeDesc::FLOAT);
+    case 8:
+      widen(read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8));
+      break;
+    case 16:
+      widen(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16));
+      break;
+    default:
+      pixels.data = read_samples<float>(image, open, OIIO::TypeDesc::FLOAT);
   }
   return pixels;
 }

@@ -20,8 +20,8 @@ struct Pixels {
   }
 };
 
-/// As Pixels, with the values of the file: integers keep their value (0..255, 0..65535), floats are as they are, NaN and
-/// infinities included.
+/// As Pixels, with the values of the file: integers keep their value (0..255, 0..65535), floats are as they
+/// are, NaN and infinities included.
 struct FloatPixels {
   std::uint32_t width_px = 0, height_px = 0, channels = 0;
   std::vector<float> data;
@@ -32,8 +32,9 @@ struct ImageLimits {
   std::uint64_t max_pixels = 20000ull * 20000ull;
 };
 
-/// What float samples (EXR, float TIFF) become: kAsIs for data (normals, roughness); kSrgb for colours, because float
-/// files hold linear light and every other image of a material is sRGB encoded. Integer images are never converted.
+/// What float samples (EXR, float TIFF) become: kAsIs for data (normals, roughness); kSrgb for colours,
+/// because float files hold linear light and every other image of a material is sRGB encoded. Integer images
+/// are never converted.
 enum class FloatEncoding : std::uint8_t { kAsIs, kSrgb };
 
 /// The allow-listed format that the first bytes show, nothing for any other content.
@@ -42,15 +43,16 @@ std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> byte
 /// "JPEG", "PNG", "TIFF", "WebP", "EXR".
 const char* image_format_name(ImageFormat format);
 
-/// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and checks
-/// size and channels against the limits before any pixel is read. `name` is for messages. Throws InputError.
-/// Channels beyond the colour (depth, object ids in EXR and TIFF) are left out; CMYK becomes RGB, palettes RGB or RGBA.
+/// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and
+/// checks size and channels against the limits before any pixel is read. `name` is for messages. Throws
+/// InputError. Channels beyond the colour (depth, object ids in EXR and TIFF) are left out; CMYK becomes RGB,
+/// palettes RGB or RGBA.
 Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const ImageLimits& limits);
 
-/// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1, NaN is 0),
-/// with the channel count of the file (1..4), top row first, no colour conversion beyond `encoding`, alpha not
-/// multiplied in, EXIF orientation ignored as glTF viewers do. Single-threaded; the same bytes for every run.
-/// Throws InputError when the file is truncated or lies about its size.
+/// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,
+/// NaN is 0), with the channel count of the file (1..4), top row first, no colour conversion beyond
+/// `encoding`, alpha not multiplied in, EXIF orientation ignored as glTF viewers do. Single-threaded; the
+/// same bytes for every run. Throws InputError when the file is truncated or lies about its size.
 Pixels decode_image(const Image& image, FloatEncoding encoding = FloatEncoding::kAsIs);
 
 /// Decodes without loss of range, for measured data such as range scans. Errors as decode_image.

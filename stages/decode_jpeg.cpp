@@ -15,7 +15,8 @@
 namespace texmesh {
 namespace {
 
-constexpr int kMaxScans = 500;  // a progressive file of endless scans is an attack on time; encoders write about 10
+constexpr int kMaxScans =
+    500;  // a progressive file of endless scans is an attack on time; encoders write about 10
 
 struct Decoder {
   jpeg_decompress_struct info{};
@@ -77,7 +78,9 @@ bool is_cmyk(const jpeg_decompress_struct& info) {
 void choose_output(jpeg_decompress_struct& info) {
   info.dct_method = JDCT_ISLOW;
   info.do_fancy_upsampling = TRUE;
-  info.out_color_space = info.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE : is_cmyk(info) ? JCS_CMYK : JCS_RGB;
+  info.out_color_space = info.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE
+                         : is_cmyk(info)                        ? JCS_CMYK
+                                                                : JCS_RGB;
 }
 
 bool start(Decoder& decoder) {
@@ -139,7 +142,8 @@ void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
   std::vector<std::uint8_t> buffer(static_cast<std::size_t>(width) *
                                    static_cast<std::size_t>(decoder.info.output_components));
   for (std::uint32_t y = 0; y < height; ++y) {
-    if (!next_row(decoder, buffer.data())) fail(name, "row " + std::to_string(y) + " of " + std::to_string(height), decoder);
+    if (!next_row(decoder, buffer.data()))
+      fail(name, "row " + std::to_string(y) + " of " + std::to_string(height), decoder);
     if (cmyk) cmyk_to_rgb(buffer.data(), width, decoder.info.saw_Adobe_marker != 0);
     row(buffer.data());
   }

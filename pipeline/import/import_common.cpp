@@ -22,18 +22,23 @@ std::string base_name(const std::string& uri) {
 
 bool extension_fits(const std::string& extension, ImageFormat format) {
   switch (format) {
-    case ImageFormat::kJpeg: return extension == "jpg" || extension == "jpeg" || extension == "jpe" || extension == "jfif";
-    case ImageFormat::kPng: return extension == "png";
-    case ImageFormat::kTiff: return extension == "tif" || extension == "tiff";
-    case ImageFormat::kWebp: return extension == "webp";
-    case ImageFormat::kExr: return extension == "exr";
+    case ImageFormat::kJpeg:
+      return extension == "jpg" || extension == "jpeg" || extension == "jpe" || extension == "jfif";
+    case ImageFormat::kPng:
+      return extension == "png";
+    case ImageFormat::kTiff:
+      return extension == "tif" || extension == "tiff";
+    case ImageFormat::kWebp:
+      return extension == "webp";
+    case ImageFormat::kExr:
+      return extension == "exr";
   }
   return false;
 }
 
 void note_foreign_extension(Model& model, const Image& image, const std::string& place) {
-  static constexpr std::string_view kKnown[] = {"jpg", "jpeg", "jpe", "jfif", "png", "tif", "tiff", "webp", "exr",
-                                                "tga", "bmp", "gif", "ppm", "pgm", "hdr", "dds"};
+  static constexpr std::string_view kKnown[] = {"jpg", "jpeg", "jpe", "jfif", "png", "tif", "tiff", "webp",
+                                                "exr", "tga",  "bmp", "gif",  "ppm", "pgm", "hdr",  "dds"};
   const std::string extension = lower_extension(image.name);
   if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) return;
   if (!extension_fits(extension, image.format))
@@ -41,7 +46,8 @@ void note_foreign_extension(Model& model, const Image& image, const std::string&
              image.name + " holds a " + image_format_name(image.format) + " and is read as one");
 }
 
-// --- finish_model -----------------------------------------------------------------------------------------------
+// --- finish_model
+// -----------------------------------------------------------------------------------------------
 
 void fill_defaults(Model& model) {
   Mesh& mesh = model.mesh;
@@ -53,7 +59,8 @@ void fill_defaults(Model& model) {
     if (mesh.part_names[i].empty()) mesh.part_names[i] = "part " + std::to_string(i + 1);
 }
 
-// A reader that hands over a wrong index has a bug; reading past an array for it would be worse than saying so.
+// A reader that hands over a wrong index has a bug; reading past an array for it would be worse than saying
+// so.
 void check_structure(const Model& model, const std::string& file_name) {
   const Mesh& mesh = model.mesh;
   const std::size_t wedges = mesh.wedge_count();
@@ -64,13 +71,17 @@ void check_structure(const Model& model, const std::string& file_name) {
   require(attribute(mesh.uv0.size()) && attribute(mesh.uv1.size()) && attribute(mesh.normals.size()) &&
               attribute(mesh.colours.size()),
           "one value per wedge for every attribute");
-  require(mesh.triangle_material.size() == mesh.triangles.size() && mesh.triangle_part.size() == mesh.triangles.size(),
+  require(mesh.triangle_material.size() == mesh.triangles.size() &&
+              mesh.triangle_part.size() == mesh.triangles.size(),
           "a material and a part for every triangle");
-  for (std::uint32_t p : mesh.wedge_position) require(p < mesh.positions.size(), "wedges that refer to positions");
+  for (std::uint32_t p : mesh.wedge_position)
+    require(p < mesh.positions.size(), "wedges that refer to positions");
   for (const Triangle& t : mesh.triangles)
     for (std::uint32_t w : t) require(w < wedges, "triangles that refer to wedges");
-  for (std::uint16_t m : mesh.triangle_material) require(m < model.materials.size(), "triangles that refer to materials");
-  for (std::uint16_t p : mesh.triangle_part) require(p < mesh.part_names.size(), "triangles that refer to parts");
+  for (std::uint16_t m : mesh.triangle_material)
+    require(m < model.materials.size(), "triangles that refer to materials");
+  for (std::uint16_t p : mesh.triangle_part)
+    require(p < mesh.part_names.size(), "triangles that refer to parts");
 }
 
 void check_limits(const Model& model, const std::string& file_name, const ImportOptions& options) {
@@ -120,8 +131,9 @@ void repair_uvs(Model& model, std::vector<Vec2f>& uvs, const std::string& file_n
       ++bad;
     }
   if (bad)
-    add_warning(model.notes, "non-finite-uv", file_name,
-                count_of(bad, "texture coordinate", "texture coordinates") + " with NaN or infinity set to 0");
+    add_warning(
+        model.notes, "non-finite-uv", file_name,
+        count_of(bad, "texture coordinate", "texture coordinates") + " with NaN or infinity set to 0");
 }
 
 // Normals become unit vectors. One that is NaN or 0 takes the sum of its triangles' area-weighted normals.
@@ -166,7 +178,8 @@ void keep_marked(std::vector<T>& values, const std::vector<std::uint32_t>& new_i
   // new_index[i] <= i; moving a string or a vector onto itself would empty it.
   for (std::size_t i = 0; i < values.size(); ++i)
     if (new_index[i] != kNone && new_index[i] != i) values[new_index[i]] = std::move(values[i]);
-  values.resize(static_cast<std::size_t>(std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNone; })));
+  values.resize(static_cast<std::size_t>(
+      std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNone; })));
 }
 
 // Marks become consecutive indices in the old order; kNone stays.
@@ -233,7 +246,8 @@ void drop_unused_images(Model& model, const std::string& file_name) {
   auto mark = [&](TextureRef& ref) {
     if (!ref.used()) return;
     if (static_cast<std::size_t>(ref.image) >= image.size())
-      throw InputError(file_name, "imported materials", "textures that refer to images", std::to_string(ref.image));
+      throw InputError(file_name, "imported materials", "textures that refer to images",
+                       std::to_string(ref.image));
     image[static_cast<std::size_t>(ref.image)] = 0;
   };
   for (Material& m : model.materials) for_each_texture(m, mark);
@@ -252,7 +266,8 @@ void turn_z_up(Mesh& mesh) {
   for (Vec3f& n : mesh.normals) turn(n);
 }
 
-// --- set_positions ----------------------------------------------------------------------------------------------
+// --- set_positions
+// ----------------------------------------------------------------------------------------------
 
 // Beyond this a coordinate is no measure of anything, and squares of differences would overflow a float.
 constexpr double kLargestCoordinate = 1e18;
@@ -288,8 +303,9 @@ void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions) {
     mesh.positions[i] = usable(positions[i]) ? to_float(positions[i] - mesh.origin) : Vec3f{nan, nan, nan};
 }
 
-std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes, const std::string& file_name,
-                             const std::string& place, const ImportOptions& options) {
+std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
+                             const std::string& file_name, const std::string& place,
+                             const ImportOptions& options) {
   for (std::size_t i = 0; i < model.images.size(); ++i)
     if (model.images[i].bytes == bytes) return static_cast<std::int32_t>(i);
   if (model.images.size() >= static_cast<std::size_t>(options.max_images))
@@ -299,7 +315,8 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   try {
     model.images.push_back(probe_image(base_name(name), std::move(bytes), limits));
   } catch (const InputError& e) {
-    throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()), e.expected(), e.found());
+    throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
+                     e.expected(), e.found());
   }
   note_foreign_extension(model, model.images.back(), place);
   return static_cast<std::int32_t>(model.images.size() - 1);
@@ -311,7 +328,8 @@ std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver,
   auto bytes = resolver.read(uri, static_cast<std::uint64_t>(options.max_file_bytes));
   if (bytes) return add_image_bytes(model, uri, std::move(*bytes), file_name, place, options);
   const std::string text = "texture " + uri + " not found; the material stays without it";
-  const bool told = std::any_of(model.notes.begin(), model.notes.end(), [&text](const Note& n) { return n.text == text; });
+  const bool told =
+      std::any_of(model.notes.begin(), model.notes.end(), [&text](const Note& n) { return n.text == text; });
   if (!told) add_warning(model.notes, "missing-texture", place, text);
   return -1;
 }

@@ -41,18 +41,25 @@ Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) 
 
 }  // namespace
 
-ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                           const ImportOptions& options, const RunContext& context) {
+ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   if (bytes.empty()) throw InputError(file_name, "", "a model", "an empty file");
   if (static_cast<double>(bytes.size()) > options.max_file_bytes)
-    throw InputError(file_name, "", "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
-                     std::to_string(bytes.size()));
+    throw InputError(
+        file_name, "",
+        "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
+        std::to_string(bytes.size()));
   switch (kind_of(file_name, bytes)) {
-    case Kind::kGltf: return import_gltf(file_name, bytes, resolver, options, context);
-    case Kind::kObj: return import_obj(file_name, bytes, resolver, options, context);
-    case Kind::kPly: return import_ply(file_name, bytes, resolver, options, context);
-    case Kind::kStl: return import_stl(file_name, bytes, options, context);
-    case Kind::kRange: break;
+    case Kind::kGltf:
+      return import_gltf(file_name, bytes, resolver, options, context);
+    case Kind::kObj:
+      return import_obj(file_name, bytes, resolver, options, context);
+    case Kind::kPly:
+      return import_ply(file_name, bytes, resolver, options, context);
+    case Kind::kStl:
+      return import_stl(file_name, bytes, options, context);
+    case Kind::kRange:
+      break;
   }
   return import_range_scan(file_name, bytes, resolver, options, context);
 }

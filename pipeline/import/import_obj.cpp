@@ -11,13 +11,14 @@
 #include "pipeline/import/text_scan.h"
 #include "pipeline/import/uri.h"
 
-// OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and words into 0 without
-// a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300 corners as one of 44, cuts `usemtl my mat`
-// to "my", and rounds 59 % of nine-digit decimals wrongly through libm's pow, whose bits differ between machines.
+// OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
+// words into 0 without a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300
+// corners as one of 44, cuts `usemtl my mat` to "my", and rounds 59 % of nine-digit decimals wrongly through
+// libm's pow, whose bits differ between machines.
 //
-// Read: v (with w ignored, with r g b), vt, vn, f and fo with negative indices and polygons, o and g (parts), usemtl, mtllib,
-// continued lines. Other statements (lines, points, curves, smoothing groups) are counted or ignored. v runs upwards in OBJ and
-// downwards in glTF: v' = 1 - v. Vertex colours are sRGB, 0..1 or 0..255.
+// Read: v (with w ignored, with r g b), vt, vn, f and fo with negative indices and polygons, o and g (parts),
+// usemtl, mtllib, continued lines. Other statements (lines, points, curves, smoothing groups) are counted or
+// ignored. v runs upwards in OBJ and downwards in glTF: v' = 1 - v. Vertex colours are sRGB, 0..1 or 0..255.
 
 namespace texmesh {
 namespace {
@@ -78,7 +79,8 @@ class NameTable {
 
 class ObjReader {
  public:
-  ObjReader(const std::string& file, std::string_view text, const ImportOptions& options, const RunContext& context)
+  ObjReader(const std::string& file, std::string_view text, const ImportOptions& options,
+            const RunContext& context)
       : file_(file), lines_(without_bom(text)), options_(options), context_(context) {}
 
   ObjData read() {
@@ -119,22 +121,32 @@ class ObjReader {
   void statement(std::string_view rest) {
     const std::string_view word = next_token(rest);
     if (word.empty() || word[0] == '#') return;
-    if (word == "v") vertex(rest);
-    else if (word == "vt") texture_coordinate(rest);
-    else if (word == "vn") normal(rest);
-    else if (word == "f" || word == "fo") face(rest);
-    else if (word == "usemtl") use_material(std::string(trim(rest)));
-    else if (word == "o") name_part(object_, rest);
-    else if (word == "g") name_part(group_, rest);
-    else if (word == "mtllib") data_.libraries.push_back({std::string(trim(rest)), lines_.number()});
-    else if (word == "l" || word == "p") ++data_.lines_and_points;
+    if (word == "v")
+      vertex(rest);
+    else if (word == "vt")
+      texture_coordinate(rest);
+    else if (word == "vn")
+      normal(rest);
+    else if (word == "f" || word == "fo")
+      face(rest);
+    else if (word == "usemtl")
+      use_material(std::string(trim(rest)));
+    else if (word == "o")
+      name_part(object_, rest);
+    else if (word == "g")
+      name_part(group_, rest);
+    else if (word == "mtllib")
+      data_.libraries.push_back({std::string(trim(rest)), lines_.number()});
+    else if (word == "l" || word == "p")
+      ++data_.lines_and_points;
   }
 
   // Up to `most` numbers; stops at a comment.
   int numbers(std::string_view rest, double* out, int most) const {
     int n = 0;
-    for (std::string_view token = next_token(rest); !token.empty() && token[0] != '#' && n < most; token = next_token(rest), ++n)
-      if (!parse_number(token, out[n])) fail("a number", quoted(token));
+    for (std::string_view token = next_token(rest); !token.empty() && token[0] != '#' && n < most;
+         token = next_token(rest), ++n)
+      if (!parse_number(token, out[n])) fail("a number", quote(token));
     return n;
   }
 
@@ -172,12 +184,14 @@ class ObjReader {
     data_.normals.push_back(to_float(Vec3d{x[0], x[1], x[2]}));
   }
 
-  // 1 is the first, -1 the latest; 0 is none. Indices may run ahead of their vertices: check_references() has the last word.
+  // 1 is the first, -1 the latest; 0 is none. Indices may run ahead of their vertices: check_references() has
+  // the last word.
   std::uint32_t index(std::string_view token, std::size_t count) const {
     std::int64_t i = 0;
-    if (!parse_integer(token, i)) fail("a face corner such as 3, 3/1 or 3/1/2", quoted(token));
+    if (!parse_integer(token, i)) fail("a face corner such as 3, 3/1 or 3/1/2", quote(token));
     if (i < 0) i += static_cast<std::int64_t>(count) + 1;
-    if (i < 1 || i > kMaxIndex) fail("an index from 1 or from -" + std::to_string(count) + " to -1", quoted(token));
+    if (i < 1 || i > kMaxIndex)
+      fail("an index from 1 or from -" + std::to_string(count) + " to -1", quote(token));
     return static_cast<std::uint32_t>(i - 1);
   }
 
@@ -197,7 +211,8 @@ class ObjReader {
 
   void face(std::string_view rest) {
     const std::size_t begin = data_.corners.size();
-    for (std::string_view token = next_token(rest); !token.empty() && token[0] != '#'; token = next_token(rest))
+    for (std::string_view token = next_token(rest); !token.empty() && token[0] != '#';
+         token = next_token(rest))
       data_.corners.push_back(corner(token));
     if (data_.corners.size() - begin < 3) {
       data_.corners.resize(begin);
@@ -206,7 +221,8 @@ class ObjReader {
     }
     if (data_.faces.size() >= static_cast<std::size_t>(options_.max_triangles))
       fail("at most " + std::to_string(options_.max_triangles) + " triangles", "more");
-    data_.faces.push_back({begin, static_cast<std::uint32_t>(std::min<std::size_t>(lines_.number(), kNone)), material_, part_});
+    data_.faces.push_back(
+        {begin, static_cast<std::uint32_t>(std::min<std::size_t>(lines_.number(), kNone)), material_, part_});
   }
 
   void use_material(const std::string& name) {
@@ -218,14 +234,18 @@ class ObjReader {
     slot = trim(rest);
     if (&slot == &object_) group_.clear();
     const bool both = !object_.empty() && !group_.empty() && object_ != group_;
-    part_ = part_numbers_(both ? object_ + "/" + group_ : object_.empty() ? group_ : object_, data_.parts, parts_full_);
+    part_ = part_numbers_(both              ? object_ + "/" + group_
+                          : object_.empty() ? group_
+                                            : object_,
+                          data_.parts, parts_full_);
   }
 
   void check_references() const {
     auto check = [this](std::uint32_t i, std::size_t count, const char* what, std::size_t f) {
       if (i != kNone && i >= count)
         throw InputError(file_, "line " + std::to_string(data_.faces[f].line),
-                         std::string(what) + " index up to " + std::to_string(count), std::to_string(std::uint64_t{i} + 1));
+                         std::string(what) + " index up to " + std::to_string(count),
+                         std::to_string(std::uint64_t{i} + 1));
     };
     for (std::size_t f = 0; f < data_.faces.size(); ++f)
       for (const Reference& r : data_.corners_of(f)) {
@@ -246,20 +266,22 @@ class ObjReader {
   bool materials_full_ = false, parts_full_ = false;
 };
 
-// --- materials --------------------------------------------------------------------------------------------------
+// --- materials
+// --------------------------------------------------------------------------------------------------
 
 struct LoadedLibrary {
   std::string name;
   MtlFile file;
   std::map<std::string, std::size_t> by_name;  // the first material so named
 
-  LoadedLibrary(std::string library_name, MtlFile library_file) : name(std::move(library_name)), file(std::move(library_file)) {
+  LoadedLibrary(std::string library_name, MtlFile library_file)
+      : name(std::move(library_name)), file(std::move(library_file)) {
     for (std::size_t i = 0; i < file.materials.size(); ++i) by_name.try_emplace(file.materials[i].name, i);
   }
 };
 
-std::optional<LoadedLibrary> load_library(std::string name, const std::string& file, const std::string& place, Model& model,
-                                          Resolver& resolver, const ImportOptions& options) {
+std::optional<LoadedLibrary> load_library(std::string name, const std::string& file, const std::string& place,
+                                          Model& model, Resolver& resolver, const ImportOptions& options) {
   std::replace(name.begin(), name.end(), '\\', '/');
   check_relative_name(name, file, place);
   const auto bytes = resolver.read(name, static_cast<std::uint64_t>(options.max_file_bytes));
@@ -268,8 +290,8 @@ std::optional<LoadedLibrary> load_library(std::string name, const std::string& f
 }
 
 // `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
-void load_libraries(const ObjData::Library& library, const std::string& file, Model& model, Resolver& resolver,
-                    const ImportOptions& options, std::vector<LoadedLibrary>& loaded) {
+void load_libraries(const ObjData::Library& library, const std::string& file, Model& model,
+                    Resolver& resolver, const ImportOptions& options, std::vector<LoadedLibrary>& loaded) {
   const std::string place = "line " + std::to_string(library.line);
   auto load = [&](const std::string& name) {
     auto found = load_library(name, file, place, model, resolver, options);
@@ -277,7 +299,8 @@ void load_libraries(const ObjData::Library& library, const std::string& file, Mo
     return found.has_value();
   };
   auto missing = [&](const std::string& name) {
-    add_warning(model.notes, "missing-mtl", place, "material library " + name + " not found; its materials stay untextured");
+    add_warning(model.notes, "missing-mtl", place,
+                "material library " + name + " not found; its materials stay untextured");
   };
   if (library.name.empty() || load(library.name)) return;
   std::string_view rest = library.name;
@@ -287,26 +310,33 @@ void load_libraries(const ObjData::Library& library, const std::string& file, Mo
   std::vector<std::string> absent;
   rest = library.name;
   for (std::string_view token = next_token(rest); !token.empty(); token = next_token(rest)) {
-    if (load(std::string(token))) any = true;
-    else absent.emplace_back(token);
+    if (load(std::string(token)))
+      any = true;
+    else
+      absent.emplace_back(token);
   }
   if (!any) return missing(library.name);
   for (const std::string& name : absent) missing(name);
 }
 
 Material find_material(const std::string& name, const std::vector<LoadedLibrary>& libraries, bool any_library,
-                       const std::string& file, Model& model, Resolver& resolver, const ImportOptions& options) {
+                       const std::string& file, Model& model, Resolver& resolver,
+                       const ImportOptions& options) {
   for (const LoadedLibrary& library : libraries)
     if (const auto it = library.by_name.find(name); it != library.by_name.end())
-      return material_from_mtl(library.file.materials[it->second], library.file, library.name, model, resolver, options);
+      return material_from_mtl(library.file.materials[it->second], library.file, library.name, model,
+                               resolver, options);
   if (!libraries.empty())
-    add_warning(model.notes, "missing-material", file, "material " + quoted(name) + " is in no material library");
+    add_warning(model.notes, "missing-material", file,
+                "material " + quote(name) + " is in no material library");
   else if (!any_library)
-    add_warning(model.notes, "missing-material", file, "material " + quoted(name) + " is used but no mtllib names a library");
+    add_warning(model.notes, "missing-material", file,
+                "material " + quote(name) + " is used but no mtllib names a library");
   return scan_material(name);
 }
 
-void add_materials(const ObjData& data, const std::string& file, Model& model, Resolver& resolver, const ImportOptions& options) {
+void add_materials(const ObjData& data, const std::string& file, Model& model, Resolver& resolver,
+                   const ImportOptions& options) {
   std::vector<LoadedLibrary> libraries;
   for (const ObjData::Library& library : data.libraries) {
     const auto same = [&library](const ObjData::Library& other) { return other.name == library.name; };
@@ -318,13 +348,14 @@ void add_materials(const ObjData& data, const std::string& file, Model& model, R
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
     // Textures of materials without faces are never asked for.
     const bool named = used[i] && !(i == 0 && data.materials[0].empty());
-    model.materials.push_back(named ? find_material(data.materials[i], libraries, !data.libraries.empty(), file, model,
-                                                    resolver, options)
+    model.materials.push_back(named ? find_material(data.materials[i], libraries, !data.libraries.empty(),
+                                                    file, model, resolver, options)
                                     : scan_material(i == 0 ? "untextured" : data.materials[i]));
   }
 }
 
-// --- mesh -------------------------------------------------------------------------------------------------------
+// --- mesh
+// -------------------------------------------------------------------------------------------------------
 
 bool has_colour(const ObjData& data, std::uint32_t position) {
   return position < data.colours.size() && std::isfinite(data.colours[position].x);
@@ -337,9 +368,12 @@ double colour_scale(const ObjData& data) {
   return largest > 1.001f ? 1 / 255.0 : 1;
 }
 
-bool textured(const Model& model, std::uint16_t material) { return model.materials[material].base_colour_texture.used(); }
+bool textured(const Model& model, std::uint16_t material) {
+  return model.materials[material].base_colour_texture.used();
+}
 
-// Colours count on untextured faces only, and there they are the colour: Kd is not multiplied in (but with obj_kd multiply).
+// Colours count on untextured faces only, and there they are the colour: Kd is not multiplied in (but with
+// obj_kd multiply).
 bool choose_colours(const ObjData& data, Model& model, const ImportOptions& options) {
   if (data.colours.empty()) return false;
   std::vector<std::uint8_t> coloured(model.materials.size(), 0);
@@ -348,8 +382,10 @@ bool choose_colours(const ObjData& data, Model& model, const ImportOptions& opti
     for (const Reference& r : data.corners_of(f)) {
       if (!has_colour(data, r.position)) continue;
       const std::uint16_t m = data.faces[f].material;
-      if (textured(model, m)) beside_texture = true;
-      else coloured[m] = 1, any = true;
+      if (textured(model, m))
+        beside_texture = true;
+      else
+        coloured[m] = 1, any = true;
     }
   if (beside_texture)
     add_info(model.notes, "colours-beside-texture", "", "vertex colours are left out where a texture shows");
@@ -379,8 +415,10 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
     for (const Reference& r : data.corners_of(f)) {
       Corner c;
       c.position = r.position;
-      if (r.uv != kNone) c.uv = data.uvs[r.uv];
-      else lacks_uv = true;
+      if (r.uv != kNone)
+        c.uv = data.uvs[r.uv];
+      else
+        lacks_uv = true;
       if (r.normal != kNone) c.normal = data.normals[r.normal];
       if (any_colour && !face_textured && has_colour(data, r.position)) {
         const Vec3d rgb = to_double(data.colours[r.position]) * scale;
@@ -392,22 +430,26 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
     builder.add_face(corners, face.material, face.part);
   }
   if (without_uv)
-    add_warning(model.notes, "missing-uv", "", std::to_string(without_uv) + " faces of textured materials have no texture coordinates");
+    add_warning(model.notes, "missing-uv", "",
+                std::to_string(without_uv) + " faces of textured materials have no texture coordinates");
   return builder.take();
 }
 
 void add_notes(const ObjData& data, bool parts_full, Model& model) {
   if (data.small_faces)
-    add_warning(model.notes, "face-without-area", "", std::to_string(data.small_faces) + " faces of fewer than three corners left out");
+    add_warning(model.notes, "face-without-area", "",
+                std::to_string(data.small_faces) + " faces of fewer than three corners left out");
   if (data.lines_and_points)
-    add_info(model.notes, "lines-and-points", "", std::to_string(data.lines_and_points) + " line and point elements left out");
-  if (parts_full) add_info(model.notes, "many-parts", "", "more groups than parts can be told apart; the rest is one part");
+    add_info(model.notes, "lines-and-points", "",
+             std::to_string(data.lines_and_points) + " line and point elements left out");
+  if (parts_full)
+    add_info(model.notes, "many-parts", "", "more groups than parts can be told apart; the rest is one part");
 }
 
 }  // namespace
 
-ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                         const ImportOptions& options, const RunContext& context) {
+ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                         Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ObjReader reader(file_name, text_of(bytes), options, context);
   const ObjData data = reader.read();
   if (data.positions.empty()) throw InputError(file_name, "", "an OBJ with v statements", "none");

@@ -7,15 +7,17 @@
 #include "pipeline/import/ply_reader.h"
 #include "pipeline/import/text_scan.h"
 
-// PLY has no specification of names beyond x, y, z; what is read here is what MeshLab, CloudCompare, Metashape, Blender and
-// VTK write:
-//   vertex  x y z; nx ny nz; s t | u v | texture_u texture_v | texcoord_u texcoord_v; red green blue alpha | r g b a |
+// PLY has no specification of names beyond x, y, z; what is read here is what MeshLab, CloudCompare,
+// Metashape, Blender and VTK write:
+//   vertex  x y z; nx ny nz; s t | u v | texture_u texture_v | texcoord_u texcoord_v; red green blue alpha |
+//   r g b a |
 //           diffuse_red ...
-//   face    vertex_indices | vertex_index, texcoord (u v per corner), texnumber, red green blue alpha (of the whole face)
-//   tristrips  vertex_indices, -1 ends a strip
-//   comment TextureFile NAME, one per texture, in texnumber's order
-// UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1. Colours beside a
-// texture are a second record of the same surface: as in MeshLab, the texture shows and the colours do not.
+//   face    vertex_indices | vertex_index, texcoord (u v per corner), texnumber, red green blue alpha (of the
+//   whole face) tristrips  vertex_indices, -1 ends a strip comment TextureFile NAME, one per texture, in
+//   texnumber's order
+// UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1.
+// Colours beside a texture are a second record of the same surface: as in MeshLab, the texture shows and the
+// colours do not.
 
 namespace texmesh {
 namespace {
@@ -23,10 +25,13 @@ namespace {
 double colour_scale(PlyType type) {
   switch (type) {
     case PlyType::kFloat:
-    case PlyType::kDouble: return 1;
+    case PlyType::kDouble:
+      return 1;
     case PlyType::kInt16:
-    case PlyType::kUint16: return 1 / 65535.0;
-    default: return 1 / 255.0;  // int too: the range of the type would leave everything black
+    case PlyType::kUint16:
+      return 1 / 65535.0;
+    default:
+      return 1 / 255.0;  // int too: the range of the type would leave everything black
   }
 }
 
@@ -49,7 +54,8 @@ struct ColourColumns {
   }
   bool any() const { return column[0] >= 0 && column[1] >= 0 && column[2] >= 0; }
   float linear(double value, double unit) const {
-    if (unit == 1 / 255.0 && value >= 0 && value <= 255 && value == std::floor(value)) return table[static_cast<std::size_t>(value)];
+    if (unit == 1 / 255.0 && value >= 0 && value <= 255 && value == std::floor(value))
+      return table[static_cast<std::size_t>(value)];
     return linear_from_srgb(value * unit);
   }
   Vec4f read(const PlyRow& row) const {
@@ -70,7 +76,7 @@ int list(const PlyElement& e, std::initializer_list<std::string_view> names) {
 
 struct Vertices {
   std::vector<Vec3d> positions;
-  std::vector<Vec2f> uv;        // each empty or one per position
+  std::vector<Vec2f> uv;  // each empty or one per position
   std::vector<Vec3f> normals;
   std::vector<Vec4f> colours;
 };
@@ -79,23 +85,28 @@ struct Vertices {
 struct Faces {
   std::vector<std::size_t> begin{0};
   std::vector<std::uint32_t> index;
-  std::vector<Vec2f> uv;           // per corner, or empty
-  std::vector<std::uint8_t> has_uv;  // per face, or empty
-  std::vector<Vec4f> colours;      // per corner, or empty
+  std::vector<Vec2f> uv;              // per corner, or empty
+  std::vector<std::uint8_t> has_uv;   // per face, or empty
+  std::vector<Vec4f> colours;         // per corner, or empty
   std::vector<std::int32_t> texture;  // per face, or empty
   std::size_t count() const { return begin.size() - 1; }
 };
 
 class PlyImporter {
  public:
-  PlyImporter(const std::string& file, std::span<const std::uint8_t> bytes, Resolver& resolver, const ImportOptions& options,
-              const RunContext& context)
-      : file_(file), header_(read_ply_header(file, bytes)), rows_(file, bytes, header_), resolver_(resolver), options_(options),
+  PlyImporter(const std::string& file, std::span<const std::uint8_t> bytes, Resolver& resolver,
+              const ImportOptions& options, const RunContext& context)
+      : file_(file),
+        header_(read_ply_header(file, bytes)),
+        rows_(file, bytes, header_),
+        resolver_(resolver),
+        options_(options),
         context_(context) {}
 
   Model run() {
     read_elements();
-    if (vertices_.positions.empty()) throw InputError(file_, "header", "an element vertex with x, y and z", "none");
+    if (vertices_.positions.empty())
+      throw InputError(file_, "header", "an element vertex with x, y and z", "none");
     if (faces_.count() == 0)
       throw InputError(file_, "", "faces",
                        "none (a point cloud of " + std::to_string(vertices_.positions.size()) + " points)");
@@ -112,10 +123,14 @@ class PlyImporter {
     for (const PlyElement& element : header_.elements) {
       if (element.properties.empty()) continue;
       rows_.begin(element);
-      if (element.name == "vertex") read_vertices(element);
-      else if (element.name == "face") read_faces(element);
-      else if (element.name == "tristrips") read_strips(element);
-      else skip(element);
+      if (element.name == "vertex")
+        read_vertices(element);
+      else if (element.name == "face")
+        read_faces(element);
+      else if (element.name == "tristrips")
+        read_strips(element);
+      else
+        skip(element);
     }
   }
 
@@ -136,13 +151,15 @@ class PlyImporter {
 
   void check_count(const PlyElement& element, int limit) const {
     if (element.count > static_cast<std::uint64_t>(limit))
-      throw InputError(file_, "element " + element.name, "at most " + std::to_string(limit), std::to_string(element.count));
+      throw InputError(file_, "element " + element.name, "at most " + std::to_string(limit),
+                       std::to_string(element.count));
   }
 
   void read_vertices(const PlyElement& element) {
     check_count(element, options_.max_vertices);
     const std::array<int, 3> xyz{scalar(element, {"x"}), scalar(element, {"y"}), scalar(element, {"z"})};
-    if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0) throw InputError(file_, "element vertex", "properties x, y and z", "not all of them");
+    if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0)
+      throw InputError(file_, "element vertex", "properties x, y and z", "not all of them");
     const std::array<int, 3> n{scalar(element, {"nx"}), scalar(element, {"ny"}), scalar(element, {"nz"})};
     const std::array<int, 2> st{scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
                                 scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
@@ -189,7 +206,8 @@ class PlyImporter {
       for (double index : indices) add_index(index);
       if (texcoord >= 0) add_face_uvs(row_.lists[static_cast<std::size_t>(texcoord)], indices.size());
       add_face_colours(colours, indices.size());
-      if (texnumber >= 0) faces_.texture.push_back(texture_number(row_.values[static_cast<std::size_t>(texnumber)]));
+      if (texnumber >= 0)
+        faces_.texture.push_back(texture_number(row_.values[static_cast<std::size_t>(texnumber)]));
       faces_.begin.push_back(faces_.index.size());
     }
   }
@@ -202,12 +220,14 @@ class PlyImporter {
     const bool good = uvs.size() == 2 * corners;
     if (!good && !uvs.empty()) ++odd_texcoords_;
     faces_.uv.resize(faces_.begin.back());  // faces before this element's have none
-    for (std::size_t k = 0; k < corners; ++k) faces_.uv.push_back(good ? flipped(uvs[2 * k], uvs[2 * k + 1]) : Vec2f{});
+    for (std::size_t k = 0; k < corners; ++k)
+      faces_.uv.push_back(good ? flipped(uvs[2 * k], uvs[2 * k + 1]) : Vec2f{});
     faces_.has_uv.push_back(good);
   }
 
-  // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a line ends in
-  // `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail holds the colours.
+  // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a line
+  // ends in `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail holds the
+  // colours.
   bool add_vcg_corner_colours(std::size_t declared, std::size_t corners) {
     if (row_.extra.empty()) return false;
     std::vector<double> tail(row_.values.end() - static_cast<std::ptrdiff_t>(declared), row_.values.end());
@@ -252,10 +272,12 @@ class PlyImporter {
 
   void check_indices() const {
     if (!faces_.index.empty() && largest_index_ >= vertices_.positions.size())
-      throw InputError(file_, largest_index_place_, "a vertex index below " + std::to_string(vertices_.positions.size()),
+      throw InputError(file_, largest_index_place_,
+                       "a vertex index below " + std::to_string(vertices_.positions.size()),
                        std::to_string(largest_index_));
     if (faces_.count() > static_cast<std::size_t>(options_.max_triangles))
-      throw InputError(file_, "element face", "at most " + std::to_string(options_.max_triangles), std::to_string(faces_.count()));
+      throw InputError(file_, "element face", "at most " + std::to_string(options_.max_triangles),
+                       std::to_string(faces_.count()));
   }
 
   bool has_uv() const { return !vertices_.uv.empty() || !faces_.uv.empty(); }
@@ -269,14 +291,18 @@ class PlyImporter {
       std::string_view rest = comment;
       if (!same_word(next_token(rest), kKey) || trim(rest).empty()) continue;
       const std::string name(trim(rest));
-      if (model_.materials.size() > 65534) throw InputError(file_, "header", "at most 65534 textures", "more");
+      if (model_.materials.size() > 65534)
+        throw InputError(file_, "header", "at most 65534 textures", "more");
       Material material = plain;
       material.name = name;
-      if (has_uv()) material.base_colour_texture.image = add_image(model_, name, resolver_, file_, "comment TextureFile", options_);
+      if (has_uv())
+        material.base_colour_texture.image =
+            add_image(model_, name, resolver_, file_, "comment TextureFile", options_);
       model_.materials.push_back(std::move(material));
     }
     if (model_.materials.size() > 1 && !has_uv())
-      add_warning(model_.notes, "texture-without-uv", "header", "a TextureFile is named but there are no texture coordinates");
+      add_warning(model_.notes, "texture-without-uv", "header",
+                  "a TextureFile is named but there are no texture coordinates");
   }
 
   std::uint16_t material_of(std::size_t face) const {
@@ -286,21 +312,26 @@ class PlyImporter {
     return texture < 0 || texture + 1 >= materials ? 0 : static_cast<std::uint16_t>(texture + 1);
   }
 
-  bool textured(std::uint16_t material) const { return model_.materials[material].base_colour_texture.used(); }
+  bool textured(std::uint16_t material) const {
+    return model_.materials[material].base_colour_texture.used();
+  }
 
   void build() {
     bool all_textured = true;
     for (std::size_t f = 0; f < faces_.count() && all_textured; ++f) all_textured = textured(material_of(f));
     const bool any_colours = !vertices_.colours.empty() || !faces_.colours.empty();
     if (any_colours && all_textured)
-      add_info(model_.notes, "colours-beside-texture", "", "vertex or face colours are left out where a texture shows");
-    MeshBuilder builder(vertices_.positions, {has_uv(), !vertices_.normals.empty(), any_colours && !all_textured});
+      add_info(model_.notes, "colours-beside-texture", "",
+               "vertex or face colours are left out where a texture shows");
+    MeshBuilder builder(vertices_.positions,
+                        {has_uv(), !vertices_.normals.empty(), any_colours && !all_textured});
     std::vector<Corner> corners;
     for (std::size_t f = 0; f < faces_.count(); ++f) {
       tick(f);
       const std::uint16_t material = material_of(f);
       corners.clear();
-      for (std::size_t k = faces_.begin[f]; k < faces_.begin[f + 1]; ++k) corners.push_back(corner(f, k, textured(material)));
+      for (std::size_t k = faces_.begin[f]; k < faces_.begin[f + 1]; ++k)
+        corners.push_back(corner(f, k, textured(material)));
       builder.add_face(corners, material, 0);
       if (corners.size() < 3) ++small_faces_;
     }
@@ -311,23 +342,30 @@ class PlyImporter {
     Corner c;
     c.position = faces_.index[k];
     const bool own_uv = face < faces_.has_uv.size() && faces_.has_uv[face];
-    if (own_uv) c.uv = faces_.uv[k];
-    else if (!vertices_.uv.empty()) c.uv = vertices_.uv[c.position];
+    if (own_uv)
+      c.uv = faces_.uv[k];
+    else if (!vertices_.uv.empty())
+      c.uv = vertices_.uv[c.position];
     if (!vertices_.normals.empty()) c.normal = vertices_.normals[c.position];
     if (is_textured) return c;
-    // Colours of vertices say more than colours of faces, where a file has both (MeshLab's default face colour is white).
-    if (!vertices_.colours.empty()) c.colour = vertices_.colours[c.position];
-    else if (k < faces_.colours.size()) c.colour = faces_.colours[k];
+    // Colours of vertices say more than colours of faces, where a file has both (MeshLab's default face
+    // colour is white).
+    if (!vertices_.colours.empty())
+      c.colour = vertices_.colours[c.position];
+    else if (k < faces_.colours.size())
+      c.colour = faces_.colours[k];
     return c;
   }
 
   void add_notes() {
     if (long_lines_)
       add_warning(model_.notes, "over-long-lines", first_long_line_,
-                  std::to_string(long_lines_) + " lines have more numbers than the header declares; what it declares is read");
+                  std::to_string(long_lines_) +
+                      " lines have more numbers than the header declares; what it declares is read");
     if (odd_texcoords_)
-      add_warning(model_.notes, "odd-texcoord-list", "element face",
-                  std::to_string(odd_texcoords_) + " faces whose texcoord list does not hold two numbers per corner");
+      add_warning(
+          model_.notes, "odd-texcoord-list", "element face",
+          std::to_string(odd_texcoords_) + " faces whose texcoord list does not hold two numbers per corner");
     if (small_faces_)
       add_warning(model_.notes, "face-without-area", "element face",
                   std::to_string(small_faces_) + " faces of fewer than three corners left out");
@@ -351,8 +389,8 @@ class PlyImporter {
 
 }  // namespace
 
-ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                         const ImportOptions& options, const RunContext& context) {
+ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                         Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
   out.model = PlyImporter(file_name, bytes, resolver, options, context).run();
   out.format = "ply";

@@ -7,9 +7,10 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 
-// STL knows triangles only: no colour, no texture, no shared vertices. Its face normals repeat the winding (and are often 0),
-// so they are ignored; the "attribute byte count" has no agreed meaning (VisCAM and Magics put different colours there) and is
-// ignored too. Equal points become one position, bit by bit (0 and -0 count as equal), so that neighbours share edges.
+// STL knows triangles only: no colour, no texture, no shared vertices. Its face normals repeat the winding
+// (and are often 0), so they are ignored; the "attribute byte count" has no agreed meaning (VisCAM and Magics
+// put different colours there) and is ignored too. Equal points become one position, bit by bit (0 and -0
+// count as equal), so that neighbours share edges.
 
 namespace texmesh {
 namespace {
@@ -24,23 +25,29 @@ std::uint32_t binary_count(std::span<const std::uint8_t> bytes) {
 
 // Many binary files begin with "solid", so the size decides first; text decides where the size is wrong.
 bool is_binary(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() >= kHeaderBytes && bytes.size() == kHeaderBytes + std::uint64_t{kTriangleBytes} * binary_count(bytes)) return true;
+  if (bytes.size() >= kHeaderBytes &&
+      bytes.size() == kHeaderBytes + std::uint64_t{kTriangleBytes} * binary_count(bytes))
+    return true;
   const std::string_view text = trim(text_of(bytes).substr(0, 1024));
   if (!same_word(text.substr(0, 5), "solid")) return true;
   return text.find('\0') != std::string_view::npos;
 }
 
-std::vector<Vec3f> read_binary(const std::string& file, std::span<const std::uint8_t> bytes, const ImportOptions& options) {
+std::vector<Vec3f> read_binary(const std::string& file, std::span<const std::uint8_t> bytes,
+                               const ImportOptions& options) {
   if (bytes.size() < kHeaderBytes)
-    throw InputError(file, "header", std::to_string(kHeaderBytes) + " bytes, or text that begins with \"solid\"",
+    throw InputError(file, "header",
+                     std::to_string(kHeaderBytes) + " bytes, or text that begins with \"solid\"",
                      std::to_string(bytes.size()) + " bytes");
   const std::uint32_t count = binary_count(bytes);
   const std::uint64_t needed = kHeaderBytes + std::uint64_t{kTriangleBytes} * count;
   if (bytes.size() < needed)
-    throw InputError(file, "byte 80 (triangle count)", std::to_string(needed) + " bytes for " + std::to_string(count) + " triangles",
+    throw InputError(file, "byte 80 (triangle count)",
+                     std::to_string(needed) + " bytes for " + std::to_string(count) + " triangles",
                      std::to_string(bytes.size()) + " bytes");
   if (count > static_cast<std::uint64_t>(options.max_triangles))
-    throw InputError(file, "byte 80 (triangle count)", "at most " + std::to_string(options.max_triangles), std::to_string(count));
+    throw InputError(file, "byte 80 (triangle count)", "at most " + std::to_string(options.max_triangles),
+                     std::to_string(count));
   std::vector<Vec3f> points(std::size_t{3} * count);
   for (std::size_t t = 0; t < count; ++t)
     std::memcpy(&points[3 * t], bytes.data() + kHeaderBytes + t * kTriangleBytes + 12, 36);
@@ -59,18 +66,20 @@ std::vector<Vec3f> read_ascii(const std::string& file, std::span<const std::uint
       double x[3];
       for (double& value : x) {
         const std::string_view token = next_token(line);
-        if (!parse_number(token, value)) throw InputError(file, lines.place(), "vertex and three numbers", quoted(token));
+        if (!parse_number(token, value))
+          throw InputError(file, lines.place(), "vertex and three numbers", quote(token));
       }
       if (++in_facet > 3) throw InputError(file, lines.place(), "three vertices in a facet", "a fourth");
       points.push_back(to_float(Vec3d{x[0], x[1], x[2]}));
     } else if (same_word(word, "endfacet")) {
-      if (in_facet != 3) throw InputError(file, lines.place(), "three vertices in a facet", std::to_string(in_facet));
+      if (in_facet != 3)
+        throw InputError(file, lines.place(), "three vertices in a facet", std::to_string(in_facet));
       in_facet = 0;
     } else if (same_word(word, "endsolid")) {
       ended = true;
-    } else if (!word.empty() && !same_word(word, "solid") && !same_word(word, "facet") && !same_word(word, "outer") &&
-               !same_word(word, "endloop")) {
-      throw InputError(file, lines.place(), "a statement of STL", quoted(word));
+    } else if (!word.empty() && !same_word(word, "solid") && !same_word(word, "facet") &&
+               !same_word(word, "outer") && !same_word(word, "endloop")) {
+      throw InputError(file, lines.place(), "a statement of STL", quote(word));
     }
   }
   if (in_facet != 0 || !ended) throw InputError(file, lines.place(), "endsolid", "the end of the file");
@@ -99,7 +108,8 @@ std::vector<std::uint32_t> weld(const std::vector<Vec3f>& points, std::vector<Ve
   std::vector<std::uint32_t> table(size, 0), index(points.size()), first;  // table: index into first + 1
   for (std::size_t i = 0; i < points.size(); ++i) {
     std::size_t slot = hash_of(points[i]) & (size - 1);
-    while (table[slot] && !same_point(points[first[table[slot] - 1]], points[i])) slot = (slot + 1) & (size - 1);
+    while (table[slot] && !same_point(points[first[table[slot] - 1]], points[i]))
+      slot = (slot + 1) & (size - 1);
     if (!table[slot]) {
       first.push_back(static_cast<std::uint32_t>(i));
       unique.push_back(to_double(points[i]));
@@ -112,9 +122,10 @@ std::vector<std::uint32_t> weld(const std::vector<Vec3f>& points, std::vector<Ve
 
 }  // namespace
 
-ImportedModel import_stl(const std::string& file_name, std::span<const std::uint8_t> bytes, const ImportOptions& options,
-                         const RunContext& context) {
-  const std::vector<Vec3f> points = is_binary(bytes) ? read_binary(file_name, bytes, options) : read_ascii(file_name, bytes);
+ImportedModel import_stl(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                         const ImportOptions& options, const RunContext& context) {
+  const std::vector<Vec3f> points =
+      is_binary(bytes) ? read_binary(file_name, bytes, options) : read_ascii(file_name, bytes);
   context.check_cancelled();
   ImportedModel out;
   out.format = "stl";
@@ -123,7 +134,8 @@ ImportedModel import_stl(const std::string& file_name, std::span<const std::uint
   const std::vector<std::uint32_t> index = weld(points, unique);
   set_positions(mesh, unique);
   for (std::uint32_t p = 0; p < unique.size(); ++p) mesh.wedge_position.push_back(p);
-  for (std::size_t i = 0; i + 2 < index.size(); i += 3) mesh.triangles.push_back({index[i], index[i + 1], index[i + 2]});
+  for (std::size_t i = 0; i + 2 < index.size(); i += 3)
+    mesh.triangles.push_back({index[i], index[i + 1], index[i + 2]});
   out.model.materials.push_back(scan_material("untextured"));
   finish_model(out.model, file_name, options);
   return out;

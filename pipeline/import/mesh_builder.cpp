@@ -15,9 +15,13 @@ std::uint64_t mix(std::uint64_t h, std::uint64_t value) {
   return h ^ h >> 29;
 }
 std::uint64_t bits(float x) { return std::bit_cast<std::uint32_t>(x); }
-bool equal_bits(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
+bool equal_bits(float a, float b) {
+  return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
+}
 bool equal_bits(Vec2f a, Vec2f b) { return equal_bits(a.x, b.x) && equal_bits(a.y, b.y); }
-bool equal_bits(Vec3f a, Vec3f b) { return equal_bits(a.x, b.x) && equal_bits(a.y, b.y) && equal_bits(a.z, b.z); }
+bool equal_bits(Vec3f a, Vec3f b) {
+  return equal_bits(a.x, b.x) && equal_bits(a.y, b.y) && equal_bits(a.z, b.z);
+}
 bool equal_bits(Vec4f a, Vec4f b) {
   return equal_bits(a.x, b.x) && equal_bits(a.y, b.y) && equal_bits(a.z, b.z) && equal_bits(a.w, b.w);
 }
@@ -27,7 +31,8 @@ bool finite(const Vec3d& p) { return std::isfinite(p.x) && std::isfinite(p.y) &&
 // Twice the area vector (Newell), about the first corner so that far-away polygons keep their digits.
 Vec3d area_vector(std::span<const Vec3d> points) {
   Vec3d sum;
-  for (std::size_t i = 1; i + 1 < points.size(); ++i) sum = sum + cross(points[i] - points[0], points[i + 1] - points[0]);
+  for (std::size_t i = 1; i + 1 < points.size(); ++i)
+    sum = sum + cross(points[i] - points[0], points[i + 1] - points[0]);
   return sum;
 }
 
@@ -94,7 +99,8 @@ bool is_ear(const std::vector<Vec2d>& flat, const Ring& ring, std::uint32_t i, s
   return true;
 }
 
-void cut_ears(const std::vector<Vec2d>& flat, std::vector<std::array<std::uint32_t, 3>>& triangles, std::uint64_t& work) {
+void cut_ears(const std::vector<Vec2d>& flat, std::vector<std::array<std::uint32_t, 3>>& triangles,
+              std::uint64_t& work) {
   Ring ring(flat.size());
   std::size_t left = flat.size();
   std::uint32_t at = 0;
@@ -112,7 +118,8 @@ void cut_ears(const std::vector<Vec2d>& flat, std::vector<std::array<std::uint32
       if (++refused > left) break;
     }
   }
-  for (std::uint32_t b = ring.next[at]; left >= 3; --left, b = ring.next[b]) triangles.push_back({at, b, ring.next[b]});
+  for (std::uint32_t b = ring.next[at]; left >= 3; --left, b = ring.next[b])
+    triangles.push_back({at, b, ring.next[b]});
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace texmesh {
 /// sRGB in 0..1 to linear light, 0..1; NaN gives 1.
 float linear_from_srgb(double srgb);
 
-/// The material of formats that know no glTF: matte, not metallic, and seen from both sides, as the viewers of OBJ, PLY and STL
-/// show a surface (open scans would have holes otherwise).
+/// The material of formats that know no glTF: matte, not metallic, and seen from both sides, as the viewers
+/// of OBJ, PLY and STL show a surface (open scans would have holes otherwise).
 Material scan_material(std::string name);
 
 /// What one corner of a face carries. Attributes the mesh has not got stay as they are here.
@@ -24,18 +24,20 @@ struct Corner {
   Vec4f colour{1, 1, 1, 1};
 };
 
-/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the same position and
-/// bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL and range scans.
+/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the same
+/// position and bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL and range
+/// scans.
 class MeshBuilder {
  public:
   struct Attributes {
     bool uv = false, normals = false, colours = false;
   };
-  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who know the line).
+  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who know
+  /// the line).
   MeshBuilder(const std::vector<Vec3d>& positions, Attributes attributes);
 
-  /// A polygon of three corners or more, in order; fewer are ignored. Triangulated by cutting ears in the plane of its
-  /// area vector, so concave polygons stay inside themselves.
+  /// A polygon of three corners or more, in order; fewer are ignored. Triangulated by cutting ears in the
+  /// plane of its area vector, so concave polygons stay inside themselves.
   void add_face(std::span<const Corner> corners, std::uint16_t material, std::uint16_t part);
 
   std::size_t triangle_count() const { return mesh_.triangles.size(); }
@@ -59,9 +61,10 @@ class MeshBuilder {
   std::vector<std::uint32_t> wedges_;
 };
 
-/// Triangles (indices into `points`) of a simple polygon in space. A quad takes the diagonal that folds neither half over,
-/// the shorter one where both do; more corners are cut ear by ear. `work` counts inside tests over all polygons of a model:
-/// past kMaxEarWork, and where no ear is left (a polygon that crosses itself), what remains becomes a fan.
+/// Triangles (indices into `points`) of a simple polygon in space. A quad takes the diagonal that folds
+/// neither half over, the shorter one where both do; more corners are cut ear by ear. `work` counts inside
+/// tests over all polygons of a model: past kMaxEarWork, and where no ear is left (a polygon that crosses
+/// itself), what remains becomes a fan.
 void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<std::uint32_t, 3>>& triangles,
                          std::uint64_t& work);
 inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds

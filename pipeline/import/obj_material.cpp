@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kMaxMaterials = 65000;
 
-// Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a file may be
-// named "1".
+// Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a
+// file may be named "1".
 std::vector<double> leading_numbers(std::string_view& rest, std::size_t most) {
   std::vector<double> numbers;
   while (numbers.size() < most) {
@@ -46,8 +46,8 @@ bool take_option(std::string_view& rest, MtlTexture& texture) {
     if (parse_number(next_token(after), bump)) texture.bump = or_default(bump, 1);
   } else if (option == "-clamp") {
     texture.clamp = same_word(next_token(after), "on");
-  } else if (option == "-blendu" || option == "-blendv" || option == "-boost" || option == "-cc" || option == "-imfchan" ||
-             option == "-texres" || option == "-type" || option == "-colorspace") {
+  } else if (option == "-blendu" || option == "-blendv" || option == "-boost" || option == "-cc" ||
+             option == "-imfchan" || option == "-texres" || option == "-type" || option == "-colorspace") {
     next_token(after);
   } else {
     return false;
@@ -62,7 +62,8 @@ std::optional<MtlTexture> read_texture(std::string_view rest, std::size_t line) 
   while (take_option(rest, texture)) {
   }
   std::string_view file = trim(rest);
-  if (file.size() >= 2 && file.front() == '"' && file.back() == '"') file = trim(file.substr(1, file.size() - 2));
+  if (file.size() >= 2 && file.front() == '"' && file.back() == '"')
+    file = trim(file.substr(1, file.size() - 2));
   if (file.empty()) return std::nullopt;
   texture.file = file;
   std::replace(texture.file.begin(), texture.file.end(), '\\', '/');
@@ -71,7 +72,8 @@ std::optional<MtlTexture> read_texture(std::string_view rest, std::size_t line) 
 
 class MtlReader {
  public:
-  MtlReader(const std::string& name, std::string_view text, Notes& notes) : name_(name), lines_(text), notes_(notes) {}
+  MtlReader(const std::string& name, std::string_view text, Notes& notes)
+      : name_(name), lines_(text), notes_(notes) {}
 
   MtlFile read() {
     std::string_view line;
@@ -82,7 +84,8 @@ class MtlReader {
         if (lower(line.substr(0, 200)).find("meshlab") != std::string::npos) file_.by_meshlab = true;
       } else if (same_word(word, "newmtl")) {
         if (file_.materials.size() >= kMaxMaterials)
-          throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxMaterials) + " materials", "more");
+          throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxMaterials) + " materials",
+                           "more");
         file_.materials.emplace_back().name = trim(rest);
       } else if (!file_.materials.empty()) {
         statement(lower(word), rest, file_.materials.back());
@@ -118,22 +121,35 @@ class MtlReader {
   void warn(std::string_view token) {
     if (warned_) return;
     warned_ = true;
-    add_warning(notes_, "odd-material", name_ + " " + lines_.place(), "expected a number, found " + quoted(token));
+    add_warning(notes_, "odd-material", name_ + " " + lines_.place(),
+                "expected a number, found " + quote(token));
   }
 
   void statement(const std::string& word, std::string_view rest, MtlMaterial& m) {
-    if (word == "kd") m.diffuse = colour(rest);
-    else if (word == "ke") m.emission = colour(rest);
-    else if (word == "d") m.opacity = number(rest);
-    else if (word == "tr") m.transparency = number(rest);
-    else if (word == "pr") m.roughness = number(rest);
-    else if (word == "pm") m.metallic = number(rest);
-    else if (word == "map_kd") m.map_kd = read_texture(rest, lines_.number());
-    else if (word == "map_ka") m.map_ka = read_texture(rest, lines_.number());
-    else if (word == "map_ke" || word == "map_emissive") m.map_ke = read_texture(rest, lines_.number());
-    else if (word == "map_d" || word == "map_opacity") m.map_d = read_texture(rest, lines_.number());
-    else if (word == "norm" || word == "map_kn") m.norm = read_texture(rest, lines_.number());
-    else if (word == "bump" || word == "map_bump") m.bump = read_texture(rest, lines_.number());
+    if (word == "kd")
+      m.diffuse = colour(rest);
+    else if (word == "ke")
+      m.emission = colour(rest);
+    else if (word == "d")
+      m.opacity = number(rest);
+    else if (word == "tr")
+      m.transparency = number(rest);
+    else if (word == "pr")
+      m.roughness = number(rest);
+    else if (word == "pm")
+      m.metallic = number(rest);
+    else if (word == "map_kd")
+      m.map_kd = read_texture(rest, lines_.number());
+    else if (word == "map_ka")
+      m.map_ka = read_texture(rest, lines_.number());
+    else if (word == "map_ke" || word == "map_emissive")
+      m.map_ke = read_texture(rest, lines_.number());
+    else if (word == "map_d" || word == "map_opacity")
+      m.map_d = read_texture(rest, lines_.number());
+    else if (word == "norm" || word == "map_kn")
+      m.norm = read_texture(rest, lines_.number());
+    else if (word == "bump" || word == "map_bump")
+      m.bump = read_texture(rest, lines_.number());
   }
 
   const std::string& name_;
@@ -143,12 +159,14 @@ class MtlReader {
   bool warned_ = false;
 };
 
-// --- what the pictures show -------------------------------------------------------------------------------------
+// --- what the pictures show
+// -------------------------------------------------------------------------------------
 
 // Visits up to about 256 x 256 texels spread over the picture.
 template <class F>
 void sample(const Pixels& pixels, F&& f) {
-  const std::uint32_t step_x = std::max(1u, pixels.width_px / 256), step_y = std::max(1u, pixels.height_px / 256);
+  const std::uint32_t step_x = std::max(1u, pixels.width_px / 256),
+                      step_y = std::max(1u, pixels.height_px / 256);
   for (std::uint32_t y = 0; y < pixels.height_px; y += step_y)
     for (std::uint32_t x = 0; x < pixels.width_px; x += step_x) f(pixels.at(x, y));
 }
@@ -181,13 +199,15 @@ AlphaMode alpha_of(const Image& image) {
   return between * 20 <= n ? AlphaMode::kMask : AlphaMode::kBlend;
 }
 
-// --- to glTF ----------------------------------------------------------------------------------------------------
+// --- to glTF
+// ----------------------------------------------------------------------------------------------------
 
 // uv' = scale * uv + offset with v upwards, said with v downwards.
 UvTransform transform_of(const MtlTexture& texture) {
   UvTransform t;
   t.scale = {static_cast<float>(texture.scale.x), static_cast<float>(texture.scale.y)};
-  t.offset = {static_cast<float>(texture.offset.x), static_cast<float>(1 - texture.scale.y - texture.offset.y)};
+  t.offset = {static_cast<float>(texture.offset.x),
+              static_cast<float>(1 - texture.scale.y - texture.offset.y)};
   return t;
 }
 
@@ -198,7 +218,9 @@ struct Converter {
   Resolver& resolver;
   const ImportOptions& options;
 
-  std::string place(const MtlTexture& t) const { return "material " + quoted(mtl.name) + " line " + std::to_string(t.line); }
+  std::string place(const MtlTexture& t) const {
+    return "material " + quote(mtl.name) + " line " + std::to_string(t.line);
+  }
 
   TextureRef texture(const std::optional<MtlTexture>& t) const {
     TextureRef ref;
@@ -210,7 +232,9 @@ struct Converter {
     return ref;
   }
 
-  const Image& image_of(const TextureRef& ref) const { return model.images[static_cast<std::size_t>(ref.image)]; }
+  const Image& image_of(const TextureRef& ref) const {
+    return model.images[static_cast<std::size_t>(ref.image)];
+  }
 
   void base_colour(Material& out) const {
     out.base_colour_texture = texture(mtl.map_kd ? mtl.map_kd : mtl.map_ka);
@@ -226,7 +250,7 @@ struct Converter {
     if (by_meshlab) return *mtl.transparency;
     if (*mtl.transparency < 1) return 1 - *mtl.transparency;
     add_info(model.notes, "transparency-read-as-opaque", mtl_name,
-             "material " + quoted(mtl.name) + ": Tr 1 without d is read as opaque");
+             "material " + quote(mtl.name) + ": Tr 1 without d is read as opaque");
     return 1;
   }
 
@@ -234,7 +258,9 @@ struct Converter {
     const double d = opacity(by_meshlab);
     out.base_colour.w = static_cast<float>(std::clamp(d, 0.0, 1.0));
     if (d < 1) out.alpha_mode = AlphaMode::kBlend;
-    if (d <= 0) add_warning(model.notes, "invisible-material", mtl_name, "material " + quoted(mtl.name) + " has no opacity");
+    if (d <= 0)
+      add_warning(model.notes, "invisible-material", mtl_name,
+                  "material " + quote(mtl.name) + " has no opacity");
     const bool own_map = mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file);
     if (own_map)
       add_warning(model.notes, "separate-alpha-map", mtl_name + " " + place(*mtl.map_d),
@@ -273,8 +299,8 @@ MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, N
   return MtlReader(name, text_of(bytes), notes).read();
 }
 
-Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name, Model& model,
-                           Resolver& resolver, const ImportOptions& options) {
+Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,
+                           Model& model, Resolver& resolver, const ImportOptions& options) {
   Material out = scan_material(mtl.name);
   const Converter converter{mtl, mtl_name, model, resolver, options};
   converter.base_colour(out);

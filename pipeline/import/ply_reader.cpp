@@ -16,11 +16,11 @@ constexpr std::size_t kMaxElements = 256, kMaxProperties = 1024;
 
 std::optional<PlyType> type_of(std::string_view word) {
   static constexpr std::pair<std::string_view, PlyType> kTypes[] = {
-      {"char", PlyType::kInt8},     {"int8", PlyType::kInt8},       {"uchar", PlyType::kUint8},
-      {"uint8", PlyType::kUint8},   {"short", PlyType::kInt16},     {"int16", PlyType::kInt16},
-      {"ushort", PlyType::kUint16}, {"uint16", PlyType::kUint16},   {"int", PlyType::kInt32},
-      {"int32", PlyType::kInt32},   {"uint", PlyType::kUint32},     {"uint32", PlyType::kUint32},
-      {"float", PlyType::kFloat},   {"float32", PlyType::kFloat},   {"double", PlyType::kDouble},
+      {"char", PlyType::kInt8},     {"int8", PlyType::kInt8},     {"uchar", PlyType::kUint8},
+      {"uint8", PlyType::kUint8},   {"short", PlyType::kInt16},   {"int16", PlyType::kInt16},
+      {"ushort", PlyType::kUint16}, {"uint16", PlyType::kUint16}, {"int", PlyType::kInt32},
+      {"int32", PlyType::kInt32},   {"uint", PlyType::kUint32},   {"uint32", PlyType::kUint32},
+      {"float", PlyType::kFloat},   {"float32", PlyType::kFloat}, {"double", PlyType::kDouble},
       {"float64", PlyType::kDouble}};
   for (const auto& [name, type] : kTypes)
     if (name == word) return type;
@@ -34,7 +34,7 @@ class HeaderReader {
 
   PlyHeader read() {
     std::string_view line;
-    if (!lines_.next(line) || trim(line) != "ply") fail("\"ply\"", quoted(line.substr(0, 20)));
+    if (!lines_.next(line) || trim(line) != "ply") fail("\"ply\"", quote(line.substr(0, 20)));
     bool has_format = false;
     while (lines_.next(line)) {
       std::string_view rest = line;
@@ -48,13 +48,19 @@ class HeaderReader {
         header_.lines = lines_.number();
         return std::move(header_);
       }
-      if (word == "format") has_format = read_format(rest);
-      else if (word == "element") read_element(rest);
-      else if (word == "property") read_property(rest);
-      else if (word == "comment" || word == "obj_info") header_.comments.emplace_back(trim(rest));
-      else if (!word.empty()) fail("format, element, property, comment or end_header", quoted(word));
+      if (word == "format")
+        has_format = read_format(rest);
+      else if (word == "element")
+        read_element(rest);
+      else if (word == "property")
+        read_property(rest);
+      else if (word == "comment" || word == "obj_info")
+        header_.comments.emplace_back(trim(rest));
+      else if (!word.empty())
+        fail("format, element, property, comment or end_header", quote(word));
     }
-    fail("end_header", text_.size() >= kMaxHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
+    fail("end_header",
+         text_.size() >= kMaxHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
   }
 
  private:
@@ -64,11 +70,15 @@ class HeaderReader {
 
   bool read_format(std::string_view rest) {
     const std::string_view word = next_token(rest), version = next_token(rest);
-    if (word == "ascii") header_.encoding = PlyEncoding::kAscii;
-    else if (word == "binary_little_endian") header_.encoding = PlyEncoding::kLittleEndian;
-    else if (word == "binary_big_endian") header_.encoding = PlyEncoding::kBigEndian;
-    else fail("ascii, binary_little_endian or binary_big_endian", quoted(word));
-    if (version != "1.0") fail("format version 1.0", quoted(version));
+    if (word == "ascii")
+      header_.encoding = PlyEncoding::kAscii;
+    else if (word == "binary_little_endian")
+      header_.encoding = PlyEncoding::kLittleEndian;
+    else if (word == "binary_big_endian")
+      header_.encoding = PlyEncoding::kBigEndian;
+    else
+      fail("ascii, binary_little_endian or binary_big_endian", quote(word));
+    if (version != "1.0") fail("format version 1.0", quote(version));
     return true;
   }
 
@@ -78,8 +88,9 @@ class HeaderReader {
     std::int64_t count = 0;
     const std::string_view token = next_token(rest);
     if (element.name.empty() || !parse_integer(token, count) || count < 0)
-      fail("element NAME COUNT", quoted(element.name + " " + std::string(token)));
-    if (header_.elements.size() >= kMaxElements) fail("at most " + std::to_string(kMaxElements) + " elements", "more");
+      fail("element NAME COUNT", quote(element.name + " " + std::string(token)));
+    if (header_.elements.size() >= kMaxElements)
+      fail("at most " + std::to_string(kMaxElements) + " elements", "more");
     element.count = static_cast<std::uint64_t>(count);
     header_.elements.push_back(std::move(element));
   }
@@ -97,13 +108,14 @@ class HeaderReader {
     property.name = next_token(rest);
     if (property.name.empty()) fail("a property name", "none");
     auto& properties = header_.elements.back().properties;
-    if (properties.size() >= kMaxProperties) fail("at most " + std::to_string(kMaxProperties) + " properties", "more");
+    if (properties.size() >= kMaxProperties)
+      fail("at most " + std::to_string(kMaxProperties) + " properties", "more");
     properties.push_back(std::move(property));
   }
 
   PlyType type_or_fail(std::string_view word) const {
     const std::optional<PlyType> type = type_of(word);
-    if (!type) fail("a type such as float or uchar", quoted(word));
+    if (!type) fail("a type such as float or uchar", quote(word));
     return *type;
   }
 
@@ -127,13 +139,17 @@ double load(const std::uint8_t* p, bool swap) {
 std::size_t ply_type_bytes(PlyType type) {
   switch (type) {
     case PlyType::kInt8:
-    case PlyType::kUint8: return 1;
+    case PlyType::kUint8:
+      return 1;
     case PlyType::kInt16:
-    case PlyType::kUint16: return 2;
+    case PlyType::kUint16:
+      return 2;
     case PlyType::kInt32:
     case PlyType::kUint32:
-    case PlyType::kFloat: return 4;
-    case PlyType::kDouble: break;
+    case PlyType::kFloat:
+      return 4;
+    case PlyType::kDouble:
+      break;
   }
   return 8;
 }
@@ -150,13 +166,18 @@ PlyHeader read_ply_header(const std::string& file, std::span<const std::uint8_t>
 }
 
 PlyRows::PlyRows(const std::string& file, std::span<const std::uint8_t> bytes, const PlyHeader& header)
-    : file_(file), bytes_(bytes), encoding_(header.encoding), at_(header.data_offset), lines_(text_of(bytes.subspan(header.data_offset)), header.lines + 1) {}
+    : file_(file),
+      bytes_(bytes),
+      encoding_(header.encoding),
+      at_(header.data_offset),
+      lines_(text_of(bytes.subspan(header.data_offset)), header.lines + 1) {}
 
 std::size_t PlyRows::left() const { return bytes_.size() - at_ + tokens_.size(); }
 
 std::string PlyRows::place() const {
   return (element_ ? element_->name + " " + std::to_string(row_) + " " : std::string()) +
-         (encoding_ == PlyEncoding::kAscii ? "(" + lines_.place() + ")" : "(byte " + std::to_string(at_) + ")");
+         (encoding_ == PlyEncoding::kAscii ? "(" + lines_.place() + ")"
+                                           : "(byte " + std::to_string(at_) + ")");
 }
 
 void PlyRows::begin(const PlyElement& element) {
@@ -179,16 +200,20 @@ void PlyRows::next(PlyRow& row) {
   row.lists.resize(n);
   row.extra.clear();
   if (n == 0) return;
-  if (encoding_ == PlyEncoding::kAscii) next_ascii(row);
-  else next_binary(row);
+  if (encoding_ == PlyEncoding::kAscii)
+    next_ascii(row);
+  else
+    next_binary(row);
   ++row_;
 }
 
-// Counts come as doubles: any type may hold one. `least_bytes_each` bounds what the rest of the file can hold.
+// Counts come as doubles: any type may hold one. `least_bytes_each` bounds what the rest of the file can
+// hold.
 std::size_t PlyRows::list_count(double count, std::size_t least_bytes_each) const {
   const double most = static_cast<double>(left() / least_bytes_each + 1);
   if (!(count >= 0) || count > most || count != std::floor(count))
-    throw InputError(file_, place(), "a list length from 0 to " + std::to_string(static_cast<std::uint64_t>(most)),
+    throw InputError(file_, place(),
+                     "a list length from 0 to " + std::to_string(static_cast<std::uint64_t>(most)),
                      std::isfinite(count) ? std::to_string(static_cast<long double>(count)) : "no number");
   return static_cast<std::size_t>(count);
 }
@@ -201,7 +226,7 @@ double PlyRows::ascii_number() {
     token = next_token(tokens_);
   }
   double value = 0;
-  if (!parse_number(token, value)) throw InputError(file_, place(), "a number", quoted(token));
+  if (!parse_number(token, value)) throw InputError(file_, place(), "a number", quote(token));
   return value;
 }
 
@@ -222,19 +247,28 @@ void PlyRows::next_ascii(PlyRow& row) {
 double PlyRows::binary_number(PlyType type) {
   const std::size_t size = ply_type_bytes(type);
   if (size > left())
-    throw InputError(file_, place(), std::to_string(size) + " more bytes", std::to_string(left()) + " (the end of the file)");
+    throw InputError(file_, place(), std::to_string(size) + " more bytes",
+                     std::to_string(left()) + " (the end of the file)");
   const std::uint8_t* p = bytes_.data() + at_;
   at_ += size;
   const bool swap = (encoding_ == PlyEncoding::kBigEndian) == (std::endian::native == std::endian::little);
   switch (type) {
-    case PlyType::kInt8: return load<std::int8_t>(p, swap);
-    case PlyType::kUint8: return load<std::uint8_t>(p, swap);
-    case PlyType::kInt16: return load<std::int16_t>(p, swap);
-    case PlyType::kUint16: return load<std::uint16_t>(p, swap);
-    case PlyType::kInt32: return load<std::int32_t>(p, swap);
-    case PlyType::kUint32: return load<std::uint32_t>(p, swap);
-    case PlyType::kFloat: return load<float>(p, swap);
-    case PlyType::kDouble: break;
+    case PlyType::kInt8:
+      return load<std::int8_t>(p, swap);
+    case PlyType::kUint8:
+      return load<std::uint8_t>(p, swap);
+    case PlyType::kInt16:
+      return load<std::int16_t>(p, swap);
+    case PlyType::kUint16:
+      return load<std::uint16_t>(p, swap);
+    case PlyType::kInt32:
+      return load<std::int32_t>(p, swap);
+    case PlyType::kUint32:
+      return load<std::uint32_t>(p, swap);
+    case PlyType::kFloat:
+      return load<float>(p, swap);
+    case PlyType::kDouble:
+      break;
   }
   return load<double>(p, swap);
 }

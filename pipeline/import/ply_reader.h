@@ -10,9 +10,9 @@
 
 namespace texmesh {
 
-// The PLY container: header, and the rows of its elements as numbers. What they mean is import_ply's affair. Written here
-// because no bounded reader is in Debian: tinyply and happly are not packaged, rply aborts a file at the first over-long
-// line, assimp and CGAL lose texture numbers or per-face coordinates.
+// The PLY container: header, and the rows of its elements as numbers. What they mean is import_ply's affair.
+// Written here because no bounded reader is in Debian: tinyply and happly are not packaged, rply aborts a
+// file at the first over-long line, assimp and CGAL lose texture numbers or per-face coordinates.
 
 enum class PlyType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 std::size_t ply_type_bytes(PlyType type);
@@ -28,7 +28,8 @@ struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
   std::vector<PlyProperty> properties;
-  int find(std::initializer_list<std::string_view> names) const;  // index of the first property so named, -1 = none
+  int find(std::initializer_list<std::string_view> names)
+      const;  // index of the first property so named, -1 = none
 };
 
 enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
@@ -43,24 +44,25 @@ struct PlyHeader {
 /// Throws InputError{file, "line N", ...}.
 PlyHeader read_ply_header(const std::string& file, std::span<const std::uint8_t> bytes);
 
-/// One row of an element. `values` holds one number per scalar property (0 for lists), `lists` the numbers of each list
-/// property; `extra` are numbers an ASCII line has beyond what the header declares.
+/// One row of an element. `values` holds one number per scalar property (0 for lists), `lists` the numbers of
+/// each list property; `extra` are numbers an ASCII line has beyond what the header declares.
 struct PlyRow {
   std::vector<double> values;
   std::vector<std::vector<double>> lists;
   std::vector<double> extra;
 };
 
-/// Walks the rows of all elements in file order. Memory is one row; every count is checked against the bytes that are left
-/// before anything is taken.
+/// Walks the rows of all elements in file order. Memory is one row; every count is checked against the bytes
+/// that are left before anything is taken.
 class PlyRows {
  public:
   PlyRows(const std::string& file, std::span<const std::uint8_t> bytes, const PlyHeader& header);
-  /// To be called for each element in order, before its rows: throws InputError when the rest of the file is shorter than
-  /// the element must be.
+  /// To be called for each element in order, before its rows: throws InputError when the rest of the file is
+  /// shorter than the element must be.
   void begin(const PlyElement& element);
-  /// Reads the next row. An ASCII row is a line; a line with too few numbers goes on in the next one, what a line has too
-  /// many is `extra`. Throws InputError at the end of the data and for anything that is no number.
+  /// Reads the next row. An ASCII row is a line; a line with too few numbers goes on in the next one, what a
+  /// line has too many is `extra`. Throws InputError at the end of the data and for anything that is no
+  /// number.
   void next(PlyRow& row);
   /// "vertex 17 (line 29)" or "vertex 17 (byte 812)".
   std::string place() const;
@@ -77,7 +79,7 @@ class PlyRows {
   std::span<const std::uint8_t> bytes_;
   PlyEncoding encoding_;
   std::size_t at_ = 0;
-  LineReader lines_;  // of an ASCII file
+  LineReader lines_;         // of an ASCII file
   std::string_view tokens_;  // what is left of the line at hand
   const PlyElement* element_ = nullptr;
   std::uint64_t row_ = 0;

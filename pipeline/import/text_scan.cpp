@@ -28,8 +28,8 @@ std::string_view trim(std::string_view s) {
 }
 
 bool same_word(std::string_view a, std::string_view b) {
-  return a.size() == b.size() &&
-         std::equal(a.begin(), a.end(), b.begin(), [](char x, char y) { return lower_char(x) == lower_char(y); });
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
+                                            [](char x, char y) { return lower_char(x) == lower_char(y); });
 }
 
 std::string lower(std::string_view s) {
@@ -69,10 +69,12 @@ bool parse_number(std::string_view token, double& value) {
   if (result.ptr != end) {
     if (*result.ptr != '#') return false;
     const std::string_view special(result.ptr, static_cast<std::size_t>(end - result.ptr));
-    if (special.substr(0, 4) == "#INF") x = std::numeric_limits<double>::infinity();
+    if (special.substr(0, 4) == "#INF")
+      x = std::numeric_limits<double>::infinity();
     else if (special.substr(0, 4) == "#IND" || special.substr(0, 3) == "#QN" || special.substr(0, 3) == "#SN")
       x = std::numeric_limits<double>::quiet_NaN();
-    else return false;
+    else
+      return false;
   }
   value = result.ec == std::errc::result_out_of_range ? out_of_range(digits, negative) : negative ? -x : x;
   return true;
@@ -87,7 +89,8 @@ bool parse_integer(std::string_view token, std::int64_t& value) {
 bool LineReader::next(std::string_view& line) {
   if (rest_.empty()) return false;
   ++number_;
-  // The next LF is remembered: in a file whose lines end in CR, looking for it at every line would take quadratic time.
+  // The next LF is remembered: in a file whose lines end in CR, looking for it at every line would take
+  // quadratic time.
   const char* begin = rest_.data();
   if (!line_feed_ || line_feed_ < begin) {
     line_feed_ = static_cast<const char*>(std::memchr(begin, '\n', rest_.size()));
@@ -104,7 +107,7 @@ bool LineReader::next(std::string_view& line) {
   return true;
 }
 
-std::string quoted(std::string_view s) {
+std::string quote(std::string_view s) {
   std::string out = "\"";
   for (char c : s.substr(0, 60)) out += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
   return out + (s.size() > 60 ? "...\"" : "\"");

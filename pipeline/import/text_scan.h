@@ -7,8 +7,8 @@
 
 namespace texmesh {
 
-// Small pieces of the text formats' readers (OBJ, MTL, PLY, STL). Everything is bounded by the view it works on; nothing
-// depends on the locale.
+// Small pieces of the text formats' readers (OBJ, MTL, PLY, STL). Everything is bounded by the view it works
+// on; nothing depends on the locale.
 
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 std::string_view trim(std::string_view s);
@@ -21,7 +21,8 @@ std::string lower_extension(const std::string& file_name);
 /// The next blank-separated token of `rest`, which moves past it; empty at the end.
 std::string_view next_token(std::string_view& rest);
 
-/// A whole token as a number, correctly rounded: "-1.5e3", "+2", "nan", "-inf", "1e999" (infinity), and MSVC's "1.#QNAN" and
+/// A whole token as a number, correctly rounded: "-1.5e3", "+2", "nan", "-inf", "1e999" (infinity), and
+/// MSVC's "1.#QNAN" and
 /// "-1.#IND" (NaN). False for anything else.
 bool parse_number(std::string_view token, double& value);
 /// A whole token as a decimal integer; false when it is none or does not fit.
@@ -34,7 +35,8 @@ inline std::string_view text_of(std::span<const std::uint8_t> bytes) {
 /// Lines of a text, one by one; "\n", "\r\n" and a lone "\r" end a line.
 class LineReader {
  public:
-  explicit LineReader(std::string_view text, std::size_t first_line = 1) : rest_(text), number_(first_line - 1) {}
+  explicit LineReader(std::string_view text, std::size_t first_line = 1)
+      : rest_(text), number_(first_line - 1) {}
   bool next(std::string_view& line);
   std::size_t number() const { return number_; }  // of the line that next() gave last, from 1
   std::string_view rest() const { return rest_; }
@@ -43,10 +45,11 @@ class LineReader {
  private:
   std::string_view rest_;
   std::size_t number_;
-  const char* line_feed_ = nullptr;  // the first "\n" at or after rest_, its end when there is none; nullptr = not looked for
+  const char* line_feed_ =
+      nullptr;  // the first "\n" at or after rest_, its end when there is none; nullptr = not looked for
 };
 
 /// A text shortened for a message, with control characters replaced.
-std::string quoted(std::string_view s);
+std::string quote(std::string_view s);
 
 }  // namespace texmesh

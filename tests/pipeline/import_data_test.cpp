@@ -1,5 +1,5 @@
-// The real scans of shared/data (TEXMESH_DATA, or beside the source tree): counts of its INDEX.md. Skipped where the
-// folder is not there: nothing of it is in the repository.
+// The real scans of shared/data (TEXMESH_DATA, or beside the source tree): counts of its INDEX.md. Skipped
+// where the folder is not there: nothing of it is in the repository.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -42,7 +42,8 @@ class FolderResolver : public Resolver {
 Model import_file(const std::filesystem::path& path) {
   FolderResolver resolver(path.parent_path());
   const Bytes bytes = read_file(path);
-  return (path.extension() == ".obj" ? import_obj : import_ply)(path.filename(), bytes, resolver, {}, {}).model;
+  return (path.extension() == ".obj" ? import_obj : import_ply)(path.filename(), bytes, resolver, {}, {})
+      .model;
 }
 
 struct Expected {
@@ -83,18 +84,20 @@ TEST_P(ImportData, CountsOfTheIndex) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ImportData,
-    ::testing::Values(Expected{"marble_bust_4k/marble_bust_01_4k.obj", 17456, 8730, 8730, 1, 2, true, false, ""},
-                      Expected{"ycb_banana_4k/textured_simple_reoriented.obj", 15728, 7866, 7866, 1, 1, true, false, ""},
-                      Expected{"sterngarten/Sterngarten_Wien_innerArea.obj", 71673, 71772, 74445, 21, 14, true, false, ""},
-                      Expected{"fran_cyberware/fran_cut.obj", 4224, 2205, 2205, 1, 1, true, false, ""},
-                      Expected{"fran_cyberware/fran_cut.ply", 4224, 2205, 2205, 1, 1, true, false, ""},
-                      Expected{"realitycapture_site/site.obj", 7472, 3687, 10338, 2, 2, true, false, ""},
-                      Expected{"yurt/yurt_vertexcolours.ply", 14298, 7306, 7306, 1, 0, false, true, ""},
-                      Expected{"fuze_bottle/fuze.obj", 1000, 502, 502, 1, 1, true, false, ""},
-                      Expected{"fuze_bottle/fuze.ply", 1000, 502, 502, 1, 1, true, false, ""},
-                      Expected{"fuze_bottle/fuze_ascii.ply", 1000, 502, 502, 1, 1, true, false, "over-long-lines"},
-                      Expected{"asteroid_eros/eros.obj", 49152, 24578, 24993, 1, 1, true, false, ""},
-                      Expected{"demosthenes_photoscan/demosthenes-low-res.obj", 16719, 8394, 8394, 1, 0, false, false, ""}));
+    ::testing::Values(
+        Expected{"marble_bust_4k/marble_bust_01_4k.obj", 17456, 8730, 8730, 1, 2, true, false, ""},
+        Expected{"ycb_banana_4k/textured_simple_reoriented.obj", 15728, 7866, 7866, 1, 1, true, false, ""},
+        Expected{"sterngarten/Sterngarten_Wien_innerArea.obj", 71673, 71772, 74445, 21, 14, true, false, ""},
+        Expected{"fran_cyberware/fran_cut.obj", 4224, 2205, 2205, 1, 1, true, false, ""},
+        Expected{"fran_cyberware/fran_cut.ply", 4224, 2205, 2205, 1, 1, true, false, ""},
+        Expected{"realitycapture_site/site.obj", 7472, 3687, 10338, 2, 2, true, false, ""},
+        Expected{"yurt/yurt_vertexcolours.ply", 14298, 7306, 7306, 1, 0, false, true, ""},
+        Expected{"fuze_bottle/fuze.obj", 1000, 502, 502, 1, 1, true, false, ""},
+        Expected{"fuze_bottle/fuze.ply", 1000, 502, 502, 1, 1, true, false, ""},
+        Expected{"fuze_bottle/fuze_ascii.ply", 1000, 502, 502, 1, 1, true, false, "over-long-lines"},
+        Expected{"asteroid_eros/eros.obj", 49152, 24578, 24993, 1, 1, true, false, ""},
+        Expected{"demosthenes_photoscan/demosthenes-low-res.obj", 16719, 8394, 8394, 1, 0, false, false,
+                 ""}));
 
 // The malformed file gives the very mesh of the sound one, but for six-digit decimals.
 TEST(ImportDataPairs, FuzeAsciiLosesNothing) {
@@ -105,7 +108,8 @@ TEST(ImportDataPairs, FuzeAsciiLosesNothing) {
   ASSERT_EQ(a.mesh.triangles.size(), b.mesh.triangles.size());
   for (std::size_t t = 0; t < a.mesh.triangles.size(); ++t)
     for (int k = 0; k < 3; ++k) {
-      const std::uint32_t wa = a.mesh.triangles[t][static_cast<std::size_t>(k)], wb = b.mesh.triangles[t][static_cast<std::size_t>(k)];
+      const std::uint32_t wa = a.mesh.triangles[t][static_cast<std::size_t>(k)],
+                          wb = b.mesh.triangles[t][static_cast<std::size_t>(k)];
       ASSERT_EQ(a.mesh.wedge_position[wa], b.mesh.wedge_position[wb]);
       ASSERT_NEAR(a.mesh.uv0[wa].x, b.mesh.uv0[wb].x, 1e-6);
       ASSERT_NEAR(a.mesh.uv0[wa].y, b.mesh.uv0[wb].y, 1e-6);

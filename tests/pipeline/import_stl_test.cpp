@@ -42,13 +42,16 @@ std::string ascii_stl(const char* end_of_line = "\n") {
   for (const auto& t : kTetrahedron) {
     s += std::string("  facet normal 0 0 0") + end_of_line + "    outer loop" + end_of_line;
     for (const Vec3f& p : t)
-      s += "      vertex " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + end_of_line;
+      s += "      vertex " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) +
+           end_of_line;
     s += std::string("    endloop") + end_of_line + "  endfacet" + end_of_line;
   }
   return s + "endsolid";
 }
 
-ImportedModel import(const Bytes& bytes, const ImportOptions& options = {}) { return import_stl("a.stl", bytes, options, {}); }
+ImportedModel import(const Bytes& bytes, const ImportOptions& options = {}) {
+  return import_stl("a.stl", bytes, options, {});
+}
 
 void expect_tetrahedron(const ImportedModel& m) {
   EXPECT_EQ(m.format, "stl");
@@ -111,9 +114,14 @@ TEST(ImportStl, HostileCountsAreCheckedAgainstTheBytes) {
 TEST(ImportStl, NoTrianglesAndNoNumbers) {
   EXPECT_THROW(import(binary_stl({})), InputError);
   EXPECT_THROW(import(bytes_of("solid nothing\nendsolid\n")), InputError);
-  const std::string text = "solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 x 0\nvertex 1 1 0\nendloop\nendfacet\nendsolid";
+  const std::string text =
+      "solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 x 0\nvertex 1 1 "
+      "0\nendloop\nendfacet\nendsolid";
   EXPECT_NE(input_error([&] { import(bytes_of(text)); }).find("line 5"), std::string::npos);
-  EXPECT_THROW(import(bytes_of("solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid")), InputError);
+  EXPECT_THROW(
+      import(bytes_of(
+          "solid\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid")),
+      InputError);
 }
 
 TEST(ImportStl, NanPositions) {

@@ -15,6 +15,7 @@
 #include "format/manifest.h"
 #include "format/tables.h"
 #include "pipeline/collection.h"
+#include "pipeline/import/range_scan.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"
 #include "pipeline/options.h"
@@ -44,6 +45,7 @@ const std::map<std::string, Reader>& readers() {
       {"provenance.v1", [](const std::string& s) { read_provenance(bytes_of(s)); }},
       {"fragments.v1", [](const std::string& s) { read_fragment_index(bytes_of(s)); }},
       {"collection.v1", [](const std::string& s) { read_collection(s, "collection.json", {}); }},
+      {"range-scan.v1", [](const std::string& s) { read_range_scan_description("scan.json", bytes_of(s)); }},
       {"profile.v1", [](const std::string& s) {
          CompileOptions options;
          read_profile(options, s, "profile.json");

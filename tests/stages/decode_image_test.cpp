@@ -41,7 +41,8 @@ int largest_difference(const Bytes& a, const Bytes& b) {
 }
 
 void put32(Bytes& bytes, std::size_t at, std::uint32_t big_endian) {
-  for (int i = 0; i < 4; ++i) bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(big_endian >> (24 - 8 * i));
+  for (int i = 0; i < 4; ++i)
+    bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(big_endian >> (24 - 8 * i));
 }
 
 std::uint32_t crc32_of(const std::uint8_t* p, std::size_t n) {
@@ -66,7 +67,8 @@ Bytes webp_bytes(int width, int height, int channels, const Bytes& samples) {
   picture.height = height;
   picture.writer = WebPMemoryWrite;
   picture.custom_ptr = &memory;
-  EXPECT_TRUE((channels == 4 ? WebPPictureImportRGBA : WebPPictureImportRGB)(&picture, samples.data(), width * channels));
+  EXPECT_TRUE((channels == 4 ? WebPPictureImportRGBA : WebPPictureImportRGB)(&picture, samples.data(),
+                                                                             width * channels));
   EXPECT_TRUE(WebPEncode(&config, &picture));
   const Bytes bytes(memory.mem, memory.mem + memory.size);
   WebPPictureFree(&picture);
@@ -86,7 +88,8 @@ Bytes png_claiming(std::uint32_t width, std::uint32_t height) {
 TEST(DecodeImage, SniffsTheAllowListOnly) {
   EXPECT_EQ(sniff_image_format(png_bytes(2, 2, 3)), ImageFormat::kPng);
   EXPECT_EQ(sniff_image_format(jpeg_bytes(2, 2, 3)), ImageFormat::kJpeg);
-  for (const char* other : {"P6\n2 2\n255\nabcdefghijkl", "GIF89a......", "BM............", "#?RADIANCE\n", "", "\xff\xd8", "RIFF....WAVE", "DDS "}) {
+  for (const char* other : {"P6\n2 2\n255\nabcdefghijkl", "GIF89a......", "BM............", "#?RADIANCE\n",
+                            "", "\xff\xd8", "RIFF....WAVE", "DDS "}) {
     const Bytes bytes(other, other + std::strlen(other));
     EXPECT_FALSE(sniff_image_format(bytes)) << other;
     EXPECT_THROW(probe(bytes), InputError) << other;
@@ -103,7 +106,8 @@ TEST(DecodeImage, LosslessFormatsGiveTheSamplesBack) {
       const Bytes samples = test_picture(37, 23, channels);
       OIIO::ImageSpec attributes;
       attributes.attribute("oiio:UnassociatedAlpha", 1);
-      const Image image = probe(encode_image(writer, 37, 23, channels, samples, OIIO::TypeDesc::UINT8, attributes));
+      const Image image =
+          probe(encode_image(writer, 37, 23, channels, samples, OIIO::TypeDesc::UINT8, attributes));
       EXPECT_EQ(image.width_px, 37u);
       EXPECT_EQ(image.height_px, 23u);
       EXPECT_EQ(image.channels, channels) << writer;
@@ -120,12 +124,16 @@ TEST(DecodeImage, TransparentTexelsKeepTheirColour) {
   OIIO::ImageSpec attributes;
   attributes.attribute("oiio:UnassociatedAlpha", 1);
   for (const char* writer : {"png", "tiff"})
-    EXPECT_EQ(decode_image(probe(encode_image(writer, 2, 1, 4, samples, OIIO::TypeDesc::UINT8, attributes))).data, samples) << writer;
+    EXPECT_EQ(
+        decode_image(probe(encode_image(writer, 2, 1, 4, samples, OIIO::TypeDesc::UINT8, attributes))).data,
+        samples)
+        << writer;
 }
 
 TEST(DecodeImage, SixteenBitsAreRoundedNotCut) {
   std::vector<std::uint16_t> samples(65536 / 16 * 3);
-  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::uint16_t>(i * 16 / 3 * 1 + i % 3);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    samples[i] = static_cast<std::uint16_t>(i * 16 / 3 * 1 + i % 3);
   for (const char* writer : {"png", "tiff"}) {
     const Image image = probe(encode_image(writer, 64, 64, 3, samples, OIIO::TypeDesc::UINT16));
     EXPECT_EQ(image.bits_per_channel, 16);
@@ -141,10 +149,12 @@ TEST(DecodeImage, SixteenBitsAreRoundedNotCut) {
 TEST(DecodeImage, JpegIsCloseAndRowsAreTopFirst) {
   for (int channels : {1, 3}) {
     Bytes samples(64 * 48 * static_cast<std::size_t>(channels));
-    for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::uint8_t>(i * 255 / samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      samples[i] = static_cast<std::uint8_t>(i * 255 / samples.size());
     OIIO::ImageSpec attributes;
     attributes.attribute("Compression", "jpeg:98");
-    const Image image = probe(encode_image("jpeg", 64, 48, channels, samples, OIIO::TypeDesc::UINT8, attributes));
+    const Image image =
+        probe(encode_image("jpeg", 64, 48, channels, samples, OIIO::TypeDesc::UINT8, attributes));
     EXPECT_EQ(image.channels, channels);
     EXPECT_LE(largest_difference(decode_image(image).data, samples), 6);
   }
@@ -180,7 +190,9 @@ TEST(DecodeImage, FloatsKeepTheirRangeAndColoursAreEncoded) {
         EXPECT_EQ(floats.data[i], samples[i]) << writer << i;
       }
     EXPECT_EQ(decode_image(image).data, (Bytes{0, 128, 255, 0, 255, 255, 0, 255, 1, 55, 64, 0})) << writer;
-    EXPECT_EQ(decode_image(image, FloatEncoding::kSrgb).data, (Bytes{0, 188, 255, 0, 255, 255, 0, 255, 7, 127, 137, 0})) << writer;
+    EXPECT_EQ(decode_image(image, FloatEncoding::kSrgb).data,
+              (Bytes{0, 188, 255, 0, 255, 255, 0, 255, 7, 127, 137, 0}))
+        << writer;
   }
 }
 
@@ -219,7 +231,8 @@ TEST(DecodeImage, HeadersThatLieAreRefused) {
   EXPECT_THROW(probe(png_claiming(65001, 65001)), InputError) << "beyond the limits";
   EXPECT_THROW(probe(png_claiming(0, 8)), InputError);
   for (auto [w, h] : {std::pair{19000u, 20000u}, {8u, 9u}, {8u, 100000u / 2}, {5000u, 8u}})
-    EXPECT_NE(error_of([&, width = w, height = h] { decode_image(probe(png_claiming(width, height))); }), "") << w << " x " << h;
+    EXPECT_NE(error_of([&, width = w, height = h] { decode_image(probe(png_claiming(width, height))); }), "")
+        << w << " x " << h;
   Bytes jpeg = jpeg_bytes(32, 32, 3);
   for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
     if (jpeg[i] == 0xff && jpeg[i + 1] == 0xc0) {
@@ -244,10 +257,11 @@ TEST(DecodeImage, EveryTruncationIsAnError) {
   for (const auto& [name, whole] : files) {
     const Bytes decoded = decode_image(probe(whole)).data;
     int accepted = 0;
-    for (std::size_t n = 0; n < whole.size(); ++n)
-      try {
-        // What a shorter file gives at all must be the whole picture: only trailing bytes without pixels may be missing.
-        EXPECT_EQ(decode_image(probe({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)})).data, decoded)
+    for (std::size_t n = 0; n < whole.size(); ++n) try {
+        // What a shorter file gives at all must be the whole picture: only trailing bytes without pixels may
+        // be missing.
+        EXPECT_EQ(decode_image(probe({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)})).data,
+                  decoded)
             << name << " cut to " << n << " of " << whole.size();
         ++accepted;
       } catch (const InputError&) {
@@ -272,7 +286,8 @@ TEST(DecodeImage, FlippedBytesNeverHarm) {
         try {
           const Image image = probe_image("flipped", bytes, limits);
           const Pixels pixels = decode_image(image);
-          ASSERT_EQ(pixels.data.size(), static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
+          ASSERT_EQ(pixels.data.size(),
+                    static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
         } catch (const InputError&) {
         }
       }

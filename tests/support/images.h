@@ -9,8 +9,8 @@
 
 namespace texmesh::testing {
 
-/// Encodes `samples` (rows top first, interleaved) with OpenImageIO's writer `writer` ("png", "jpeg", "tiff", "webp",
-/// "openexr"). `type` is the type of the samples and of the file.
+/// Encodes `samples` (rows top first, interleaved) with OpenImageIO's writer `writer` ("png", "jpeg", "tiff",
+/// "webp", "openexr"). `type` is the type of the samples and of the file.
 template <class T>
 std::vector<std::uint8_t> encode_image(const std::string& writer, int width, int height, int channels,
                                        const std::vector<T>& samples, OIIO::TypeDesc type,
@@ -38,10 +38,12 @@ inline std::vector<std::uint8_t> test_picture(int width, int height, int channel
 }
 
 inline std::vector<std::uint8_t> png_bytes(int width, int height, int channels) {
-  return encode_image("png", width, height, channels, test_picture(width, height, channels), OIIO::TypeDesc::UINT8);
+  return encode_image("png", width, height, channels, test_picture(width, height, channels),
+                      OIIO::TypeDesc::UINT8);
 }
 inline std::vector<std::uint8_t> jpeg_bytes(int width, int height, int channels) {
-  return encode_image("jpeg", width, height, channels, test_picture(width, height, channels), OIIO::TypeDesc::UINT8);
+  return encode_image("jpeg", width, height, channels, test_picture(width, height, channels),
+                      OIIO::TypeDesc::UINT8);
 }
 
 }  // namespace texmesh::testing

@@ -21,7 +21,8 @@ class MemoryResolver : public Resolver {
     asked.push_back(uri);
     const auto it = files.find(uri);
     if (it == files.end()) return std::nullopt;
-    if (it->second.size() > max_bytes) throw InputError(uri, "", "at most " + std::to_string(max_bytes) + " bytes", "more");
+    if (it->second.size() > max_bytes)
+      throw InputError(uri, "", "at most " + std::to_string(max_bytes) + " bytes", "more");
     return it->second;
   }
 };
