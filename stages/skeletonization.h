@@ -26,8 +26,8 @@ struct SkeletonizationOptions {
   }
 };
 
-/// The curve skeleton and the skeleton distance R(v) (thesis 6.2; facts: alpha wrap, mean curvature flow, distance to
-/// segments).
+/// The curve skeleton and the skeleton distance R(v) (thesis 6.2): alpha wrap, mean curvature flow, distance to
+/// segments. Parts that contract to a point, and the centroids of the fallback, are segments of no length.
 struct Skeleton {
   std::vector<Vec3f> nodes;                            // mesh-local coordinates
   std::vector<std::array<std::uint32_t, 2>> segments;  // node indices
@@ -40,7 +40,8 @@ struct Skeleton {
 };
 
 /// Works for any conditioned mesh (open, several components, one triangle): where the wrap or the contraction fails it
-/// falls back to component centroids with a warning, it never fails. Deterministic.
+/// falls back to component centroids with a warning, it never fails (but for Cancelled and bad_alloc). Meshes of more than
+/// 100,000 triangles are clustered to that first. Wrap and contraction run on one thread. Deterministic.
 Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -1,0 +1,21 @@
+#pragma once
+#include <vector>
+
+#include "format/model.h"
+
+namespace texmesh {
+
+/// Points and triangles over them; nothing else is promised.
+struct TriangleSoup {
+  std::vector<Vec3d> points;
+  std::vector<Triangle> triangles;
+};
+
+/// The alpha wrap of a triangle soup (Portaneri et al. 2022, CGAL): closed oriented 2-manifolds around it
+/// that enter no hole narrower than alpha, at a distance of about `offset`, decimated to `max_faces`; one
+/// soup for each connected part, every point in use. Throws whatever CGAL throws. Deterministic,
+/// single-threaded.
+std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
+                                       std::size_t max_faces);
+
+}  // namespace texmesh
