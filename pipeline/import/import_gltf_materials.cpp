@@ -23,6 +23,9 @@ const Json* extension(const Json& object, const char* name) {
 
 float to_unit(double v) { return static_cast<float>(std::clamp(v, 0.0, 1.0)); }
 
+/// Numbers beyond a float would become infinities, which no JSON can hold later.
+float to_float(double v) { return static_cast<float>(std::clamp(v, -1e30, 1e30)); }
+
 Wrap wrap_of(int mode) {
   if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::kClamp;
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror : Wrap::kRepeat;
@@ -92,11 +95,15 @@ std::int32_t MaterialReader::image(std::size_t index) {
 std::int32_t MaterialReader::image_of_texture(std::size_t index) {
   const Json& texture = document_["textures"][index];
   std::int32_t found = -1;
-  if (const Json* webp = extension(texture, "EXT_texture_webp"); webp && member(*webp, "source")) {
+  const Json* webp = extension(texture, "EXT_texture_webp");
+  if (webp && member(*webp, "source")) {
     found = image((*webp)["source"].get<std::size_t>());
   }
-  if (found < 0 && structure_.textures[index].source >= 0) {
-    found = image(static_cast<std::size_t>(structure_.textures[index].source));
+  const int source = structure_.textures[index].source;
+  if (found < 0 && source >= 0) found = image(static_cast<std::size_t>(source));
+  if (found < 0 && source < 0 && !webp) {
+    source_.note_once(Severity::kWarning, "missing-texture", "/textures/" + std::to_string(index),
+                      "a texture without an image of a kind that texmesh reads is left out");
   }
   return found;
 }
@@ -109,11 +116,11 @@ TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
   if (const Json* t = extension(*info, "KHR_texture_transform")) {
     const auto pair = [&](const char* key, Vec2f otherwise) {
       const Json* v = member(*t, key);
-      return v ? Vec2f{(*v)[0].get<float>(), (*v)[1].get<float>()} : otherwise;
+      return v ? Vec2f{to_float((*v)[0].get<double>()), to_float((*v)[1].get<double>())} : otherwise;
     };
     ref.transform.offset = pair("offset", {0, 0});
     ref.transform.scale = pair("scale", {1, 1});
-    ref.transform.rotation = t->value("rotation", 0.0f);
+    ref.transform.rotation = to_float(t->value("rotation", 0.0));
     texcoord = t->value("texCoord", texcoord);
   }
   if (texcoord > 1) {
@@ -179,11 +186,11 @@ Material MaterialReader::read(std::size_t index) {
   out.metallic = to_unit(m.pbrMetallicRoughness.metallicFactor);
   out.roughness = to_unit(m.pbrMetallicRoughness.roughnessFactor);
   out.emissive = {to_unit(m.emissiveFactor[0]), to_unit(m.emissiveFactor[1]), to_unit(m.emissiveFactor[2])};
-  out.normal_scale = static_cast<float>(m.normalTexture.scale);
+  out.normal_scale = to_float(m.normalTexture.scale);
   out.occlusion_strength = to_unit(m.occlusionTexture.strength);
   if (m.alphaMode == "MASK") out.alpha_mode = AlphaMode::kMask;
   if (m.alphaMode == "BLEND") out.alpha_mode = AlphaMode::kBlend;
-  out.alpha_cutoff = static_cast<float>(m.alphaCutoff);
+  out.alpha_cutoff = to_float(m.alphaCutoff);
   out.double_sided = m.doubleSided;
   out.unlit = extension(declared, "KHR_materials_unlit") != nullptr;
   const Json* specular = extension(declared, "KHR_materials_pbrSpecularGlossiness");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/support/gltf_builder.h"
 
@@ -138,6 +139,26 @@ TEST(ImportGltfMaterials, AMissingImageIsAWarning) {
   EXPECT_TRUE(has_note(m, "missing-texture", Severity::kWarning));
   EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
   EXPECT_TRUE(m.images.empty());
+}
+
+TEST(ImportGltfMaterials, ATextureOfAnotherKindOnlyIsAWarning) {
+  GltfBuilder b = textured(base_colour());
+  b.json["textures"][0] = {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}};
+  const Model m = import(b);
+  EXPECT_TRUE(has_note(m, "missing-texture", Severity::kWarning));
+  EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
+}
+
+TEST(ImportGltfMaterials, HugeNumbersStayFinite) {
+  const json transform = {{"offset", {1e300, -1e300}}, {"rotation", 1e300}};
+  json material = base_colour({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}});
+  material["alphaCutoff"] = 1e300;
+  material["normalTexture"] = {{"index", 0}, {"scale", -1e300}};
+  const Material r = import(textured(material)).materials.at(0);
+  for (const float v : {r.alpha_cutoff, r.normal_scale, r.base_colour_texture.transform.offset.x,
+                        r.base_colour_texture.transform.offset.y, r.base_colour_texture.transform.rotation}) {
+    EXPECT_LT(std::fabs(v), 1e31f);
+  }
 }
 
 TEST(ImportGltfMaterials, NeverOpensImagesOfUnusedMaterials) {
