@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/portable_math.h"
 #include "stages/collapse_engine.h"
 #include "stages/distance.h"
 #include "stages/parallel.h"
@@ -15,11 +16,19 @@ constexpr std::size_t kErrorSamples = 4000;  // per scale and direction; rms wit
 // A scale that was stopped before its target is left out when it has more than this share of the next finer's triangles.
 constexpr double kRepeatedShare = 0.97;
 
-/// #{p >= i} for i = 0..scales.
-std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map) {
+/// #{p >= i} for i = 0..scales, scaled down so that the last is at most the share that the options ask for.
+std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const SimplificationOptions& options) {
   std::vector<std::uint32_t> target(static_cast<std::size_t>(scale_map.scales) + 1, 0);
   for (std::uint8_t p : scale_map.persistence)
     for (std::size_t i = 0; i <= std::min<std::size_t>(p, target.size() - 1); ++i) ++target[i];
+  const double most = options.coarsest * target[0], last = target.back();
+  if (options.order == CollapseOrder::kThesis || last <= most) return target;
+  const double factor = portable::pow(most / last, 1.0 / scale_map.scales);
+  double scale = 1;
+  for (std::uint32_t& t : target) {
+    t = static_cast<std::uint32_t>(std::floor(t * scale + 0.5));
+    scale *= factor;
+  }
   return target;
 }
 
@@ -140,7 +149,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, co
   NestedScales result;
   result.mesh = mesh.mesh;
   result.twin = mesh.twin;
-  const std::vector<std::uint32_t> target = vertex_targets(scale_map);
+  const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
   CollapseEngine engine(mesh, scale_map, options);
   result.scales.push_back(take_scale(engine, 0, ""));
   std::string floor;

@@ -27,6 +27,9 @@ struct SimplificationOptions {
   double boundary_weight = 10;       // of the border quadrics
   double max_error = 0.05;           // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
   int min_triangles = 100;           // no scale is asked to go below
+  // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no scale small
+  // enough for a first picture; targets are then scaled down geometrically so that the coarsest is asked for this share.
+  double coarsest = 0.03;            // of S_0's vertices; 1 = the scale map's counts as they are; not for order thesis
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("order", s.order, "texmesh = quadrics weighted by persistence; qem = quadrics alone; thesis = scale map, closest neighbour");
@@ -34,6 +37,7 @@ struct SimplificationOptions {
     v("uv_weight", s.uv_weight, Range{0, 10}, "weight of the texture's distortion against the shape's");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1}, "no scale deviates more than this fraction of the diagonal");
+    v("coarsest", s.coarsest, Range{0.0001, 1}, "share of the vertices that the coarsest scale is asked for at most");
     v("min_triangles", s.min_triangles, Range{1, 1000000}, "no scale is asked to have fewer triangles");
   }
 };
@@ -74,7 +78,8 @@ struct NestedScales {
   static void archive(S& s, A& a) { a(s.mesh, s.twin, s.collapses, s.scales, s.notes); }
 };
 
-/// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}), seam- and
+/// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}, see
+/// SimplificationOptions::coarsest), seam- and
 /// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV triangle; border
 /// vertices move along the border only, seams along the seam, twins together (see facts/geometry.md, section 3).
 /// Deterministic: ties by place along a space-filling curve. About 5 us per removed vertex on one core.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -173,7 +174,7 @@ TEST(Simplification, KeepsBordersOfSheets) {
 TEST(Simplification, MeetsVertexTargetsWhereNothingLocks) {
   const ConditionedMesh mesh = condition(sheet(40, 0.2f));
   const ScaleMap map = random_scale_map(mesh.mesh.positions.size());
-  const NestedScales scales = simplify(mesh, map, {.min_triangles = 20}, kOneThread);
+  const NestedScales scales = simplify(mesh, map, {.min_triangles = 20, .coarsest = 1}, kOneThread);
   for (const NestedScale& s : scales.scales) {
     const auto asked = static_cast<std::uint32_t>(
         std::count_if(map.persistence.begin(), map.persistence.end(), [&](std::uint8_t p) { return p >= s.scale; }));
@@ -183,6 +184,21 @@ TEST(Simplification, MeetsVertexTargetsWhereNothingLocks) {
       EXPECT_GT(s.position_count, asked);
     }
   }
+}
+
+TEST(Simplification, CoarsestScaleIsSmallWhereMuchPersists) {
+  const ConditionedMesh mesh = condition(sheet(40, 0.1f));
+  ScaleMap map = random_scale_map(mesh.mesh.positions.size());
+  for (std::size_t p = 0; p < map.persistence.size(); ++p)
+    if (p % 3 == 0) map.persistence[p] = 12;
+  auto last = [&](double coarsest) {
+    const NestedScales scales = simplify(mesh, map, {.min_triangles = 20, .coarsest = coarsest}, kOneThread);
+    expect_sound(scales);
+    return scales.scales.back();
+  };
+  EXPECT_GE(last(1).position_count, mesh.mesh.positions.size() / 3);
+  EXPECT_EQ(last(0.05).position_count, std::lround(0.05 * static_cast<double>(mesh.mesh.positions.size())));
+  EXPECT_EQ(last(0.05).scale, 12);
 }
 
 TEST(Simplification, CubeOfTwelveTrianglesStaysAsItIs) {
