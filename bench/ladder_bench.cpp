@@ -1,6 +1,6 @@
 // The texture stages against plain libjpeg on the same pixels in the same run. Counters:
-//   cpu_ratio    CPU of the stage / CPU of ten whole-image encodes with standard tables (one thread); target <= 1.5
-//   bytes_ratio  bytes of the ladder, tables included / bytes of those ten files; target <= 1.0
+//   cpu_ratio    CPU of the stage / CPU of ten whole-image encodes with standard tables (one thread); target
+//   <= 1.5 bytes_ratio  bytes of the ladder, tables included / bytes of those ten files; target <= 1.0
 //   speedup      wall with one thread / wall with two
 #include <benchmark/benchmark.h>
 
@@ -34,7 +34,8 @@ std::uint32_t hash(std::uint32_t x, std::uint32_t y, std::uint32_t c) {
 std::uint32_t octave(std::uint32_t x, std::uint32_t y, std::uint32_t c, std::uint32_t step) {
   const std::uint32_t u = x / step, v = y / step, a = x % step, b = y % step;
   const std::uint64_t top = std::uint64_t{hash(u, v, c)} * (step - a) + std::uint64_t{hash(u + 1, v, c)} * a;
-  const std::uint64_t low = std::uint64_t{hash(u, v + 1, c)} * (step - a) + std::uint64_t{hash(u + 1, v + 1, c)} * a;
+  const std::uint64_t low =
+      std::uint64_t{hash(u, v + 1, c)} * (step - a) + std::uint64_t{hash(u + 1, v + 1, c)} * a;
   return static_cast<std::uint32_t>((top * (step - b) + low * b) / (std::uint64_t{step} * step));
 }
 
@@ -109,7 +110,8 @@ RunContext threads(int count) {
 }
 
 void encode_ladder_bench(benchmark::State& state) {
-  const Scene scene = make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
+  const Scene scene =
+      make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
   const LadderOptions options;
   double plain = 0, ours = 0, one = 0, two = 0;
   std::size_t plain_bytes = 0, our_bytes = 0;
@@ -133,17 +135,24 @@ void encode_ladder_bench(benchmark::State& state) {
   state.counters["bytes_ratio"] = static_cast<double>(our_bytes) / static_cast<double>(plain_bytes);
   state.counters["speedup"] = one / two;
 }
-BENCHMARK(encode_ladder_bench)->Args({1024, 128})->Args({2048, 128})->Args({2048, 256})->Args({4096, 256})
-    ->Unit(benchmark::kMillisecond)->MinTime(1);
+BENCHMARK(encode_ladder_bench)
+    ->Args({1024, 128})
+    ->Args({2048, 128})
+    ->Args({2048, 256})
+    ->Args({4096, 256})
+    ->Unit(benchmark::kMillisecond)
+    ->MinTime(1);
 
 void build_tables_bench(benchmark::State& state) {
-  const Scene scene = make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
+  const Scene scene =
+      make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
   const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, threads(2));
   const Predictors predictors = predict_quality(scene.fragments, scene.pixels, {}, threads(2));
   double plain = 0, ours = 0, one = 0, two = 0;
   for (auto _ : state) {
     double start = cpu_seconds();
-    for (int quality : LadderOptions{}.rungs) benchmark::DoNotOptimize(plain_encode(scene.pixels[0], quality));
+    for (int quality : LadderOptions{}.rungs)
+      benchmark::DoNotOptimize(plain_encode(scene.pixels[0], quality));
     plain += cpu_seconds() - start;
     start = cpu_seconds();
     double wall = wall_seconds();
@@ -166,8 +175,10 @@ void fill_bench(benchmark::State& state) {
   std::vector<std::uint8_t> coverage(std::size_t{size} / 8 * size);
   for (std::uint32_t y = 0; y < size; ++y)
     for (std::uint32_t x = 0; x < size; ++x) {
-      const std::int64_t dx = static_cast<std::int64_t>(x % 300) - 150, dy = static_cast<std::int64_t>(y % 300) - 150;
-      if (dx * dx + dy * dy < 120 * 120) coverage[std::size_t{size} / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
+      const std::int64_t dx = static_cast<std::int64_t>(x % 300) - 150,
+                         dy = static_cast<std::int64_t>(y % 300) - 150;
+      if (dx * dx + dy * dy < 120 * 120)
+        coverage[std::size_t{size} / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
     }
   for (auto _ : state) {
     state.PauseTiming();
@@ -185,7 +196,8 @@ void fragment_bench(benchmark::State& state) {
   ConditionedMesh mesh;
   for (std::uint32_t j = 0; j <= n; ++j)
     for (std::uint32_t i = 0; i <= n; ++i) {
-      const float x = static_cast<float>(i) / static_cast<float>(n), y = static_cast<float>(j) / static_cast<float>(n);
+      const float x = static_cast<float>(i) / static_cast<float>(n),
+                  y = static_cast<float>(j) / static_cast<float>(n);
       mesh.mesh.positions.push_back({x, y, 0});
       mesh.mesh.uv0.push_back({x, y});
       mesh.mesh.wedge_position.push_back(j * (n + 1) + i);
@@ -200,11 +212,12 @@ void fragment_bench(benchmark::State& state) {
   mesh.mesh.triangle_material.assign(mesh.mesh.triangles.size(), 0);
   ScaleMap scale_map;
   scale_map.scales = 20;
-  for (std::size_t p = 0; p < mesh.mesh.positions.size(); ++p) scale_map.crossing.push_back(static_cast<std::uint8_t>(p % 21));
+  for (std::size_t p = 0; p < mesh.mesh.positions.size(); ++p)
+    scale_map.crossing.push_back(static_cast<std::uint8_t>(p % 21));
   // Different wrap modes keep the four from sharing one measurement.
   Material material;
-  TextureRef Material::* const slots[] = {&Material::base_colour_texture, &Material::normal_texture,
-                                          &Material::occlusion_texture, &Material::emissive_texture};
+  TextureRef Material::*const slots[] = {&Material::base_colour_texture, &Material::normal_texture,
+                                         &Material::occlusion_texture, &Material::emissive_texture};
   std::vector<Image> images(4);
   for (int k = 0; k < 4; ++k) {
     (material.*slots[k]).image = k;

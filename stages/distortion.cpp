@@ -16,9 +16,13 @@ double ssim(double n, double sx, double sxx, double sy, double syy, double sxy) 
 
 }  // namespace
 
-DistortionMeter::DistortionMeter(std::vector<std::uint8_t> source, std::vector<std::uint8_t> mask, std::uint32_t width,
-                                 std::uint32_t height)
-    : source_(std::move(source)), mask_(std::move(mask)), width_(width), columns_(width / 4), rows_(height / 4) {
+DistortionMeter::DistortionMeter(std::vector<std::uint8_t> source, std::vector<std::uint8_t> mask,
+                                 std::uint32_t width, std::uint32_t height)
+    : source_(std::move(source)),
+      mask_(std::move(mask)),
+      width_(width),
+      columns_(width / 4),
+      rows_(height / 4) {
   for (std::size_t k = 0; k < source_.size(); ++k) source_[k] &= mask_[k];
   cells_.resize(std::size_t{columns_} * rows_);
   for (std::size_t y = 0; y < height; ++y)
@@ -74,11 +78,13 @@ Distortion DistortionMeter::against(const std::vector<std::uint8_t>& decoded) co
         return here[c].*member + here[c - 1].*member + above[c].*member + above[c - 1].*member;
       };
       weight += n;
-      similarity += n * ssim(n, source(&SourceCell::sum), source(&SourceCell::square), coded(&DecodedCell::sum),
-                             coded(&DecodedCell::square), coded(&DecodedCell::product));
+      similarity +=
+          n * ssim(n, source(&SourceCell::sum), source(&SourceCell::square), coded(&DecodedCell::sum),
+                   coded(&DecodedCell::square), coded(&DecodedCell::product));
     }
   }
-  return {static_cast<double>(error) / static_cast<double>(count), 1 - similarity / static_cast<double>(weight)};
+  return {static_cast<double>(error) / static_cast<double>(count),
+          1 - similarity / static_cast<double>(weight)};
 }
 
 }  // namespace texmesh

@@ -14,13 +14,14 @@ struct Distortion {
 /// One fragment's source, against which any number of decoded versions is compared.
 class DistortionMeter {
  public:
-  /// `source` and `mask` are width x height values, sides multiples of 4 and at least 8; a mask is 0 or 255. At least
-  /// one texel is covered.
+  /// `source` and `mask` are width x height values, sides multiples of 4 and at least 8; a mask is 0 or 255.
+  /// At least one texel is covered.
   DistortionMeter(std::vector<std::uint8_t> source, std::vector<std::uint8_t> mask, std::uint32_t width,
                   std::uint32_t height);
 
-  /// MSE and the mean structural similarity (Wang et al. 2004) in 8 x 8 windows every 4 texels, without Gaussian
-  /// weights. Statistics of a window are those of its covered texels, and it counts as many times as it has of them.
+  /// MSE and the mean structural similarity (Wang et al. 2004) in 8 x 8 windows every 4 texels, without
+  /// Gaussian weights. Statistics of a window are those of its covered texels, and it counts as many times as
+  /// it has of them.
   Distortion against(const std::vector<std::uint8_t>& decoded) const;
 
  private:
@@ -31,7 +32,8 @@ class DistortionMeter {
   struct DecodedCell {
     std::uint32_t sum, square, product;
   };
-  DecodedCell decoded_cell(const std::vector<std::uint8_t>& decoded, std::uint32_t column, std::uint32_t row) const;
+  DecodedCell decoded_cell(const std::vector<std::uint8_t>& decoded, std::uint32_t column,
+                           std::uint32_t row) const;
 
   std::vector<std::uint8_t> source_, mask_;  // source_ is 0 where the mask is
   std::uint32_t width_, columns_, rows_;     // in cells

@@ -29,10 +29,14 @@ Neighbours neighbours(std::uint32_t fine, std::uint32_t coarse_size) {
 
 std::uint8_t mean_of(std::uint32_t sum, std::uint32_t count) {
   switch (count) {  // by constants: a division by a variable doubles the time of the whole push
-    case 1: return static_cast<std::uint8_t>(sum);
-    case 2: return static_cast<std::uint8_t>((sum + 1) / 2);
-    case 3: return static_cast<std::uint8_t>((sum + 1) / 3);
-    default: return static_cast<std::uint8_t>((sum + 2) / 4);
+    case 1:
+      return static_cast<std::uint8_t>(sum);
+    case 2:
+      return static_cast<std::uint8_t>((sum + 1) / 2);
+    case 3:
+      return static_cast<std::uint8_t>((sum + 1) / 3);
+    default:
+      return static_cast<std::uint8_t>((sum + 2) / 4);
   }
 }
 
@@ -40,7 +44,10 @@ template <int C>
 class PushPull {
  public:
   PushPull(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context)
-      : pixels_(pixels), coverage_(coverage), stride_((std::size_t{pixels.width_px} + 7) / 8), context_(context) {}
+      : pixels_(pixels),
+        coverage_(coverage),
+        stride_((std::size_t{pixels.width_px} + 7) / 8),
+        context_(context) {}
 
   void run() {
     std::vector<Level> levels;
@@ -115,7 +122,8 @@ class PushPull {
     const Neighbours n = neighbours(x, coarse.width);
     const std::uint8_t *a = near_row + std::size_t{n.near} * C, *b = near_row + std::size_t{n.far} * C;
     const std::uint8_t *c = far_row + std::size_t{n.near} * C, *d = far_row + std::size_t{n.far} * C;
-    for (int k = 0; k < C; ++k) to[k] = static_cast<std::uint8_t>((9 * a[k] + 3 * b[k] + 3 * c[k] + d[k] + 8) >> 4);
+    for (int k = 0; k < C; ++k)
+      to[k] = static_cast<std::uint8_t>((9 * a[k] + 3 * b[k] + 3 * c[k] + d[k] + 8) >> 4);
   }
 
   void pull(const Level& coarse, Level& fine) const {
@@ -169,9 +177,11 @@ Pixels channels_of(const Pixels& image, const TexturePlane& plane) {
 
 /// Repeats the last column and row until the fragments are whole.
 Pixels padded(Pixels from, const TexturePlane& plane) {
-  Pixels to{plane.columns * plane.fragment_width_px, plane.rows * plane.fragment_height_px, from.channels, {}};
+  Pixels to{
+      plane.columns * plane.fragment_width_px, plane.rows * plane.fragment_height_px, from.channels, {}};
   if (to.width_px == from.width_px && to.height_px == from.height_px) return from;
-  const std::size_t stride = std::size_t{to.width_px} * to.channels, used = std::size_t{from.width_px} * to.channels;
+  const std::size_t stride = std::size_t{to.width_px} * to.channels,
+                    used = std::size_t{from.width_px} * to.channels;
   to.data.resize(stride * to.height_px);
   for (std::uint32_t y = 0; y < to.height_px; ++y) {
     std::uint8_t* row = to.data.data() + stride * y;
@@ -182,7 +192,8 @@ Pixels padded(Pixels from, const TexturePlane& plane) {
 }
 
 Pixels decode_for(const Image& image, const TexturePlane& plane) {
-  const bool data = plane.role == TextureRole::kNormal || plane.role == TextureRole::kOcclusionRoughnessMetallic;
+  const bool data =
+      plane.role == TextureRole::kNormal || plane.role == TextureRole::kOcclusionRoughnessMetallic;
   Pixels out = decode_image(image, data ? FloatEncoding::kAsIs : FloatEncoding::kSrgb);
   const std::uint32_t least = plane.role == TextureRole::kAlpha ? 2 : plane.channels;
   if (out.width_px != plane.width_px || out.height_px != plane.height_px || out.channels < least)
@@ -199,10 +210,14 @@ Pixels decode_for(const Image& image, const TexturePlane& plane) {
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
   const std::size_t bytes = (std::size_t{pixels.width_px} + 7) / 8 * pixels.height_px;
   if (coverage.size() != bytes || bytes == 0)
-    throw StageError("fragmentation", "coverage", std::to_string(bytes) + " bytes", std::to_string(coverage.size()));
-  if (pixels.channels == 1) PushPull<1>(pixels, coverage, context).run();
-  else if (pixels.channels == 3) PushPull<3>(pixels, coverage, context).run();
-  else throw StageError("fragmentation", "channels", "1 or 3", std::to_string(pixels.channels));
+    throw StageError("fragmentation", "coverage", std::to_string(bytes) + " bytes",
+                     std::to_string(coverage.size()));
+  if (pixels.channels == 1)
+    PushPull<1>(pixels, coverage, context).run();
+  else if (pixels.channels == 3)
+    PushPull<3>(pixels, coverage, context).run();
+  else
+    throw StageError("fragmentation", "channels", "1 or 3", std::to_string(pixels.channels));
 }
 
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
@@ -227,7 +242,8 @@ std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Im
         if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
           throw StageError("fragmentation", image.name, "an alpha channel", "none");
         const bool last = p + 1 == planes.size() || planes[p + 1].image != planes[p].image;
-        Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded) : channels_of(decoded, planes[p]);
+        Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
+                                                                      : channels_of(decoded, planes[p]);
         if (fill == Fill::kPushPull) fill_uncovered(plane, planes[p].coverage, inner);
         out[p] = padded(std::move(plane), planes[p]);
       }

@@ -21,7 +21,8 @@ struct Axis {
 /// About `side` px each, never below min_px unless the image is smaller.
 Axis cut_axis(std::uint32_t size_px, std::uint32_t side, std::uint32_t min_px) {
   const auto up16 = [](std::uint32_t v) { return (v + 15) / 16 * 16; };
-  const std::uint32_t most = std::max<std::uint32_t>(size_px / min_px, (size_px + kMaxSidePx - 1) / kMaxSidePx);
+  const std::uint32_t most =
+      std::max<std::uint32_t>(size_px / min_px, (size_px + kMaxSidePx - 1) / kMaxSidePx);
   const std::uint32_t wanted = std::clamp<std::uint32_t>((size_px + side - 1) / side, 1, std::max(most, 1u));
   const std::uint32_t side_px = up16((size_px + wanted - 1) / wanted);
   return {(size_px + side_px - 1) / side_px, side_px};
@@ -46,8 +47,8 @@ std::string reason_of(const FragmentGrid& g, std::uint32_t max_fragments, std::u
   else
     why = "sides near the least of " + text(min_px) + " px";
   return text(g.width_px) + " x " + text(g.height_px) + " px in " + text(g.columns) + " x " + text(g.rows) +
-         " fragments of " + text(g.fragment_width_px) + " x " + text(g.fragment_height_px) + " px (" + why + "; " +
-         text(permille / 10) + "." + text(permille % 10) + " % padding)";
+         " fragments of " + text(g.fragment_width_px) + " x " + text(g.fragment_height_px) + " px (" + why +
+         "; " + text(permille / 10) + "." + text(permille % 10) + " % padding)";
 }
 
 /// The part of a convex polygon with lo <= axis <= hi.
@@ -132,8 +133,8 @@ void AreaSpreader::add_evenly(double amount, std::vector<double>& fragments) con
     }
 }
 
-void AreaSpreader::add_longest_edge(const std::array<Vec2d, 3>& triangle, Wrap wrap_s, Wrap wrap_t, double amount,
-                                    std::vector<double>& fragments) const {
+void AreaSpreader::add_longest_edge(const std::array<Vec2d, 3>& triangle, Wrap wrap_s, Wrap wrap_t,
+                                    double amount, std::vector<double>& fragments) const {
   std::size_t longest = 0;
   const auto squared = [&](std::size_t k) {
     const Vec2d d = triangle[(k + 1) % 3] - triangle[k];
@@ -162,8 +163,8 @@ void AreaSpreader::add_clipped(const std::array<Vec2d, 3>& triangle, double amou
     }
   }
   for (std::size_t k = 0; k < parts.size(); ++k)
-    fragments[std::size_t{rows_[k / columns_.size()].index} * grid_.columns + columns_[k % columns_.size()].index] +=
-        amount * (parts[k] / whole);
+    fragments[std::size_t{rows_[k / columns_.size()].index} * grid_.columns +
+              columns_[k % columns_.size()].index] += amount * (parts[k] / whole);
 }
 
 void AreaSpreader::add(const std::array<Vec2d, 3>& triangle, Wrap wrap_s, Wrap wrap_t, double amount,
@@ -181,8 +182,10 @@ void AreaSpreader::add(const std::array<Vec2d, 3>& triangle, Wrap wrap_s, Wrap w
   }
   const double area = std::fabs(cross(triangle[1] - triangle[0], triangle[2] - triangle[0])) / 2;
   const double extent = std::max(x1 - x0, y1 - y0);
-  if (area > 1e-9 * extent * extent) add_clipped(triangle, amount, fragments);
-  else add_longest_edge(triangle, wrap_s, wrap_t, amount, fragments);
+  if (area > 1e-9 * extent * extent)
+    add_clipped(triangle, amount, fragments);
+  else
+    add_longest_edge(triangle, wrap_s, wrap_t, amount, fragments);
 }
 
 std::uint32_t fragment_at(const FragmentGrid& grid, Vec2d point, Wrap wrap_s, Wrap wrap_t) {

@@ -16,17 +16,18 @@ struct FragmentGrid {
   std::string reason;
 };
 
-/// At most max_fragments, sides multiples of 16 and at least min_px where the image allows. The side is 256 px where that
-/// gives at least 64 fragments (or all that are allowed), because a 256 px fragment costs 0.5 % more than a whole image and one of
-/// 128 px 2 %; below that it is as large as 64 fragments allow, because harmonic time compensation with 16 misses its
-/// deadline by 0.8 %, with 64 by 0.1 %. Sides above 65488 px are never chosen (JPEG), so a larger image has more than
-/// max_fragments when that is 1.
+/// At most max_fragments, sides multiples of 16 and at least min_px where the image allows. The side is 256
+/// px where that gives at least 64 fragments (or all that are allowed), because a 256 px fragment costs 0.5 %
+/// more than a whole image and one of 128 px 2 %; below that it is as large as 64 fragments allow, because
+/// harmonic time compensation with 16 misses its deadline by 0.8 %, with 64 by 0.1 %. Sides above 65488 px
+/// are never chosen (JPEG), so a larger image has more than max_fragments when that is 1.
 FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t max_fragments,
                          std::uint32_t min_px);
 
-/// Adds `amount` to the fragments in proportion to the area of the triangle in them (texel coordinates, wrapped; a
-/// fragment may be met several times where a texture tiles). A triangle without area counts where its longest edge
-/// lies; one that spreads over more than 4096 fragment cells counts evenly over the whole image.
+/// Adds `amount` to the fragments in proportion to the area of the triangle in them (texel coordinates,
+/// wrapped; a fragment may be met several times where a texture tiles). A triangle without area counts where
+/// its longest edge lies; one that spreads over more than 4096 fragment cells counts evenly over the whole
+/// image.
 class AreaSpreader {
  public:
   explicit AreaSpreader(const FragmentGrid& grid) : grid_(grid) {}
@@ -39,7 +40,8 @@ class AreaSpreader {
     double begin, end;
     std::uint32_t index;
   };
-  static bool cut(double lo, double hi, std::uint32_t size, std::uint32_t step, Wrap wrap, std::vector<Cell>& out);
+  static bool cut(double lo, double hi, std::uint32_t size, std::uint32_t step, Wrap wrap,
+                  std::vector<Cell>& out);
   void add_evenly(double amount, std::vector<double>& fragments) const;
   void add_longest_edge(const std::array<Vec2d, 3>& triangle, Wrap wrap_s, Wrap wrap_t, double amount,
                         std::vector<double>& fragments) const;

@@ -35,7 +35,8 @@ struct Measure {
   bool missing_uvs = false;
 };
 
-void check(const ConditionedMesh& conditioned, const std::vector<Material>& materials, const ScaleMap& scale_map) {
+void check(const ConditionedMesh& conditioned, const std::vector<Material>& materials,
+           const ScaleMap& scale_map) {
   const Mesh& mesh = conditioned.mesh;
   const auto fail = [](std::string place, std::size_t expected, std::size_t found) {
     throw StageError("fragmentation", std::move(place), std::to_string(expected), std::to_string(found));
@@ -77,7 +78,8 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
         if (ref.image != static_cast<std::int32_t>(image)) continue;
         role_used[static_cast<int>(role)] = true;
         add_use(colour, m, ref);
-        if (role == TextureRole::kBaseColour && materials[m].alpha_mode != AlphaMode::kOpaque) add_use(alpha, m, ref);
+        if (role == TextureRole::kBaseColour && materials[m].alpha_mode != AlphaMode::kOpaque)
+          add_use(alpha, m, ref);
       }
     if (colour.empty()) continue;
     TexturePlane plane;
@@ -86,7 +88,8 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
     plane.channels = images[image].channels >= 3 ? 3 : 1;
     std::string others;
     for (int r = static_cast<int>(plane.role) + 1; r < 5; ++r)
-      if (role_used[r]) others += (others.empty() ? "" : ", ") + std::string(enum_name(static_cast<TextureRole>(r)));
+      if (role_used[r])
+        others += (others.empty() ? "" : ", ") + std::string(enum_name(static_cast<TextureRole>(r)));
     if (!others.empty())
       add_info(out.notes, "image-with-several-roles", images[image].name,
                "coded as " + std::string(enum_name(plane.role)) + ", used as " + others + " too");
@@ -102,7 +105,8 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
 
 double area_in_space(const Mesh& mesh, std::size_t triangle) {
   Vec3d p[3];
-  for (int c = 0; c < 3; ++c) p[c] = to_double(mesh.positions[mesh.position_of(static_cast<std::uint32_t>(triangle), c)]);
+  for (int c = 0; c < 3; ++c)
+    p[c] = to_double(mesh.positions[mesh.position_of(static_cast<std::uint32_t>(triangle), c)]);
   const double area = length(cross(p[1] - p[0], p[2] - p[0])) / 2;
   return std::isfinite(area) ? area : 0;
 }
@@ -128,8 +132,10 @@ void for_each_triangle(const Mesh& mesh, const Job& job, Measure& out, const Bod
         texels[c] = map(uvs[mesh.triangles[t][c]]);
         finite = finite && std::isfinite(texels[c].x) && std::isfinite(texels[c].y);
       }
-      if (finite) body(t, use, first, texels);
-      else ++out.broken_triangles;
+      if (finite)
+        body(t, use, first, texels);
+      else
+        ++out.broken_triangles;
     }
   }
 }
@@ -158,22 +164,24 @@ Measure measure(const ConditionedMesh& conditioned, const ScaleMap& scale_map, c
   AreaSpreader spreader(job.grid);
   std::vector<std::uint64_t> corners;
   std::vector<std::uint32_t> last_fragment(mesh.positions.size(), 0xffffffff);  // spares most of the sorting
-  for_each_triangle(mesh, job, out, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
-    coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
-    coverage.add(texels);
-    if (first) spreader.add(texels, use.ref.wrap_s, use.ref.wrap_t, area_in_space(mesh, t), out.surface);
-    const Vec2d centre = (texels[0] + texels[1] + texels[2]) * (1.0 / 3);
-    for (int c = 0; c < 3; ++c) {
-      std::uint32_t position = mesh.position_of(static_cast<std::uint32_t>(t), c);
-      if (!conditioned.twin.empty()) position = conditioned.twin[position];
-      const Vec2d corner = texels[static_cast<std::size_t>(c)];
-      const Vec2d inside = corner + (centre - corner) * 1e-6;  // decides on which side of a border it lies
-      const std::uint32_t fragment = fragment_at(job.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
-      if (last_fragment[position] == fragment) continue;
-      last_fragment[position] = fragment;
-      corners.push_back(std::uint64_t{position} << 16 | fragment);
-    }
-  });
+  for_each_triangle(
+      mesh, job, out, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
+        coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
+        coverage.add(texels);
+        if (first) spreader.add(texels, use.ref.wrap_s, use.ref.wrap_t, area_in_space(mesh, t), out.surface);
+        const Vec2d centre = (texels[0] + texels[1] + texels[2]) * (1.0 / 3);
+        for (int c = 0; c < 3; ++c) {
+          std::uint32_t position = mesh.position_of(static_cast<std::uint32_t>(t), c);
+          if (!conditioned.twin.empty()) position = conditioned.twin[position];
+          const Vec2d corner = texels[static_cast<std::size_t>(c)];
+          const Vec2d inside =
+              corner + (centre - corner) * 1e-6;  // decides on which side of a border it lies
+          const std::uint32_t fragment = fragment_at(job.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
+          if (last_fragment[position] == fragment) continue;
+          last_fragment[position] = fragment;
+          corners.push_back(std::uint64_t{position} << 16 | fragment);
+        }
+      });
   out.coverage = coverage.take();
   out.features = count_features(corners, scale_map, fragments);
   return out;
@@ -185,7 +193,8 @@ std::vector<std::uint32_t> count_covered(const TexturePlane& plane) {
   for (std::uint32_t y = 0; y < plane.height_px; ++y) {
     std::uint32_t* row = out.data() + std::size_t{y / plane.fragment_height_px} * plane.columns;
     for (std::size_t byte = 0; byte < stride; ++byte)  // fragment sides are multiples of 8
-      row[byte * 8 / plane.fragment_width_px] += static_cast<std::uint32_t>(std::popcount(plane.coverage[y * stride + byte]));
+      row[byte * 8 / plane.fragment_width_px] +=
+          static_cast<std::uint32_t>(std::popcount(plane.coverage[y * stride + byte]));
   }
   return out;
 }
@@ -207,7 +216,8 @@ std::vector<float> eta_of_features(const TexturePlane& plane) {
   return eta;
 }
 
-void complete_plane(const FragmentGrid& grid, const Measure& measured, double whole_surface, TexturePlane& plane) {
+void complete_plane(const FragmentGrid& grid, const Measure& measured, double whole_surface,
+                    TexturePlane& plane) {
   plane.width_px = grid.width_px;
   plane.height_px = grid.height_px;
   plane.fragment_width_px = grid.fragment_width_px;
@@ -226,10 +236,12 @@ void complete_plane(const FragmentGrid& grid, const Measure& measured, double wh
 void note_faults(const TexturePlane& plane, const Measure& measured, const std::string& image, Notes& notes) {
   if (plane.role == TextureRole::kAlpha) return;  // said of the colours already
   if (measured.missing_uvs)
-    add_warning(notes, "missing-texture-coordinates", image, "a material uses the image without texture coordinates");
+    add_warning(notes, "missing-texture-coordinates", image,
+                "a material uses the image without texture coordinates");
   if (measured.broken_triangles > 0)
     add_warning(notes, "non-finite-texture-coordinate", image,
-                std::to_string(measured.broken_triangles) + " triangles sample it at coordinates that are not finite");
+                std::to_string(measured.broken_triangles) +
+                    " triangles sample it at coordinates that are not finite");
   if (std::all_of(plane.covered_texels.begin(), plane.covered_texels.end(), [](auto n) { return n == 0; }))
     add_info(notes, "unused-image", image, "no triangle samples the image");
 }
@@ -250,13 +262,15 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
     const Image& image = images[out.planes[p].image];
     const auto same = std::find_if(jobs.begin(), jobs.end(), [&](const Job& job) {
-      return job.uses == uses[p] && job.grid.width_px == image.width_px && job.grid.height_px == image.height_px;
+      return job.uses == uses[p] && job.grid.width_px == image.width_px &&
+             job.grid.height_px == image.height_px;
     });
     job_of[p] = static_cast<std::size_t>(same - jobs.begin());
     if (same != jobs.end()) continue;
-    jobs.push_back({choose_grid(image.width_px, image.height_px, static_cast<std::uint32_t>(options.max_fragments),
-                                static_cast<std::uint32_t>(options.min_fragment_px)),
-                    uses[p]});
+    jobs.push_back(
+        {choose_grid(image.width_px, image.height_px, static_cast<std::uint32_t>(options.max_fragments),
+                     static_cast<std::uint32_t>(options.min_fragment_px)),
+         uses[p]});
   }
   std::vector<Measure> measured(jobs.size());
   parallel_for(context, jobs.size(), 1, [&](std::size_t begin, std::size_t end) {

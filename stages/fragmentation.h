@@ -28,69 +28,85 @@ struct FragmentationOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("max_fragments", s.max_fragments, Range{1, 256}, "most fragments of one texture");
-    v("min_fragment_px", s.min_fragment_px, Range{16, 4096}, "least side of a fragment, where the image allows");
-    v("fill", s.fill, "push-pull = smooth colours where no chart covers the texture; none = the source's texels");
+    v("min_fragment_px", s.min_fragment_px, Range{16, 4096},
+      "least side of a fragment, where the image allows");
+    v("fill", s.fill,
+      "push-pull = smooth colours where no chart covers the texture; none = the source's texels");
   }
 };
 
-enum class TextureRole : std::uint8_t { kBaseColour = 0, kEmissive = 1, kNormal = 2, kOcclusionRoughnessMetallic = 3, kAlpha = 4 };
+enum class TextureRole : std::uint8_t {
+  kBaseColour = 0,
+  kEmissive = 1,
+  kNormal = 2,
+  kOcclusionRoughnessMetallic = 3,
+  kAlpha = 4
+};
 template <>
 struct EnumNames<TextureRole> {
-  static constexpr std::array<std::string_view, 5> names{"base-colour", "emissive", "normal", "occlusion-roughness-metallic", "alpha"};
+  static constexpr std::array<std::string_view, 5> names{"base-colour", "emissive", "normal",
+                                                         "occlusion-roughness-metallic", "alpha"};
 };
 
-/// One coded image of the package: the colour or data channels of a source image, or its alpha channel. A source image
-/// with an alpha channel that some material uses (mask or blend) gives two planes, colour first.
+/// One coded image of the package: the colour or data channels of a source image, or its alpha channel. A
+/// source image with an alpha channel that some material uses (mask or blend) gives two planes, colour first.
 struct TexturePlane {
-  std::uint32_t image = 0;          // index into Model::images
+  std::uint32_t image = 0;  // index into Model::images
   TextureRole role = TextureRole::kBaseColour;
-  std::uint32_t width_px = 0, height_px = 0, channels = 3;   // 1 or 3
+  std::uint32_t width_px = 0, height_px = 0, channels = 3;                             // 1 or 3
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;  // multiples of 16
-  std::string grid_reason;          // why this grid
-  std::vector<std::uint8_t> coverage;          // 1 bit per texel, rows of ceil(width / 8) bytes, bit 7 first
+  std::string grid_reason;                                                             // why this grid
+  std::vector<std::uint8_t> coverage;  // 1 bit per texel, rows of ceil(width / 8) bytes, bit 7 first
   // Per fragment, row by row from the top left (design 8.13):
-  std::vector<std::uint32_t> covered_texels;   // 0 = never stored
-  std::vector<float> surface_fraction;         // of the object's whole surface area
-  std::vector<std::uint32_t> features;         // [scale * fragments + fragment], scale 0..ScaleMap::scales: f_i
-  std::vector<float> eta;                      // same shape: eta_i (3.1), 0..1, min-max over covered fragments
+  std::vector<std::uint32_t> covered_texels;  // 0 = never stored
+  std::vector<float> surface_fraction;        // of the object's whole surface area
+  std::vector<std::uint32_t> features;  // [scale * fragments + fragment], scale 0..ScaleMap::scales: f_i
+  std::vector<float> eta;               // same shape: eta_i (3.1), 0..1, min-max over covered fragments
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.image, s.role, s.width_px, s.height_px, s.channels, s.fragment_width_px, s.fragment_height_px, s.columns,
-      s.rows, s.grid_reason, s.coverage, s.covered_texels, s.surface_fraction, s.features, s.eta);
+    a(s.image, s.role, s.width_px, s.height_px, s.channels, s.fragment_width_px, s.fragment_height_px,
+      s.columns, s.rows, s.grid_reason, s.coverage, s.covered_texels, s.surface_fraction, s.features, s.eta);
   }
 };
 
 struct Fragments {
-  int scales = 0;                     // as ScaleMap::scales
-  std::vector<TexturePlane> planes;   // by image index, colour before alpha; empty for untextured models
+  int scales = 0;                    // as ScaleMap::scales
+  std::vector<TexturePlane> planes;  // by image index, colour before alpha; empty for untextured models
   Notes notes;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.scales, s.planes, s.notes); }
+  static void archive(S& s, A& a) {
+    a(s.scales, s.planes, s.notes);
+  }
 };
 
 /// Cuts the images that materials use into planes and fragments (thesis 3.2):
-/// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a note.
-/// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the image allows.
-/// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the texture's
+/// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a
+/// note.
+/// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the
+/// image allows.
+/// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the
+/// texture's
 ///   transform and wrap modes. Triangles whose UVs are absent or not finite cover nothing (a note says so).
 /// - Surface: each triangle's area in space, spread over fragments by its area on the texture.
-/// - Features f_i: positions with ScaleMap::crossing >= i, twins as one, counted once in every fragment in which a
+/// - Features f_i: positions with ScaleMap::crossing >= i, twins as one, counted once in every fragment in
+/// which a
 ///   corner lies (a corner on the border between two fragments lies where its triangle does).
 /// - eta_i (3.1) is 0 everywhere at a scale where all covered fragments have the same count.
-/// Throws StageError when the scale map or a triangle's material does not fit. Same result for any thread count.
+/// Throws StageError when the scale map or a triangle's material does not fit. Same result for any thread
+/// count.
 Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                             const std::vector<Image>& images, const ScaleMap& scale_map,
                             const FragmentationOptions& options, const RunContext& context);
 
-/// The pixels of every plane: decoded, uncovered texels filled, edges replicated to columns x fragment_width by
-/// rows x fragment_height. Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for an
-/// image that does not decode.
+/// The pixels of every plane: decoded, uncovered texels filled, edges replicated to columns x fragment_width
+/// by rows x fragment_height. Derived data, never stored: zim, ladder and lut share one copy. Throws
+/// InputError for an image that does not decode.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context);
 
-/// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of the
-/// covered ones; those keep their value. Without any covered texel nothing changes.
+/// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of
+/// the covered ones; those keep their value. Without any covered texel nothing changes.
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context);
 
 }  // namespace texmesh

@@ -10,8 +10,8 @@
 namespace texmesh {
 namespace {
 
-// libjpeg decodes a progressive file scan by scan over all its coefficients; a hostile one has thousands of empty scans.
-// Encoders write about ten.
+// libjpeg decodes a progressive file scan by scan over all its coefficients; a hostile one has thousands of
+// empty scans. Encoders write about ten.
 constexpr int kMaxScans = 100;
 
 [[noreturn]] void fail(std::string expected, std::string found) {
@@ -70,7 +70,8 @@ Pixels decode(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels, boo
   }));
   check_header(info, max_pixels);
   const bool grey = luma_only || info.num_components == 1;
-  if (grey && info.num_components == 3 && info.jpeg_color_space != JCS_YCbCr) fail("YCbCr channels", "RGB channels");
+  if (grey && info.num_components == 3 && info.jpeg_color_space != JCS_YCbCr)
+    fail("YCbCr channels", "RGB channels");
   Pixels out;
   out.width_px = info.image_width;
   out.height_px = info.image_height;
@@ -100,7 +101,8 @@ Pixels decode(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels, boo
 
 }  // namespace
 
-std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables, std::span<const std::uint8_t> fragment) {
+std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables,
+                                        std::span<const std::uint8_t> fragment) {
   constexpr std::uint8_t kSoi = 0xd8, kEoi = 0xd9;
   if (tables.size() < 4 || !marker_at(tables, 0, kSoi) || !marker_at(tables, tables.size() - 2, kEoi))
     throw FormatError("JPEG", "table stream", "SOI .. EOI", std::to_string(tables.size()) + " other bytes");

@@ -15,20 +15,23 @@ struct EnumNames<Subsampling> {
   static constexpr std::array<std::string_view, 2> names{"420", "444"};
 };
 
-/// A complete JPEG from a rung's table stream and one abbreviated fragment (ISO 10918-1 B.5): tables without EOI +
-/// fragment without SOI. Throws FormatError when either lacks the markers it must begin and end with.
-std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables, std::span<const std::uint8_t> fragment);
+/// A complete JPEG from a rung's table stream and one abbreviated fragment (ISO 10918-1 B.5): tables without
+/// EOI + fragment without SOI. Throws FormatError when either lacks the markers it must begin and end with.
+std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables,
+                                        std::span<const std::uint8_t> fragment);
 
-/// Decodes a complete Huffman-coded JPEG of 8 bits, 1 or 3 channels, baseline or progressive, with libjpeg-turbo
-/// (ISLOW, fancy upsampling). Throws FormatError on any libjpeg error *or warning*, on bytes after the end of the
-/// image, and when the size exceeds max_pixels; nothing is allocated for pixels before that check.
+/// Decodes a complete Huffman-coded JPEG of 8 bits, 1 or 3 channels, baseline or progressive, with
+/// libjpeg-turbo (ISLOW, fancy upsampling). Throws FormatError on any libjpeg error *or warning*, on bytes
+/// after the end of the image, on more than 100 scans, and when the size exceeds max_pixels; nothing is
+/// allocated for pixels before that check. For what packages hold; source images, which may be sloppy, go
+/// through stages/decode_image.h.
 Pixels decode_jpeg(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels);
 
 /// The same, but the luma (Y) channel only, which is cheaper than the colours.
 Pixels decode_jpeg_luma(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels);
 
-/// A complete baseline JFIF file with Huffman tables of its own; 1 or 3 channels, sides 1..65500. The subsampling
-/// matters for 3 channels only. Throws StageError for what a JPEG cannot hold.
+/// A complete baseline JFIF file with Huffman tables of its own; 1 or 3 channels, sides 1..65500. The
+/// subsampling matters for 3 channels only. Throws StageError for what a JPEG cannot hold.
 std::vector<std::uint8_t> encode_jpeg(const Pixels& pixels, int quality, Subsampling subsampling);
 
 }  // namespace texmesh

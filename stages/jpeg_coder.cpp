@@ -148,8 +148,9 @@ void JpegCoder::use_tables(const HuffmanTables& tables) {
     throw StageError("jpeg", "Huffman tables", std::to_string(2 * state_->table_pairs()),
                      std::to_string(tables.size()));
   for (std::size_t k = 0; k < tables.size(); ++k) {
-    JHUFF_TBL* const* const kind = k % 2 ? info.ac_huff_tbl_ptrs : info.dc_huff_tbl_ptrs;  // g++ 12's -fsanitize=bounds
-    JHUFF_TBL& to = *kind[k / 2];                                                          // breaks on one expression
+    JHUFF_TBL* const* const kind =
+        k % 2 ? info.ac_huff_tbl_ptrs : info.dc_huff_tbl_ptrs;  // g++ 12's -fsanitize=bounds
+    JHUFF_TBL& to = *kind[k / 2];                               // breaks on one expression
     std::copy(tables[k].bits.begin(), tables[k].bits.end(), to.bits);
     std::memset(to.huffval, 0, sizeof to.huffval);
     std::copy(tables[k].symbols.begin(), tables[k].symbols.end(), to.huffval);
@@ -188,7 +189,8 @@ std::vector<std::uint8_t> JpegCoder::complete(const PixelWindow& image) {
   return state_->output();
 }
 
-HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols, const std::vector<std::uint64_t>& weights) {
+HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols,
+                                const std::vector<std::uint64_t>& weights) {
   // The reserved symbol 256 of weight 1 takes the code of ones only and is dropped afterwards.
   constexpr int kReserved = 256;
   struct Node {
@@ -215,8 +217,8 @@ HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols, const 
     for (int leaf : b.leaves) ++length[static_cast<std::size_t>(leaf)];
     std::push_heap(nodes.begin(), nodes.end(), lighter);
   }
-  // Codes longer than 16 bits move up: of a pair of the longest, one takes the parent's place and the other shares the
-  // place of a shorter code (annex K.2, figure K.3).
+  // Codes longer than 16 bits move up: of a pair of the longest, one takes the parent's place and the other
+  // shares the place of a shorter code (annex K.2, figure K.3).
   std::vector<std::size_t> count(symbols.size() + 2);
   for (int l : length) ++count[static_cast<std::size_t>(l)];
   count[0] = 0;  // numbers that are no symbol

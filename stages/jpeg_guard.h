@@ -1,5 +1,6 @@
 #pragma once
-// For jpeg*.cpp only: how libjpeg's errors become ours without an exception or a longjmp crossing the wrong frames.
+// For jpeg*.cpp only: how libjpeg's errors become ours without an exception or a longjmp crossing the wrong
+// frames.
 #include <csetjmp>
 #include <cstdio>
 
@@ -29,8 +30,9 @@ struct JpegErrors {
   }
 };
 
-/// Runs body(); false when libjpeg failed, with the reason in errors.message. libjpeg is C and leaves by longjmp, so
-/// the body must own nothing: no automatic object with a destructor may live in it while it calls libjpeg.
+/// Runs body(); false when libjpeg failed, with the reason in errors.message. libjpeg is C and leaves by
+/// longjmp, so the body must own nothing: no automatic object with a destructor may live in it while it calls
+/// libjpeg.
 template <class Body>
 bool jpeg_guarded(JpegErrors& errors, Body&& body) {
   if (setjmp(errors.jump)) return false;

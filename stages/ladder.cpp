@@ -12,13 +12,13 @@
 namespace texmesh {
 namespace {
 
-// Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (facts: 16 rungs gain
-// 0.1 dB over 10).
+// Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (facts: 16
+// rungs gain 0.1 dB over 10).
 constexpr std::size_t kMaxRungs = 16;
 constexpr std::size_t kFragmentsPerTask = 4;
 constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
-// Share of the trained statistics against the typical tables' in a rung's tables: costs < 0.2 % where the training
-// fits, and bounds what a fragment unlike the others costs.
+// Share of the trained statistics against the typical tables' in a rung's tables: costs < 0.2 % where the
+// training fits, and bounds what a fragment unlike the others costs.
 constexpr std::uint64_t kTrainedWeight = 256;
 
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const LadderOptions& options) {
@@ -39,8 +39,9 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     const TexturePlane& plane = fragments.planes[p];
     const std::uint64_t width = std::uint64_t{plane.columns} * plane.fragment_width_px;
     const std::uint64_t height = std::uint64_t{plane.rows} * plane.fragment_height_px;
-    if (pixels[p].width_px != width || pixels[p].height_px != height || pixels[p].channels != plane.channels ||
-        pixels[p].data.size() != width * height * plane.channels || plane.covered_texels.size() != plane.fragment_count())
+    if (pixels[p].width_px != width || pixels[p].height_px != height ||
+        pixels[p].channels != plane.channels || pixels[p].data.size() != width * height * plane.channels ||
+        plane.covered_texels.size() != plane.fragment_count())
       fail("plane " + std::to_string(p), std::to_string(width) + " x " + std::to_string(height),
            std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
   }
@@ -69,15 +70,18 @@ std::vector<std::size_t> training_fragments(const TexturePlane& plane, int wante
   return chosen;
 }
 
-/// The middles of the training fragments side by side: about 1/16 of the plane, because coding the mosaic with
-/// optimised tables costs three times as much per pixel as the ladder itself; at least 256 x 256 where there is so much.
+/// The middles of the training fragments side by side: about 1/16 of the plane, because coding the mosaic
+/// with optimised tables costs three times as much per pixel as the ladder itself; at least 256 x 256 where
+/// there is so much.
 Pixels training_mosaic(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options) {
   const std::vector<std::size_t> chosen = training_fragments(plane, options.training_fragments);
   if (chosen.empty()) return {};
-  const std::uint64_t budget = std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 65536);
+  const std::uint64_t budget =
+      std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 65536);
   std::uint32_t side = 16;
   while (std::uint64_t{side + 16} * (side + 16) * chosen.size() <= budget) side += 16;
-  const std::uint32_t w = std::min(side, plane.fragment_width_px), h = std::min(side, plane.fragment_height_px);
+  const std::uint32_t w = std::min(side, plane.fragment_width_px),
+                      h = std::min(side, plane.fragment_height_px);
   std::uint32_t across = 1;
   while (std::size_t{across} * across < chosen.size()) ++across;
   const auto down = static_cast<std::uint32_t>((chosen.size() + across - 1) / across);
@@ -89,13 +93,14 @@ Pixels training_mosaic(const TexturePlane& plane, const Pixels& pixels, const La
     const std::size_t left = (from.width_px - w) / 2 * plane.channels, top = (from.height_px - h) / 2;
     std::uint8_t* to = mosaic.data.data() + k / across * h * stride + k % across * w * plane.channels;
     for (std::uint32_t y = 0; y < h; ++y)
-      std::memcpy(to + y * stride, from.data + (top + y) * from.stride_bytes + left, std::size_t{w} * plane.channels);
+      std::memcpy(to + y * stride, from.data + (top + y) * from.stride_bytes + left,
+                  std::size_t{w} * plane.channels);
   }
   return mosaic;
 }
 
-/// A table like `trained`, with a code for every symbol of `typical`. Weights are read off code lengths: a code of
-/// length l stands for a probability of 2^-l.
+/// A table like `trained`, with a code for every symbol of `typical`. Weights are read off code lengths: a
+/// code of length l stands for a probability of 2^-l.
 HuffmanTable completed(const HuffmanTable& trained, const HuffmanTable& typical) {
   std::array<std::uint64_t, 256> weight{};
   const auto add = [&weight](const HuffmanTable& table, std::uint64_t scale) {
@@ -154,7 +159,8 @@ BoxSums sums_of_twice(const BoxSums& from) {
     for (std::uint32_t x = 0; x < from.width; ++x) {
       const std::size_t a = std::size_t{y} * from.width + x, b = std::size_t{y / 2} * out.width + x / 2;
       out.count[b] += from.count[a];
-      for (std::uint32_t c = 0; c < out.channels; ++c) out.sum[b * out.channels + c] += from.sum[a * out.channels + c];
+      for (std::uint32_t c = 0; c < out.channels; ++c)
+        out.sum[b * out.channels + c] += from.sum[a * out.channels + c];
     }
   return out;
 }
@@ -169,7 +175,8 @@ Pixels means_of(const BoxSums& boxes) {
   return out;
 }
 
-void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options, PlaneLadder& out) {
+void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
+                    PlaneLadder& out) {
   const auto encode = [&](const BoxSums& boxes) {
     out.preview = encode_jpeg(means_of(boxes), options.preview_quality, subsampling_of(plane, options));
     out.preview_width_px = boxes.width;
@@ -180,12 +187,12 @@ void encode_preview(const TexturePlane& plane, const Pixels& pixels, const Ladde
   if (out.preview.size() >= kPreviewLimitBytes) encode(sums_of_twice(eighth));
 }
 
-/// A few neighbouring fragments at every rung: what one thread encodes at a time. Fragment by fragment, so that the pixels
-/// of one stay in the cache for all its rungs; rung by rung costs a quarter more.
+/// A few neighbouring fragments at every rung: what one thread encodes at a time. Fragment by fragment, so
+/// that the pixels of one stay in the cache for all its rungs; rung by rung costs a quarter more.
 struct EncodeTask {
   std::size_t plane, first, last;
-  std::vector<std::vector<std::uint8_t>> data;    // [rung]: streams one after the other
-  std::vector<std::vector<std::size_t>> sizes;    // [rung][fragment - first]
+  std::vector<std::vector<std::uint8_t>> data;  // [rung]: streams one after the other
+  std::vector<std::vector<std::size_t>> sizes;  // [rung][fragment - first]
 };
 
 std::vector<EncodeTask> encode_tasks(const Fragments& fragments) {
@@ -201,7 +208,8 @@ void encode_fragments(const TexturePlane& plane, const Pixels& pixels, const Huf
   const std::size_t rungs = options.rungs.size();
   std::vector<std::unique_ptr<JpegCoder>> coders;
   for (std::size_t r = 0; r < rungs; ++r) {
-    coders.push_back(std::make_unique<JpegCoder>(plane.channels, options.rungs[r], subsampling_of(plane, options)));
+    coders.push_back(
+        std::make_unique<JpegCoder>(plane.channels, options.rungs[r], subsampling_of(plane, options)));
     coders[r]->use_tables(tables[r]);
   }
   task.data.resize(rungs);
@@ -228,8 +236,8 @@ void append(EncodeTask& task, PlaneLadder& plane) {
 
 }  // namespace
 
-Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const LadderOptions& options,
-                     const RunContext& context) {
+Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                     const LadderOptions& options, const RunContext& context) {
   check(fragments, pixels, options);
   const std::size_t planes = fragments.planes.size(), rungs = options.rungs.size();
   Ladder ladder;
@@ -272,7 +280,8 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
 }
 
 std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment) {
-  return std::span(rung.data).subspan(rung.offset[fragment], rung.offset[fragment + 1] - rung.offset[fragment]);
+  return std::span(rung.data).subspan(rung.offset[fragment],
+                                      rung.offset[fragment + 1] - rung.offset[fragment]);
 }
 
 }  // namespace texmesh

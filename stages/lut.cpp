@@ -34,14 +34,16 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     const TexturePlane& plane = fragments.planes[p];
     const std::string place = "plane " + std::to_string(p);
     if (predictors.planes[p].vqp.size() != plane.fragment_count())
-      fail(place + ": predictors", std::to_string(plane.fragment_count()), std::to_string(predictors.planes[p].vqp.size()));
+      fail(place + ": predictors", std::to_string(plane.fragment_count()),
+           std::to_string(predictors.planes[p].vqp.size()));
     if (pixels[p].width_px != plane.columns * plane.fragment_width_px ||
         pixels[p].height_px != plane.rows * plane.fragment_height_px || pixels[p].channels != plane.channels)
       fail(place + ": pixels", "whole fragments",
            std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
     for (const LadderRung& rung : ladder.planes[p].rungs)
       if (rung.offset.size() != plane.fragment_count() + 1 || rung.offset.back() != rung.data.size())
-        fail(place + ": rung " + std::to_string(rung.quality), std::to_string(plane.fragment_count()) + " streams",
+        fail(place + ": rung " + std::to_string(rung.quality),
+             std::to_string(plane.fragment_count()) + " streams",
              std::to_string(rung.offset.size()) + " offsets");
   }
   if (!(options.quality_min <= options.quality_max))
@@ -49,7 +51,8 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
 }
 
 /// One value of 8 bits per texel of a fragment: what the distortion is measured on. Luma as JPEG defines it.
-std::vector<std::uint8_t> fragment_luma(const TexturePlane& plane, const Pixels& pixels, std::size_t fragment) {
+std::vector<std::uint8_t> fragment_luma(const TexturePlane& plane, const Pixels& pixels,
+                                        std::size_t fragment) {
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * w;
   const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * h;
@@ -58,7 +61,9 @@ std::vector<std::uint8_t> fragment_luma(const TexturePlane& plane, const Pixels&
   for (std::uint32_t y = 0; y < h; ++y) {
     const std::uint8_t* p = pixels.at(left, top + y);
     for (std::uint32_t x = 0; x < w; ++x, p += plane.channels)
-      *to++ = plane.channels == 1 ? p[0] : static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
+      *to++ = plane.channels == 1
+                  ? p[0]
+                  : static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
   }
   return out;
 }
@@ -72,13 +77,14 @@ std::vector<std::uint8_t> fragment_mask(const TexturePlane& plane, std::size_t f
   std::vector<std::uint8_t> out(std::size_t{w} * h);
   for (std::uint32_t y = 0; y < h && top + y < plane.height_px; ++y)
     for (std::uint32_t x = 0; x < w && left + x < plane.width_px; ++x)
-      if (plane.coverage[(top + y) * stride + (left + x) / 8] >> (7 - (left + x) % 8) & 1) out[std::size_t{y} * w + x] = 255;
+      if (plane.coverage[(top + y) * stride + (left + x) / 8] >> (7 - (left + x) % 8) & 1)
+        out[std::size_t{y} * w + x] = 255;
   return out;
 }
 
 /// Sizes, digests and distortions of one fragment at every rung.
-void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder, std::size_t fragment,
-                      PlaneTables& out) {
+void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                      std::size_t fragment, PlaneTables& out) {
   const DistortionMeter meter(fragment_luma(plane, pixels, fragment), fragment_mask(plane, fragment),
                               plane.fragment_width_px, plane.fragment_height_px);
   const std::uint64_t texels = std::uint64_t{plane.fragment_width_px} * plane.fragment_height_px;
@@ -98,8 +104,8 @@ void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const Pla
 }
 
 /// Everything that is copied or follows from the options.
-PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors, const PlaneLadder& ladder,
-                        std::uint32_t scales, const LutOptions& options) {
+PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors,
+                        const PlaneLadder& ladder, std::uint32_t scales, const LutOptions& options) {
   PlaneTables out;
   out.columns = plane.columns;
   out.rows = plane.rows;
@@ -122,8 +128,8 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.vqp = predictors.vqp;
   out.features = plane.features;
   for (std::uint32_t s = 0; s <= scales; ++s)
-    out.quality.push_back(static_cast<float>(options.quality_fine + (options.quality_coarse - options.quality_fine) * s /
-                                                                        std::max(scales, 1u)));
+    out.quality.push_back(static_cast<float>(
+        options.quality_fine + (options.quality_coarse - options.quality_fine) * s / std::max(scales, 1u)));
   out.allocation = static_cast<std::uint8_t>(options.allocate);
   out.quality_width = static_cast<float>(options.quality_width);
   out.log_width = static_cast<float>(options.log_width);
@@ -157,11 +163,13 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
   return out;
 }
 
-/// S = A R^Q + c by least squares on log (S - c) (8.7) over the plane's rungs, B from (8.8) with the plane's mean VQP.
+/// S = A R^Q + c by least squares on log (S - c) (8.7) over the plane's rungs, B from (8.8) with the plane's
+/// mean VQP.
 void fit_size_model(const TexturePlane& plane, PlaneTables& t) {
   const std::size_t rungs = t.rung_count(), fragments = t.fragment_count();
   if (t.order.empty() || rungs < 2) return;
-  const double header = (plane.channels == 1 ? kGreyHeader : kColourHeader) * static_cast<double>(t.order.size());
+  const double header =
+      (plane.channels == 1 ? kGreyHeader : kColourHeader) * static_cast<double>(t.order.size());
   std::vector<double> size(rungs), q(rungs), s(rungs);
   double mean_q = 0, mean_s = 0, predictor = 0;
   for (std::size_t r = 0; r < rungs; ++r) {
@@ -181,7 +189,8 @@ void fit_size_model(const TexturePlane& plane, PlaneTables& t) {
   const double log_r = qs / qq, log_a = mean_s - log_r * mean_q;
   double error = 0;
   for (std::size_t r = 0; r < rungs; ++r)
-    error += std::fabs(portable::exp(log_a + log_r * q[r]) + header - size[r]) / size[r] / static_cast<double>(rungs);
+    error += std::fabs(portable::exp(log_a + log_r * q[r]) + header - size[r]) / size[r] /
+             static_cast<double>(rungs);
   t.model_a = static_cast<float>(portable::exp(log_a));
   t.model_r = static_cast<float>(portable::exp(log_r));
   t.model_b = static_cast<float>(log_r / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
@@ -191,8 +200,9 @@ void fit_size_model(const TexturePlane& plane, PlaneTables& t) {
 
 }  // namespace
 
-PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
-                           const Ladder& ladder, const LutOptions& options, const RunContext& context) {
+PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
+                           const RunContext& context) {
   check(fragments, pixels, predictors, ladder, options);
   PackageTables out;
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment

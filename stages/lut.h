@@ -20,30 +20,34 @@ struct EnumNames<Allocation> {
 
 struct LutOptions {
   Allocation allocate = Allocation::kLog;
-  double quality_fine = 80, quality_coarse = 40;   // Q_i falls linearly from S_0 to S_max
-  double quality_width = 60;                       // dQ of (3.2)
-  double log_width = 0.7;                          // dg of the log-quantiser form
-  double quality_min = 5, quality_max = 97;        // clip
+  double quality_fine = 80, quality_coarse = 40;  // Q_i falls linearly from S_0 to S_max
+  double quality_width = 60;                      // dQ of (3.2)
+  double log_width = 0.7;                         // dg of the log-quantiser form
+  double quality_min = 5, quality_max = 97;       // clip
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("allocate", s.allocate, "thesis = equation 3.2 in quality; log = the same in the logarithm of the quantiser");
+    v("allocate", s.allocate,
+      "thesis = equation 3.2 in quality; log = the same in the logarithm of the quantiser");
     v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
     v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
     v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
-    v("log_width", s.log_width, Range{0, 4}, "dg: how far feature density moves the logarithm of the quantiser");
+    v("log_width", s.log_width, Range{0, 4},
+      "dg: how far feature density moves the logarithm of the quantiser");
     v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
     v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
   }
 };
 
-/// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the exact
-/// bytes, the digest, MSE and 1 - SSIM of luma (or grey) over covered texels; Q_i, D_i over 21 values of Gamma (bytes of
-/// the fragments' streams, tables not counted); the order of falling importance: eta of scale 0, then surface, then
-/// index; and the size model S = A R^Q + c over the plane's rungs, c = the stored fragments' constant headers, B from
-/// (8.8) with the plane's mean VQP, not below 0.02. The model is 0 where there are fewer than two rungs or nothing is
-/// stored. `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each other, FormatError for a stream
-/// that does not decode. Same result for any thread count.
-PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
-                           const Ladder& ladder, const LutOptions& options, const RunContext& context);
+/// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the
+/// exact bytes, the digest, MSE and 1 - SSIM of luma (or grey) over covered texels; Q_i, D_i over 21 values
+/// of Gamma (bytes of the fragments' streams, tables not counted); the order of falling importance: eta of
+/// scale 0, then surface, then index; and the size model S = A R^Q + c over the plane's rungs, c = the stored
+/// fragments' constant headers, B from (8.8) with the plane's mean VQP, not below 0.02. The model is 0 where
+/// there are fewer than two rungs or nothing is stored. `pixels` are fill_planes()'s. Throws StageError for
+/// parts that do not fit each other, FormatError for a stream that does not decode. Same result for any
+/// thread count.
+PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
+                           const RunContext& context);
 
 }  // namespace texmesh

@@ -24,7 +24,10 @@ double tile_origin(double smallest, std::uint32_t size, Wrap wrap) {
 }  // namespace
 
 TexelMap::TexelMap(const UvTransform& transform, std::uint32_t width_px, std::uint32_t height_px)
-    : offset_(to_double(transform.offset)), scale_(to_double(transform.scale)), width_(width_px), height_(height_px) {
+    : offset_(to_double(transform.offset)),
+      scale_(to_double(transform.scale)),
+      width_(width_px),
+      height_(height_px) {
   if (transform.rotation != 0) {
     cos_ = portable::cos(transform.rotation);
     sin_ = portable::sin(transform.rotation);
@@ -93,8 +96,8 @@ void TexelCoverage::add_row(std::uint32_t row, Extent extent) {
   }
 }
 
-/// Fills slabs_[k - first] with the extent in x of the triangle within y in [k - 0.5, k + 0.5], k = first..last; what
-/// lies above or below goes to the first and last slab.
+/// Fills slabs_[k - first] with the extent in x of the triangle within y in [k - 0.5, k + 0.5], k =
+/// first..last; what lies above or below goes to the first and last slab.
 void TexelCoverage::trace(const std::array<Vec2d, 3>& triangle, std::int64_t first, std::int64_t last) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   slabs_.assign(static_cast<std::size_t>(last - first + 1), {kInfinity, -kInfinity});
@@ -107,14 +110,16 @@ void TexelCoverage::trace(const std::array<Vec2d, 3>& triangle, std::int64_t fir
     e.hi = std::max(e.hi, x);
   };
   for (int edge = 0; edge < 3; ++edge) {
-    Vec2d a = triangle[static_cast<std::size_t>(edge)], b = triangle[static_cast<std::size_t>((edge + 1) % 3)];
+    Vec2d a = triangle[static_cast<std::size_t>(edge)],
+          b = triangle[static_cast<std::size_t>((edge + 1) % 3)];
     if (a.y > b.y) std::swap(a, b);
     const std::int64_t from = slab_of(a.y), to = slab_of(b.y);
     put(from, a.x);
     put(to, b.x);
     for (std::int64_t k = from; k < to; ++k) {
       const double y = static_cast<double>(k) + 0.5;
-      const double x = std::clamp(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)), std::min(a.x, b.x), std::max(a.x, b.x));
+      const double x =
+          std::clamp(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)), std::min(a.x, b.x), std::max(a.x, b.x));
       put(k, x);
       put(k + 1, x);
     }
@@ -143,8 +148,9 @@ void TexelCoverage::add(const std::array<Vec2d, 3>& triangle) {
   trace(local, first, last);
   // Row j reads y in [j - 0.5, j + 1.5]: slabs j and j + 1.
   const auto slab = [&](std::int64_t k) {
-    return k < first || k > last ? Extent{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}
-                                 : slabs_[static_cast<std::size_t>(k - first)];
+    return k < first || k > last
+               ? Extent{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}
+               : slabs_[static_cast<std::size_t>(k - first)];
   };
   for (std::int64_t j = first - 1; j <= last; ++j) {
     const Extent a = slab(j), b = slab(j + 1);

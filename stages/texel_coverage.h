@@ -1,6 +1,6 @@
 #pragma once
-// Inside stages only: where on a texture a triangle lies. Texel coordinates: p = uv * size in texels, texel (i, j) is the
-// unit square [i, i + 1) x [j, j + 1) with its centre at + 0.5.
+// Inside stages only: where on a texture a triangle lies. Texel coordinates: p = uv * size in texels, texel
+// (i, j) is the unit square [i, i + 1) x [j, j + 1) with its centre at + 0.5.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace texmesh {
 
-/// UV to texel coordinates of one texture reference: KHR_texture_transform (scale, then rotation counter-clockwise as
-/// seen with v downwards, then offset), then the size.
+/// UV to texel coordinates of one texture reference: KHR_texture_transform (scale, then rotation
+/// counter-clockwise as seen with v downwards, then offset), then the size.
 class TexelMap {
  public:
   TexelMap(const UvTransform& transform, std::uint32_t width_px, std::uint32_t height_px);
@@ -24,15 +24,16 @@ class TexelMap {
   double cos_ = 1, sin_ = 0, width_, height_;
 };
 
-/// The texels that sampling with bilinear interpolation can touch, one bit each, rows of ceil(width / 8) bytes, bit 7
-/// first.
+/// The texels that sampling with bilinear interpolation can touch, one bit each, rows of ceil(width / 8)
+/// bytes, bit 7 first.
 class TexelCoverage {
  public:
   TexelCoverage(std::uint32_t width_px, std::uint32_t height_px, Wrap wrap_s, Wrap wrap_t);
 
-  /// Marks every texel (i, j) with |x - (i + 0.5)| <= 1 and |y - (j + 0.5)| <= 1 for some point (x, y) of the triangle,
-  /// after wrapping. Exact but for rounding, except that a triangle more than four tiles high counts as its bounding
-  /// box, and one beyond 2^40 texels as everything: float UVs have no fraction there. Coordinates are finite.
+  /// Marks every texel (i, j) with |x - (i + 0.5)| <= 1 and |y - (j + 0.5)| <= 1 for some point (x, y) of the
+  /// triangle, after wrapping. Exact but for rounding, except that a triangle more than four tiles high
+  /// counts as its bounding box, and one beyond 2^40 texels as everything: float UVs have no fraction there.
+  /// Coordinates are finite.
   void add(const std::array<Vec2d, 3>& triangle);
 
   /// More triangles with other wrap modes.

@@ -41,7 +41,10 @@ struct Sums {
 class FragmentReader {
  public:
   FragmentReader(const TexturePlane& plane, const Pixels& pixels, int difference)
-      : plane_(plane), pixels_(pixels), stride_((std::size_t{plane.width_px} + 7) / 8), difference_(difference) {}
+      : plane_(plane),
+        pixels_(pixels),
+        stride_((std::size_t{plane.width_px} + 7) / 8),
+        difference_(difference) {}
 
   Sums read(std::size_t fragment) const {
     const auto column = static_cast<std::uint32_t>(fragment % plane_.columns);
@@ -66,7 +69,9 @@ class FragmentReader {
   }
 
  private:
-  std::uint8_t coverage_byte(std::uint32_t x, std::uint32_t y) const { return plane_.coverage[y * stride_ + x / 8]; }
+  std::uint8_t coverage_byte(std::uint32_t x, std::uint32_t y) const {
+    return plane_.coverage[y * stride_ + x / 8];
+  }
   bool covered(std::uint32_t x, std::uint32_t y) const { return coverage_byte(x, y) >> (7 - x % 8) & 1; }
 
   void add_texel(std::uint32_t x, std::uint32_t y, Sums& out) const {
@@ -104,7 +109,8 @@ void predict_fragment(const Sums& sums, std::uint32_t channels, const ZimOptions
     deviation += std::sqrt(std::max(0.0, static_cast<double>(sums.square[c]) / count - m * m)) / channels;
   }
   const double z = std::min(1.0, deviation / 127.5), i = mean / 255;
-  const double zeta = sums.pairs > 0 ? static_cast<double>(sums.different) / static_cast<double>(sums.pairs) : 0;
+  const double zeta =
+      sums.pairs > 0 ? static_cast<double>(sums.different) / static_cast<double>(sums.pairs) : 0;
   const double m = 1 - (options.weight_intensity * (1 - i) + options.weight_complexity * zeta);
   out.z[f] = static_cast<float>(z);
   out.i[f] = static_cast<float>(i);
@@ -127,8 +133,10 @@ void add_spread(const TexturePlane& plane, const float* values, double weight, s
       to[f] += weight * (static_cast<double>(values[f]) - lo) / (static_cast<double>(hi) - lo);
 }
 
-void combine(const TexturePlane& plane, const std::array<double, kPredictors>& weights, PlanePredictors& out) {
-  const std::array<const float*, kPredictors> predictors{plane.eta.data(), out.z.data(), out.i.data(), out.m.data()};
+void combine(const TexturePlane& plane, const std::array<double, kPredictors>& weights,
+             PlanePredictors& out) {
+  const std::array<const float*, kPredictors> predictors{plane.eta.data(), out.z.data(), out.i.data(),
+                                                         out.m.data()};
   std::vector<double> vqp(plane.fragment_count());
   for (std::size_t k = 0; k < kPredictors; ++k) add_spread(plane, predictors[k], weights[k], vqp);
   for (std::size_t f = 0; f < vqp.size(); ++f) out.vqp[f] = static_cast<float>(std::min(vqp[f], 1.0));
@@ -136,10 +144,11 @@ void combine(const TexturePlane& plane, const std::array<double, kPredictors>& w
 
 }  // namespace
 
-Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels, const ZimOptions& options,
-                           const RunContext& context) {
+Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                           const ZimOptions& options, const RunContext& context) {
   check(fragments, pixels);
-  std::array<double, kPredictors> weights{options.weight_eta, options.weight_z, options.weight_i, options.weight_m};
+  std::array<double, kPredictors> weights{options.weight_eta, options.weight_z, options.weight_i,
+                                          options.weight_m};
   const double sum = weights[0] + weights[1] + weights[2] + weights[3];
   if (!(sum > 0)) fail("weights of VQP", "at least one above 0", "none");
   for (double& w : weights) w /= sum;

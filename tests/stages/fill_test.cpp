@@ -16,14 +16,16 @@ std::vector<std::uint8_t> coverage_where(std::uint32_t w, std::uint32_t h, auto&
   std::vector<std::uint8_t> bits((std::size_t{w} + 7) / 8 * h);
   for (std::uint32_t y = 0; y < h; ++y)
     for (std::uint32_t x = 0; x < w; ++x)
-      if (covered(x, y)) bits[(std::size_t{w} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
+      if (covered(x, y))
+        bits[(std::size_t{w} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
   return bits;
 }
 
 Pixels noise(std::uint32_t w, std::uint32_t h, std::uint32_t channels) {
   Pixels out{w, h, channels, {}};
   Random random{2};
-  for (std::size_t k = 0; k < std::size_t{w} * h * channels; ++k) out.data.push_back(static_cast<std::uint8_t>(random.next()));
+  for (std::size_t k = 0; k < std::size_t{w} * h * channels; ++k)
+    out.data.push_back(static_cast<std::uint8_t>(random.next()));
   return out;
 }
 
@@ -37,7 +39,8 @@ TEST(Fill, CoveredTexelsStayAndTheOthersLieBetweenThem) {
       Pixels wild = pixels;  // what is not covered must not matter
       for (std::uint32_t y = 0; y < h; ++y)
         for (std::uint32_t x = 0; x < w; ++x)
-          if (!covered(x, y)) std::fill_n(wild.data.begin() + (y * w + x) * channels, channels, std::uint8_t{255});
+          if (!covered(x, y))
+            std::fill_n(wild.data.begin() + (y * w + x) * channels, channels, std::uint8_t{255});
       Pixels filled = pixels;
       fill_uncovered(filled, coverage, {});
       fill_uncovered(wild, coverage, {});
@@ -45,8 +48,10 @@ TEST(Fill, CoveredTexelsStayAndTheOthersLieBetweenThem) {
       for (std::uint32_t y = 0; y < h; ++y)
         for (std::uint32_t x = 0; x < w; ++x)
           for (std::uint32_t c = 0; c < channels; ++c) {
-            if (covered(x, y)) EXPECT_EQ(filled.at(x, y)[c], pixels.at(x, y)[c]);
-            else EXPECT_TRUE(filled.at(x, y)[c] >= 60 && filled.at(x, y)[c] < 110);
+            if (covered(x, y))
+              EXPECT_EQ(filled.at(x, y)[c], pixels.at(x, y)[c]);
+            else
+              EXPECT_TRUE(filled.at(x, y)[c] >= 60 && filled.at(x, y)[c] < 110);
           }
     }
 }
@@ -54,7 +59,8 @@ TEST(Fill, CoveredTexelsStayAndTheOthersLieBetweenThem) {
 TEST(Fill, IsSmoothAndConstantForAConstant) {
   const std::uint32_t w = 100, h = 80;
   Pixels flat{w, h, 3, std::vector<std::uint8_t>(w * h * 3, 77)};
-  const auto coverage = coverage_where(w, h, [](std::uint32_t x, std::uint32_t y) { return x > 70 && y % 2; });
+  const auto coverage =
+      coverage_where(w, h, [](std::uint32_t x, std::uint32_t y) { return x > 70 && y % 2; });
   for (std::uint32_t k = 0; k < 70; ++k) flat.data[k * 3] = 0;
   fill_uncovered(flat, coverage, {});
   EXPECT_EQ(std::count(flat.data.begin(), flat.data.end(), 77), w * h * 3);
@@ -62,8 +68,10 @@ TEST(Fill, IsSmoothAndConstantForAConstant) {
   // Dark on the left, light on the right: what lies between rises without a jump.
   Pixels ramp{128, 8, 1, std::vector<std::uint8_t>(128 * 8)};
   for (std::uint32_t y = 0; y < 8; ++y) std::fill_n(ramp.data.begin() + y * 128 + 112, 16, std::uint8_t{240});
-  fill_uncovered(ramp, coverage_where(128, 8, [](std::uint32_t x, std::uint32_t) { return x < 16 || x >= 112; }), {});
-  for (std::uint32_t x = 1; x < 128; ++x) EXPECT_LT(std::abs(ramp.at(x, 4)[0] - ramp.at(x - 1, 4)[0]), 80) << x;
+  fill_uncovered(
+      ramp, coverage_where(128, 8, [](std::uint32_t x, std::uint32_t) { return x < 16 || x >= 112; }), {});
+  for (std::uint32_t x = 1; x < 128; ++x)
+    EXPECT_LT(std::abs(ramp.at(x, 4)[0] - ramp.at(x - 1, 4)[0]), 80) << x;
 }
 
 TEST(Fill, NothingCoveredChangesNothingAndBadCoverageIsRefused) {
@@ -92,8 +100,10 @@ Image tiff_of(const Pixels& pixels) {
   };
   entry(256, 4, 1, pixels.width_px);
   entry(257, 4, 1, pixels.height_px);
-  if (pixels.channels > 2) entry(258, 3, pixels.channels, bits_at);
-  else entry(258, 3, pixels.channels, pixels.channels == 2 ? 8 | 8 << 16 : 8);
+  if (pixels.channels > 2)
+    entry(258, 3, pixels.channels, bits_at);
+  else
+    entry(258, 3, pixels.channels, pixels.channels == 2 ? 8 | 8 << 16 : 8);
   entry(259, 3, 1, 1);
   entry(262, 3, 1, pixels.channels > 2 ? 2 : 1);
   entry(273, 4, 1, data_at);
@@ -151,18 +161,20 @@ TEST(FillPlanes, FillsOnlyWhereAsked) {
   const Pixels source = noise(64, 64, 3);
   const Image image = tiff_of(source);
   Fragments fragments = planes_of(image, {TextureRole::kNormal});
-  fragments.planes[0].coverage = coverage_where(64, 64, [](std::uint32_t x, std::uint32_t) { return x < 32; });
+  fragments.planes[0].coverage =
+      coverage_where(64, 64, [](std::uint32_t x, std::uint32_t) { return x < 32; });
   EXPECT_TRUE(fill_planes(fragments, {image}, Fill::kNone, {})[0].data == source.data);
   const Pixels filled = fill_planes(fragments, {image}, Fill::kPushPull, {})[0];
   EXPECT_FALSE(filled.data == source.data);
-  for (std::uint32_t y = 0; y < 64; ++y) EXPECT_TRUE(std::equal(filled.at(0, y), filled.at(32, y), source.at(0, y)));
+  for (std::uint32_t y = 0; y < 64; ++y)
+    EXPECT_TRUE(std::equal(filled.at(0, y), filled.at(32, y), source.at(0, y)));
 }
 
 TEST(FillPlanes, SameBytesForAnyNumberOfThreads) {
   const Image image = tiff_of(noise(500, 700, 3));
   Fragments fragments = planes_of(image, {TextureRole::kBaseColour});
-  fragments.planes[0].coverage =
-      coverage_where(500, 700, [](std::uint32_t x, std::uint32_t y) { return (x * x + y * y) / 5000 % 3 == 0; });
+  fragments.planes[0].coverage = coverage_where(
+      500, 700, [](std::uint32_t x, std::uint32_t y) { return (x * x + y * y) / 5000 % 3 == 0; });
   RunContext one, eight;
   eight.threads = 8;
   EXPECT_TRUE(fill_planes(fragments, {image}, Fill::kPushPull, one)[0].data ==

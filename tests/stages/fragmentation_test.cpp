@@ -24,7 +24,8 @@ bool bit(const std::vector<std::uint8_t>& bits, std::uint32_t width, std::uint32
   return bits[(std::size_t{width} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
 }
 
-std::vector<std::uint8_t> coverage_of(const Corners& triangle, std::uint32_t w, std::uint32_t h, Wrap s, Wrap t) {
+std::vector<std::uint8_t> coverage_of(const Corners& triangle, std::uint32_t w, std::uint32_t h, Wrap s,
+                                      Wrap t) {
   TexelCoverage coverage(w, h, s, t);
   coverage.add(triangle);
   return coverage.take();
@@ -32,7 +33,8 @@ std::vector<std::uint8_t> coverage_of(const Corners& triangle, std::uint32_t w, 
 
 /// Separating axes: does the triangle meet the square of half-side `half` around (x, y)?
 bool meets(const Corners& triangle, double x, double y, double half) {
-  const Vec2d square[4] = {{x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};
+  const Vec2d square[4] = {
+      {x - half, y - half}, {x + half, y - half}, {x + half, y + half}, {x - half, y + half}};
   Vec2d axes[5] = {{1, 0}, {0, 1}};
   for (int e = 0; e < 3; ++e) {
     const Vec2d d = triangle[static_cast<std::size_t>((e + 1) % 3)] - triangle[static_cast<std::size_t>(e)];
@@ -69,12 +71,14 @@ TEST(TexelCoverage, CoversEverySampleAndNothingThatIsNotNear) {
       if (a + b > 1) a = 1 - a, b = 1 - b;
       if (k < 3) a = k == 0, b = k == 1;
       const Vec2d p = triangle[0] * a + triangle[1] * b + triangle[2] * (1 - a - b);
-      const auto x = static_cast<std::int64_t>(std::floor(p.x - 0.5)), y = static_cast<std::int64_t>(std::floor(p.y - 0.5));
+      const auto x = static_cast<std::int64_t>(std::floor(p.x - 0.5)),
+                 y = static_cast<std::int64_t>(std::floor(p.y - 0.5));
       for (int dy = 0; dy < 2; ++dy)
         for (int dx = 0; dx < 2; ++dx)
           ASSERT_TRUE(bit(bits, w, wrapped(x + dx, w, s), wrapped(y + dy, h, t))) << round;
     }
-    // Every covered texel has a copy whose footprint the triangle meets. Clamped border texels reach to infinity.
+    // Every covered texel has a copy whose footprint the triangle meets. Clamped border texels reach to
+    // infinity.
     std::vector<bool> allowed(w * h);
     const std::int64_t reach = 160;
     for (std::int64_t y = -reach; y < reach; ++y)
@@ -119,9 +123,9 @@ TEST(TexelMap, AppliesScaleThenRotationThenOffset) {
 
 TEST(FragmentGrid, FollowsItsRules) {
   Random random{5};
-  std::vector<std::array<std::uint32_t, 2>> sizes{{1, 1},       {32, 32},     {678, 2199},   {2048, 2048}, {4096, 4096},
-                                                  {8192, 8192}, {65500, 1},   {65500, 65500}, {130, 130},   {518, 429},
-                                                  {16, 20000},  {4096, 2048}, {1024, 1024},  {512, 512}};
+  std::vector<std::array<std::uint32_t, 2>> sizes{
+      {1, 1},         {32, 32},   {678, 2199}, {2048, 2048}, {4096, 4096}, {8192, 8192}, {65500, 1},
+      {65500, 65500}, {130, 130}, {518, 429},  {16, 20000},  {4096, 2048}, {1024, 1024}, {512, 512}};
   for (int k = 0; k < 500; ++k) sizes.push_back({1 + random.next() % 9000, 1 + random.next() % 9000});
   for (const auto& [w, h] : sizes)
     for (const std::uint32_t most : {256u, 64u, 5u, 1u})
@@ -169,7 +173,8 @@ TEST(AreaSpreader, SpreadsAsManySamplesDo) {
         const Vec2d p = triangle[0] * a + triangle[1] * b + triangle[2] * (1 - a - b);
         expected[fragment_at(grid, p, s, t)] += 2.0 / (n * n);
       }
-    // A triangle without area has its samples along the edge in another density; only the sum is promised there.
+    // A triangle without area has its samples along the edge in another density; only the sum is promised
+    // there.
     if (std::fabs(cross(triangle[1] - triangle[0], triangle[2] - triangle[0])) < 1e-6) continue;
     for (std::size_t f = 0; f < 12; ++f) EXPECT_NEAR(got[f], expected[f], 0.02) << round << ' ' << f;
   }
@@ -219,8 +224,8 @@ Material with_base(int image) {
   return m;
 }
 
-Fragments run(const ConditionedMesh& mesh, const std::vector<Material>& materials, const std::vector<Image>& images,
-              int threads = 1, FragmentationOptions options = {}) {
+Fragments run(const ConditionedMesh& mesh, const std::vector<Material>& materials,
+              const std::vector<Image>& images, int threads = 1, FragmentationOptions options = {}) {
   RunContext context;
   context.threads = threads;
   return fragment_textures(mesh, materials, images, scale_map(mesh.mesh), options, context);
@@ -240,7 +245,8 @@ TEST(Fragmentation, AFullyUsedTexture) {
   EXPECT_NEAR(total(p.surface_fraction), 1, 1e-6);
   ASSERT_EQ(p.features.size(), 4u * 4u);
   ASSERT_EQ(p.eta.size(), 16u);
-  // Every position lies in one fragment or on a border between two or four of them; counts fall with the scale.
+  // Every position lies in one fragment or on a border between two or four of them; counts fall with the
+  // scale.
   const std::uint32_t all = std::accumulate(p.features.begin(), p.features.begin() + 4, 0u);
   EXPECT_GE(all, 441u);
   EXPECT_LE(all, 441u + 42u);
@@ -301,12 +307,14 @@ TEST(Fragmentation, TwinsCountAsOnePosition) {
 TEST(Fragmentation, SurfaceFractionIsThatOfTheTexturedPart) {
   Mesh mesh = testing::side_by_side({testing::cube(), testing::sheet(4, 0)});
   for (std::size_t t = 12; t < mesh.triangles.size(); ++t) mesh.triangle_material[t] = 1;
-  const Fragments out = run(conditioned(mesh), {with_base(0), with_base(1)}, {image_of(256, 256), image_of(512, 512)});
+  const Fragments out =
+      run(conditioned(mesh), {with_base(0), with_base(1)}, {image_of(256, 256), image_of(512, 512)});
   ASSERT_EQ(out.planes.size(), 2u);
   EXPECT_NEAR(total(out.planes[0].surface_fraction), 24.0 / 25, 1e-5);
   EXPECT_NEAR(total(out.planes[1].surface_fraction), 1.0 / 25, 1e-5);
   // The cube's atlas leaves gaps.
-  const auto covered = std::accumulate(out.planes[0].covered_texels.begin(), out.planes[0].covered_texels.end(), 0u);
+  const auto covered =
+      std::accumulate(out.planes[0].covered_texels.begin(), out.planes[0].covered_texels.end(), 0u);
   EXPECT_LT(covered, 256u * 256u);
   EXPECT_GT(covered, 6u * 76u * 115u);
   for (std::size_t f = 0; f < out.planes[0].fragment_count(); ++f)
@@ -322,8 +330,9 @@ TEST(Fragmentation, RolesChannelsAndSharing) {
   m.occlusion_texture.image = 2;
   m.emissive_texture.image = 3;
   Material other = with_base(1);  // the normal map as colour too
-  const Fragments out = run(mesh, {m, other}, {image_of(256, 256, 4), image_of(256, 256), image_of(256, 256),
-                                               image_of(64, 64, 2), image_of(8, 8)});
+  const Fragments out = run(
+      mesh, {m, other},
+      {image_of(256, 256, 4), image_of(256, 256), image_of(256, 256), image_of(64, 64, 2), image_of(8, 8)});
   ASSERT_EQ(out.planes.size(), 5u);
   const auto is = [&](std::size_t p, std::uint32_t image, TextureRole role, std::uint32_t channels) {
     EXPECT_EQ(out.planes[p].image, image);
@@ -342,7 +351,8 @@ TEST(Fragmentation, RolesChannelsAndSharing) {
   EXPECT_EQ(out.notes[0].text, "coded as base-colour, used as normal too");
 
   m.alpha_mode = AlphaMode::kOpaque;
-  EXPECT_EQ(run(mesh, {m, other}, {image_of(256, 256, 4), image_of(256, 256), image_of(256, 256), image_of(64, 64, 2)})
+  EXPECT_EQ(run(mesh, {m, other},
+                {image_of(256, 256, 4), image_of(256, 256), image_of(256, 256), image_of(64, 64, 2)})
                 .planes.size(),
             4u);
 }
@@ -369,7 +379,8 @@ TEST(Fragmentation, TinyAndOddImages) {
   for (const auto& [w, h] : {std::array{1u, 1u}, {32u, 32u}, {678u, 2199u}, {3u, 700u}, {17u, 9u}}) {
     const Fragments out = run(mesh, {with_base(0)}, {image_of(w, h)});
     const TexturePlane& p = out.planes[0];
-    EXPECT_EQ(std::accumulate(p.covered_texels.begin(), p.covered_texels.end(), std::uint64_t{0}), std::uint64_t{w} * h);
+    EXPECT_EQ(std::accumulate(p.covered_texels.begin(), p.covered_texels.end(), std::uint64_t{0}),
+              std::uint64_t{w} * h);
     EXPECT_NEAR(total(p.surface_fraction), 1, 1e-5);
     for (float e : p.eta) EXPECT_TRUE(e >= 0 && e <= 1);
   }

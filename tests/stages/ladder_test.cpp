@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
+
+#include <jpeglib.h>
 
 #include "format/errors.h"
 #include "stages/jpeg_coder.h"
@@ -70,7 +73,8 @@ Pixels crop(const Pixels& from, const TexturePlane& plane, std::size_t fragment)
   const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * out.width_px;
   const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * out.height_px;
   for (std::uint32_t y = 0; y < out.height_px; ++y)
-    out.data.insert(out.data.end(), from.at(left, top + y), from.at(left, top + y) + out.width_px * from.channels);
+    out.data.insert(out.data.end(), from.at(left, top + y),
+                    from.at(left, top + y) + out.width_px * from.channels);
   return out;
 }
 
@@ -121,9 +125,9 @@ TEST(Ladder, FragmentsMeetAsInTheWholeImage) {
 }
 
 TEST(Ladder, DataPlanesKeepFullChroma) {
-  const Plane colour = make_plane(1, 1, 64, 3), data = make_plane(1, 1, 64, 3, Content::kPhoto, TextureRole::kNormal);
-  const Pixels expected =
-      decode_jpeg(encode_jpeg(data.pixels[0], 97, Subsampling::k444), 1 << 24);
+  const Plane colour = make_plane(1, 1, 64, 3),
+              data = make_plane(1, 1, 64, 3, Content::kPhoto, TextureRole::kNormal);
+  const Pixels expected = decode_jpeg(encode_jpeg(data.pixels[0], 97, Subsampling::k444), 1 << 24);
   EXPECT_TRUE(decode_fragment(encode(data).planes[0].rungs.back(), 0).data == expected.data);
   EXPECT_FALSE(decode_fragment(encode(colour).planes[0].rungs.back(), 0).data == expected.data);
 }
@@ -165,8 +169,8 @@ TEST(Ladder, TrainedTablesBeatTypicalOnes) {
 }
 
 TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
-  // 40 flat fragments and one of noise, which the training does not see. libjpeg-turbo does not report a symbol without
-  // a code: its SIMD coder writes a damaged stream.
+  // 40 flat fragments and one of noise, which the training does not see. libjpeg-turbo does not report a
+  // symbol without a code: its SIMD coder writes a damaged stream.
   Plane p = make_plane(41, 1, 32, 3, Content::kFlat);
   Random random{3};
   for (std::uint32_t y = 0; y < 32; ++y)
@@ -239,7 +243,8 @@ TEST(Ladder, PreviewIsOneEighthWhereSmallAndOneSixteenthElsewhere) {
 TEST(Ladder, RefusesRungsThatDoNotRiseAndPixelsThatDoNotFit) {
   Plane p = make_plane(1, 1, 16, 3);
   LadderOptions options;
-  for (const std::vector<int>& rungs : {std::vector<int>{}, {10, 10}, {20, 10}, {0}, {101}, std::vector<int>(17, 1)}) {
+  for (const std::vector<int>& rungs :
+       {std::vector<int>{}, {10, 10}, {20, 10}, {0}, {101}, std::vector<int>(17, 1)}) {
     options.rungs = rungs;
     EXPECT_THROW(encode(p, options), StageError);
   }
@@ -290,13 +295,63 @@ TEST(Jpeg, RefusesWhatIsNoImageOrTooLarge) {
   EXPECT_THROW(encode_jpeg(Pixels{2, 2, 3, {}}, 50, Subsampling::k420), StageError);
 }
 
+enum class Coding { kBaseline, kProgressive, kManyScans, kArithmetic, kCmyk };
+
+/// Files that our own encoder never writes.
+std::vector<std::uint8_t> foreign_jpeg(const Pixels& pixels, Coding coding) {
+  jpeg_compress_struct info;
+  jpeg_error_mgr errors;
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* data = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &data, &size);
+  info.image_width = pixels.width_px;
+  info.image_height = pixels.height_px;
+  info.input_components = static_cast<int>(pixels.channels);
+  info.in_color_space = coding == Coding::kCmyk ? JCS_CMYK : JCS_RGB;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, 70, TRUE);
+  std::vector<jpeg_scan_info> scans;
+  if (coding == Coding::kProgressive) jpeg_simple_progression(&info);
+  if (coding == Coding::kArithmetic) info.arith_code = TRUE;
+  if (coding == Coding::kManyScans) {
+    scans.push_back({3, {0, 1, 2}, 0, 0, 0, 0});
+    for (int component = 0; component < 3; ++component)
+      for (int k = 1; k < 64; ++k) scans.push_back({1, {component}, k, k, 0, 0});
+    info.scan_info = scans.data();
+    info.num_scans = static_cast<int>(scans.size());
+  }
+  jpeg_start_compress(&info, TRUE);
+  while (info.next_scanline < info.image_height) {
+    JSAMPROW row = const_cast<JSAMPROW>(pixels.at(0, info.next_scanline));
+    jpeg_write_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  const std::vector<std::uint8_t> out(data, data + size);
+  std::free(data);
+  return out;
+}
+
+TEST(Jpeg, ReadsBaselineAndProgressiveAndRefusesOtherKinds) {
+  const Plane p = make_plane(1, 1, 64, 3);
+  const Pixels baseline = decode_jpeg(foreign_jpeg(p.pixels[0], Coding::kBaseline), 1 << 16);
+  EXPECT_TRUE(decode_jpeg(foreign_jpeg(p.pixels[0], Coding::kProgressive), 1 << 16).data == baseline.data);
+  EXPECT_THROW(decode_jpeg(foreign_jpeg(p.pixels[0], Coding::kManyScans), 1 << 16), FormatError);
+  EXPECT_THROW(decode_jpeg(foreign_jpeg(p.pixels[0], Coding::kArithmetic), 1 << 16), FormatError);
+  const Pixels four{8, 8, 4, std::vector<std::uint8_t>(256, 9)};
+  EXPECT_THROW(decode_jpeg(foreign_jpeg(four, Coding::kCmyk), 1 << 16), FormatError);
+}
+
 TEST(Jpeg, LumaIsTheGreyOfTheColours) {
   const Plane p = make_plane(1, 1, 64, 3);
   const auto bytes = encode_jpeg(p.pixels[0], 90, Subsampling::k420);
   const Pixels colour = decode_jpeg(bytes, 1 << 16), luma = decode_jpeg_luma(bytes, 1 << 16);
   ASSERT_EQ(luma.channels, 1u);
   for (std::size_t k = 0; k < luma.data.size(); ++k) {
-    const double y = 0.299 * colour.data[3 * k] + 0.587 * colour.data[3 * k + 1] + 0.114 * colour.data[3 * k + 2];
+    const double y =
+        0.299 * colour.data[3 * k] + 0.587 * colour.data[3 * k + 1] + 0.114 * colour.data[3 * k + 2];
     EXPECT_NEAR(luma.data[k], y, 2.5);  // colours were rounded, and clipped where out of range
   }
 }

@@ -97,8 +97,9 @@ TEST(Lut, DistortionIsMeasuredAndFallsWithTheRung) {
   const PlaneTables t = build(s).planes[1];
   const TexturePlane& plane = s.fragments.planes[1];
   for (std::size_t r = 0; r < t.rung_count(); ++r) {
-    const Pixels decoded =
-        decode_jpeg(complete_jpeg(s.ladder.planes[1].rungs[r].tables, fragment_stream(s.ladder.planes[1].rungs[r], 0)), 1 << 20);
+    const Pixels decoded = decode_jpeg(
+        complete_jpeg(s.ladder.planes[1].rungs[r].tables, fragment_stream(s.ladder.planes[1].rungs[r], 0)),
+        1 << 20);
     double error = 0;
     int count = 0;
     for (std::uint32_t y = 0; y < plane.height_px; ++y)
@@ -226,7 +227,8 @@ TEST(Distortion, EqualOppositeAndMasked) {
   const DistortionMeter masked(source, mask, 16, 16);
   EXPECT_EQ(masked.against(source).mse, 0);
   other = source;
-  for (std::size_t k = 0; k < 256; ++k) other[k] = mask[k] ? source[k] : static_cast<std::uint8_t>(random.next());
+  for (std::size_t k = 0; k < 256; ++k)
+    other[k] = mask[k] ? source[k] : static_cast<std::uint8_t>(random.next());
   EXPECT_EQ(masked.against(other).mse, 0);
   EXPECT_NEAR(masked.against(other).dssim, 0, 1e-12);
   other[0] = static_cast<std::uint8_t>(source[0] ^ 16);
@@ -247,7 +249,8 @@ TEST(Distortion, AgainstTheFormulaInOneWindow) {
     vb += (b[k] - mb) * (b[k] - mb) / 64;
     cov += (a[k] - ma) * (b[k] - mb) / 64;
   }
-  const double ssim = (2 * ma * mb + 6.5025) * (2 * cov + 58.5225) / ((ma * ma + mb * mb + 6.5025) * (va + vb + 58.5225));
+  const double ssim =
+      (2 * ma * mb + 6.5025) * (2 * cov + 58.5225) / ((ma * ma + mb * mb + 6.5025) * (va + vb + 58.5225));
   const DistortionMeter meter(a, std::vector<std::uint8_t>(64, 255), 8, 8);
   EXPECT_NEAR(meter.against(b).dssim, 1 - ssim, 1e-12);
 }

@@ -31,7 +31,8 @@ Plane make_plane(std::uint32_t channels, auto&& value) {
   Pixels pixels{32, 16, channels, {}};
   for (std::uint32_t y = 0; y < 16; ++y)
     for (std::uint32_t x = 0; x < 32; ++x)
-      for (std::uint32_t c = 0; c < channels; ++c) pixels.data.push_back(static_cast<std::uint8_t>(value(x, y, c)));
+      for (std::uint32_t c = 0; c < channels; ++c)
+        pixels.data.push_back(static_cast<std::uint8_t>(value(x, y, c)));
   Plane out;
   out.fragments.planes = {p};
   out.pixels = {pixels};
@@ -46,7 +47,8 @@ PlanePredictors predict(const Plane& p, const ZimOptions& options = {}, int thre
 
 TEST(Zim, FlatAndCheckerboard) {
   // Left flat 51; right a board of 0 and 255 in every channel.
-  const auto out = predict(make_plane(3, [](auto x, auto y, auto) { return x < 16 ? 51 : (x + y) % 2 * 255; }));
+  const auto out =
+      predict(make_plane(3, [](auto x, auto y, auto) { return x < 16 ? 51 : (x + y) % 2 * 255; }));
   EXPECT_FLOAT_EQ(out.z[0], 0);
   EXPECT_FLOAT_EQ(out.i[0], 0.2f);
   EXPECT_FLOAT_EQ(out.zeta[0], 0);
@@ -61,7 +63,9 @@ TEST(Zim, FlatAndCheckerboard) {
 }
 
 TEST(Zim, GreyIsThreeEqualChannels) {
-  const auto value = [](std::uint32_t x, std::uint32_t y, std::uint32_t) { return (x * x * 7 + y * 13) % 256; };
+  const auto value = [](std::uint32_t x, std::uint32_t y, std::uint32_t) {
+    return (x * x * 7 + y * 13) % 256;
+  };
   const auto grey = predict(make_plane(1, value)), colour = predict(make_plane(3, value));
   EXPECT_FLOAT_EQ(grey.z[0], colour.z[0]);
   EXPECT_FLOAT_EQ(grey.i[1], colour.i[1]);
@@ -103,7 +107,9 @@ TEST(Zim, OnlyCoveredTexelsCount) {
   const auto before = predict(p);
   for (std::uint32_t y = 0; y < 16; ++y)
     for (std::uint32_t x = y < 8 ? 4 : 0; x < 8; ++x)
-      for (int c = 0; c < 3; ++c) p.pixels[0].data[(y * 32 + x) * 3 + static_cast<std::uint32_t>(c)] = static_cast<std::uint8_t>(random.next());
+      for (int c = 0; c < 3; ++c)
+        p.pixels[0].data[(y * 32 + x) * 3 + static_cast<std::uint32_t>(c)] =
+            static_cast<std::uint8_t>(random.next());
   const auto after = predict(p);
   EXPECT_EQ(before.z, after.z);
   EXPECT_EQ(before.i, after.i);
