@@ -60,6 +60,8 @@ class MemorySource final : public ByteSource {
  public:
   MemorySource(std::span<const std::uint8_t> bytes, std::string name)
       : bytes_(bytes), name_(std::move(name)) {}
+  MemorySource(Bytes&& bytes, std::string name)
+      : own_(std::move(bytes)), bytes_(own_), name_(std::move(name)) {}
   std::string name() const override { return name_; }
   std::uint64_t size() override { return bytes_.size(); }
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
@@ -71,6 +73,7 @@ class MemorySource final : public ByteSource {
   }
 
  private:
+  Bytes own_;
   std::span<const std::uint8_t> bytes_;
   std::string name_;
 };
@@ -80,8 +83,13 @@ class MemorySource final : public ByteSource {
 std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
   return std::make_unique<FileSource>(path);
 }
+
 std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name) {
   return std::make_unique<MemorySource>(bytes, std::move(name));
+}
+
+std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name) {
+  return std::make_unique<MemorySource>(std::move(bytes), std::move(name));
 }
 
 }  // namespace texmesh

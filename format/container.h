@@ -24,6 +24,8 @@ class ByteSource {
 std::unique_ptr<ByteSource> open_file_source(const std::string& path);  // InputError
 std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes,
                                           std::string name = "package");  // keeps the span, not a copy
+std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes,
+                                          std::string name = "package");  // keeps the bytes
 
 struct ContainerEntry {
   std::string path;

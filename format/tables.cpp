@@ -19,7 +19,7 @@ constexpr std::size_t kHeadFixed = 16, kDirectoryRecord = 36, kSectionFixed = 56
 constexpr std::uint32_t kMaxFragments = 65535, kMaxRungs = 100, kMaxScaleCount = 100, kGammaSteps = 21;
 constexpr std::uint32_t kFeatureLimit = 1u << 24;
 constexpr float kLargestMse = 65025, kLargestDssim = 2;
-// How far rounding may carry a fraction out of 0..1 before it is an error.
+// How far rounding may carry a fraction out of 0..1 before the writer calls it an error.
 constexpr float kRounding = 1e-4f;
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
@@ -99,16 +99,17 @@ void check_order(const PlaneTables& t, const std::string& place) {
             "fragment " + std::to_string(f));
 }
 
-/// Everything that holds for the tables of a plane, whoever made them.
-void check_plane(const PlaneTables& t, const std::string& place) {
+/// Everything that holds for the tables of a plane. `rounding` is how far fractions may be out of their range: a writer
+/// tolerates what arithmetic does and clamps it, a reader nothing.
+void check_plane(const PlaneTables& t, float rounding, const std::string& place) {
   check_shape(t, place);
   check_counts(t, place);
   check_parameters(t, place);
   require_range(t.mse, 0, kLargestMse, place + "/mse");
-  require_range(t.dssim, -kRounding, kLargestDssim, place + "/dssim");
-  require_range(t.surface_fraction, 0, 1 + kRounding, place + "/surface_fraction");
+  require_range(t.dssim, -rounding, kLargestDssim, place + "/dssim");
+  require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
-    require_range(*v, -kRounding, 1 + kRounding, place + "/predictors");
+    require_range(*v, -rounding, 1 + rounding, place + "/predictors");
   require_range(t.quality, 0, 100, place + "/quality");
   for (const std::uint32_t f : t.features)
     require(f < kFeatureLimit, place + "/features", "less than 2^24", std::to_string(f));
@@ -231,7 +232,7 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   if (bytes.size() < expected || (bytes.size() > expected && minor <= kFormatMinor))
     in.fail(std::to_string(expected) + " bytes", std::to_string(bytes.size()));
   read_arrays(in, t, rungs, order, size_width, feature_width);
-  check_plane(t, place);
+  check_plane(t, 0, place);
   if (size_width != width_of(t.size_bytes) || feature_width != width_of(t.features))
     in.fail("the least width that holds the values", "another");
   return t;
@@ -249,7 +250,7 @@ std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
   head.u32(tables.planes.size());
   head.u32(0);
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
-    check_plane(tables.planes[p], plane_place(p));
+    check_plane(tables.planes[p], kRounding, plane_place(p));
     const Bytes section = write_section(tables.planes[p]);
     head.u32(section.size());
     head.raw(sha256(section));

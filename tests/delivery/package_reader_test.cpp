@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "tests/format/package_fixture.h"
 
@@ -19,8 +20,8 @@ using testing::fake_jpeg;
 using testing::make_package;
 using Bytes = std::vector<std::uint8_t>;
 
-PackageReader open_memory(const Bytes& package) {
-  return PackageReader(open_container(memory_source(package)));
+PackageReader open_memory(Bytes package) {
+  return PackageReader(open_container(memory_source(std::move(package))));
 }
 
 /// Counts what is read from a package.

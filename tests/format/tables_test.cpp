@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -183,6 +184,23 @@ TEST(Tables, FractionsMayLeaveTheirRangeByRoundingOnly) {
   EXPECT_EQ(back.surface_fraction[0], 1.0f);
   EXPECT_EQ(back.z[0], 0.0f);
   EXPECT_EQ(back.dssim[0], 0.0f);
+}
+
+TEST(Tables, ReaderTakesNoFractionAboveOne) {
+  PlaneTables t = make_tables(1, 1, 1, 0);
+  t.surface_fraction[0] = 1;
+  Bytes bytes = write_tables({{t}});
+  const Bytes one{0, 0, 0x80, 0x3f};
+  const auto at = std::search(bytes.begin() + 52 + 56, bytes.end(), one.begin(), one.end());
+  ASSERT_NE(at, bytes.end());
+  *at = 1;  // the next float
+  const Sha256 digest = sha256(std::span(bytes).subspan(52));
+  std::copy(digest.begin(), digest.end(), bytes.begin() + 20);
+  EXPECT_THROW(read_tables(bytes), FormatError);
+  *at = 0;
+  const Sha256 right = sha256(std::span(bytes).subspan(52));
+  std::copy(right.begin(), right.end(), bytes.begin() + 20);
+  EXPECT_NO_THROW(read_tables(bytes));
 }
 
 PlaneTables allocation_case(std::uint8_t allocation) {
