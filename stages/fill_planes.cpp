@@ -175,19 +175,43 @@ Pixels channels_of(const Pixels& image, const TexturePlane& plane) {
   return out;
 }
 
-/// Repeats the last column and row until the fragments are whole.
+constexpr std::uint32_t kMcu = 16;  // what JPEG codes together with 4:2:0
+
+/// Sets the 16 x 16 block at (x, y) to the mean of the 16 texels that start at (u, v) and go right or down.
+void flatten_block(Pixels& pixels, std::uint32_t x, std::uint32_t y, std::uint32_t u, std::uint32_t v,
+                   bool down) {
+  for (std::uint32_t c = 0; c < pixels.channels; ++c) {
+    std::uint32_t sum = 0;
+    for (std::uint32_t k = 0; k < kMcu; ++k) sum += (down ? pixels.at(u, v + k) : pixels.at(u + k, v))[c];
+    const auto mean = static_cast<std::uint8_t>((sum + kMcu / 2) / kMcu);
+    for (std::uint32_t row = 0; row < kMcu; ++row)
+      for (std::uint32_t column = 0; column < kMcu; ++column)
+        pixels.data[(std::size_t{y + row} * pixels.width_px + x + column) * pixels.channels + c] = mean;
+  }
+}
+
+/// Adds columns and rows until the fragments are whole. Within a 16 x 16 block that holds texels of the image
+/// the last ones are repeated; blocks beyond are flat, since nobody sees them: repeating the edge there would
+/// cost 5 % of the bytes of a 931 x 647 px image in fragments of 144 px.
 Pixels padded(Pixels from, const TexturePlane& plane) {
   Pixels to{
       plane.columns * plane.fragment_width_px, plane.rows * plane.fragment_height_px, from.channels, {}};
   if (to.width_px == from.width_px && to.height_px == from.height_px) return from;
+  const std::uint32_t block_width = (from.width_px + kMcu - 1) / kMcu * kMcu;
+  const std::uint32_t block_height = (from.height_px + kMcu - 1) / kMcu * kMcu;
   const std::size_t stride = std::size_t{to.width_px} * to.channels,
                     used = std::size_t{from.width_px} * to.channels;
   to.data.resize(stride * to.height_px);
-  for (std::uint32_t y = 0; y < to.height_px; ++y) {
+  for (std::uint32_t y = 0; y < block_height; ++y) {
     std::uint8_t* row = to.data.data() + stride * y;
     std::memcpy(row, from.at(0, std::min(y, from.height_px - 1)), used);
-    for (std::size_t k = used; k < stride; ++k) row[k] = row[k - to.channels];
+    for (std::size_t k = used; k < std::size_t{block_width} * to.channels; ++k) row[k] = row[k - to.channels];
   }
+  for (std::uint32_t y = 0; y < block_height; y += kMcu)
+    for (std::uint32_t x = block_width; x < to.width_px; x += kMcu)
+      flatten_block(to, x, y, block_width - 1, y, true);
+  for (std::uint32_t y = block_height; y < to.height_px; y += kMcu)
+    for (std::uint32_t x = 0; x < to.width_px; x += kMcu) flatten_block(to, x, y, x, block_height - 1, false);
   return to;
 }
 

@@ -99,9 +99,10 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
                             const std::vector<Image>& images, const ScaleMap& scale_map,
                             const FragmentationOptions& options, const RunContext& context);
 
-/// The pixels of every plane: decoded, uncovered texels filled, edges replicated to columns x fragment_width
-/// by rows x fragment_height. Derived data, never stored: zim, ladder and lut share one copy. Throws
-/// InputError for an image that does not decode.
+/// The pixels of every plane: decoded, uncovered texels filled, and extended to columns x fragment_width by
+/// rows x fragment_height: edges repeated to the end of their 16 x 16 block, flat blocks beyond (never seen,
+/// nearly free). Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for an
+/// image that does not decode.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context);
 

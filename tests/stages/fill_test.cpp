@@ -157,6 +157,25 @@ TEST(FillPlanes, SplitsChannelsAndRepeatsEdges) {
   }
 }
 
+TEST(FillPlanes, BlocksBeyondTheImageAreFlat) {
+  const Pixels source = noise(21, 35, 3);
+  const Image image = tiff_of(source);
+  const auto out =
+      fill_planes(planes_of(image, {TextureRole::kBaseColour}, 64), {image}, Fill::kPushPull, {})[0];
+  ASSERT_EQ(out.width_px, 64u);
+  for (std::uint32_t y = 0; y < 48; ++y)
+    for (std::uint32_t x = 0; x < 32; ++x)
+      ASSERT_TRUE(std::equal(out.at(x, y), out.at(x, y) + 3, source.at(std::min(x, 20u), std::min(y, 34u))));
+  for (std::uint32_t y = 0; y < 64; ++y)
+    for (std::uint32_t x = 0; x < 64; ++x) {
+      if (x < 32 && y < 48) continue;
+      ASSERT_TRUE(std::equal(out.at(x, y), out.at(x, y) + 3, out.at(x / 16 * 16, y / 16 * 16)));
+    }
+  int sum = 0;  // the block right of the last column's second sixteen texels has their mean
+  for (std::uint32_t y = 16; y < 32; ++y) sum += source.at(20, y)[1];
+  EXPECT_NEAR(out.at(40, 20)[1], sum / 16.0, 0.51);
+}
+
 TEST(FillPlanes, FillsOnlyWhereAsked) {
   const Pixels source = noise(64, 64, 3);
   const Image image = tiff_of(source);
