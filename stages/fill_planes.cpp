@@ -192,7 +192,7 @@ void flatten_block(Pixels& pixels, std::uint32_t x, std::uint32_t y, std::uint32
 
 /// Adds columns and rows until the fragments are whole. Within a 16 x 16 block that holds texels of the image
 /// the last ones are repeated; blocks beyond are flat, since nobody sees them: repeating the edge there would
-/// cost 5 % of the bytes of a 931 x 647 px image in fragments of 144 px.
+/// cost 3 % of the bytes of a 931 x 647 px image in fragments of 144 px.
 Pixels padded(Pixels from, const TexturePlane& plane) {
   Pixels to{
       plane.columns * plane.fragment_width_px, plane.rows * plane.fragment_height_px, from.channels, {}};
