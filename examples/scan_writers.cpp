@@ -239,10 +239,13 @@ void write_range_scan(const MadeRangeScan& scan, int jpeg_quality, const std::st
   }
   write_file(beside(path, stem + "_grid.pgm"), grid);
   write_file(beside(path, stem + ".jpg"), encode_scan_jpeg(scan.colour, jpeg_quality));
-  const Json json{
-      {"version", 1},          {"type", "cylindrical-range-scan"}, {"grid", stem + "_grid.pgm"},
-      {"radius_scale", scale}, {"y_top", scan.height / 2},         {"y_step", scan.height / (scan.rows - 1)},
-      {"full_turn", true},     {"texture", stem + ".jpg"}};
+  const Json json{{"version", 1},
+                  {"type", "cylindrical-range-scan"},
+                  {"grid", stem + "_grid.pgm"},
+                  {"radius_scale", scale},
+                  {"y_top", scan.height / 2},
+                  {"y_step", scan.height / (scan.rows - 1)},
+                  {"texture", stem + ".jpg"}};
   Bytes text;
   append(text, json.dump(2) + "\n");
   write_file(path, text);
