@@ -31,8 +31,7 @@ std::string refusal(const GltfBuilder& b) {
   }
 }
 
-// --- Draco
-// --------------------------------------------------------------------------------------------------------
+// --- Draco ---
 
 struct DracoIds {
   int position, uv, normal, colour;
@@ -182,8 +181,25 @@ TEST(ImportGltfDraco, RefusesEveryTruncationAndWrongIds) {
   EXPECT_NE(refusal(draco_model(good, wrong, 1)).find("of 3 components, found 2"), std::string::npos);
 }
 
-// --- meshopt
-// ------------------------------------------------------------------------------------------------------
+/// A damaged stream is read or refused. (The command does this in a child with limits besides.)
+TEST(ImportGltfDraco, SurvivesEveryFlippedByte) {
+  const Mesh source = testing::sphere(4, 6);
+  for (const auto method : {draco::MESH_EDGEBREAKER_ENCODING, draco::MESH_SEQUENTIAL_ENCODING}) {
+    DracoIds ids{};
+    const testing::Bytes good = draco_of(source, method, false, ids);
+    std::size_t refused = 0;
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      for (const int flip : {0x01, 0x80, 0xff}) {
+        testing::Bytes damaged = good;
+        damaged[i] = static_cast<std::uint8_t>(damaged[i] ^ flip);
+        refused += !refusal(draco_model(damaged, ids, source.triangles.size())).empty();
+      }
+    }
+    EXPECT_GT(refused, 30u);  // the magic, versions and counts at least
+  }
+}
+
+// --- meshopt ---
 
 testing::Bytes encode_vertices(const void* data, std::size_t count, std::size_t stride) {
   testing::Bytes out(meshopt_encodeVertexBufferBound(count, stride));
@@ -365,6 +381,19 @@ TEST(ImportGltfMeshopt, RefusesDamagedAndLyingViews) {
   const std::uint64_t length =
       good.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["byteLength"];
   for (std::uint64_t n = 0; n < length; ++n) EXPECT_NE(changed(0, "byteLength", n), "") << n;
+}
+
+TEST(ImportGltfMeshopt, SurvivesEveryFlippedByte) {
+  const GltfBuilder good = meshopt_quad();
+  std::size_t refused = 0;
+  for (std::size_t i = 80; i < good.bin.size(); ++i) {  // what stands before is the uncompressed quad
+    for (const int flip : {0x01, 0x02, 0x10, 0x80, 0xff}) {
+      GltfBuilder b = good;
+      b.bin[i] = static_cast<std::uint8_t>(b.bin[i] ^ flip);
+      refused += !refusal(b).empty();
+    }
+  }
+  EXPECT_GT(refused, 20u);
 }
 
 }  // namespace
