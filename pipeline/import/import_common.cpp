@@ -277,6 +277,13 @@ bool usable(const Vec3d& p) {
   return in_range(p.x) && in_range(p.y) && in_range(p.z);
 }
 
+// GCC 12.2 at -O2 drops the rounding of to_double(to_float(v)) when it puts x and y into one vector register
+// (found by the test; -fno-tree-slp-vectorize does not), hence volatile.
+double float_exact(double x) {
+  const volatile float rounded = static_cast<float>(x);
+  return static_cast<double>(rounded);
+}
+
 Vec3d choose_origin(const std::vector<Vec3d>& positions) {
   const double inf = std::numeric_limits<double>::infinity();
   Vec3d lo{inf, inf, inf}, hi{-inf, -inf, -inf};
@@ -290,7 +297,8 @@ Vec3d choose_origin(const std::vector<Vec3d>& positions) {
   for (int i = 0; i < 3; ++i) farthest = std::max({farthest, std::fabs(lo[i]), std::fabs(hi[i])});
   const double rounding = farthest / 16777216;  // half a unit in the last place of a float, at most
   if (rounding <= 1e-7 * length(hi - lo)) return {};
-  return to_double(to_float((lo + hi) * 0.5));
+  const Vec3d centre = (lo + hi) * 0.5;
+  return {float_exact(centre.x), float_exact(centre.y), float_exact(centre.z)};
 }
 
 }  // namespace
