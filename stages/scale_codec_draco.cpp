@@ -69,6 +69,8 @@ class DracoPrimitive {
   CodedPrimitive code(GlbWriter& writer) {
     // Equal values get one index, so that connectivity is that of positions and every other attribute's seams are its own.
     if (!mesh_.DeduplicateAttributeValues()) fail("attributes without repeats", "a failure");
+    // Points that agree in everything (relaxed junctions make some) are one to a decoder; the encoder would count each.
+    mesh_.DeduplicatePointIds();
     draco::ExpertEncoder encoder(mesh_);
     const int speed = 10 - coding_.options.draco_level;
     encoder.SetSpeedOptions(speed, speed);

@@ -54,7 +54,7 @@ struct ScaleFiles {
   static void archive(S& s, A& a) { a(s.files, s.position_bits, s.uv_bits, s.position_error, s.notes); }
 };
 
-/// Writes every kept scale as a GLB: one node per part, one primitive per material in it, the source's materials with
+/// Writes every kept scale as a GLB: one node per part (one for all where there are more than 256), one primitive per material in it, the source's materials with
 /// the previews of the planes as images (RGBA PNG where a material needs alpha). GLB image k is named "texture/<k>" for
 /// source image k. Positions are quantised on one grid for all scales, so shared vertices are bit-equal between scales;
 /// triangles with two corners in one place of the grid are left out. Texture coordinates of unused sets are left out,

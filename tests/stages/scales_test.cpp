@@ -343,6 +343,19 @@ TEST(Scales, SeveralPartsMaterialsTextureSetsAndColours) {
   }
 }
 
+TEST(Scales, VeryManyPartsBecomeOneNode) {
+  Mesh m = testing::bumpy_sphere(16, 24);
+  m.part_names.clear();
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) m.triangle_part[t] = static_cast<std::uint16_t>(t % 257);
+  for (int i = 0; i < 257; ++i) m.part_names.push_back("part " + std::to_string(i));
+  const Case c(m, 1, 1);
+  expect_round_trip(c, MeshCodec::kDraco);
+  const ScaleFiles files = c.write(MeshCodec::kDraco);
+  EXPECT_EQ(open(files.files[0].glb).json["nodes"].size(), 1u);
+  ASSERT_EQ(files.notes.size(), 1u);
+  EXPECT_EQ(files.notes[0].code, "parts-merged");
+}
+
 TEST(Scales, MeshWithoutTextureCoordinates) {
   Mesh m = testing::bumpy_sphere(10, 14);
   m.uv0.clear(), m.normals.clear();
