@@ -21,10 +21,13 @@ class CollectionReader {
 
   std::vector<CollectionModel> read(const Json& root) {
     check_members(root, "", {"$schema", "version", "options", "models"});
-    if (!root.contains("version") || root["version"] != 1) fail("/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
+    if (!root.contains("version") || root["version"] != 1)
+      fail("/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
     if (root.contains("options")) apply(options_, root["options"], "/options");
-    if (!root.contains("models") || !root["models"].is_array() || root["models"].empty() || root["models"].size() > kMaxModels)
-      fail("/models", "a list of 1 to " + std::to_string(kMaxModels) + " models", root.contains("models") ? root["models"].type_name() : "nothing");
+    if (!root.contains("models") || !root["models"].is_array() || root["models"].empty() ||
+        root["models"].size() > kMaxModels)
+      fail("/models", "a list of 1 to " + std::to_string(kMaxModels) + " models",
+           root.contains("models") ? root["models"].type_name() : "nothing");
     std::vector<CollectionModel> models;
     for (std::size_t i = 0; i < root["models"].size(); ++i)
       models.push_back(read_model(root["models"][i], "/models/" + std::to_string(i)));
@@ -32,26 +35,31 @@ class CollectionReader {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) const {
+  [[noreturn]] void fail(const std::string& place, const std::string& expected,
+                         const std::string& found) const {
     throw InputError(file_, place, expected, found.substr(0, 120));
   }
 
-  void check_members(const Json& object, const std::string& place, std::initializer_list<std::string_view> known) const {
+  void check_members(const Json& object, const std::string& place,
+                     std::initializer_list<std::string_view> known) const {
     if (!object.is_object()) fail(place, "an object", object.type_name());
     for (const auto& [name, value] : object.items())
-      if (std::find(known.begin(), known.end(), name) == known.end()) fail(place + "/" + name, "a known field", "\"" + name + "\"");
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        fail(place + "/" + name, "a known field", "\"" + name + "\"");
   }
 
   std::string path_at(const Json& object, const char* key, const std::string& place) const {
     const Json& v = object[key];
-    if (!v.is_string() || v.get_ref<const std::string&>().empty() || v.get_ref<const std::string&>().size() > kMaxPathBytes)
+    if (!v.is_string() || v.get_ref<const std::string&>().empty() ||
+        v.get_ref<const std::string&>().size() > kMaxPathBytes)
       fail(place + "/" + key, "a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes", v.dump());
     return v.get<std::string>();
   }
 
   void apply(CompileOptions& options, const Json& body, const std::string& place) const {
     if (!body.is_object()) fail(place, "an object", body.type_name());
-    if (body.contains("version")) fail(place + "/version", "no version, the collection has one", body["version"].dump());
+    if (body.contains("version"))
+      fail(place + "/version", "no version, the collection has one", body["version"].dump());
     Json profile = body;
     profile["version"] = 1;
     try {
@@ -67,12 +75,15 @@ class CollectionReader {
     if (!json.contains("input")) fail(place + "/input", "a path", "nothing");
     CollectionModel m;
     m.input = path_at(json, "input", place);
-    m.output = json.contains("output") ? path_at(json, "output", place) : fs::path(m.input).filename().replace_extension(".texmesh").string();
+    m.output = json.contains("output") ? path_at(json, "output", place)
+                                       : fs::path(m.input).filename().replace_extension(".texmesh").string();
     const fs::path output(m.output);
     bool beneath = output.is_relative() && output.extension() == ".texmesh";
     for (const fs::path& part : output) beneath = beneath && part != "..";
-    if (!beneath) fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
-    if (!outputs_.insert(output.lexically_normal().string()).second) fail(place + "/output", "an output of its own", m.output + ", as another model");
+    if (!beneath)
+      fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
+    if (!outputs_.insert(output.lexically_normal().string()).second)
+      fail(place + "/output", "an output of its own", m.output + ", as another model");
     m.options = options_;
     if (json.contains("options")) apply(m.options, json["options"], place + "/options");
     return m;
@@ -85,8 +96,10 @@ class CollectionReader {
 
 }  // namespace
 
-std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name, const CompileOptions& base) {
-  if (json.size() > kMaxFileBytes) throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
+std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
+                                             const CompileOptions& base) {
+  if (json.size() > kMaxFileBytes)
+    throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
   try {
     const std::span bytes(reinterpret_cast<const std::uint8_t*>(json.data()), json.size());
     return CollectionReader(file_name, base).read(parse_bounded_json(bytes, file_name, 16));

@@ -25,11 +25,14 @@ void add_dump_command(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<Arguments>();
   CLI::App* c = app.add_subcommand("dump", "Show what a package holds and why it is as large as it is");
   c->add_option("package", args->package, "A .texmesh file, or a folder that unpack made")->required();
-  c->add_option("part", args->part,
-                "summary: bounds, scales, textures, bytes by kind, options. scales: the meshes and when each is enough. "
-                "fragments: the texture's grid, importance and sizes. ladder: the rungs' bytes and distortion. tables: size "
-                "model, allocation, measured quality. entries: every file with offset and digest. provenance: inputs, "
-                "options, versions. all: everything")
+  c->add_option(
+       "part", args->part,
+       "summary: bounds, scales, textures, bytes by kind, options. scales: the meshes and when each is "
+       "enough. "
+       "fragments: the texture's grid, importance and sizes. ladder: the rungs' bytes and distortion. "
+       "tables: size "
+       "model, allocation, measured quality. entries: every file with offset and digest. provenance: inputs, "
+       "options, versions. all: everything")
       ->check(CLI::IsMember(std::vector<std::string>(kDumpParts.begin(), kDumpParts.end())))
       ->type_name("PART")
       ->capture_default_str();
@@ -44,8 +47,10 @@ void add_dump_command(CLI::App& app, int& exit_code) {
   c->callback([args, &exit_code] {
     PackageReader package(open_store(args->package));
     const DumpPart part = part_of(args->part);
-    if (args->json) std::cout << dump_json(package, part).dump() << '\n';
-    else std::cout << dump_text(package, part);
+    if (args->json)
+      std::cout << dump_json(package, part).dump() << '\n';
+    else
+      std::cout << dump_text(package, part);
     exit_code = kExitOk;
   });
 }

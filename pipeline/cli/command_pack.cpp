@@ -12,18 +12,24 @@ void add_unpack_command(CLI::App& app, int& exit_code) {
     bool force = false;
   };
   auto args = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("unpack", "Write a package's entries as files, for servers or tools that want a folder");
+  CLI::App* c = app.add_subcommand(
+      "unpack", "Write a package's entries as files, for servers or tools that want a folder");
   c->add_option("package", args->package, "A .texmesh file")->required();
-  c->add_option("-o,--output", args->folder, "The folder to make; it must not exist or be empty")->required()->type_name("DIR");
+  c->add_option("-o,--output", args->folder, "The folder to make; it must not exist or be empty")
+      ->required()
+      ->type_name("DIR");
   c->add_option("--fragments", args->fragments,
-                "packs: one file per texture and quality, as in the package. files: every fragment also as a complete JPEG "
+                "packs: one file per texture and quality, as in the package. files: every fragment also as a "
+                "complete JPEG "
                 "with fragments.json beside, for servers that ignore Range requests")
       ->check(CLI::IsMember({"packs", "files"}))
       ->type_name("packs|files")
       ->capture_default_str();
-  c->add_flag("--force", args->force, "Replace DIR if it holds an unpacked package; other folders are never replaced");
+  c->add_flag("--force", args->force,
+              "Replace DIR if it holds an unpacked package; other folders are never replaced");
   c->footer(
-      "The folder works like the file: dump, verify and clients take either. Any unzip tool makes the same files; this\n"
+      "The folder works like the file: dump, verify and clients take either. Any unzip tool makes the same "
+      "files; this\n"
       "command also checks every digest, and DIR appears whole or not at all.\n"
       "Examples:\n"
       "  texmesh unpack bust.texmesh -o www/bust\n"
@@ -44,7 +50,8 @@ void add_pack_command(CLI::App& app, int& exit_code) {
   c->add_option("folder", args->folder, "A folder that unpack made")->required()->type_name("DIR");
   c->add_option("-o,--output", args->package, "The .texmesh file to write")->required()->type_name("PKG");
   c->footer(
-      "Every file is checked against its digest first; files that are not of the package are refused, fragment files are\n"
+      "Every file is checked against its digest first; files that are not of the package are refused, "
+      "fragment files are\n"
       "left out. The package appears whole or not at all.\n"
       "Example:\n"
       "  texmesh pack www/bust -o bust.texmesh\n"

@@ -22,8 +22,8 @@ struct Arguments {
   bool json = false, quiet = false;
 };
 
-/// Mesh decoders trust counts in the data; a package from a stranger must not take the whole machine. Sanitizers
-/// reserve more address space than any limit allows.
+/// Mesh decoders trust counts in the data; a package from a stranger must not take the whole machine.
+/// Sanitizers reserve more address space than any limit allows.
 void limit_memory(std::uint64_t mib) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   rlimit limit{};
@@ -35,7 +35,8 @@ void limit_memory(std::uint64_t mib) {
 #endif
 }
 
-/// A package that cannot even be opened is a finding of its own, so that the others are looked at all the same.
+/// A package that cannot even be opened is a finding of its own, so that the others are looked at all the
+/// same.
 VerifyReport verify_path(const std::string& path, const RunContext& context) {
   try {
     const auto store = open_store(path);
@@ -50,32 +51,44 @@ VerifyReport verify_path(const std::string& path, const RunContext& context) {
 Json to_json(const std::string& path, const VerifyReport& r) {
   Json findings = Json::array();
   for (const Finding& f : r.findings)
-    findings.push_back({{"check", f.check}, {"entry", f.entry}, {"field", f.field}, {"expected", f.expected}, {"found", f.found}});
-  return {{"package", path}, {"ok", r.findings.empty()}, {"entries", r.entries}, {"bytes", r.bytes}, {"meshes", r.meshes},
-          {"previews", r.previews}, {"fragments", r.fragments}, {"findings", findings}};
+    findings.push_back({{"check", f.check},
+                        {"entry", f.entry},
+                        {"field", f.field},
+                        {"expected", f.expected},
+                        {"found", f.found}});
+  return {{"package", path},          {"ok", r.findings.empty()}, {"entries", r.entries},
+          {"bytes", r.bytes},         {"meshes", r.meshes},       {"previews", r.previews},
+          {"fragments", r.fragments}, {"findings", findings}};
 }
 
 void print(const std::string& path, const VerifyReport& r, bool quiet) {
   for (const Finding& f : r.findings) std::cout << path << ": " << printable(to_string(f)) << '\n';
   if (quiet && r.findings.empty()) return;
-  std::cout << path << ": " << (r.findings.empty() ? "ok" : std::to_string(r.findings.size()) + (r.findings.size() == 1 ? " finding" : " findings"))
-            << " (" << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, " << r.previews
-            << " previews, " << r.fragments << " fragments)\n";
+  std::cout << path << ": "
+            << (r.findings.empty()
+                    ? "ok"
+                    : std::to_string(r.findings.size()) + (r.findings.size() == 1 ? " finding" : " findings"))
+            << " (" << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
+            << r.previews << " previews, " << r.fragments << " fragments)\n";
 }
 
 int run_verify(const Arguments& args) {
   limit_memory(args.memory_mib);
   RunContext context;
-  context.threads = args.jobs > 0 ? args.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  context.threads =
+      args.jobs > 0 ? args.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   bool clean = true;
   Json all = Json::array();
   for (const std::string& path : args.packages) {
     const VerifyReport report = verify_path(path, context);
     clean = clean && report.findings.empty();
-    if (args.json) all.push_back(to_json(path, report));
-    else print(path, report, args.quiet);
+    if (args.json)
+      all.push_back(to_json(path, report));
+    else
+      print(path, report, args.quiet);
   }
-  if (args.json) std::cout << Json{{"packages", all}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+  if (args.json)
+    std::cout << Json{{"packages", all}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
   return clean ? kExitOk : kExitModelFailed;
 }
 
@@ -83,14 +96,22 @@ int run_verify(const Arguments& args) {
 
 void add_verify_command(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("verify", "Check every byte of packages: digests, documents, meshes, images");
-  c->add_option("packages", args->packages, ".texmesh files or unpacked folders")->required()->type_name("PKG...");
-  c->add_option("--jobs,-j", args->jobs, "Threads (default: one per core)")->check(CLI::Range(1, 1024))->type_name("N");
-  c->add_option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit")->capture_default_str()->type_name("MIB");
+  CLI::App* c =
+      app.add_subcommand("verify", "Check every byte of packages: digests, documents, meshes, images");
+  c->add_option("packages", args->packages, ".texmesh files or unpacked folders")
+      ->required()
+      ->type_name("PKG...");
+  c->add_option("--jobs,-j", args->jobs, "Threads (default: one per core)")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
+  c->add_option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit")
+      ->capture_default_str()
+      ->type_name("MIB");
   c->add_flag("--json", args->json, "One JSON object with all findings");
   c->add_flag("--quiet,-q", args->quiet, "Say nothing about sound packages");
   c->footer(
-      "Looks at everything and reports everything: each finding names the entry, the place in it, what was expected, what\n"
+      "Looks at everything and reports everything: each finding names the entry, the place in it, what was "
+      "expected, what\n"
       "was found and [the rule]. Meshes and every texture fragment are decoded.\n"
       "Examples:\n"
       "  texmesh verify out/*.texmesh\n"

@@ -16,7 +16,7 @@ namespace texmesh {
 namespace {
 
 using Json = GlbDocument::Json;
-using Matrix = std::array<double, 16>;   // column-major, as glTF
+using Matrix = std::array<double, 16>;  // column-major, as glTF
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kMaxPreviewPixels = 1ull << 26;
@@ -32,10 +32,12 @@ struct Box {
   bool empty() const { return !(min.x <= max.x); }
 };
 
-std::string indexed(const char* array, std::size_t i) { return std::string("/") + array + "/" + std::to_string(i); }
+std::string indexed(const char* array, std::size_t i) {
+  return std::string("/") + array + "/" + std::to_string(i);
+}
 
-/// Checks that every "index" of a texture info of `object` (recursively: materials hold them at several depths) is in
-/// range.
+/// Checks that every "index" of a texture info of `object` (recursively: materials hold them at several
+/// depths) is in range.
 void check_texture_infos(GlbDocument& d, const Json& object, std::size_t textures, const std::string& place) {
   if (!object.is_object()) return;
   for (const auto& [key, value] : object.items()) {
@@ -64,9 +66,12 @@ class GlbChecker {
     mesh_boxes_.resize(count_of("meshes"));
     each("meshes", "glb-decode", [&](std::size_t i, const Json& j) { check_mesh(i, j); });
     d_.guarded("glb-node", "/nodes", [&] { check_nodes(); });
-    if (d_.uses_extension("KHR_draco_mesh_compression")) facts_.codec = "draco";
-    else if (d_.uses_extension("EXT_meshopt_compression")) facts_.codec = "meshopt";
-    else if (d_.uses_extension("KHR_mesh_quantization")) facts_.codec = "quantized";
+    if (d_.uses_extension("KHR_draco_mesh_compression"))
+      facts_.codec = "draco";
+    else if (d_.uses_extension("EXT_meshopt_compression"))
+      facts_.codec = "meshopt";
+    else if (d_.uses_extension("KHR_mesh_quantization"))
+      facts_.codec = "quantized";
   }
 
  private:
@@ -91,9 +96,15 @@ class GlbChecker {
     const auto shown = sniff_image_format(bytes);
     const bool jpeg = shown == ImageFormat::kJpeg, png = shown == ImageFormat::kPng;
     if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png"))
-      d_.fail("glb-image", place + "/mimeType", jpeg ? "image/jpeg" : png ? "image/png" : "a JPEG or PNG", type);
-    if (jpeg) decode_jpeg(bytes, kMaxPreviewPixels);
-    else decode_image(probe_image(place, bytes, {16384, kMaxPreviewPixels}));
+      d_.fail("glb-image", place + "/mimeType",
+              jpeg  ? "image/jpeg"
+              : png ? "image/png"
+                    : "a JPEG or PNG",
+              type);
+    if (jpeg)
+      decode_jpeg(bytes, kMaxPreviewPixels);
+    else
+      decode_image(probe_image(place, bytes, {16384, kMaxPreviewPixels}));
   }
 
   void check_texture(std::size_t i, const Json& json) {
@@ -119,45 +130,52 @@ class GlbChecker {
   }
 
   Primitive check_primitive(const Json& json, const std::string& place) {
-    if (d_.number(json, "mode", 4, place) != 4) d_.fail("glb-reference", place + "/mode", "4, triangles", json["mode"].dump());
+    if (d_.number(json, "mode", 4, place) != 4)
+      d_.fail("glb-reference", place + "/mode", "4, triangles", json["mode"].dump());
     if (json.contains("material")) d_.index(json, "material", count_of("materials"), place);
     const auto attributes = json.find("attributes");
     if (attributes == json.end() || !attributes->is_object() || !attributes->contains("POSITION"))
       d_.fail("glb-reference", place + "/attributes/POSITION", "an accessor", "nothing");
     const auto& position = accessor(*attributes, "POSITION", place + "/attributes");
-    if (position.components != 3) d_.fail("glb-accessor", place + "/attributes/POSITION", "VEC3", "another type");
+    if (position.components != 3)
+      d_.fail("glb-accessor", place + "/attributes/POSITION", "VEC3", "another type");
     for (const auto& [name, value] : attributes->items()) {
       const auto& a = accessor(*attributes, name.c_str(), place + "/attributes");
       if (a.count != position.count)
-        d_.fail("glb-accessor", place + "/attributes/" + name, std::to_string(position.count) + " elements, as POSITION",
-                std::to_string(a.count));
+        d_.fail("glb-accessor", place + "/attributes/" + name,
+                std::to_string(position.count) + " elements, as POSITION", std::to_string(a.count));
     }
     const auto& indices = accessor(json, "indices", place);
     if (indices.components != 1 || indices.count % 3 != 0 || indices.component_type == 5126)
       d_.fail("glb-accessor", place + "/indices", "a multiple of 3 integers", std::to_string(indices.count));
     Primitive p{indices.count / 3, position.count, {}};
     const auto extensions = json.find("extensions");
-    const bool draco = extensions != json.end() && extensions->is_object() && extensions->contains("KHR_draco_mesh_compression");
+    const bool draco = extensions != json.end() && extensions->is_object() &&
+                       extensions->contains("KHR_draco_mesh_compression");
     if (draco) {
       check_draco((*extensions)["KHR_draco_mesh_compression"], *attributes, p, place);
     } else {
       check_indices(indices, position.count, place);
       for (std::size_t v = 0; v < position.count; ++v)
-        p.box.add({finite(position, v, 0, place), finite(position, v, 1, place), finite(position, v, 2, place)});
+        p.box.add(
+            {finite(position, v, 0, place), finite(position, v, 1, place), finite(position, v, 2, place)});
     }
-    check_stated_box(d_.root()["accessors"][(*attributes)["POSITION"].get<std::size_t>()], p.box, place + "/attributes/POSITION");
+    check_stated_box(d_.root()["accessors"][(*attributes)["POSITION"].get<std::size_t>()], p.box,
+                     place + "/attributes/POSITION");
     return p;
   }
 
   const GlbDocument::Accessor& accessor(const Json& object, const char* key, const std::string& place) {
     const auto& a = d_.accessors()[d_.index(object, key, d_.accessors().size(), place)];
-    if (!a.ok) throw GlbDocument::Broken{};   // it has its finding
+    if (!a.ok) throw GlbDocument::Broken{};  // it has its finding
     return a;
   }
 
   double finite(const GlbDocument::Accessor& a, std::size_t i, std::size_t c, const std::string& place) {
     const double v = d_.value(a, i, c);
-    if (!std::isfinite(v)) d_.fail("glb-position", place + "/attributes/POSITION", "finite positions", "element " + std::to_string(i));
+    if (!std::isfinite(v))
+      d_.fail("glb-position", place + "/attributes/POSITION", "finite positions",
+              "element " + std::to_string(i));
     return v;
   }
 
@@ -180,33 +198,41 @@ class GlbChecker {
     if (!decoded.ok()) d_.fail("glb-decode", at, "a Draco mesh", decoded.status().error_msg_string());
     const draco::Mesh& mesh = *decoded.value();
     if (mesh.num_faces() != p.triangles)
-      d_.fail("glb-decode", place + "/indices", std::to_string(mesh.num_faces()) + " triangles, as decoded", std::to_string(p.triangles));
+      d_.fail("glb-decode", place + "/indices", std::to_string(mesh.num_faces()) + " triangles, as decoded",
+              std::to_string(p.triangles));
     if (mesh.num_points() != p.vertices)
-      d_.fail("glb-decode", place + "/attributes/POSITION", std::to_string(mesh.num_points()) + " vertices, as decoded", std::to_string(p.vertices));
+      d_.fail("glb-decode", place + "/attributes/POSITION",
+              std::to_string(mesh.num_points()) + " vertices, as decoded", std::to_string(p.vertices));
     for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
       for (const draco::PointIndex& corner : mesh.face(f))
         if (corner.value() >= mesh.num_points())
-          d_.fail("glb-index", at, "indices below " + std::to_string(mesh.num_points()), std::to_string(corner.value()));
+          d_.fail("glb-index", at, "indices below " + std::to_string(mesh.num_points()),
+                  std::to_string(corner.value()));
     const auto ids = extension.find("attributes");
     for (const auto& [name, value] : attributes.items()) {
-      if (ids == extension.end() || !ids->is_object() || !ids->contains(name)) continue;   // stored without Draco
+      if (ids == extension.end() || !ids->is_object() || !ids->contains(name))
+        continue;  // stored without Draco
       const auto id = static_cast<std::uint32_t>(d_.number(*ids, name.c_str(), 0, at + "/attributes"));
       const draco::PointAttribute* a = mesh.GetAttributeByUniqueId(id);
       const auto& stated = accessor(attributes, name.c_str(), place + "/attributes");
       if (!a || static_cast<std::size_t>(a->num_components()) != stated.components)
-        d_.fail("glb-decode", at + "/attributes/" + name, std::to_string(stated.components) + " components in attribute " + std::to_string(id),
+        d_.fail("glb-decode", at + "/attributes/" + name,
+                std::to_string(stated.components) + " components in attribute " + std::to_string(id),
                 a ? std::to_string(a->num_components()) : "no such attribute");
       if (name == "POSITION") add_draco_positions(mesh, *a, p.box, at);
     }
-    if (p.box.empty()) d_.fail("glb-decode", at + "/attributes/POSITION", "positions in the Draco data", "none");
+    if (p.box.empty())
+      d_.fail("glb-decode", at + "/attributes/POSITION", "positions in the Draco data", "none");
   }
 
-  void add_draco_positions(const draco::Mesh& mesh, const draco::PointAttribute& a, Box& box, const std::string& at) {
+  void add_draco_positions(const draco::Mesh& mesh, const draco::PointAttribute& a, Box& box,
+                           const std::string& at) {
     for (draco::PointIndex i(0); i < mesh.num_points(); ++i) {
       std::array<float, 3> v{};
       const bool read = a.ConvertValue<float>(a.mapped_index(i), 3, v.data());
       if (!read || !std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
-        d_.fail("glb-position", at + "/attributes/POSITION", "finite positions", "point " + std::to_string(i.value()));
+        d_.fail("glb-position", at + "/attributes/POSITION", "finite positions",
+                "point " + std::to_string(i.value()));
       box.add({v[0], v[1], v[2]});
     }
   }
@@ -218,11 +244,13 @@ class GlbChecker {
       const auto it = accessor_json.find(key);
       if (it == accessor_json.end() || !it->is_array() || it->size() != 3 ||
           !std::all_of(it->begin(), it->end(), [](const Json& x) { return x.is_number(); }))
-        d_.fail("glb-accessor", place + "/" + key, "three numbers", it == accessor_json.end() ? "nothing" : it->dump().substr(0, 80));
+        d_.fail("glb-accessor", place + "/" + key, "three numbers",
+                it == accessor_json.end() ? "nothing" : it->dump().substr(0, 80));
       const Vec3d& real = key[1] == 'i' ? box.min : box.max;
       for (int k = 0; k < 3; ++k)
         if (!(std::fabs((*it)[static_cast<std::size_t>(k)].get<double>() - real[k]) <= slack))
-          d_.fail("glb-position", place + "/" + key, Json{real.x, real.y, real.z}.dump(), it->dump().substr(0, 120));
+          d_.fail("glb-position", place + "/" + key, Json{real.x, real.y, real.z}.dump(),
+                  it->dump().substr(0, 120));
     }
   }
 
@@ -234,8 +262,10 @@ class GlbChecker {
       if (nodes[i].contains("mesh")) d_.index(nodes[i], "mesh", mesh_boxes_.size(), place);
       const Json& children = d_.array(nodes[i], "children", place);
       for (std::size_t k = 0; k < children.size(); ++k) {
-        const std::uint64_t c = children[k].is_number_unsigned() ? children[k].get<std::uint64_t>() : nodes.size();
-        if (c >= nodes.size()) d_.fail("glb-reference", place + "/children/" + std::to_string(k), "a node", children[k].dump());
+        const std::uint64_t c =
+            children[k].is_number_unsigned() ? children[k].get<std::uint64_t>() : nodes.size();
+        if (c >= nodes.size())
+          d_.fail("glb-reference", place + "/children/" + std::to_string(k), "a node", children[k].dump());
         if (parent[c] >= 0 || c == i) d_.fail("glb-node", indexed("nodes", c), "one parent", "two");
         parent[c] = static_cast<std::int64_t>(i);
       }
@@ -258,7 +288,8 @@ class GlbChecker {
     for (std::size_t i = 0; i < scenes.size(); ++i)
       for (const Json& root : d_.array(scenes[i], "nodes", indexed("scenes", i))) {
         const std::uint64_t n = root.is_number_unsigned() ? root.get<std::uint64_t>() : nodes;
-        if (n >= nodes || parent[n] >= 0) d_.fail("glb-node", indexed("scenes", i) + "/nodes", "root nodes", root.dump());
+        if (n >= nodes || parent[n] >= 0)
+          d_.fail("glb-node", indexed("scenes", i) + "/nodes", "root nodes", root.dump());
       }
   }
 
@@ -269,8 +300,10 @@ class GlbChecker {
       std::vector<double> v;
       if (it->is_array())
         for (const Json& x : *it) v.push_back(x.is_number() ? x.get<double>() : kInfinity);
-      if (v.size() != fallback.size() || !std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); }))
-        d_.fail("glb-node", place + "/" + key, std::to_string(fallback.size()) + " numbers", it->dump().substr(0, 80));
+      if (v.size() != fallback.size() ||
+          !std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); }))
+        d_.fail("glb-node", place + "/" + key, std::to_string(fallback.size()) + " numbers",
+                it->dump().substr(0, 80));
       return v;
     };
     Matrix m{};
@@ -279,11 +312,12 @@ class GlbChecker {
       std::copy(v.begin(), v.end(), m.begin());
       return m;
     }
-    const auto t = numbers("translation", {0, 0, 0}), s = numbers("scale", {1, 1, 1}), q = numbers("rotation", {0, 0, 0, 1});
+    const auto t = numbers("translation", {0, 0, 0}), s = numbers("scale", {1, 1, 1}),
+               q = numbers("rotation", {0, 0, 0, 1});
     const double x = q[0], y = q[1], z = q[2], w = q[3];
-    const std::array<double, 9> r{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w),
-                                  2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w),
-                                  2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)};
+    const std::array<double, 9> r{1 - 2 * (y * y + z * z), 2 * (x * y + z * w),     2 * (x * z - y * w),
+                                  2 * (x * y - z * w),     1 - 2 * (x * x + z * z), 2 * (y * z + x * w),
+                                  2 * (x * z + y * w),     2 * (y * z - x * w),     1 - 2 * (x * x + y * y)};
     for (std::size_t c = 0; c < 3; ++c) {
       for (std::size_t k = 0; k < 3; ++k) m[c * 4 + k] = r[c * 3 + k] * s[c];
       m[12 + c] = t[c];
@@ -297,7 +331,8 @@ class GlbChecker {
     std::size_t steps = 0;
     for (std::int64_t p = parent[i]; p >= 0; p = parent[static_cast<std::size_t>(p)]) {
       if (++steps > nodes.size()) d_.fail("glb-node", indexed("nodes", i), "a tree", "a cycle");
-      const Matrix up = local_matrix(nodes[static_cast<std::size_t>(p)], indexed("nodes", static_cast<std::size_t>(p)));
+      const Matrix up =
+          local_matrix(nodes[static_cast<std::size_t>(p)], indexed("nodes", static_cast<std::size_t>(p)));
       Matrix product{};
       for (std::size_t c = 0; c < 4; ++c)
         for (std::size_t r = 0; r < 4; ++r)
@@ -309,7 +344,8 @@ class GlbChecker {
 
   static void add_transformed(const Matrix& m, const Box& b, Box& out) {
     for (int corner = 0; corner < 8; ++corner) {
-      const Vec3d p{corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y, corner & 4 ? b.max.z : b.min.z};
+      const Vec3d p{corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
+                    corner & 4 ? b.max.z : b.min.z};
       out.add({m[0] * p.x + m[4] * p.y + m[8] * p.z + m[12], m[1] * p.x + m[5] * p.y + m[9] * p.z + m[13],
                m[2] * p.x + m[6] * p.y + m[10] * p.z + m[14]});
     }

@@ -13,7 +13,8 @@ Json vector_json(const Vec3d& v) { return Json{v.x, v.y, v.z}; }
 
 std::uint64_t package_bytes(PackageReader& p) {
   std::uint64_t bytes = 0;
-  for (const KindBytes& k : bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.index())) bytes += k.bytes;
+  for (const KindBytes& k : bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.index()))
+    bytes += k.bytes;
   return bytes;
 }
 
@@ -25,17 +26,30 @@ Json summary_json(PackageReader& p) {
   for (const ManifestStep& s : m.steps) steps.push_back({{"up_to_px", s.up_to_px}, {"scale", s.scale}});
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& t = p.textures()[k];
-    textures.push_back({{"plane", k}, {"image", t.image}, {"name", t.name}, {"role", t.role},
-                        {"width_px", t.width_px}, {"height_px", t.height_px}, {"channels", t.channels},
-                        {"fragments", stored_fragments(p.tables().planes[k])}, {"rungs", t.rungs.size()}});
+    textures.push_back({{"plane", k},
+                        {"image", t.image},
+                        {"name", t.name},
+                        {"role", t.role},
+                        {"width_px", t.width_px},
+                        {"height_px", t.height_px},
+                        {"channels", t.channels},
+                        {"fragments", stored_fragments(p.tables().planes[k])},
+                        {"rungs", t.rungs.size()}});
   }
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
   return {{"package",
-           {{"id", to_hex(p.id())}, {"version", {{"major", m.major}, {"minor", m.minor}}}, {"title", m.title},
-            {"tool", provenance.tool}, {"entries", p.index().size() + 2}, {"entry_bytes", package_bytes(p)}}},
+           {{"id", to_hex(p.id())},
+            {"version", {{"major", m.major}, {"minor", m.minor}}},
+            {"title", m.title},
+            {"tool", provenance.tool},
+            {"entries", p.index().size() + 2},
+            {"entry_bytes", package_bytes(p)}}},
           {"object",
-           {{"origin", vector_json(m.origin)}, {"bounds_min", vector_json(m.bounds_min)},
-            {"bounds_max", vector_json(m.bounds_max)}, {"height", m.object_height}, {"jnd", m.jnd}}},
+           {{"origin", vector_json(m.origin)},
+            {"bounds_min", vector_json(m.bounds_min)},
+            {"bounds_max", vector_json(m.bounds_max)},
+            {"height", m.object_height},
+            {"jnd", m.jnd}}},
           {"steps", steps},
           {"textures", textures},
           {"bytes", kinds},
@@ -45,10 +59,19 @@ Json summary_json(PackageReader& p) {
 Json scales_json(PackageReader& p) {
   Json list = Json::array();
   for (const ManifestScale& s : p.manifest().scales)
-    list.push_back({{"scale", s.scale}, {"triangles", s.triangles}, {"vertices", s.vertices}, {"bytes", s.glb.bytes},
-                    {"major", s.major}, {"error_max", s.error_max}, {"error_rms", s.error_rms}, {"p95", s.p95},
-                    {"p99", s.p99}, {"display_px_jnd", s.display_px_jnd}, {"display_px_error", s.display_px_error},
-                    {"display_px_edge", s.display_px_edge}, {"path", s.glb.path}});
+    list.push_back({{"scale", s.scale},
+                    {"triangles", s.triangles},
+                    {"vertices", s.vertices},
+                    {"bytes", s.glb.bytes},
+                    {"major", s.major},
+                    {"error_max", s.error_max},
+                    {"error_rms", s.error_rms},
+                    {"p95", s.p95},
+                    {"p99", s.p99},
+                    {"display_px_jnd", s.display_px_jnd},
+                    {"display_px_error", s.display_px_error},
+                    {"display_px_edge", s.display_px_edge},
+                    {"path", s.glb.path}});
   return {{"scales", list}};
 }
 
@@ -56,9 +79,19 @@ Json fragment_json(const PlaneTables& t, std::size_t i, const std::vector<float>
   Json bytes = Json::array(), features = Json::array();
   for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
   for (std::size_t s = 0; s <= t.scales; ++s) features.push_back(t.features[s * t.fragment_count() + i]);
-  return {{"fragment", i}, {"column", i % t.columns}, {"row", i / t.columns}, {"covered_texels", t.covered_texels[i]},
-          {"surface_fraction", t.surface_fraction[i]}, {"eta", eta[i]}, {"vqp", t.vqp[i]}, {"z", t.z[i]}, {"i", t.i[i]},
-          {"zeta", t.zeta[i]}, {"m", t.m[i]}, {"features", features}, {"bytes", bytes}};
+  return {{"fragment", i},
+          {"column", i % t.columns},
+          {"row", i / t.columns},
+          {"covered_texels", t.covered_texels[i]},
+          {"surface_fraction", t.surface_fraction[i]},
+          {"eta", eta[i]},
+          {"vqp", t.vqp[i]},
+          {"z", t.z[i]},
+          {"i", t.i[i]},
+          {"zeta", t.zeta[i]},
+          {"m", t.m[i]},
+          {"features", features},
+          {"bytes", bytes}};
 }
 
 Json fragments_json(PackageReader& p) {
@@ -69,9 +102,14 @@ Json fragments_json(PackageReader& p) {
     const std::vector<float> eta = eta_of(t, 0);
     Json fragments = Json::array();
     for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, i, eta));
-    planes.push_back({{"plane", k}, {"columns", info.columns}, {"rows", info.rows},
-                      {"fragment_width_px", info.fragment_width_px}, {"fragment_height_px", info.fragment_height_px},
-                      {"grid_reason", info.grid_reason}, {"rung_quality", info.rung_quality}, {"fragments", fragments}});
+    planes.push_back({{"plane", k},
+                      {"columns", info.columns},
+                      {"rows", info.rows},
+                      {"fragment_width_px", info.fragment_width_px},
+                      {"fragment_height_px", info.fragment_height_px},
+                      {"grid_reason", info.grid_reason},
+                      {"rung_quality", info.rung_quality},
+                      {"fragments", fragments}});
   }
   return {{"fragments", planes}};
 }
@@ -83,11 +121,18 @@ Json ladder_json(PackageReader& p) {
     const auto figures = rung_figures(p.tables().planes[k]);
     Json rungs = Json::array();
     for (std::size_t r = 0; r < figures.size(); ++r)
-      rungs.push_back({{"rung", r}, {"quality", figures[r].quality}, {"bytes", figures[r].bytes},
-                       {"table_bytes", figures[r].table_bytes}, {"mse", figures[r].mse}, {"ssim", figures[r].ssim},
+      rungs.push_back({{"rung", r},
+                       {"quality", figures[r].quality},
+                       {"bytes", figures[r].bytes},
+                       {"table_bytes", figures[r].table_bytes},
+                       {"mse", figures[r].mse},
+                       {"ssim", figures[r].ssim},
                        {"path", info.rungs[r].path}});
-    planes.push_back({{"plane", k}, {"codec", info.codec}, {"preview_width_px", info.preview_width_px},
-                      {"preview_height_px", info.preview_height_px}, {"preview_bytes", info.preview.bytes},
+    planes.push_back({{"plane", k},
+                      {"codec", info.codec},
+                      {"preview_width_px", info.preview_width_px},
+                      {"preview_height_px", info.preview_height_px},
+                      {"preview_bytes", info.preview.bytes},
                       {"rungs", rungs}});
   }
   return {{"ladder", planes}};
@@ -103,8 +148,10 @@ Json allocation_json(const PlaneTables& t, std::uint32_t scale) {
     rungs.push_back(stored ? Json(nearest_rung(t, static_cast<double>(quality[i]))) : Json());
   }
   for (std::size_t g = 0; g < kGammas; ++g) total.push_back(t.total_bytes[scale * kGammas + g]);
-  return {{"scale", scale}, {"quality", t.quality[scale]}, {"gamma", f.gamma}, {"bytes_at_gamma", f.bytes},
-          {"total_bytes", total}, {"fragment_quality", q}, {"fragment_rung", rungs}};
+  return {{"scale", scale},        {"quality", t.quality[scale]},
+          {"gamma", f.gamma},      {"bytes_at_gamma", f.bytes},
+          {"total_bytes", total},  {"fragment_quality", q},
+          {"fragment_rung", rungs}};
 }
 
 Json tables_json(PackageReader& p) {
@@ -113,23 +160,34 @@ Json tables_json(PackageReader& p) {
     const PlaneTables& t = p.tables().planes[k];
     Json scales = Json::array();
     for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s));
-    planes.push_back({{"plane", k}, {"allocation", t.allocation == 0 ? "thesis" : "log"},
-                      {"quality_width", t.quality_width}, {"log_width", t.log_width}, {"quality_min", t.quality_min},
+    planes.push_back({{"plane", k},
+                      {"allocation", t.allocation == 0 ? "thesis" : "log"},
+                      {"quality_width", t.quality_width},
+                      {"log_width", t.log_width},
+                      {"quality_min", t.quality_min},
                       {"quality_max", t.quality_max},
-                      {"size_model", {{"a", t.model_a}, {"b", t.model_b}, {"r", t.model_r},
-                                      {"correlation", t.model_correlation}, {"error", t.model_error}}},
+                      {"size_model",
+                       {{"a", t.model_a},
+                        {"b", t.model_b},
+                        {"r", t.model_r},
+                        {"correlation", t.model_correlation},
+                        {"error", t.model_error}}},
                       {"scales", scales}});
   }
   const QualityTable& q = p.quality();
   Json samples = Json::array();
   for (std::size_t s = 0; s < q.scales.size(); ++s)
     for (std::size_t r = 0; r < q.rungs.size(); ++r)
-      samples.push_back({{"scale", q.scales[s]}, {"quality", q.rungs[r]}, {"ssim", q.ssim[s * q.rungs.size() + r]},
+      samples.push_back({{"scale", q.scales[s]},
+                         {"quality", q.rungs[r]},
+                         {"ssim", q.ssim[s * q.rungs.size() + r]},
                          {"difference", q.difference[s * q.rungs.size() + r]}});
-  return {{"tables", planes}, {"measured_quality", {{"views", q.views}, {"size_px", q.size_px}, {"samples", samples}}}};
+  return {{"tables", planes},
+          {"measured_quality", {{"views", q.views}, {"size_px", q.size_px}, {"samples", samples}}}};
 }
 
-Json entry_json(const std::string& path, std::uint64_t offset, std::uint64_t bytes, const std::string& digest) {
+Json entry_json(const std::string& path, std::uint64_t offset, std::uint64_t bytes,
+                const std::string& digest) {
   return {{"path", path}, {"offset", offset}, {"bytes", bytes}, {"sha256", digest}};
 }
 
@@ -145,19 +203,26 @@ Json entries_json(PackageReader& p) {
 
 Json provenance_json(PackageReader& p) {
   const auto bytes = p.entry(p.manifest().provenance);
-  read_provenance(bytes);   // refuse what verify would refuse
+  read_provenance(bytes);  // refuse what verify would refuse
   return {{"provenance", Json::parse(bytes.begin(), bytes.end())}};
 }
 
 Json part_json(PackageReader& p, DumpPart part) {
   switch (part) {
-    case DumpPart::kSummary: return summary_json(p);
-    case DumpPart::kScales: return scales_json(p);
-    case DumpPart::kFragments: return fragments_json(p);
-    case DumpPart::kLadder: return ladder_json(p);
-    case DumpPart::kTables: return tables_json(p);
-    case DumpPart::kEntries: return entries_json(p);
-    default: return provenance_json(p);
+    case DumpPart::kSummary:
+      return summary_json(p);
+    case DumpPart::kScales:
+      return scales_json(p);
+    case DumpPart::kFragments:
+      return fragments_json(p);
+    case DumpPart::kLadder:
+      return ladder_json(p);
+    case DumpPart::kTables:
+      return tables_json(p);
+    case DumpPart::kEntries:
+      return entries_json(p);
+    default:
+      return provenance_json(p);
   }
 }
 
@@ -166,7 +231,8 @@ Json part_json(PackageReader& p, DumpPart part) {
 Json dump_json(PackageReader& package, DumpPart part) {
   if (part != DumpPart::kAll) return part_json(package, part);
   Json all = Json::object();
-  for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k) all.update(part_json(package, static_cast<DumpPart>(k)));
+  for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k)
+    all.update(part_json(package, static_cast<DumpPart>(k)));
   return all;
 }
 

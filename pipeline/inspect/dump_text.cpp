@@ -22,25 +22,30 @@ std::string vector_text(const Vec3d& v) {
 }
 
 /// Displayed sizes: whole pixels below 100000, "any" for what is enough at any size.
-std::string pixels(double px) { return px >= kAnyDisplayPx ? "any" : grouped(static_cast<std::uint64_t>(px + 0.5)); }
+std::string pixels(double px) {
+  return px >= kAnyDisplayPx ? "any" : grouped(static_cast<std::uint64_t>(px + 0.5));
+}
 
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
   const std::string name = t.name.empty() ? "" : " \"" + printable(t.name) + "\"";
-  return fmt::format("texture plane {}{}, {}: {} x {} px, {} channel{}\n", plane, name, t.role, t.width_px, t.height_px,
-                     t.channels, t.channels == 1 ? "" : "s");
+  return fmt::format("texture plane {}{}, {}: {} x {} px, {} channel{}\n", plane, name, t.role, t.width_px,
+                     t.height_px, t.channels, t.channels == 1 ? "" : "s");
 }
 
 std::string scales_text(PackageReader& p) {
   TextTable table;
-  for (const char* header : {"scale", "triangles", "vertices", "kB", "major", "max error", "rms error", "p95 [%]", "p99 [%]",
-                             "jnd [px]", "error [px]", "edge [px]"})
+  for (const char* header : {"scale", "triangles", "vertices", "kB", "major", "max error", "rms error",
+                             "p95 [%]", "p99 [%]", "jnd [px]", "error [px]", "edge [px]"})
     table.column(header);
   for (const ManifestScale& s : p.manifest().scales)
-    table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices), kilobytes(s.glb.bytes),
-               s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms), percent(s.p95, 2), percent(s.p99, 2),
-               pixels(s.display_px_jnd), pixels(s.display_px_error), pixels(s.display_px_edge)});
-  return "scales (errors in object units; px = displayed height up to which the scale is enough, by the just-noticeable\n"
-         "difference, by an error of one pixel, by its edges)\n" + table.text();
+    table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
+               kilobytes(s.glb.bytes), s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
+               percent(s.p95, 2), percent(s.p99, 2), pixels(s.display_px_jnd), pixels(s.display_px_error),
+               pixels(s.display_px_edge)});
+  return "scales (errors in object units; px = displayed height up to which the scale is enough, by the "
+         "just-noticeable\n"
+         "difference, by an error of one pixel, by its edges)\n" +
+         table.text();
 }
 
 std::string steps_text(const Manifest& m) {
@@ -57,13 +62,16 @@ std::string textures_text(PackageReader& p) {
   for (const char* header : {"plane", "image"}) table.column(header);
   table.column("role", Align::kLeft);
   table.column("name", Align::kLeft);
-  for (const char* header : {"width px", "height px", "grid", "stored", "rungs", "lowest kB", "highest kB"}) table.column(header);
+  for (const char* header : {"width px", "height px", "grid", "stored", "rungs", "lowest kB", "highest kB"})
+    table.column(header);
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& t = p.textures()[k];
-    table.row({std::to_string(k), std::to_string(t.image), t.role, printable(t.name), std::to_string(t.width_px),
-               std::to_string(t.height_px), fmt::format("{}x{}", t.columns, t.rows),
+    table.row({std::to_string(k), std::to_string(t.image), t.role, printable(t.name),
+               std::to_string(t.width_px), std::to_string(t.height_px),
+               fmt::format("{}x{}", t.columns, t.rows),
                std::to_string(stored_fragments(p.tables().planes[k])), std::to_string(t.rungs.size()),
-               t.rungs.empty() ? "" : kilobytes(t.rungs.front().bytes), t.rungs.empty() ? "" : kilobytes(t.rungs.back().bytes)});
+               t.rungs.empty() ? "" : kilobytes(t.rungs.front().bytes),
+               t.rungs.empty() ? "" : kilobytes(t.rungs.back().bytes)});
   }
   return "textures (grid and stored count fragments; kB of the lowest and the highest rung)\n" + table.text();
 }
@@ -75,7 +83,8 @@ std::string kinds_text(const std::vector<KindBytes>& kinds) {
   std::uint64_t sum = 0, entries = 0;
   for (const KindBytes& k : kinds) sum += k.bytes, entries += k.entries;
   for (const KindBytes& k : kinds)
-    table.row({k.kind, grouped(k.entries), kilobytes(k.bytes), percent(static_cast<double>(k.bytes) / static_cast<double>(sum))});
+    table.row({k.kind, grouped(k.entries), kilobytes(k.bytes),
+               percent(static_cast<double>(k.bytes) / static_cast<double>(sum))});
   table.row({"all", grouped(entries), kilobytes(sum), "100.0"});
   return table.text();
 }
@@ -88,7 +97,8 @@ std::string options_text(const Provenance& provenance) {
   table.column("value", Align::kLeft);
   table.column("default", Align::kLeft);
   for (const OptionChange& c : changes) table.row({printable(c.name), printable(c.value), c.fallback});
-  return "options that differ from this version's defaults (all of them: dump PKG provenance)\n" + table.text();
+  return "options that differ from this version's defaults (all of them: dump PKG provenance)\n" +
+         table.text();
 }
 
 std::string summary_text(PackageReader& p) {
@@ -97,13 +107,17 @@ std::string summary_text(PackageReader& p) {
   const auto kinds = bytes_by_kind(m, p.store().read_manifest().size(), p.index());
   const Vec3d size = m.bounds_max - m.bounds_min;
   std::string s = m.title.empty() ? std::string() : printable(m.title) + "\n";
-  s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor, printable(provenance.tool));
-  s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n", vector_text(m.origin),
-                   vector_text(m.bounds_min), vector_text(m.bounds_max), vector_text(size));
-  s += fmt::format("start     {} kB show the object: manifest and index, then one range of {} bytes from {}\n\n",
-                   kilobytes(m.first_picture_offset + m.first_picture_bytes), m.first_picture_bytes, m.first_picture_offset);
-  return s + scales_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" + kinds_text(kinds) + "\n" +
-         options_text(provenance);
+  s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
+                   printable(provenance.tool));
+  s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n",
+                   vector_text(m.origin), vector_text(m.bounds_min), vector_text(m.bounds_max),
+                   vector_text(size));
+  s += fmt::format(
+      "start     {} kB show the object: manifest and index, then one range of {} bytes from {}\n\n",
+      kilobytes(m.first_picture_offset + m.first_picture_bytes), m.first_picture_bytes,
+      m.first_picture_offset);
+  return s + scales_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" + kinds_text(kinds) +
+         "\n" + options_text(provenance);
 }
 
 /// Where texture detail lies: a digit per fragment, eta of S_0 in tenths, '.' where nothing is stored.
@@ -125,22 +139,28 @@ std::string fragments_text(PackageReader& p) {
     const PlaneTables& t = p.tables().planes[k];
     const std::vector<float> eta = eta_of(t, 0);
     TextTable table;
-    for (const char* header : {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP"}) table.column(header);
+    for (const char* header : {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP"})
+      table.column(header);
     for (const int q : info.rung_quality) table.column(fmt::format("q{} B", q));
     const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
     for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
       const std::size_t i = t.order[rank];
-      std::vector<std::string> row{std::to_string(rank), std::to_string(i), std::to_string(i % t.columns),
-                                   std::to_string(i / t.columns), percent(t.covered_texels[i] / texels),
+      std::vector<std::string> row{std::to_string(rank),
+                                   std::to_string(i),
+                                   std::to_string(i % t.columns),
+                                   std::to_string(i / t.columns),
+                                   percent(t.covered_texels[i] / texels),
                                    percent(static_cast<double>(t.surface_fraction[i]), 2),
-                                   fixed(static_cast<double>(eta[i]), 3), fixed(static_cast<double>(t.vqp[i]), 3)};
+                                   fixed(static_cast<double>(eta[i]), 3),
+                                   fixed(static_cast<double>(t.vqp[i]), 3)};
       for (std::size_t r = 0; r < t.rung_count(); ++r)
         row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
       table.row(std::move(row));
     }
     s += plane_title(info, k);
-    s += fmt::format("{} x {} fragments of {} x {} px ({}); eta of S_0 in tenths, . = not stored\n", info.columns, info.rows,
-                     info.fragment_width_px, info.fragment_height_px, printable(info.grid_reason));
+    s += fmt::format("{} x {} fragments of {} x {} px ({}); eta of S_0 in tenths, . = not stored\n",
+                     info.columns, info.rows, info.fragment_width_px, info.fragment_height_px,
+                     printable(info.grid_reason));
     s += eta_map(t, eta) + "fragments by falling importance\n" + table.text() + "\n";
   }
   return s.empty() ? "no textures\n" : s;
@@ -150,7 +170,8 @@ std::string ladder_text(PackageReader& p) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     TextTable table;
-    for (const char* header : {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "bits/texel"}) table.column(header);
+    for (const char* header : {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "bits/texel"})
+      table.column(header);
     const PlaneTables& t = p.tables().planes[k];
     double texels = 0;
     for (const std::uint16_t i : t.order) texels += t.covered_texels[i];
@@ -161,21 +182,23 @@ std::string ladder_text(PackageReader& p) {
                  texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
     const TextureInfo& info = p.textures()[k];
     s += plane_title(info, k) + table.text();
-    s += fmt::format("  preview {} x {} px, {} B; means over covered texels\n\n", info.preview_width_px, info.preview_height_px,
-                     info.preview.bytes);
+    s += fmt::format("  preview {} x {} px, {} B; means over covered texels\n\n", info.preview_width_px,
+                     info.preview_height_px, info.preview.bytes);
   }
   return s.empty() ? "no textures\n" : s;
 }
 
 std::string allocation_text(const PlaneTables& t) {
   TextTable table;
-  for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB", "0.25 kB", "0.5 kB",
-                             "0.75 kB", "1 kB"})
+  for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB",
+                             "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
     table.column(header);
   for (std::uint32_t s = 0; s <= t.scales; ++s) {
     const AllocationFigures f = allocation_figures(t, s);
-    std::vector<std::string> row{fmt::format("S_{}", s), fixed(static_cast<double>(t.quality[s]), 1), fixed(f.gamma, 3),
-                                 fixed(f.quality_min, 1), fixed(f.quality_mean, 1), fixed(f.quality_max, 1), kilobytes(f.bytes)};
+    std::vector<std::string> row{fmt::format("S_{}", s),   fixed(static_cast<double>(t.quality[s]), 1),
+                                 fixed(f.gamma, 3),        fixed(f.quality_min, 1),
+                                 fixed(f.quality_mean, 1), fixed(f.quality_max, 1),
+                                 kilobytes(f.bytes)};
     for (std::size_t g = 0; g < kGammas; g += 5) row.push_back(kilobytes(t.total_bytes[s * kGammas + g]));
     table.row(std::move(row));
   }
@@ -189,11 +212,15 @@ std::string measured_text(const QualityTable& q) {
   for (const int rung : q.rungs) table.column(fmt::format("diff q{}", rung));
   for (std::size_t s = 0; s < q.scales.size(); ++s) {
     std::vector<std::string> row{fmt::format("S_{}", q.scales[s])};
-    for (std::size_t r = 0; r < q.rungs.size(); ++r) row.push_back(fixed(static_cast<double>(q.ssim[s * q.rungs.size() + r]), 4));
-    for (std::size_t r = 0; r < q.rungs.size(); ++r) row.push_back(fixed(static_cast<double>(q.difference[s * q.rungs.size() + r]), 4));
+    for (std::size_t r = 0; r < q.rungs.size(); ++r)
+      row.push_back(fixed(static_cast<double>(q.ssim[s * q.rungs.size() + r]), 4));
+    for (std::size_t r = 0; r < q.rungs.size(); ++r)
+      row.push_back(fixed(static_cast<double>(q.difference[s * q.rungs.size() + r]), 4));
     table.row(std::move(row));
   }
-  return fmt::format("measured quality against S_0 with the source's texture ({} views of {} px)\n", q.views, q.size_px) + table.text();
+  return fmt::format("measured quality against S_0 with the source's texture ({} views of {} px)\n", q.views,
+                     q.size_px) +
+         table.text();
 }
 
 std::string tables_text(PackageReader& p) {
@@ -201,12 +228,16 @@ std::string tables_text(PackageReader& p) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
     s += plane_title(p.textures()[k], k);
-    s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n", shortest(static_cast<double>(t.model_a)),
-                     shortest(static_cast<double>(t.model_b)), shortest(static_cast<double>(t.model_r), 6),
-                     fixed(static_cast<double>(t.model_correlation), 4), percent(static_cast<double>(t.model_error)));
-    s += fmt::format("  allocation {}, width {}, q within {} .. {}; D_i at the default Gamma, then by Gamma\n",
-                     t.allocation == 0 ? "thesis" : "log", shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
-                     shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)));
+    s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
+                     shortest(static_cast<double>(t.model_a)), shortest(static_cast<double>(t.model_b)),
+                     shortest(static_cast<double>(t.model_r), 6),
+                     fixed(static_cast<double>(t.model_correlation), 4),
+                     percent(static_cast<double>(t.model_error)));
+    s += fmt::format(
+        "  allocation {}, width {}, q within {} .. {}; D_i at the default Gamma, then by Gamma\n",
+        t.allocation == 0 ? "thesis" : "log",
+        shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
+        shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)));
     s += allocation_text(t) + "\n";
   }
   return s + measured_text(p.quality());
@@ -226,7 +257,8 @@ std::string entries_text(PackageReader& p) {
 
 std::string provenance_text(PackageReader& p) {
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
-  std::string s = fmt::format("made by   {}, format {}.{}\n\ninputs\n", printable(provenance.tool), provenance.format_major, provenance.format_minor);
+  std::string s = fmt::format("made by   {}, format {}.{}\n\ninputs\n", printable(provenance.tool),
+                              provenance.format_major, provenance.format_minor);
   TextTable inputs;
   inputs.column("role", Align::kLeft);
   inputs.column("bytes");
@@ -239,25 +271,35 @@ std::string provenance_text(PackageReader& p) {
   options.column("value", Align::kLeft);
   for (const auto& [stage, section] : provenance.options.items())
     if (section.is_object())
-      for (const auto& [name, value] : section.items()) options.row({printable(stage + "." + name), printable(value.dump())});
+      for (const auto& [name, value] : section.items())
+        options.row({printable(stage + "." + name), printable(value.dump())});
   s += options.text() + "\nversions\n";
   TextTable versions;
   versions.column("stage or library", Align::kLeft);
   versions.column("version");
-  for (const auto& [name, version] : provenance.stages) versions.row({printable(name), std::to_string(version)});
-  for (const auto& [name, version] : provenance.libraries) versions.row({printable(name), printable(version)});
+  for (const auto& [name, version] : provenance.stages)
+    versions.row({printable(name), std::to_string(version)});
+  for (const auto& [name, version] : provenance.libraries)
+    versions.row({printable(name), printable(version)});
   return s + versions.text();
 }
 
 std::string part_text(PackageReader& p, DumpPart part) {
   switch (part) {
-    case DumpPart::kSummary: return summary_text(p);
-    case DumpPart::kScales: return scales_text(p);
-    case DumpPart::kFragments: return fragments_text(p);
-    case DumpPart::kLadder: return ladder_text(p);
-    case DumpPart::kTables: return tables_text(p);
-    case DumpPart::kEntries: return entries_text(p);
-    default: return provenance_text(p);
+    case DumpPart::kSummary:
+      return summary_text(p);
+    case DumpPart::kScales:
+      return scales_text(p);
+    case DumpPart::kFragments:
+      return fragments_text(p);
+    case DumpPart::kLadder:
+      return ladder_text(p);
+    case DumpPart::kTables:
+      return tables_text(p);
+    case DumpPart::kEntries:
+      return entries_text(p);
+    default:
+      return provenance_text(p);
   }
 }
 
@@ -267,8 +309,9 @@ std::string dump_text(PackageReader& package, DumpPart part) {
   if (part != DumpPart::kAll) return part_text(package, part);
   std::string s;
   for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k) {
-    if (k == static_cast<std::size_t>(DumpPart::kScales)) continue;   // stands in the summary
-    s += (k ? "\n== " + std::string(kDumpParts[k]) + "\n" : "") + part_text(package, static_cast<DumpPart>(k));
+    if (k == static_cast<std::size_t>(DumpPart::kScales)) continue;  // stands in the summary
+    s +=
+        (k ? "\n== " + std::string(kDumpParts[k]) + "\n" : "") + part_text(package, static_cast<DumpPart>(k));
   }
   return s;
 }

@@ -7,9 +7,9 @@
 
 namespace texmesh {
 
-/// One thing about a package that is not as its format says. `check` names the rule (stable, kebab-case), `entry` the
-/// path inside the package ("" = the package as a whole), `field` the place in the entry: a JSON pointer, an array
-/// element, a byte offset.
+/// One thing about a package that is not as its format says. `check` names the rule (stable, kebab-case),
+/// `entry` the path inside the package ("" = the package as a whole), `field` the place in the entry: a JSON
+/// pointer, an array element, a byte offset.
 struct Finding {
   std::string check, entry, field, expected, found;
   friend bool operator==(const Finding&, const Finding&) = default;
@@ -18,11 +18,13 @@ struct Finding {
 /// `mesh/s09.glb: /accessors/3/count: expected 12, found 13 [glb-accessor]`
 std::string to_string(const Finding& finding);
 
-/// Collects findings; every method returns whether the rule holds, so that a check can stop where going on is pointless.
+/// Collects findings; every method returns whether the rule holds, so that a check can stop where going on is
+/// pointless.
 class Findings {
  public:
   void add(std::string check, std::string entry, std::string field, std::string expected, std::string found) {
-    list_.push_back({std::move(check), std::move(entry), std::move(field), std::move(expected), std::move(found)});
+    list_.push_back(
+        {std::move(check), std::move(entry), std::move(field), std::move(expected), std::move(found)});
   }
   void add(const std::string& check, const std::string& entry, const Error& error) {
     add(check, entry, error.place(), error.expected(), error.found());

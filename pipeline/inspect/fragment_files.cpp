@@ -43,10 +43,13 @@ FragmentIndex::Rung read_rung(const Json& json, std::size_t fragments, const std
   const Json& bytes = list_member(json, "bytes", place);
   const Json& digests = list_member(json, "sha256", place);
   if (bytes.size() != fragments || digests.size() != fragments)
-    fail(place, std::to_string(fragments) + " fragments, as in order", std::to_string(bytes.size()) + " sizes, " + std::to_string(digests.size()) + " digests");
+    fail(place, std::to_string(fragments) + " fragments, as in order",
+         std::to_string(bytes.size()) + " sizes, " + std::to_string(digests.size()) + " digests");
   for (std::size_t i = 0; i < fragments; ++i) {
     rung.bytes.push_back(integer(bytes[i], place + "/bytes/" + std::to_string(i), 1ull << 32));
-    if (!is_short_digest(digests[i])) fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits", digests[i].dump().substr(0, 60));
+    if (!is_short_digest(digests[i]))
+      fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits",
+           digests[i].dump().substr(0, 60));
     rung.digests.push_back(digests[i].get<std::string>());
   }
   return rung;
@@ -56,7 +59,8 @@ FragmentIndex::Plane read_plane(const Json& json, const std::string& place) {
   FragmentIndex::Plane plane;
   const Json& order = list_member(json, "order", place);
   for (std::size_t i = 0; i < order.size(); ++i)
-    plane.order.push_back(static_cast<std::uint16_t>(integer(order[i], place + "/order/" + std::to_string(i), 65535)));
+    plane.order.push_back(
+        static_cast<std::uint16_t>(integer(order[i], place + "/order/" + std::to_string(i), 65535)));
   const Json& rungs = list_member(json, "rungs", place);
   for (std::size_t r = 0; r < rungs.size(); ++r)
     plane.rungs.push_back(read_rung(rungs[r], plane.order.size(), place + "/rungs/" + std::to_string(r)));
@@ -64,29 +68,36 @@ FragmentIndex::Plane read_plane(const Json& json, const std::string& place) {
 }
 
 /// Compares the files of one rung with the index and the rung's own entry.
-void check_rung_files(PackageStore& folder, const std::map<std::string, std::uint64_t>& files, const TextureInfo& info,
-                      const PlaneTables& t, std::uint32_t plane, std::uint32_t rung, const FragmentIndex::Rung& stated, Findings& findings) {
-  const std::uint64_t tables_at = std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
+void check_rung_files(PackageStore& folder, const std::map<std::string, std::uint64_t>& files,
+                      const TextureInfo& info, const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
+                      const FragmentIndex::Rung& stated, Findings& findings) {
+  const std::uint64_t tables_at =
+      std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
   const Bytes tables = folder.read(info.tables, tables_at, t.table_bytes[rung]);
   std::uint64_t at = 0;
   for (std::size_t k = 0; k < t.order.size(); ++k) {
     const std::uint32_t fragment = t.order[k], bytes = t.size_bytes[rung * t.fragment_count() + fragment];
     const std::string path = fragment_file_path(plane, rung, fragment);
     if (bytes == 0) {
-      findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path, "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
+      findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path,
+                       "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
       continue;
     }
     const Bytes jpeg = join_jpeg(tables, folder.read(info.rungs[rung], at, bytes));
     at += bytes;
     const auto file = files.find(path);
     if (!findings.require(file != files.end(), "fragment-file", path, "", "a file", "none")) continue;
-    if (!findings.require_equal<std::uint64_t>(jpeg.size(), file->second, "fragment-file", path, "bytes")) continue;
+    if (!findings.require_equal<std::uint64_t>(jpeg.size(), file->second, "fragment-file", path, "bytes"))
+      continue;
     EntryRef ref;
     ref.path = path;
     ref.bytes = jpeg.size();
-    findings.require(folder.read(ref, 0, ref.bytes) == jpeg, "fragment-file", path, "", "the fragment of " + info.rungs[rung].path, "other bytes");
-    findings.require(stated.bytes[k] == jpeg.size() && stated.digests[k] == short_digest(jpeg), "fragment-file", kFragmentIndexPath,
-                     path, std::to_string(jpeg.size()) + " bytes, " + short_digest(jpeg), std::to_string(stated.bytes[k]) + " bytes, " + stated.digests[k]);
+    findings.require(folder.read(ref, 0, ref.bytes) == jpeg, "fragment-file", path, "",
+                     "the fragment of " + info.rungs[rung].path, "other bytes");
+    findings.require(stated.bytes[k] == jpeg.size() && stated.digests[k] == short_digest(jpeg),
+                     "fragment-file", kFragmentIndexPath, path,
+                     std::to_string(jpeg.size()) + " bytes, " + short_digest(jpeg),
+                     std::to_string(stated.bytes[k]) + " bytes, " + stated.digests[k]);
   }
 }
 
@@ -104,10 +115,12 @@ std::string write_fragment_index(const FragmentIndex& index) {
 
 FragmentIndex read_fragment_index(std::span<const std::uint8_t> json) {
   const Json root = parse_bounded_json(json, kFragmentIndexPath, 16);
-  if (!root.is_object() || !root.contains("version") || root["version"] != 1) fail("/version", "1", "something else");
+  if (!root.is_object() || !root.contains("version") || root["version"] != 1)
+    fail("/version", "1", "something else");
   FragmentIndex index;
   const Json& planes = list_member(root, "planes", "");
-  for (std::size_t k = 0; k < planes.size(); ++k) index.planes.push_back(read_plane(planes[k], "/planes/" + std::to_string(k)));
+  for (std::size_t k = 0; k < planes.size(); ++k)
+    index.planes.push_back(read_plane(planes[k], "/planes/" + std::to_string(k)));
   return index;
 }
 
@@ -122,12 +135,13 @@ FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink
       FragmentIndex::Rung files;
       for (const std::uint16_t fragment : t.order) {
         const ByteRange range = package.fragment_range(plane, rung, fragment);
-        if (range.bytes == 0) {   // not stored on this rung
+        if (range.bytes == 0) {  // not stored on this rung
           files.bytes.push_back(0);
           files.digests.push_back(kNoFile);
           continue;
         }
-        const Bytes jpeg = join_jpeg(tables, std::span(pack).subspan(static_cast<std::size_t>(range.offset), static_cast<std::size_t>(range.bytes)));
+        const Bytes jpeg = join_jpeg(tables, std::span(pack).subspan(static_cast<std::size_t>(range.offset),
+                                                                     static_cast<std::size_t>(range.bytes)));
         files.bytes.push_back(jpeg.size());
         files.digests.push_back(short_digest(jpeg));
         sink(fragment_file_path(plane, rung, fragment), jpeg);
@@ -139,16 +153,20 @@ FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink
   return index;
 }
 
-Bytes join_fragment_files(const PlaneTables& t, std::uint32_t plane, std::uint32_t rung, const Bytes& table_stream,
+Bytes join_fragment_files(const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
+                          const Bytes& table_stream,
                           const std::function<Bytes(const std::string&)>& read_file) {
-  if (table_stream.size() < 4) throw FormatError("tables", "", "a table stream", std::to_string(table_stream.size()) + " bytes");
-  const std::size_t head = table_stream.size() - 2;   // without EOI
+  if (table_stream.size() < 4)
+    throw FormatError("tables", "", "a table stream", std::to_string(table_stream.size()) + " bytes");
+  const std::size_t head = table_stream.size() - 2;  // without EOI
   Bytes pack;
   for (const std::uint16_t fragment : t.order) {
     if (t.size_bytes[rung * t.fragment_count() + fragment] == 0) continue;
     const std::string path = fragment_file_path(plane, rung, fragment);
     const Bytes jpeg = read_file(path);
-    if (jpeg.size() < head || !std::equal(table_stream.begin(), table_stream.begin() + static_cast<std::ptrdiff_t>(head), jpeg.begin()))
+    if (jpeg.size() < head ||
+        !std::equal(table_stream.begin(), table_stream.begin() + static_cast<std::ptrdiff_t>(head),
+                    jpeg.begin()))
       throw FormatError(path, "byte 0", "the table stream of rung " + std::to_string(rung), "other bytes");
     pack.insert(pack.end(), {0xff, 0xd8});
     pack.insert(pack.end(), jpeg.begin() + static_cast<std::ptrdiff_t>(head), jpeg.end());
@@ -156,8 +174,9 @@ Bytes join_fragment_files(const PlaneTables& t, std::uint32_t plane, std::uint32
   return pack;
 }
 
-void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry>& listed, const std::vector<TextureInfo>& textures,
-                          const PackageTables& tables, Findings& findings) {
+void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry>& listed,
+                          const std::vector<TextureInfo>& textures, const PackageTables& tables,
+                          Findings& findings) {
   std::map<std::string, std::uint64_t> files;
   EntryRef index_ref;
   index_ref.path = kFragmentIndexPath;
@@ -166,20 +185,27 @@ void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry
     const EntryName name = parse_entry_path(e.path);
     if (name.kind != EntryKind::kFragmentFile) continue;
     files[e.path] = e.bytes;
-    const bool known = name.number < tables.planes.size() && name.rung < tables.planes[name.number].rung_count() &&
-                       std::count(tables.planes[name.number].order.begin(), tables.planes[name.number].order.end(), name.fragment) > 0;
-    findings.require(known, "fragment-file", e.path, "", "a stored fragment of the package", "none of that name");
+    const bool known = name.number < tables.planes.size() &&
+                       name.rung < tables.planes[name.number].rung_count() &&
+                       std::count(tables.planes[name.number].order.begin(),
+                                  tables.planes[name.number].order.end(), name.fragment) > 0;
+    findings.require(known, "fragment-file", e.path, "", "a stored fragment of the package",
+                     "none of that name");
   }
   const FragmentIndex index = read_fragment_index(folder.read(index_ref, 0, index_ref.bytes));
-  if (!findings.require_equal(tables.planes.size(), index.planes.size(), "fragment-file", kFragmentIndexPath, "/planes")) return;
+  if (!findings.require_equal(tables.planes.size(), index.planes.size(), "fragment-file", kFragmentIndexPath,
+                              "/planes"))
+    return;
   for (std::uint32_t plane = 0; plane < tables.planes.size(); ++plane) {
     const PlaneTables& t = tables.planes[plane];
     const std::string place = "/planes/" + std::to_string(plane);
-    if (!findings.require(index.planes[plane].order == t.order && index.planes[plane].rungs.size() == t.rung_count(), "fragment-file",
-                          kFragmentIndexPath, place, "order and rungs as in the tables", "others"))
+    if (!findings.require(
+            index.planes[plane].order == t.order && index.planes[plane].rungs.size() == t.rung_count(),
+            "fragment-file", kFragmentIndexPath, place, "order and rungs as in the tables", "others"))
       continue;
     for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung)
-      check_rung_files(folder, files, textures[plane], t, plane, rung, index.planes[plane].rungs[rung], findings);
+      check_rung_files(folder, files, textures[plane], t, plane, rung, index.planes[plane].rungs[rung],
+                       findings);
   }
 }
 

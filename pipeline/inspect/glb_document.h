@@ -10,9 +10,9 @@
 
 namespace texmesh {
 
-/// A GLB file whose chunks, buffer views and accessors have been checked and whose data can be read. Elements that are
-/// broken have given a finding and are marked `ok == false`; nothing that is ok reaches outside the file's bytes.
-/// check_glb.h is the interface; this header is shared with its implementation only.
+/// A GLB file whose chunks, buffer views and accessors have been checked and whose data can be read. Elements
+/// that are broken have given a finding and are marked `ok == false`; nothing that is ok reaches outside the
+/// file's bytes. check_glb.h is the interface; this header is shared with its implementation only.
 class GlbDocument {
  public:
   using Json = nlohmann::ordered_json;
@@ -21,12 +21,12 @@ class GlbDocument {
   struct Broken {};
 
   struct View {
-    std::span<const std::uint8_t> data;   // decoded where the view is compressed
-    std::size_t stride = 0;               // 0 = tightly packed
+    std::span<const std::uint8_t> data;  // decoded where the view is compressed
+    std::size_t stride = 0;              // 0 = tightly packed
     bool ok = false;
   };
   struct Accessor {
-    std::int64_t view = -1;               // -1: zeros, or the data comes from Draco
+    std::int64_t view = -1;  // -1: zeros, or the data comes from Draco
     std::size_t offset = 0, count = 0, components = 0, component_bytes = 0, stride = 0;
     int component_type = 0;
     bool normalized = false, ok = false;
@@ -85,7 +85,7 @@ class GlbDocument {
   std::string entry_;
   Findings& findings_;
   Json root_;
-  std::vector<std::uint64_t> buffer_bytes_;   // declared; 0 bytes readable for all but buffer 0
+  std::vector<std::uint64_t> buffer_bytes_;  // declared; 0 bytes readable for all but buffer 0
   std::vector<View> views_;
   std::vector<std::vector<std::uint8_t>> decoded_;
   std::vector<Accessor> accessors_;

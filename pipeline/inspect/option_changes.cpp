@@ -16,7 +16,8 @@ std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile)
     for (const auto& [name, value] : section.items()) {
       const std::string path = stage + "." + name, text = value.dump();
       const auto it = fallback.find(path);
-      if (it == fallback.end() || it->second != text) changes.push_back({path, text, it == fallback.end() ? "" : it->second});
+      if (it == fallback.end() || it->second != text)
+        changes.push_back({path, text, it == fallback.end() ? "" : it->second});
     }
   }
   return changes;

@@ -14,12 +14,13 @@ struct Kind {
 };
 
 const std::array<Kind, 6>& kinds() {
-  static const std::array<Kind, 6> list{{{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
-                                         {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
-                                         {"meshes", {EntryKind::kMesh}},
-                                         {"previews", {EntryKind::kPreview}},
-                                         {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
-                                         {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
+  static const std::array<Kind, 6> list{
+      {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
+       {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
+       {"meshes", {EntryKind::kMesh}},
+       {"previews", {EntryKind::kPreview}},
+       {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
+       {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
   return list;
 }
 

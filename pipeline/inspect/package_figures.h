@@ -12,7 +12,7 @@ namespace texmesh {
 // What dump shows beyond the fields that stand in a package: sums and means, computed once for text and JSON.
 
 struct KindBytes {
-  std::string kind;            // "meshes", "textures", ...
+  std::string kind;  // "meshes", "textures", ...
   std::uint64_t entries = 0, bytes = 0;
 };
 /// Entries of a package by what they are for, in a fixed order; kinds without entries are left out.
@@ -21,8 +21,8 @@ std::vector<KindBytes> bytes_by_kind(const Manifest& manifest, std::uint64_t man
 
 struct RungFigures {
   int quality = 0;
-  std::uint64_t bytes = 0, table_bytes = 0;   // of all fragments; of the table stream
-  double mse = 0, ssim = 1;                   // means over covered texels
+  std::uint64_t bytes = 0, table_bytes = 0;  // of all fragments; of the table stream
+  double mse = 0, ssim = 1;                  // means over covered texels
 };
 std::vector<RungFigures> rung_figures(const PlaneTables& tables);
 std::uint64_t stored_fragments(const PlaneTables& tables);
@@ -30,7 +30,7 @@ std::uint64_t stored_fragments(const PlaneTables& tables);
 /// The texture quality that the tables ask for at one scale and the default Gamma (the mean of eta).
 struct AllocationFigures {
   double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;
-  std::uint64_t bytes = 0;                    // of the nearest rungs, table streams not counted
+  std::uint64_t bytes = 0;  // of the nearest rungs, table streams not counted
 };
 AllocationFigures allocation_figures(const PlaneTables& tables, std::uint32_t scale);
 

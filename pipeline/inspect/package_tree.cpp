@@ -53,17 +53,21 @@ void write_new_file(const fs::path& path, const Bytes& bytes) {
   if (!ok) fail_output(path, "a writable file");
 }
 
-bool holds_unpacked_package(const fs::path& folder) { return fs::is_regular_file(fs::symlink_status(folder / kManifestPath)); }
+bool holds_unpacked_package(const fs::path& folder) {
+  return fs::is_regular_file(fs::symlink_status(folder / kManifestPath));
+}
 
 /// A folder under a temporary name that takes its final name in publish(), or disappears with this object.
 class NewTree {
  public:
   NewTree(const std::string& folder, bool force) : force_(force) {
     std::error_code ec;
-    target_ = fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
+    target_ =
+        fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
     if (fs::exists(target_, ec)) target_ = fs::canonical(target_);
     check_target();
-    std::string name = (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
+    std::string name =
+        (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
     if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "a writable folder");
     tree_ = name;
   }
@@ -75,7 +79,8 @@ class NewTree {
   NewTree& operator=(const NewTree&) = delete;
 
   void add(const std::string& path, const Bytes& bytes) {
-    if (!is_valid_entry_path(path)) throw FormatError("package", path, "a path of the package format", "another");
+    if (!is_valid_entry_path(path))
+      throw FormatError("package", path, "a path of the package format", "another");
     const fs::path file = tree_ / path, folder = file.parent_path();
     if (folders_.insert(folder).second) fs::create_directories(folder);
     write_new_file(file, bytes);
@@ -88,8 +93,10 @@ class NewTree {
     sync_folder(tree_);
     check_target();
     if (fs::exists(target_) && !fs::is_empty(target_)) {
-      // Both names stay whole at any moment: the old tree moves into the temporary name, which the destructor removes.
-      if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) fail_output(target_, "a folder that can be replaced");
+      // Both names stay whole at any moment: the old tree moves into the temporary name, which the destructor
+      // removes.
+      if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0)
+        fail_output(target_, "a folder that can be replaced");
     } else {
       if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");
       tree_.clear();
@@ -100,11 +107,16 @@ class NewTree {
  private:
   void check_target() const {
     if (!fs::exists(fs::symlink_status(target_))) return;
-    if (!fs::is_directory(target_)) throw InputError(target_.string(), "", "a folder, or nothing yet", "a file");
+    if (!fs::is_directory(target_))
+      throw InputError(target_.string(), "", "a folder, or nothing yet", "a file");
     if (fs::is_empty(target_)) return;
-    if (!force_) throw InputError(target_.string(), "", "an empty folder, or nothing yet (--force replaces an unpacked package)", "a folder with files");
+    if (!force_)
+      throw InputError(target_.string(), "",
+                       "an empty folder, or nothing yet (--force replaces an unpacked package)",
+                       "a folder with files");
     if (!holds_unpacked_package(target_))
-      throw InputError(target_.string(), "", "an unpacked package, the only thing that --force replaces", "a folder with other files");
+      throw InputError(target_.string(), "", "an unpacked package, the only thing that --force replaces",
+                       "a folder with other files");
   }
 
   fs::path target_, tree_;
@@ -116,13 +128,16 @@ class NewTree {
 std::vector<EntryRef> container_order(PackageReader& package) {
   std::vector<EntryRef> entries = package.index();
   entries.push_back(package.manifest().index);
-  std::sort(entries.begin(), entries.end(), [](const EntryRef& a, const EntryRef& b) { return a.offset < b.offset; });
+  std::sort(entries.begin(), entries.end(),
+            [](const EntryRef& a, const EntryRef& b) { return a.offset < b.offset; });
   return entries;
 }
 
 Bytes manifest_bytes(PackageReader& package) {
   Bytes bytes = package.store().read_manifest();
-  if (sha256(bytes) != package.id()) throw FormatError(package.store().name(), kManifestPath, "a package that does not change meanwhile", "other bytes");
+  if (sha256(bytes) != package.id())
+    throw FormatError(package.store().name(), kManifestPath, "a package that does not change meanwhile",
+                      "other bytes");
   return bytes;
 }
 
@@ -141,7 +156,9 @@ class TreeFiles {
     Bytes bytes = join_fragment_files(package_.tables().planes.at(name.number), name.number, name.rung,
                                       package_.table_stream(name.number, name.rung),
                                       [&](const std::string& path) { return file(path); });
-    if (sha256(bytes) != ref.digest) throw FormatError(ref.path, "", "fragment files that make " + to_hex(ref.digest), to_hex(sha256(bytes)));
+    if (sha256(bytes) != ref.digest)
+      throw FormatError(ref.path, "", "fragment files that make " + to_hex(ref.digest),
+                        to_hex(sha256(bytes)));
     return bytes;
   }
 
@@ -169,26 +186,31 @@ class TreeFiles {
 
 void check_offset(const ContainerEntry& written, const EntryRef& stated) {
   if (written.offset != stated.offset)
-    throw FormatError(stated.path, "offset", std::to_string(stated.offset) + ", as the index says", std::to_string(written.offset));
+    throw FormatError(stated.path, "offset", std::to_string(stated.offset) + ", as the index says",
+                      std::to_string(written.offset));
 }
 
 void check_first_picture(const Manifest& m, const Bytes& container) {
-  const bool inside = m.first_picture_offset <= container.size() && m.first_picture_bytes <= container.size() - m.first_picture_offset;
+  const bool inside = m.first_picture_offset <= container.size() &&
+                      m.first_picture_bytes <= container.size() - m.first_picture_offset;
   if (!inside || sha256(std::span(container).subspan(static_cast<std::size_t>(m.first_picture_offset),
-                                                     static_cast<std::size_t>(m.first_picture_bytes))) != m.first_picture_digest)
+                                                     static_cast<std::size_t>(m.first_picture_bytes))) !=
+                     m.first_picture_digest)
     throw FormatError(kManifestPath, "/firstPicture", "a range of the container with that digest", "another");
 }
 
 }  // namespace
 
-void unpack_package(const std::string& package_path, const std::string& folder, const UnpackOptions& options) {
+void unpack_package(const std::string& package_path, const std::string& folder,
+                    const UnpackOptions& options) {
   PackageReader package(open_store(package_path));
   const Bytes manifest = manifest_bytes(package);
   NewTree tree(folder, options.force);
   tree.add(kManifestPath, manifest);
   for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
   if (options.fragment_files) {
-    const FragmentIndex index = make_fragment_files(package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
+    const FragmentIndex index = make_fragment_files(
+        package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
     const std::string json = write_fragment_index(index);
     tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
   }
@@ -199,7 +221,9 @@ void pack_folder(const std::string& folder, const std::string& package_path) {
   PackageReader package(open_folder(folder));
   TreeFiles files(package);
   Bytes container;
-  ContainerWriter writer([&](std::span<const std::uint8_t> bytes) { container.insert(container.end(), bytes.begin(), bytes.end()); });
+  ContainerWriter writer([&](std::span<const std::uint8_t> bytes) {
+    container.insert(container.end(), bytes.begin(), bytes.end());
+  });
   writer.add(kManifestPath, manifest_bytes(package));
   const std::vector<EntryRef> order = container_order(package);
   for (const EntryRef& e : order) {

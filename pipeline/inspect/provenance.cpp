@@ -21,7 +21,8 @@ Json member(const Json& object, const char* key) {
 
 std::string text(const Json& object, const char* key, const std::string& place) {
   const Json v = member(object, key);
-  if (!v.is_string() || v.get_ref<const std::string&>().empty()) fail(place + "/" + key, "a text that is not empty", v);
+  if (!v.is_string() || v.get_ref<const std::string&>().empty())
+    fail(place + "/" + key, "a text that is not empty", v);
   return v.get<std::string>();
 }
 
@@ -52,7 +53,8 @@ std::vector<Provenance::Input> read_inputs(const Json& root) {
     if (input.role == "file") input.uri = text(list[i], "uri", place);
     input.sha256 = text(list[i], "sha256", place);
     Sha256 digest;
-    if (!from_hex(input.sha256, digest)) fail(place + "/sha256", "64 lower-case hexadecimal digits", input.sha256);
+    if (!from_hex(input.sha256, digest))
+      fail(place + "/sha256", "64 lower-case hexadecimal digits", input.sha256);
     input.bytes = integer(list[i], "bytes", place, 1ull << 53);
     inputs.push_back(std::move(input));
   }
@@ -83,7 +85,8 @@ Provenance read_provenance(std::span<const std::uint8_t> json) {
   const Json stages = object_member(root, "stages"), libraries = object_member(root, "libraries");
   for (const auto& [name, value] : stages.items())
     p.stages.emplace_back(name, static_cast<int>(integer(stages, name.c_str(), "/stages", 1u << 30)));
-  for (const auto& [name, value] : libraries.items()) p.libraries.emplace_back(name, text(libraries, name.c_str(), "/libraries"));
+  for (const auto& [name, value] : libraries.items())
+    p.libraries.emplace_back(name, text(libraries, name.c_str(), "/libraries"));
   return p;
 }
 

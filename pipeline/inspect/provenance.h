@@ -8,18 +8,19 @@
 
 namespace texmesh {
 
-/// provenance.json (schemas/provenance.v1.schema.json): what a package was made from and with. No dates, hosts, paths.
+/// provenance.json (schemas/provenance.v1.schema.json): what a package was made from and with. No dates,
+/// hosts, paths.
 struct Provenance {
   struct Input {
-    std::string role, uri, sha256;   // role: model, or file for what the model refers to by `uri`
+    std::string role, uri, sha256;  // role: model, or file for what the model refers to by `uri`
     std::uint64_t bytes = 0;
   };
-  std::string tool;                  // "texmesh 1.2.3"
+  std::string tool;  // "texmesh 1.2.3"
   int format_major = 0, format_minor = 0;
-  std::vector<Input> inputs;         // the model first
-  nlohmann::ordered_json options;    // a profile with every option
-  std::vector<std::pair<std::string, int>> stages;               // name, version
-  std::vector<std::pair<std::string, std::string>> libraries;    // name, version
+  std::vector<Input> inputs;                                   // the model first
+  nlohmann::ordered_json options;                              // a profile with every option
+  std::vector<std::pair<std::string, int>> stages;             // name, version
+  std::vector<std::pair<std::string, std::string>> libraries;  // name, version
 };
 
 /// Strict for what version 1 defines, ignores unknown fields. FormatError names the JSON pointer.

@@ -8,7 +8,8 @@ namespace texmesh {
 namespace {
 
 std::size_t width_of(const std::string& s) {
-  return static_cast<std::size_t>(std::count_if(s.begin(), s.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+  return static_cast<std::size_t>(
+      std::count_if(s.begin(), s.end(), [](char c) { return (c & 0xc0) != 0x80; }));
 }
 
 void put_cell(std::string& line, const std::string& cell, std::size_t width, Align align) {
@@ -20,13 +21,18 @@ void put_cell(std::string& line, const std::string& cell, std::size_t width, Ali
 std::size_t sequence_bytes(const std::string& s, std::size_t at) {
   const auto byte = [&](std::size_t i) { return i < s.size() ? static_cast<unsigned char>(s[i]) : 0u; };
   const unsigned lead = byte(at);
-  const std::size_t n = lead < 0x80 ? 1 : lead >= 0xc2 && lead < 0xe0 ? 2 : (lead & 0xf0) == 0xe0 ? 3 : lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
+  const std::size_t n = lead < 0x80                   ? 1
+                        : lead >= 0xc2 && lead < 0xe0 ? 2
+                        : (lead & 0xf0) == 0xe0       ? 3
+                        : lead >= 0xf0 && lead < 0xf5 ? 4
+                                                      : 0;
   for (std::size_t i = 1; i < n; ++i)
     if ((byte(at + i) & 0xc0) != 0x80) return 0;
-  // Overlong forms, surrogates and values above U+10FFFF show in the second byte; C1 controls are control characters.
+  // Overlong forms, surrogates and values above U+10FFFF show in the second byte; C1 controls are control
+  // characters.
   const unsigned second = byte(at + 1);
-  if ((lead == 0xc2 && second < 0xa0) || (lead == 0xe0 && second < 0xa0) || (lead == 0xed && second >= 0xa0) ||
-      (lead == 0xf0 && second < 0x90) || (lead == 0xf4 && second >= 0x90))
+  if ((lead == 0xc2 && second < 0xa0) || (lead == 0xe0 && second < 0xa0) ||
+      (lead == 0xed && second >= 0xa0) || (lead == 0xf0 && second < 0x90) || (lead == 0xf4 && second >= 0x90))
     return 0;
   return n;
 }
@@ -51,7 +57,8 @@ std::string TextTable::text() const {
   };
   put_line([&](std::size_t k) { return columns_[k].header; });
   put_line([&](std::size_t k) { return std::string(widths[k], '-'); });
-  for (const auto& row : rows_) put_line([&](std::size_t k) { return k < row.size() ? row[k] : std::string(); });
+  for (const auto& row : rows_)
+    put_line([&](std::size_t k) { return k < row.size() ? row[k] : std::string(); });
   return out;
 }
 

@@ -88,13 +88,17 @@ class Verifier {
     });
   }
 
-  void check_head(const PagedRef& ref, const Bytes& bytes, std::uint64_t head_bytes, const std::string& field) {
-    if (!findings_.require_equal(head_bytes, ref.head_bytes, "reference", kManifestPath, field + "/headBytes")) return;
-    findings_.require_equal(to_hex(sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))), to_hex(ref.head_digest), "reference",
-                            kManifestPath, field + "/headSha256");
+  void check_head(const PagedRef& ref, const Bytes& bytes, std::uint64_t head_bytes,
+                  const std::string& field) {
+    if (!findings_.require_equal(head_bytes, ref.head_bytes, "reference", kManifestPath,
+                                 field + "/headBytes"))
+      return;
+    findings_.require_equal(to_hex(sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))),
+                            to_hex(ref.head_digest), "reference", kManifestPath, field + "/headSha256");
   }
 
-  /// The bytes of an entry, compared with the digest and the container's CRC. FormatError when they are not there.
+  /// The bytes of an entry, compared with the digest and the container's CRC. FormatError when they are not
+  /// there.
   Bytes read(const EntryRef& ref) {
     Bytes bytes = store_.read(ref, 0, ref.bytes);
     findings_.require_equal(to_hex(ref.digest), to_hex(sha256(bytes)), "entry-digest", ref.path, "sha256");
@@ -106,7 +110,7 @@ class Verifier {
     ++report_.entries;
     report_.bytes += bytes.size();
     const auto it = by_path_.find(path);
-    if (it == by_path_.end()) return;   // check_entry_set says so
+    if (it == by_path_.end()) return;  // check_entry_set says so
     if (!store_.is_folder())
       findings_.require_equal(hex8(crc_of(bytes)), hex8(it->second->crc32), "entry-crc", path, "CRC-32");
     if (!store_.is_folder() && path != kManifestPath)
@@ -116,21 +120,25 @@ class Verifier {
 
   /// The index names exactly what is there, in the order that the format prescribes.
   void check_entry_set() {
-    if (listed_.empty()) return;   // "container" says why
+    if (listed_.empty()) return;  // "container" says why
     std::vector<std::string> named{kManifestPath, kIndexPath};
     for (const EntryRef& e : index_) named.push_back(e.path);
     for (const std::string& path : named)
-      findings_.require(by_path_.count(path) > 0, "entry-set", path, "", "an entry of the package, as the index says", "none");
+      findings_.require(by_path_.count(path) > 0, "entry-set", path, "",
+                        "an entry of the package, as the index says", "none");
     std::vector<std::string> sorted = named;
     std::sort(sorted.begin(), sorted.end());
     for (const ContainerEntry& e : listed_) {
-      const bool extra = store_.is_folder() && (parse_entry_path(e.path).kind == EntryKind::kFragmentFile || e.path == kFragmentIndexPath);
+      const bool extra = store_.is_folder() && (parse_entry_path(e.path).kind == EntryKind::kFragmentFile ||
+                                                e.path == kFragmentIndexPath);
       if (!extra && !std::binary_search(sorted.begin(), sorted.end(), e.path))
         findings_.add("entry-set", e.path, "", "to be named by the index", "not there");
     }
     const std::vector<std::string> order = streaming_order(named);
     for (std::size_t k = 0; k < std::min(order.size(), named.size()); ++k)
-      if (!findings_.require_equal(order[k], named[k], "entry-order", kIndexPath, "entry " + std::to_string(k))) break;
+      if (!findings_.require_equal(order[k], named[k], "entry-order", kIndexPath,
+                                   "entry " + std::to_string(k)))
+        break;
   }
 
   void read_documents() {
@@ -158,38 +166,47 @@ class Verifier {
     for (std::size_t k = 0; k < std::min(textures_->size(), tables_->planes.size()); ++k) {
       const TextureInfo& info = (*textures_)[k];
       const PlaneTables& t = tables_->planes[k];
-      consistent_.push_back(info.columns == t.columns && info.rows == t.rows && info.rungs.size() == t.rung_count());
+      consistent_.push_back(info.columns == t.columns && info.rows == t.rows &&
+                            info.rungs.size() == t.rung_count());
       if (consistent_.back()) check_plane_tables(info, static_cast<std::uint32_t>(k), t, findings_);
     }
   }
 
   void check_entry(const EntryRef& e) {
     const EntryName name = parse_entry_path(e.path);
-    const bool texture = name.kind == EntryKind::kPreview || name.kind == EntryKind::kTableStreams || name.kind == EntryKind::kRung;
+    const bool texture = name.kind == EntryKind::kPreview || name.kind == EntryKind::kTableStreams ||
+                         name.kind == EntryKind::kRung;
     if (name.kind == EntryKind::kMesh) {
       guarded("entry-read", e.path, [&] { check_mesh_entry(e, static_cast<int>(name.number)); });
     } else if (texture) {
       guarded("entry-read", e.path, [&] { check_texture_entry(e, name); });
     } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
       findings_.require(manifest_.minor > kFormatMinor, "entry-unknown", e.path, "",
-                        "an entry that format " + std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor) + " defines", "another");
+                        "an entry that format " + std::to_string(kFormatMajor) + "." +
+                            std::to_string(kFormatMinor) + " defines",
+                        "another");
       guarded("entry-read", e.path, [&] { read(e); });
     }
   }
 
   void check_mesh_entry(const EntryRef& e, int number) {
     const Bytes bytes = read(e);
-    const auto scale = std::find_if(manifest_.scales.begin(), manifest_.scales.end(), [&](const ManifestScale& s) { return s.scale == number; });
-    if (!findings_.require(scale != manifest_.scales.end(), "entry-set", e.path, "", "a scale of the manifest", "none")) return;
+    const auto scale = std::find_if(manifest_.scales.begin(), manifest_.scales.end(),
+                                    [&](const ManifestScale& s) { return s.scale == number; });
+    if (!findings_.require(scale != manifest_.scales.end(), "entry-set", e.path, "",
+                           "a scale of the manifest", "none"))
+      return;
     ++report_.meshes;
     check_mesh(manifest_, *scale, textures_.value_or(std::vector<TextureInfo>{}), bytes, findings_);
   }
 
   void check_texture_entry(const EntryRef& e, const EntryName& name) {
     const Bytes bytes = read(e);
-    if (!textures_ || !tables_) return;   // they have their findings
+    if (!textures_ || !tables_) return;  // they have their findings
     const std::size_t plane = name.number;
-    if (!findings_.require(plane < textures_->size(), "entry-set", e.path, "", "a plane of textures.json", "none")) return;
+    if (!findings_.require(plane < textures_->size(), "entry-set", e.path, "", "a plane of textures.json",
+                           "none"))
+      return;
     const TextureInfo& info = (*textures_)[plane];
     if (name.kind == EntryKind::kPreview) {
       ++report_.previews;
@@ -201,7 +218,9 @@ class Verifier {
       check_table_streams(info, t, bytes, findings_);
       table_packs_[plane] = bytes;
     } else if (name.kind == EntryKind::kRung) {
-      if (!findings_.require(name.rung < t.rung_count(), "entry-set", e.path, "", "a rung of textures.json", "none")) return;
+      if (!findings_.require(name.rung < t.rung_count(), "entry-set", e.path, "", "a rung of textures.json",
+                             "none"))
+        return;
       if (!table_packs_.count(plane)) table_packs_[plane] = store_.read(info.tables, 0, info.tables.bytes);
       report_.fragments += check_rung(info, t, name.rung, table_packs_[plane], bytes, context_, findings_);
     }
@@ -212,11 +231,13 @@ class Verifier {
     if (!textures_ || !tables_ || !by_path_.count(kFragmentIndexPath)) {
       for (const ContainerEntry& e : listed_)
         if (parse_entry_path(e.path).kind == EntryKind::kFragmentFile)
-          findings_.add("fragment-file", e.path, "", std::string("a ") + kFragmentIndexPath + " beside fragment files", "none");
+          findings_.add("fragment-file", e.path, "",
+                        std::string("a ") + kFragmentIndexPath + " beside fragment files", "none");
       return;
     }
     if (std::find(consistent_.begin(), consistent_.end(), false) != consistent_.end()) return;
-    guarded("fragment-file", kFragmentIndexPath, [&] { check_fragment_files(store_, listed_, *textures_, *tables_, findings_); });
+    guarded("fragment-file", kFragmentIndexPath,
+            [&] { check_fragment_files(store_, listed_, *textures_, *tables_, findings_); });
   }
 
   PackageStore& store_;
@@ -229,12 +250,14 @@ class Verifier {
   std::vector<EntryRef> index_;
   std::optional<std::vector<TextureInfo>> textures_;
   std::optional<PackageTables> tables_;
-  std::vector<bool> consistent_;              // per plane: textures.json and tables.bin describe the same grid and rungs
+  std::vector<bool> consistent_;  // per plane: textures.json and tables.bin describe the same grid and rungs
   std::map<std::size_t, Bytes> table_packs_;  // per plane
 };
 
 }  // namespace
 
-VerifyReport verify_package(PackageStore& store, const RunContext& context) { return Verifier(store, context).run(); }
+VerifyReport verify_package(PackageStore& store, const RunContext& context) {
+  return Verifier(store, context).run();
+}
 
 }  // namespace texmesh

@@ -10,38 +10,43 @@
 
 namespace texmesh {
 
-// The rules of verify.h, each over documents that have been read or bytes whose place is known. All add findings and
-// go on.
+// The rules of verify.h, each over documents that have been read or bytes whose place is known. All add
+// findings and go on.
 
-/// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse, the step function.
+/// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse, the step
+/// function.
 void check_manifest(const Manifest& manifest, Findings& findings);
 
-/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews and first picture.
+/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews and first
+/// picture.
 void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
 
 /// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
-void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures, const PackageTables& tables,
-                    Findings& findings);
+void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                    const PackageTables& tables, Findings& findings);
 
 /// One plane's tables in themselves: stored fragments, order, surface, D_i(Gamma) against a recomputation.
-void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables, Findings& findings);
+void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
+                        Findings& findings);
 
-void check_quality(const Manifest& manifest, const PackageTables& tables, const QualityTable& quality, Findings& findings);
-void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures, const Provenance& provenance,
-                      Findings& findings);
+void check_quality(const Manifest& manifest, const PackageTables& tables, const QualityTable& quality,
+                   Findings& findings);
+void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                      const Provenance& provenance, Findings& findings);
 
 /// A GLB and what the manifest says about it.
-void check_mesh(const Manifest& manifest, const ManifestScale& scale, const std::vector<TextureInfo>& textures,
-                std::span<const std::uint8_t> glb, Findings& findings);
+void check_mesh(const Manifest& manifest, const ManifestScale& scale,
+                const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
+                Findings& findings);
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 
 /// The table streams of all rungs: each SOI, tables, EOI, of the size the tables say.
-void check_table_streams(const TextureInfo& texture, const PlaneTables& tables, std::span<const std::uint8_t> pack,
-                         Findings& findings);
+void check_table_streams(const TextureInfo& texture, const PlaneTables& tables,
+                         std::span<const std::uint8_t> pack, Findings& findings);
 
-/// All fragments of one rung: digest, and the decoded JPEG's size and channels. `table_pack` holds the plane's table
-/// streams. Returns the number of fragments looked at.
+/// All fragments of one rung: digest, and the decoded JPEG's size and channels. `table_pack` holds the
+/// plane's table streams. Returns the number of fragments looked at.
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& tables, std::uint32_t rung,
                          std::span<const std::uint8_t> table_pack, std::span<const std::uint8_t> pack,
                          const RunContext& context, Findings& findings);

@@ -15,19 +15,24 @@ namespace {
 
 constexpr std::size_t kGammas = 21;
 
-std::string plane_field(std::uint32_t plane, const std::string& member) { return "plane " + std::to_string(plane) + ", " + member; }
+std::string plane_field(std::uint32_t plane, const std::string& member) {
+  return "plane " + std::to_string(plane) + ", " + member;
+}
 
-std::uint64_t sum(const std::vector<std::uint32_t>& v) { return std::accumulate(v.begin(), v.end(), std::uint64_t{0}); }
+std::uint64_t sum(const std::vector<std::uint32_t>& v) {
+  return std::accumulate(v.begin(), v.end(), std::uint64_t{0});
+}
 
 /// Readers check that the grid covers the plane; JPEG blocks of 16 px must not straddle fragments either.
 void check_grid(const TextureInfo& t, std::size_t plane, Findings& findings) {
-  findings.require(t.fragment_width_px % 16 == 0 && t.fragment_height_px % 16 == 0, "texture-grid", kTexturesPath,
-                   "/textures/" + std::to_string(plane), "fragments with sides of multiples of 16 px",
-                   std::to_string(t.fragment_width_px) + " x " + std::to_string(t.fragment_height_px) + " px");
+  findings.require(
+      t.fragment_width_px % 16 == 0 && t.fragment_height_px % 16 == 0, "texture-grid", kTexturesPath,
+      "/textures/" + std::to_string(plane), "fragments with sides of multiples of 16 px",
+      std::to_string(t.fragment_width_px) + " x " + std::to_string(t.fragment_height_px) + " px");
 }
 
-/// Exactly the covered fragments are stored, by falling importance. (Readers check that `order` names those once that
-/// have bytes.)
+/// Exactly the covered fragments are stored, by falling importance. (Readers check that `order` names those
+/// once that have bytes.)
 void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
   std::vector<bool> stored(t.fragment_count());
   for (const std::uint16_t i : t.order) stored[i] = true;
@@ -40,10 +45,12 @@ void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) 
   for (std::size_t k = 1; k < t.order.size(); ++k) {
     const std::size_t a = t.order[k - 1], b = t.order[k];
     const bool falling = eta[a] != eta[b] ? eta[a] > eta[b]
-                         : t.surface_fraction[a] != t.surface_fraction[b] ? t.surface_fraction[a] > t.surface_fraction[b]
-                                                                          : a < b;
-    findings.require(falling, "tables-order", kTablesPath, plane_field(plane, "order[" + std::to_string(k) + "]"),
-                     "falling importance (eta, surface, index)", std::to_string(b) + " after " + std::to_string(a));
+                         : t.surface_fraction[a] != t.surface_fraction[b]
+                             ? t.surface_fraction[a] > t.surface_fraction[b]
+                             : a < b;
+    findings.require(
+        falling, "tables-order", kTablesPath, plane_field(plane, "order[" + std::to_string(k) + "]"),
+        "falling importance (eta, surface, index)", std::to_string(b) + " after " + std::to_string(a));
   }
 }
 
@@ -55,8 +62,9 @@ void check_total_bytes(std::uint32_t plane, const PlaneTables& t, Findings& find
       std::uint64_t bytes = 0;
       for (const std::uint16_t i : t.order)
         bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[i])) * fragments + i];
-      findings.require_equal(bytes, t.total_bytes[s * kGammas + g], "tables-total", kTablesPath,
-                             plane_field(plane, "D_" + std::to_string(s) + "(" + fixed(static_cast<double>(g) / 20, 2) + ")"));
+      findings.require_equal(
+          bytes, t.total_bytes[s * kGammas + g], "tables-total", kTablesPath,
+          plane_field(plane, "D_" + std::to_string(s) + "(" + fixed(static_cast<double>(g) / 20, 2) + ")"));
     }
 }
 
@@ -65,7 +73,8 @@ bool is_table_stream(std::span<const std::uint8_t> s) {
 }
 
 void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung, std::size_t i,
-                    std::span<const std::uint8_t> tables, std::span<const std::uint8_t> stream, Findings& findings) {
+                    std::span<const std::uint8_t> tables, std::span<const std::uint8_t> stream,
+                    Findings& findings) {
   const std::string& entry = texture.rungs[rung].path;
   const std::string field = "fragment " + std::to_string(i);
   const std::uint64_t stated = t.digest[rung * t.fragment_count() + i], real = truncated(sha256(stream));
@@ -78,15 +87,17 @@ void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint3
     findings.add("fragment-digest", entry, field, hex(stated), hex(real));
   }
   try {
-    const std::uint64_t texels = static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
+    const std::uint64_t texels =
+        static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
     const Pixels pixels = decode_jpeg(complete_jpeg(tables, stream), texels);
-    findings.require(pixels.width_px == texture.fragment_width_px && pixels.height_px == texture.fragment_height_px &&
-                         pixels.channels == texture.channels,
-                     "fragment-decode", entry, field,
-                     std::to_string(texture.fragment_width_px) + " x " + std::to_string(texture.fragment_height_px) + " px, " +
-                         std::to_string(texture.channels) + " channels",
-                     std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px) + " px, " +
-                         std::to_string(pixels.channels) + " channels");
+    findings.require(
+        pixels.width_px == texture.fragment_width_px && pixels.height_px == texture.fragment_height_px &&
+            pixels.channels == texture.channels,
+        "fragment-decode", entry, field,
+        std::to_string(texture.fragment_width_px) + " x " + std::to_string(texture.fragment_height_px) +
+            " px, " + std::to_string(texture.channels) + " channels",
+        std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px) + " px, " +
+            std::to_string(pixels.channels) + " channels");
   } catch (const Error& e) {
     findings.add("fragment-decode", entry, field, e.expected(), e.found());
   }
@@ -94,7 +105,8 @@ void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint3
 
 }  // namespace
 
-void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures, const PackageTables& tables, Findings& findings) {
+void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures, const PackageTables& tables,
+                    Findings& findings) {
   findings.require_equal<std::uint64_t>(m.plane_count, textures.size(), "textures", kTexturesPath, "");
   findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), "tables", kTablesPath, "planes");
   std::set<std::pair<std::uint32_t, bool>> seen;
@@ -104,11 +116,14 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
     const std::string place = "/" + std::to_string(k);
     check_grid(info, k, findings);
     findings.require(seen.insert({info.image, info.role == "alpha"}).second, "textures", kTexturesPath, place,
-                     "one plane for the colours and one for the alpha of image " + std::to_string(info.image), "another");
+                     "one plane for the colours and one for the alpha of image " + std::to_string(info.image),
+                     "another");
     findings.require(info.columns == t.columns && info.rows == t.rows, "tables-grid", kTablesPath,
-                     plane_field(static_cast<std::uint32_t>(k), "grid"), std::to_string(info.columns) + " x " + std::to_string(info.rows),
+                     plane_field(static_cast<std::uint32_t>(k), "grid"),
+                     std::to_string(info.columns) + " x " + std::to_string(info.rows),
                      std::to_string(t.columns) + " x " + std::to_string(t.rows));
-    findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(), t.rung_quality.end()) &&
+    findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(),
+                                t.rung_quality.end()) &&
                          info.rungs.size() == info.rung_quality.size(),
                      "tables-rungs", kTablesPath, plane_field(static_cast<std::uint32_t>(k), "rungs"),
                      std::to_string(info.rung_quality.size()) + " rungs of the qualities in textures.json",
@@ -122,17 +137,20 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
   }
 }
 
-void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& t, Findings& findings) {
+void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& t,
+                        Findings& findings) {
   check_order(plane, t, findings);
   double surface = 0;
-  const std::uint64_t texels = static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
+  const std::uint64_t texels =
+      static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
   for (std::size_t i = 0; i < t.fragment_count(); ++i) {
     surface += static_cast<double>(t.surface_fraction[i]);
     findings.require(t.covered_texels[i] <= texels, "tables", kTablesPath,
-                     plane_field(plane, "covered texels of fragment " + std::to_string(i)), "at most " + std::to_string(texels),
-                     std::to_string(t.covered_texels[i]));
+                     plane_field(plane, "covered texels of fragment " + std::to_string(i)),
+                     "at most " + std::to_string(texels), std::to_string(t.covered_texels[i]));
   }
-  findings.require(surface <= 1.001, "tables", kTablesPath, plane_field(plane, "surface"), "at most the whole surface, 1", shortest(surface, 6));
+  findings.require(surface <= 1.001, "tables", kTablesPath, plane_field(plane, "surface"),
+                   "at most the whole surface, 1", shortest(surface, 6));
   check_total_bytes(plane, t, findings);
 }
 
@@ -141,26 +159,31 @@ void check_mesh(const Manifest& m, const ManifestScale& scale, const std::vector
   const std::string& entry = scale.glb.path;
   const std::size_t before = findings.list().size();
   const GlbFacts facts = check_glb(glb, entry, findings);
-  if (findings.list().size() != before) return;   // counts of a broken file say nothing
+  if (findings.list().size() != before) return;  // counts of a broken file say nothing
   findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, "mesh-counts", entry, "triangles");
   findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, "mesh-counts", entry, "vertices");
   const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
   for (int k = 0; k < 3 && facts.has_bounds; ++k)
-    findings.require(facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack, "mesh-bounds",
-                     entry, std::string("axis ") + "xyz"[k], shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
-                     shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
+    findings.require(
+        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
+        "mesh-bounds", entry, std::string("axis ") + "xyz"[k],
+        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
+        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
   for (const TextureInfo& t : textures) {
     const std::string name = "texture/" + std::to_string(t.image);
     // A scale may have lost every triangle of a material; S_0 has them all.
     if (scale.scale == 0)
-      findings.require(std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(), "mesh-images",
-                       entry, "/images", "an image named " + name, "none");
+      findings.require(
+          std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(),
+          "mesh-images", entry, "/images", "an image named " + name, "none");
   }
   for (std::size_t k = 0; k < facts.image_names.size(); ++k)
-    findings.require(std::any_of(textures.begin(), textures.end(), [&](const TextureInfo& t) {
-                       return facts.image_names[k] == "texture/" + std::to_string(t.image); }),
-                     "mesh-images", entry, "/images/" + std::to_string(k) + "/name", "texture/<image> of textures.json",
-                     facts.image_names[k]);
+    findings.require(std::any_of(textures.begin(), textures.end(),
+                                 [&](const TextureInfo& t) {
+                                   return facts.image_names[k] == "texture/" + std::to_string(t.image);
+                                 }),
+                     "mesh-images", entry, "/images/" + std::to_string(k) + "/name",
+                     "texture/<image> of textures.json", facts.image_names[k]);
 }
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings) {
@@ -169,38 +192,47 @@ void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpe
     findings.require(p.width_px == texture.preview_width_px && p.height_px == texture.preview_height_px &&
                          p.channels == texture.channels,
                      "preview", texture.preview.path, "",
-                     std::to_string(texture.preview_width_px) + " x " + std::to_string(texture.preview_height_px) + " px, " +
+                     std::to_string(texture.preview_width_px) + " x " +
+                         std::to_string(texture.preview_height_px) + " px, " +
                          std::to_string(texture.channels) + " channels",
-                     std::to_string(p.width_px) + " x " + std::to_string(p.height_px) + " px, " + std::to_string(p.channels) + " channels");
+                     std::to_string(p.width_px) + " x " + std::to_string(p.height_px) + " px, " +
+                         std::to_string(p.channels) + " channels");
   } catch (const Error& e) {
     findings.add("preview", texture.preview.path, e.place(), e.expected(), e.found());
   }
 }
 
-void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::span<const std::uint8_t> pack, Findings& findings) {
-  if (pack.size() != sum(t.table_bytes)) return;   // check_textures says so
+void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::span<const std::uint8_t> pack,
+                         Findings& findings) {
+  if (pack.size() != sum(t.table_bytes)) return;  // check_textures says so
   std::size_t offset = 0;
   for (std::size_t r = 0; r < t.rung_count(); ++r) {
-    findings.require(is_table_stream(pack.subspan(offset, t.table_bytes[r])), "table-stream", texture.tables.path,
-                     "rung " + std::to_string(r), "SOI, tables, EOI in " + std::to_string(t.table_bytes[r]) + " bytes", "other bytes");
+    findings.require(is_table_stream(pack.subspan(offset, t.table_bytes[r])), "table-stream",
+                     texture.tables.path, "rung " + std::to_string(r),
+                     "SOI, tables, EOI in " + std::to_string(t.table_bytes[r]) + " bytes", "other bytes");
     offset += t.table_bytes[r];
   }
 }
 
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung,
-                         std::span<const std::uint8_t> table_pack, std::span<const std::uint8_t> pack, const RunContext& context,
-                         Findings& findings) {
+                         std::span<const std::uint8_t> table_pack, std::span<const std::uint8_t> pack,
+                         const RunContext& context, Findings& findings) {
   std::vector<std::uint64_t> offset{0};
-  for (const std::uint16_t i : t.order) offset.push_back(offset.back() + t.size_bytes[rung * t.fragment_count() + i]);
-  const std::uint64_t tables_at = std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
-  if (offset.back() != pack.size() || tables_at + t.table_bytes[rung] > table_pack.size()) return 0;   // check_textures says so
+  for (const std::uint16_t i : t.order)
+    offset.push_back(offset.back() + t.size_bytes[rung * t.fragment_count() + i]);
+  const std::uint64_t tables_at =
+      std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
+  if (offset.back() != pack.size() || tables_at + t.table_bytes[rung] > table_pack.size())
+    return 0;  // check_textures says so
   const auto tables = table_pack.subspan(static_cast<std::size_t>(tables_at), t.table_bytes[rung]);
   std::vector<Findings> per_fragment(t.order.size());
   parallel_for(context, t.order.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k)
-      if (offset[k + 1] > offset[k])   // a fragment may be stored on some rungs only
+      if (offset[k + 1] > offset[k])  // a fragment may be stored on some rungs only
         check_fragment(texture, t, rung, t.order[k], tables,
-                     pack.subspan(static_cast<std::size_t>(offset[k]), static_cast<std::size_t>(offset[k + 1] - offset[k])), per_fragment[k]);
+                       pack.subspan(static_cast<std::size_t>(offset[k]),
+                                    static_cast<std::size_t>(offset[k + 1] - offset[k])),
+                       per_fragment[k]);
   });
   for (Findings& f : per_fragment) findings.append(std::move(f));
   return t.order.size();

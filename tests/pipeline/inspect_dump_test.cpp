@@ -33,14 +33,17 @@ TEST_F(Dump, ScalesJsonHasTheAgreedShape) {
 
 TEST_F(Dump, SummaryIsAPageThatExplainsThePackage) {
   const std::string page = text(DumpPart::kSummary);
-  for (const std::string line : {"Two spheres\n", "format    1.0, made by texmesh test\n", "origin    10  20  30\n", "bounds    -1  -1  -1\n",
-                                 "  S_5 ", "displayed height up to [px]", "base-colour", "ball.jpg", "bytes by kind", "ladder.rungs"})
+  for (const std::string line :
+       {"Two spheres\n", "format    1.0, made by texmesh test\n", "origin    10  20  30\n",
+        "bounds    -1  -1  -1\n", "  S_5 ", "displayed height up to [px]", "base-colour", "ball.jpg",
+        "bytes by kind", "ladder.rungs"})
     EXPECT_NE(page.find(line), std::string::npos) << line << "\n" << page;
   EXPECT_EQ(page.find(" \n"), std::string::npos) << "blanks at a line's end";
 }
 
 TEST_F(Dump, BytesByKindAddUpToTheEntries) {
-  const auto kinds = bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.index());
+  const auto kinds =
+      bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.index());
   std::uint64_t sum = 0, expected = 0;
   for (const KindBytes& k : kinds) sum += k.bytes;
   for (const ContainerEntry& e : package.store().list()) expected += e.bytes;
@@ -68,7 +71,8 @@ TEST_F(Dump, LadderSumsTheFragments) {
 }
 
 TEST_F(Dump, TablesGiveTheModelAndTheAllocation) {
-  EXPECT_TRUE(says(DumpPart::kTables, "A 300, B 0.5, R 1.02; correlation 0.9800, mean error 5.0 %")) << text(DumpPart::kTables);
+  EXPECT_TRUE(says(DumpPart::kTables, "A 300, B 0.5, R 1.02; correlation 0.9800, mean error 5.0 %"))
+      << text(DumpPart::kTables);
   const Json j = dump_json(package, DumpPart::kTables);
   const Json& scale = j["tables"][0]["scales"][0];
   EXPECT_EQ(scale["total_bytes"].size(), 21u);
@@ -92,7 +96,8 @@ TEST_F(Dump, EntriesStandInContainerOrder) {
 
 TEST_F(Dump, AllJoinsTheParts) {
   const Json all = dump_json(package, DumpPart::kAll);
-  for (const char* member : {"package", "scales", "fragments", "ladder", "tables", "entries", "provenance"}) EXPECT_TRUE(all.contains(member)) << member;
+  for (const char* member : {"package", "scales", "fragments", "ladder", "tables", "entries", "provenance"})
+    EXPECT_TRUE(all.contains(member)) << member;
   EXPECT_GT(text(DumpPart::kAll).size(), text(DumpPart::kSummary).size());
 }
 

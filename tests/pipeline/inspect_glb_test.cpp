@@ -17,7 +17,9 @@ using nlohmann::json;
 using testing::Bytes;
 using testing::GlbParts;
 
-Bytes small_jpeg() { return encode_jpeg(Pixels{8, 8, 3, std::vector<std::uint8_t>(192, 90)}, 80, Subsampling::k444); }
+Bytes small_jpeg() {
+  return encode_jpeg(Pixels{8, 8, 3, std::vector<std::uint8_t>(192, 90)}, 80, Subsampling::k444);
+}
 
 GlbParts good() { return testing::make_glb(testing::cube(), small_jpeg()); }
 
@@ -38,10 +40,13 @@ Checked check(const Bytes& glb) {
 /// One finding, of that check and in that field.
 ::testing::AssertionResult finds(const Bytes& glb, const std::string& check_name, const std::string& field) {
   const Checked c = check(glb);
-  if (c.findings.size() == 1 && c.findings[0].check == check_name && c.findings[0].field == field) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << check_name << " in " << field << " is not what was found:\n" << c.text;
+  if (c.findings.size() == 1 && c.findings[0].check == check_name && c.findings[0].field == field)
+    return ::testing::AssertionSuccess();
+  return ::testing::AssertionFailure() << check_name << " in " << field << " is not what was found:\n"
+                                       << c.text;
 }
-::testing::AssertionResult finds(const std::function<void(json&)>& change, const std::string& check_name, const std::string& field) {
+::testing::AssertionResult finds(const std::function<void(json&)>& change, const std::string& check_name,
+                                 const std::string& field) {
   GlbParts g = good();
   change(g.json);
   return finds(g.glb(), check_name, field);
@@ -56,7 +61,9 @@ GlbParts draco_cube() {
   const int uv = builder.AddAttribute(draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto face = draco::FaceIndex(static_cast<std::uint32_t>(t));
-    const auto p = [&](std::size_t c) { return &mesh.positions[mesh.wedge_position[mesh.triangles[t][c]]].x; };
+    const auto p = [&](std::size_t c) {
+      return &mesh.positions[mesh.wedge_position[mesh.triangles[t][c]]].x;
+    };
     const auto q = [&](std::size_t c) { return &mesh.uv0[mesh.triangles[t][c]].x; };
     builder.SetAttributeValuesForFace(position, face, p(0), p(1), p(2));
     builder.SetAttributeValuesForFace(uv, face, q(0), q(1), q(2));
@@ -73,7 +80,8 @@ GlbParts draco_cube() {
   g.json["accessors"][0]["count"] = g.json["accessors"][1]["count"] = coded->num_points();
   g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
       {"bufferView", 0},
-      {"attributes", {{"POSITION", coded->attribute(0)->unique_id()}, {"TEXCOORD_0", coded->attribute(1)->unique_id()}}}};
+      {"attributes",
+       {{"POSITION", coded->attribute(0)->unique_id()}, {"TEXCOORD_0", coded->attribute(1)->unique_id()}}}};
   g.json["extensionsUsed"] = g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   return g;
 }
@@ -82,10 +90,15 @@ GlbParts draco_cube() {
 GlbParts meshopt_cube() {
   const Mesh mesh = testing::cube();
   GlbParts g = testing::make_glb(mesh, {});
-  const auto compress = [&](std::size_t view, const char* mode, std::size_t stride, std::size_t count, const Bytes& data) {
+  const auto compress = [&](std::size_t view, const char* mode, std::size_t stride, std::size_t count,
+                            const Bytes& data) {
     json& v = g.json["bufferViews"][view];
-    v["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0}, {"byteOffset", g.binary.size()}, {"byteLength", data.size()},
-                                                  {"byteStride", stride}, {"count", count}, {"mode", mode}};
+    v["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
+                                                  {"byteOffset", g.binary.size()},
+                                                  {"byteLength", data.size()},
+                                                  {"byteStride", stride},
+                                                  {"count", count},
+                                                  {"mode", mode}};
     v["buffer"] = 1;
     g.binary.insert(g.binary.end(), data.begin(), data.end());
     while (g.binary.size() % 4) g.binary.push_back(0);
@@ -115,7 +128,8 @@ TEST(CheckGlb, ReadsWhatIsThere) {
 
 TEST(CheckGlb, AppliesNodeTransforms) {
   GlbParts g = good();
-  g.json["nodes"] = {{{"children", {1}}, {"translation", {10, 0, 0}}}, {{"mesh", 0}, {"scale", {2, 1, 1}}, {"rotation", {0, 0, 1, 0}}}};
+  g.json["nodes"] = {{{"children", {1}}, {"translation", {10, 0, 0}}},
+                     {{"mesh", 0}, {"scale", {2, 1, 1}}, {"rotation", {0, 0, 1, 0}}}};
   const Checked c = check(g.glb());
   EXPECT_EQ(c.text, "");
   EXPECT_EQ(c.facts.bounds_min, (Vec3d{8, -1, -1}));
@@ -125,7 +139,8 @@ TEST(CheckGlb, AppliesNodeTransforms) {
 TEST(CheckGlb, EveryTruncationIsFound) {
   const Bytes glb = good().glb();
   for (std::size_t n = 0; n < glb.size(); n += n < 64 ? 1 : 37)
-    EXPECT_FALSE(check(Bytes(glb.begin(), glb.begin() + static_cast<std::ptrdiff_t>(n))).findings.empty()) << n;
+    EXPECT_FALSE(check(Bytes(glb.begin(), glb.begin() + static_cast<std::ptrdiff_t>(n))).findings.empty())
+        << n;
 }
 
 TEST(CheckGlb, FlippedBytesDoNoHarm) {
@@ -133,7 +148,7 @@ TEST(CheckGlb, FlippedBytesDoNoHarm) {
     for (std::size_t i = 0; i < glb.size(); ++i) {
       Bytes broken = glb;
       broken[i] ^= static_cast<std::uint8_t>(1u << (i % 8));
-      check(broken);   // says something or nothing, but neither throws nor reads beyond
+      check(broken);  // says something or nothing, but neither throws nor reads beyond
     }
 }
 
@@ -154,8 +169,10 @@ TEST(CheckGlb, Container) {
 
 TEST(CheckGlb, Json) {
   EXPECT_TRUE(finds([](json& j) { j["asset"]["version"] = "1.0"; }, "glb-json", "/asset/version"));
-  EXPECT_TRUE(finds([](json& j) { j["extensionsRequired"] = {"KHR_unheard_of"}; }, "glb-json", "/extensionsRequired"));
-  EXPECT_TRUE(finds([](json& j) { j["extensionsRequired"] = {"KHR_mesh_quantization"}; }, "glb-json", "/extensionsUsed"));
+  EXPECT_TRUE(finds([](json& j) { j["extensionsRequired"] = {"KHR_unheard_of"}; }, "glb-json",
+                    "/extensionsRequired"));
+  EXPECT_TRUE(finds([](json& j) { j["extensionsRequired"] = {"KHR_mesh_quantization"}; }, "glb-json",
+                    "/extensionsUsed"));
   EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["count"] = -5; }, "glb-json", "/accessors/0/count"));
   EXPECT_TRUE(finds([](json& j) { j["meshes"] = 5; }, "glb-json", "/meshes"));
   GlbParts deep = good();
@@ -166,23 +183,34 @@ TEST(CheckGlb, Json) {
 }
 
 TEST(CheckGlb, References) {
-  EXPECT_TRUE(finds([](json& j) { j["meshes"][0]["primitives"][0]["material"] = 3; }, "glb-reference", "/meshes/0/primitives/0/material"));
-  EXPECT_TRUE(finds([](json& j) { j["meshes"][0]["primitives"][0].erase("attributes"); }, "glb-reference", "/meshes/0/primitives/0/attributes/POSITION"));
-  EXPECT_TRUE(finds([](json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 1; }, "glb-reference", "/materials/0/pbrMetallicRoughness/baseColorTexture/index"));
+  EXPECT_TRUE(finds([](json& j) { j["meshes"][0]["primitives"][0]["material"] = 3; }, "glb-reference",
+                    "/meshes/0/primitives/0/material"));
+  EXPECT_TRUE(finds([](json& j) { j["meshes"][0]["primitives"][0].erase("attributes"); }, "glb-reference",
+                    "/meshes/0/primitives/0/attributes/POSITION"));
+  EXPECT_TRUE(
+      finds([](json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 1; },
+            "glb-reference", "/materials/0/pbrMetallicRoughness/baseColorTexture/index"));
   EXPECT_TRUE(finds([](json& j) { j["textures"][0]["source"] = 9; }, "glb-reference", "/textures/0/source"));
   EXPECT_TRUE(finds([](json& j) { j["nodes"][0]["mesh"] = 1; }, "glb-reference", "/nodes/0/mesh"));
-  EXPECT_TRUE(finds([](json& j) { j["buffers"][0]["uri"] = "../secret"; }, "glb-reference", "/buffers/0/uri"));
+  EXPECT_TRUE(
+      finds([](json& j) { j["buffers"][0]["uri"] = "../secret"; }, "glb-reference", "/buffers/0/uri"));
   EXPECT_TRUE(finds([](json& j) { j["scene"] = 1; }, "glb-reference", "/scene"));
 }
 
 TEST(CheckGlb, Accessors) {
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][1]["count"] = 3; }, "glb-accessor", "/meshes/0/primitives/0/attributes/TEXCOORD_0"));
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["count"] = 1ull << 31; }, "glb-accessor", "/accessors/0"));
+  EXPECT_TRUE(finds([](json& j) { j["accessors"][1]["count"] = 3; }, "glb-accessor",
+                    "/meshes/0/primitives/0/attributes/TEXCOORD_0"));
+  EXPECT_TRUE(
+      finds([](json& j) { j["accessors"][0]["count"] = 1ull << 31; }, "glb-accessor", "/accessors/0"));
   EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["byteOffset"] = 2; }, "glb-accessor", "/accessors/0"));
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["componentType"] = 5130; }, "glb-accessor", "/accessors/0/componentType"));
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][2]["count"] = 35; }, "glb-accessor", "/meshes/0/primitives/0/indices"));
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][0].erase("max"); }, "glb-accessor", "/meshes/0/primitives/0/attributes/POSITION/max"));
-  EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["max"][1] = 1.5; }, "glb-position", "/meshes/0/primitives/0/attributes/POSITION/max"));
+  EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["componentType"] = 5130; }, "glb-accessor",
+                    "/accessors/0/componentType"));
+  EXPECT_TRUE(finds([](json& j) { j["accessors"][2]["count"] = 35; }, "glb-accessor",
+                    "/meshes/0/primitives/0/indices"));
+  EXPECT_TRUE(finds([](json& j) { j["accessors"][0].erase("max"); }, "glb-accessor",
+                    "/meshes/0/primitives/0/attributes/POSITION/max"));
+  EXPECT_TRUE(finds([](json& j) { j["accessors"][0]["max"][1] = 1.5; }, "glb-position",
+                    "/meshes/0/primitives/0/attributes/POSITION/max"));
 }
 
 TEST(CheckGlb, IndicesAndPositions) {
@@ -198,16 +226,27 @@ TEST(CheckGlb, IndicesAndPositions) {
 
 TEST(CheckGlb, Nodes) {
   EXPECT_TRUE(finds([](json& j) { j["nodes"][0]["children"] = {0}; }, "glb-node", "/nodes/0"));
-  EXPECT_TRUE(finds([](json& j) { j["nodes"] = {{{"mesh", 0}}, {{"children", {2}}}, {{"children", {1}}}}; }, "glb-node", "/nodes/1"));
-  EXPECT_TRUE(finds([](json& j) { j["nodes"] = {{{"mesh", 0}, {"children", {1}}}, json::object()}; j["scenes"][0]["nodes"] = {1}; }, "glb-node", "/scenes/0/nodes"));
+  EXPECT_TRUE(finds(
+      [](json& j) {
+        j["nodes"] = {{{"mesh", 0}}, {{"children", {2}}}, {{"children", {1}}}};
+      },
+      "glb-node", "/nodes/1"));
+  EXPECT_TRUE(finds(
+      [](json& j) {
+        j["nodes"] = {{{"mesh", 0}, {"children", {1}}}, json::object()};
+        j["scenes"][0]["nodes"] = {1};
+      },
+      "glb-node", "/scenes/0/nodes"));
   EXPECT_TRUE(finds([](json& j) { j["nodes"][0]["scale"] = {1, 2}; }, "glb-node", "/nodes/0/scale"));
 }
 
 TEST(CheckGlb, Images) {
-  EXPECT_TRUE(finds([](json& j) { j["images"][0]["mimeType"] = "image/png"; }, "glb-image", "/images/0/mimeType"));
+  EXPECT_TRUE(
+      finds([](json& j) { j["images"][0]["mimeType"] = "image/png"; }, "glb-image", "/images/0/mimeType"));
   GlbParts g = good();
-  g.binary.back() ^= 0xff;   // the end of the JPEG or its padding
-  const std::size_t end = g.json["bufferViews"][3]["byteOffset"].get<std::size_t>() + g.json["bufferViews"][3]["byteLength"].get<std::size_t>();
+  g.binary.back() ^= 0xff;  // the end of the JPEG or its padding
+  const std::size_t end = g.json["bufferViews"][3]["byteOffset"].get<std::size_t>() +
+                          g.json["bufferViews"][3]["byteLength"].get<std::size_t>();
   g.binary[end - 1] = 0;
   EXPECT_TRUE(finds(g.glb(), "glb-image", "/images/0"));
 }
@@ -226,8 +265,10 @@ TEST(CheckGlb, Draco) {
   g.json["accessors"][0]["count"] = g.json["accessors"][1]["count"] = 7;
   EXPECT_TRUE(finds(g.glb(), "glb-decode", at + "/attributes/POSITION"));
   g = draco_cube();
-  g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 40;
-  EXPECT_TRUE(finds(g.glb(), "glb-decode", at + "/extensions/KHR_draco_mesh_compression/attributes/POSITION"));
+  g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] =
+      40;
+  EXPECT_TRUE(
+      finds(g.glb(), "glb-decode", at + "/extensions/KHR_draco_mesh_compression/attributes/POSITION"));
   g = draco_cube();
   g.binary[0] = 'X';
   EXPECT_TRUE(finds(g.glb(), "glb-decode", at + "/extensions/KHR_draco_mesh_compression"));

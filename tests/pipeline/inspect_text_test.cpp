@@ -44,10 +44,10 @@ TEST(Numbers, AreShortAndReadable) {
 TEST(Printable, ReplacesWhatATerminalMustNotSee) {
   EXPECT_EQ(printable("Fig \xc3\xa4 \xf0\x9f\x97\xbf"), "Fig \xc3\xa4 \xf0\x9f\x97\xbf");
   EXPECT_EQ(printable("a\x1b[2Jb\n\x7f"), "a?[2Jb??");
-  EXPECT_EQ(printable("\xc2\x9b"), "??");            // a C1 control character
-  EXPECT_EQ(printable("\xed\xa0\x80"), "???");       // a surrogate
-  EXPECT_EQ(printable("\xe2\x82"), "??");            // cut short
-  EXPECT_EQ(printable("\xc0\xaf"), "??");            // overlong
+  EXPECT_EQ(printable("\xc2\x9b"), "??");       // a C1 control character
+  EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // a surrogate
+  EXPECT_EQ(printable("\xe2\x82"), "??");       // cut short
+  EXPECT_EQ(printable("\xc0\xaf"), "??");       // overlong
 }
 
 }  // namespace

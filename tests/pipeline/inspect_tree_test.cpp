@@ -25,9 +25,7 @@ using testing::write_text;
 std::string text_of(const Bytes& b) { return {b.begin(), b.end()}; }
 
 struct Tree : ::testing::Test {
-  Tree() {
-    write_text(folder / "a.texmesh", text_of(package));
-  }
+  Tree() { write_text(folder / "a.texmesh", text_of(package)); }
   std::string verify(const std::string& path) const {
     const auto store = open_store(path);
     std::string text;
@@ -61,20 +59,23 @@ TEST_F(Tree, PackAfterUnpackWithFragmentFiles) {
   pack_folder(folder / "tree/", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   for (std::uint32_t rung = 0; rung < 2; ++rung) fs::remove(fs::path(folder / "tree") / rung_path(0, rung));
-  pack_folder(folder / "tree", folder / "c.texmesh");   // the rungs' entries are put together from the files
+  pack_folder(folder / "tree", folder / "c.texmesh");  // the rungs' entries are put together from the files
   EXPECT_EQ(read_text(folder / "c.texmesh"), text_of(package));
 }
 
 TEST_F(Tree, FragmentFilesAreCompleteJpegs) {
   unpack_package(folder / "a.texmesh", folder / "tree", {true, false});
   const std::string json = read_text(folder / "tree/fragments.json");
-  const FragmentIndex index = read_fragment_index({reinterpret_cast<const std::uint8_t*>(json.data()), json.size()});
+  const FragmentIndex index =
+      read_fragment_index({reinterpret_cast<const std::uint8_t*>(json.data()), json.size()});
   EXPECT_EQ(index.planes.at(0).order, (std::vector<std::uint16_t>{1, 2, 0}));
   for (std::uint32_t rung = 0; rung < 2; ++rung)
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::string jpeg = read_text((fs::path(folder / "tree") / fragment_file_path(0, rung, index.planes[0].order[k])).string());
+      const std::string jpeg = read_text(
+          (fs::path(folder / "tree") / fragment_file_path(0, rung, index.planes[0].order[k])).string());
       EXPECT_EQ(jpeg.size(), index.planes[0].rungs.at(rung).bytes[k]);
-      const Pixels p = decode_jpeg({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, 1 << 20);
+      const Pixels p =
+          decode_jpeg({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, 1 << 20);
       EXPECT_EQ(p.width_px, 32u);
     }
 }
@@ -87,13 +88,17 @@ TEST_F(Tree, FragmentFilesThatDoNotFitAreFound) {
   write_text(path, jpeg);
   EXPECT_NE(verify(folder / "tree").find("[fragment-file]"), std::string::npos);
   fs::remove(path);
-  EXPECT_NE(verify(folder / "tree").find(fragment_file_path(0, 1, 2) + ": expected a file, found none [fragment-file]"), std::string::npos);
+  EXPECT_NE(verify(folder / "tree")
+                .find(fragment_file_path(0, 1, 2) + ": expected a file, found none [fragment-file]"),
+            std::string::npos);
   fs::remove(folder / "tree/fragments.json");
-  EXPECT_NE(verify(folder / "tree").find("expected a fragments.json beside fragment files"), std::string::npos);
+  EXPECT_NE(verify(folder / "tree").find("expected a fragments.json beside fragment files"),
+            std::string::npos);
 }
 
 TEST_F(Tree, ADamagedPackageLeavesNothing) {
-  Bytes damaged = testing::PackagePatcher(package).edit(mesh_path(0), [](Bytes& b) { b[100] ^= 1; }).package();
+  Bytes damaged =
+      testing::PackagePatcher(package).edit(mesh_path(0), [](Bytes& b) { b[100] ^= 1; }).package();
   write_text(folder / "a.texmesh", text_of(damaged));
   EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "tree", {}), FormatError);
   expect_names({"a.texmesh"});
@@ -103,7 +108,8 @@ TEST_F(Tree, AnExistingFolderIsNeverMixed) {
   fs::create_directory(folder.path() / "tree");
   write_text(folder / "tree/mine.txt", "mine");
   EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "tree", {}), InputError);
-  EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "tree", {false, true}), InputError);   // --force spares foreign folders
+  EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "tree", {false, true}),
+               InputError);  // --force spares foreign folders
   EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "a.texmesh", {false, true}), InputError);
   EXPECT_EQ(read_text(folder / "tree/mine.txt"), "mine");
   fs::create_directory(folder.path() / "empty");
@@ -152,10 +158,14 @@ TEST_F(Tree, PackRefusesWhatIsNotThePackage) {
 TEST_F(Tree, VerifyNamesFilesThatAreMissingOrTooMany) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   write_text(folder / "tree/notes.txt", "x");
-  EXPECT_EQ(verify(folder / "tree"), "notes.txt: expected to be named by the index, found not there [entry-set]\n");
+  EXPECT_EQ(verify(folder / "tree"),
+            "notes.txt: expected to be named by the index, found not there [entry-set]\n");
   fs::remove(folder / "tree/notes.txt");
   fs::remove(fs::path(folder / "tree") / mesh_path(5));
-  EXPECT_NE(verify(folder / "tree").find("mesh/s05.glb: expected an entry of the package, as the index says, found none [entry-set]"), std::string::npos);
+  EXPECT_NE(
+      verify(folder / "tree")
+          .find("mesh/s05.glb: expected an entry of the package, as the index says, found none [entry-set]"),
+      std::string::npos);
 }
 
 TEST_F(Tree, ContainersWithPathsThatEscapeAreRefused) {
@@ -163,7 +173,8 @@ TEST_F(Tree, ContainersWithPathsThatEscapeAreRefused) {
   std::string evil = text_of(package);
   const std::string path = mesh_path(0), escape = "../../s0.glb";
   ASSERT_EQ(path.size(), escape.size());
-  for (std::size_t at = 0; (at = evil.find(path, at)) != std::string::npos; at += path.size()) evil.replace(at, path.size(), escape);
+  for (std::size_t at = 0; (at = evil.find(path, at)) != std::string::npos; at += path.size())
+    evil.replace(at, path.size(), escape);
   write_text(folder / "a.texmesh", evil);
   EXPECT_THROW(unpack_package(folder / "a.texmesh", folder / "tree", {}), FormatError);
   EXPECT_NE(verify(folder / "a.texmesh").find("[container]"), std::string::npos);

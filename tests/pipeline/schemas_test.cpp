@@ -1,5 +1,5 @@
-// Every example of schemas/examples goes through its schema and, where the code has one, through the reader of such
-// documents; both must say what the file's name says.
+// Every example of schemas/examples goes through its schema and, where the code has one, through the reader
+// of such documents; both must say what the file's name says.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -33,7 +33,9 @@ std::string read_file(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-std::span<const std::uint8_t> bytes_of(const std::string& s) { return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()}; }
+std::span<const std::uint8_t> bytes_of(const std::string& s) {
+  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+}
 
 /// Throws an Error when the document is not valid.
 using Reader = std::function<void(const std::string& document)>;
@@ -68,7 +70,8 @@ class SchemaTest : public testing::TestWithParam<std::string> {
  protected:
   SchemaTest() {
     document_ = json::parse(read_file(kSchemas / (GetParam() + ".schema.json")));
-    valijson::SchemaParser(valijson::SchemaParser::kDraft7).populateSchema(valijson::adapters::NlohmannJsonAdapter(document_), schema_);
+    valijson::SchemaParser(valijson::SchemaParser::kDraft7)
+        .populateSchema(valijson::adapters::NlohmannJsonAdapter(document_), schema_);
   }
   bool schema_accepts(const json& document) const {
     valijson::Validator validator;
@@ -110,7 +113,8 @@ TEST_P(SchemaTest, AgreesWithExamplesAndReader) {
 
 INSTANTIATE_TEST_SUITE_P(All, SchemaTest, testing::ValuesIn(schema_names()), [](const auto& test) {
   std::string name = test.param;
-  std::replace_if(name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
   return name;
 });
 
@@ -136,9 +140,12 @@ TEST(Collection, NamesThePlaceOfAFault) {
     }
     return std::string("no error");
   };
-  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.glb","options":{"ssf":{"scales":99}}}]})"), "/models/0/options/ssf/scales");
-  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb"},{"input":"b/x.glb"}]})"), "/models/1/output");
-  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb","output":"k/../x.texmesh"}]})"), "/models/0/output");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.glb","options":{"ssf":{"scales":99}}}]})"),
+            "/models/0/options/ssf/scales");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb"},{"input":"b/x.glb"}]})"),
+            "/models/1/output");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb","output":"k/../x.texmesh"}]})"),
+            "/models/0/output");
   EXPECT_NE(place_of("{\"version\":1,"), "no error");
   EXPECT_NE(place_of(std::string(100000, '[')), "no error");
 }

@@ -33,12 +33,14 @@ std::size_t append(Bytes& out, const std::vector<T>& values) {
 template <class T>
 std::size_t add_view(GlbParts& g, const std::vector<T>& values) {
   const std::size_t at = append(g.binary, values);
-  g.json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", values.size() * sizeof(T)}});
+  g.json["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", at}, {"byteLength", values.size() * sizeof(T)}});
   return g.json["bufferViews"].size() - 1;
 }
 
 std::size_t add_accessor(GlbParts& g, std::size_t view, int component, const char* type, std::size_t count) {
-  g.json["accessors"].push_back({{"bufferView", view}, {"componentType", component}, {"type", type}, {"count", count}});
+  g.json["accessors"].push_back(
+      {{"bufferView", view}, {"componentType", component}, {"type", type}, {"count", count}});
   return g.json["accessors"].size() - 1;
 }
 
@@ -49,7 +51,8 @@ Pixels picture(std::uint32_t width, std::uint32_t height) {
   for (std::uint32_t y = 0; y < height; ++y)
     for (std::uint32_t x = 0; x < width; ++x)
       for (std::uint32_t c = 0; c < 3; ++c)
-        p.data.push_back(static_cast<std::uint8_t>(40 + 2 * y + c * 20 + random.next() % (x < width / 2 ? 4 : 60)));
+        p.data.push_back(
+            static_cast<std::uint8_t>(40 + 2 * y + c * 20 + random.next() % (x < width / 2 ? 4 : 60)));
   return p;
 }
 
@@ -62,7 +65,8 @@ TexturePlane make_plane() {
   plane.columns = plane.rows = 2;
   plane.grid_reason = "a test's";
   plane.coverage.assign(8 * 48, 0xff);
-  for (std::size_t y = 32; y < 48; ++y) std::fill_n(plane.coverage.begin() + static_cast<std::ptrdiff_t>(y * 8 + 4), 4, std::uint8_t{0});
+  for (std::size_t y = 32; y < 48; ++y)
+    std::fill_n(plane.coverage.begin() + static_cast<std::ptrdiff_t>(y * 8 + 4), 4, std::uint8_t{0});
   plane.covered_texels = {1024, 1024, 512, 0};
   plane.surface_fraction = {0.5f, 0.25f, 0.25f, 0};
   plane.features = {5, 9, 7, 0, 4, 4, 8, 0};
@@ -76,7 +80,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   t.surface_fraction = plane.surface_fraction;
   t.features = plane.features;
   for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
-  t.order = {1, 2, 0};   // eta_0 = 0, 1, 0.5
+  t.order = {1, 2, 0};  // eta_0 = 0, 1, 0.5
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {
     t.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
@@ -93,7 +97,8 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
     for (int g = 0; g <= 20; ++g) {
       const auto quality = quality_of(t, s, g / 20.0);
       std::uint64_t bytes = 0;
-      for (const std::uint16_t f : t.order) bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[f])) * kFragments + f];
+      for (const std::uint16_t f : t.order)
+        bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[f])) * kFragments + f];
       t.total_bytes.push_back(bytes);
     }
   t.model_a = 300, t.model_b = 0.5f, t.model_r = 1.02f, t.model_correlation = 0.98f, t.model_error = 0.05f;
@@ -106,7 +111,8 @@ json make_provenance() {
           {"tool", "texmesh test"},
           {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
           {"inputs", {{{"role", "model"}, {"sha256", digest}, {"bytes", 4321}}}},
-          {"options", {{"version", 1}, {"package", {{"title", "Two spheres"}}}, {"ladder", {{"rungs", {20, 70}}}}}},
+          {"options",
+           {{"version", 1}, {"package", {{"title", "Two spheres"}}}, {"ladder", {{"rungs", {20, 70}}}}}},
           {"stages", {{"ssf", 1}}},
           {"libraries", {{"draco", "1.5.5"}}}};
 }
@@ -127,7 +133,8 @@ void add_texture(PackageParts& p) {
     tables.insert(tables.end(), rung.tables.begin(), rung.tables.end());
     Bytes& pack = p.streams[rung_path(0, r)];
     for (const std::uint16_t f : p.tables.planes[0].order)
-      pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f]), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f + 1u]));
+      pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f]),
+                  rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f + 1u]));
   }
   TextureInfo t;
   t.role = "base-colour", t.name = "ball.jpg", t.colour_space = "srgb";
@@ -154,7 +161,8 @@ void add_scale(PackageParts& p, int scale, const Mesh& mesh) {
 }
 
 std::uint32_t read_u32(const Bytes& b, std::size_t at) {
-  return static_cast<std::uint32_t>(b[at] | b[at + 1] << 8 | b[at + 2] << 16) | static_cast<std::uint32_t>(b[at + 3]) << 24;
+  return static_cast<std::uint32_t>(b[at] | b[at + 1] << 8 | b[at + 2] << 16) |
+         static_cast<std::uint32_t>(b[at + 3]) << 24;
 }
 
 void set_u32(Bytes& b, std::size_t at, std::uint32_t v) {
@@ -176,7 +184,9 @@ Bytes GlbParts::glb() const {
   Bytes padded = binary;
   padded.resize((padded.size() + 3) / 4 * 4);
   Bytes out;
-  for (const std::uint32_t v : {0x46546c67u, 2u, static_cast<std::uint32_t>(28 + text.size() + padded.size()), static_cast<std::uint32_t>(text.size()), 0x4e4f534au}) put_u32(out, v);
+  for (const std::uint32_t v : {0x46546c67u, 2u, static_cast<std::uint32_t>(28 + text.size() + padded.size()),
+                                static_cast<std::uint32_t>(text.size()), 0x4e4f534au})
+    put_u32(out, v);
   out.insert(out.end(), text.begin(), text.end());
   put_u32(out, static_cast<std::uint32_t>(padded.size()));
   put_u32(out, 0x004e4942u);
@@ -195,11 +205,14 @@ GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg) {
   g.json["accessors"][position]["min"] = {lo.x, lo.y, lo.z};
   g.json["accessors"][position]["max"] = {hi.x, hi.y, hi.z};
   const std::size_t uv = add_accessor(g, add_view(g, mesh.uv0), 5126, "VEC2", mesh.uv0.size());
-  const std::size_t indices = add_accessor(g, add_view(g, mesh.triangles), 5125, "SCALAR", mesh.triangles.size() * 3);
-  json primitive{{"attributes", {{"POSITION", position}, {"TEXCOORD_0", uv}}}, {"indices", indices}, {"material", 0}};
+  const std::size_t indices =
+      add_accessor(g, add_view(g, mesh.triangles), 5125, "SCALAR", mesh.triangles.size() * 3);
+  json primitive{
+      {"attributes", {{"POSITION", position}, {"TEXCOORD_0", uv}}}, {"indices", indices}, {"material", 0}};
   json material{{"pbrMetallicRoughness", json::object()}};
   if (!jpeg.empty()) {
-    g.json["images"] = {{{"name", "texture/0"}, {"mimeType", "image/jpeg"}, {"bufferView", add_view(g, jpeg)}}};
+    g.json["images"] = {
+        {{"name", "texture/0"}, {"mimeType", "image/jpeg"}, {"bufferView", add_view(g, jpeg)}}};
     g.json["textures"] = {{{"source", 0}}};
     material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
   }
@@ -241,7 +254,9 @@ Bytes PackageParts::build() const {
   return write_package(manifest, textures, entries);
 }
 
-PackagePatcher::PackagePatcher(Bytes package) : package_(std::move(package)) { manifest_ = read_manifest(entry(kManifestPath)); }
+PackagePatcher::PackagePatcher(Bytes package) : package_(std::move(package)) {
+  manifest_ = read_manifest(entry(kManifestPath));
+}
 
 Bytes PackagePatcher::entry(const std::string& path) const {
   const ContainerEntry e = find_entry(package_, path);
@@ -254,8 +269,9 @@ PackagePatcher& PackagePatcher::patch(const std::string& path, const Bytes& byte
   if (bytes.size() != e.bytes) throw std::runtime_error(path + ": another size");
   const auto crc = static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
   std::copy(bytes.begin(), bytes.end(), package_.begin() + static_cast<std::ptrdiff_t>(e.offset));
-  std::size_t at = read_u32(package_, package_.size() - 6);   // of the central directory
-  while (std::string(package_.begin() + static_cast<std::ptrdiff_t>(at + 46), package_.begin() + static_cast<std::ptrdiff_t>(at + 46 + path.size())) != path ||
+  std::size_t at = read_u32(package_, package_.size() - 6);  // of the central directory
+  while (std::string(package_.begin() + static_cast<std::ptrdiff_t>(at + 46),
+                     package_.begin() + static_cast<std::ptrdiff_t>(at + 46 + path.size())) != path ||
          package_[at + 28] != path.size())
     at += 46u + package_[at + 28] + package_[at + 30] + package_[at + 32];
   set_u32(package_, at + 16, crc);
@@ -271,13 +287,14 @@ PackagePatcher& PackagePatcher::edit(const std::string& path, const std::functio
 
 void PackagePatcher::write_manifest_entry(Manifest m) {
   const auto slice = [&](std::uint64_t offset, std::uint64_t bytes) {
-    return std::span<const std::uint8_t>(package_).subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(bytes));
+    return std::span<const std::uint8_t>(package_).subspan(static_cast<std::size_t>(offset),
+                                                           static_cast<std::size_t>(bytes));
   };
   m.first_picture_digest = sha256(slice(m.first_picture_offset, m.first_picture_bytes));
   std::string json = write_manifest(m);
   const std::size_t room = entry(kManifestPath).size();
   if (json.size() > room) throw std::runtime_error("the manifest grew");
-  json.resize(room, ' ');   // blanks after the JSON are allowed
+  json.resize(room, ' ');  // blanks after the JSON are allowed
   patch(kManifestPath, Bytes(json.begin(), json.end()));
 }
 
@@ -285,7 +302,8 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
   Manifest m = manifest_;
   std::vector<EntryRef> index = read_index(entry(kIndexPath));
   for (EntryRef& e : index) e.digest = sha256(entry(e.path));
-  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables}) ref->digest = sha256(entry(ref->path));
+  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables})
+    ref->digest = sha256(entry(ref->path));
   for (ManifestScale& s : m.scales) s.glb.digest = sha256(entry(s.glb.path));
   if (change) change(index);
   Bytes written = write_index(index);

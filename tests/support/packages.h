@@ -19,11 +19,12 @@ struct GlbParts {
   Bytes binary;
   Bytes glb() const;
 };
-/// A valid GLB of a mesh without compression: positions, UVs, indices; `jpeg` as image "texture/0" unless empty.
+/// A valid GLB of a mesh without compression: positions, UVs, indices; `jpeg` as image "texture/0" unless
+/// empty.
 GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg);
 
-/// A small but true package: spheres as S_0 and S_5, one 64 x 48 texture of 2 x 2 fragments of which one is uncovered,
-/// two rungs. Tests change a part, then build().
+/// A small but true package: spheres as S_0 and S_5, one 64 x 48 texture of 2 x 2 fragments of which one is
+/// uncovered, two rungs. Tests change a part, then build().
 struct PackageParts {
   Manifest manifest;
   std::vector<TextureInfo> textures;
@@ -31,7 +32,7 @@ struct PackageParts {
   QualityTable quality;
   nlohmann::json provenance;
   std::map<int, Bytes> meshes;
-  std::map<std::string, Bytes> streams;   // previews, table streams, rungs by path
+  std::map<std::string, Bytes> streams;  // previews, table streams, rungs by path
   Bytes build() const;
 };
 PackageParts make_package_parts();
@@ -44,7 +45,8 @@ class PackagePatcher {
   /// New bytes of the same size under the entry, its CRC made to fit. Digests stay as they were.
   PackagePatcher& patch(const std::string& path, const Bytes& bytes);
   PackagePatcher& edit(const std::string& path, const std::function<void(Bytes&)>& change);
-  /// Makes every digest (index, tables head, manifest) fit the entries again, then lets `change` alter the manifest.
+  /// Makes every digest (index, tables head, manifest) fit the entries again, then lets `change` alter the
+  /// manifest.
   PackagePatcher& seal(const std::function<void(Manifest&)>& change = {});
   /// The same, with a change of the index's entries.
   PackagePatcher& seal_index(const std::function<void(std::vector<EntryRef>&)>& change);
