@@ -158,9 +158,7 @@ std::string fragments_text(PackageReader& p) {
       table.row(std::move(row));
     }
     s += plane_title(info, k);
-    s += fmt::format("{} x {} fragments of {} x {} px ({}); eta of S_0 in tenths, . = not stored\n",
-                     info.columns, info.rows, info.fragment_width_px, info.fragment_height_px,
-                     printable(info.grid_reason));
+    s += "grid: " + printable(info.grid_reason) + "\neta of S_0 in tenths, . = not stored\n";
     s += eta_map(t, eta) + "fragments by falling importance\n" + table.text() + "\n";
   }
   return s.empty() ? "no textures\n" : s;

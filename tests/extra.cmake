@@ -1,0 +1,6 @@
+# Tests that need more than a C++ library: the Khronos glTF validator (Node.js) over the meshes of real packages.
+if(TARGET texmesh AND TARGET make_scan)
+  add_test(NAME gltf_validator COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/node/run ${CMAKE_CURRENT_BINARY_DIR}/gltf_validator
+    $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>)
+  set_tests_properties(gltf_validator PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS pipeline)
+endif()
