@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <tuple>
 
 #include "pipeline/inspect/glb_document.h"
 #include "stages/decode_image.h"
@@ -51,6 +51,11 @@ void check_texture_infos(GlbDocument& d, const Json& object, std::size_t texture
 struct Primitive {
   std::uint64_t triangles = 0, vertices = 0;
   Box box;
+  std::vector<Vec3d> positions;
+  void add(Vec3d p) {
+    box.add(p);
+    positions.push_back(p);
+  }
 };
 
 class GlbChecker {
@@ -63,7 +68,7 @@ class GlbChecker {
     each("materials", "glb-reference", [&](std::size_t i, const Json& j) {
       check_texture_infos(d_, j, count_of("textures"), indexed("materials", i));
     });
-    mesh_boxes_.resize(count_of("meshes"));
+    mesh_positions_.resize(count_of("meshes"));
     each("meshes", "glb-decode", [&](std::size_t i, const Json& j) { check_mesh(i, j); });
     d_.guarded("glb-node", "/nodes", [&] { check_nodes(); });
     if (d_.uses_extension("KHR_draco_mesh_compression"))
@@ -124,7 +129,7 @@ class GlbChecker {
         ++facts_.primitives;
         facts_.triangles += p.triangles;
         facts_.vertices += p.vertices;
-        mesh_boxes_[i].push_back(p.box);
+        mesh_positions_[i].insert(mesh_positions_[i].end(), p.positions.begin(), p.positions.end());
       });
     }
   }
@@ -157,8 +162,7 @@ class GlbChecker {
     } else {
       check_indices(indices, position.count, place);
       for (std::size_t v = 0; v < position.count; ++v)
-        p.box.add(
-            {finite(position, v, 0, place), finite(position, v, 1, place), finite(position, v, 2, place)});
+        p.add({finite(position, v, 0, place), finite(position, v, 1, place), finite(position, v, 2, place)});
     }
     check_stated_box(d_.root()["accessors"][(*attributes)["POSITION"].get<std::size_t>()], p.box,
                      place + "/attributes/POSITION");
@@ -219,13 +223,13 @@ class GlbChecker {
         d_.fail("glb-decode", at + "/attributes/" + name,
                 std::to_string(stated.components) + " components in attribute " + std::to_string(id),
                 a ? std::to_string(a->num_components()) : "no such attribute");
-      if (name == "POSITION") add_draco_positions(mesh, *a, p.box, at);
+      if (name == "POSITION") add_draco_positions(mesh, *a, p, at);
     }
     if (p.box.empty())
       d_.fail("glb-decode", at + "/attributes/POSITION", "positions in the Draco data", "none");
   }
 
-  void add_draco_positions(const draco::Mesh& mesh, const draco::PointAttribute& a, Box& box,
+  void add_draco_positions(const draco::Mesh& mesh, const draco::PointAttribute& a, Primitive& out,
                            const std::string& at) {
     for (draco::PointIndex i(0); i < mesh.num_points(); ++i) {
       std::array<float, 3> v{};
@@ -233,7 +237,7 @@ class GlbChecker {
       if (!read || !std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
         d_.fail("glb-position", at + "/attributes/POSITION", "finite positions",
                 "point " + std::to_string(i.value()));
-      box.add({v[0], v[1], v[2]});
+      out.add({v[0], v[1], v[2]});
     }
   }
 
@@ -259,7 +263,7 @@ class GlbChecker {
     std::vector<std::int64_t> parent(nodes.size(), -1);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const std::string place = indexed("nodes", i);
-      if (nodes[i].contains("mesh")) d_.index(nodes[i], "mesh", mesh_boxes_.size(), place);
+      if (nodes[i].contains("mesh")) d_.index(nodes[i], "mesh", mesh_positions_.size(), place);
       const Json& children = d_.array(nodes[i], "children", place);
       for (std::size_t k = 0; k < children.size(); ++k) {
         const std::uint64_t c =
@@ -271,13 +275,20 @@ class GlbChecker {
       }
     }
     check_scenes(nodes.size(), parent);
+    std::vector<Vec3d>& all = facts_.positions;
     Box box;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const Matrix m = world_matrix(nodes, parent, i);
       if (!nodes[i].contains("mesh")) continue;
-      for (const Box& b : mesh_boxes_[nodes[i]["mesh"].get<std::size_t>()])
-        if (!b.empty()) add_transformed(m, b, box);
+      for (const Vec3d& p : mesh_positions_[nodes[i]["mesh"].get<std::size_t>()]) {
+        all.push_back(transformed(m, p));
+        box.add(all.back());
+      }
     }
+    const auto tuple_of = [](const Vec3d& p) { return std::tie(p.x, p.y, p.z); };
+    std::sort(all.begin(), all.end(),
+              [&](const Vec3d& p, const Vec3d& q) { return tuple_of(p) < tuple_of(q); });
+    all.erase(std::unique(all.begin(), all.end()), all.end());
     facts_.has_bounds = !box.empty();
     if (!box.empty()) facts_.bounds_min = box.min, facts_.bounds_max = box.max;
   }
@@ -342,18 +353,14 @@ class GlbChecker {
     return m;
   }
 
-  static void add_transformed(const Matrix& m, const Box& b, Box& out) {
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3d p{corner & 1 ? b.max.x : b.min.x, corner & 2 ? b.max.y : b.min.y,
-                    corner & 4 ? b.max.z : b.min.z};
-      out.add({m[0] * p.x + m[4] * p.y + m[8] * p.z + m[12], m[1] * p.x + m[5] * p.y + m[9] * p.z + m[13],
-               m[2] * p.x + m[6] * p.y + m[10] * p.z + m[14]});
-    }
+  static Vec3d transformed(const Matrix& m, const Vec3d& p) {
+    return {m[0] * p.x + m[4] * p.y + m[8] * p.z + m[12], m[1] * p.x + m[5] * p.y + m[9] * p.z + m[13],
+            m[2] * p.x + m[6] * p.y + m[10] * p.z + m[14]};
   }
 
   GlbDocument& d_;
   GlbFacts& facts_;
-  std::vector<std::vector<Box>> mesh_boxes_;
+  std::vector<std::vector<Vec3d>> mesh_positions_;  // per mesh, all primitives
 };
 
 }  // namespace

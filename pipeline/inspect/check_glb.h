@@ -15,6 +15,7 @@ struct GlbFacts {
   std::uint64_t primitives = 0;
   std::vector<std::string> image_names;  // in order; "" where an image has no name
   std::string codec = "none";            // none, quantized, meshopt or draco, as ScalesOptions::mesh_codec
+  std::vector<Vec3d> positions;  // all different ones under their nodes' transforms, sorted by x, y, z
   bool has_bounds = false;
   Vec3d bounds_min, bounds_max;  // of the decoded positions under their nodes' transforms
 };

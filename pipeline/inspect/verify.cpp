@@ -197,7 +197,13 @@ class Verifier {
                            "a scale of the manifest", "none"))
       return;
     ++report_.meshes;
-    check_mesh(manifest_, *scale, textures_.value_or(std::vector<TextureInfo>{}), bytes, findings_);
+    std::vector<Vec3d> positions =
+        check_mesh(manifest_, *scale, textures_.value_or(std::vector<TextureInfo>{}), bytes, findings_);
+    // Meshes stand from coarse to fine; in any other order "entry-order" speaks up.
+    if (coarser_ && coarser_->scale > scale->scale)
+      check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
+    coarser_ = &*scale;
+    coarser_positions_ = std::move(positions);
   }
 
   void check_texture_entry(const EntryRef& e, const EntryName& name) {
@@ -250,6 +256,8 @@ class Verifier {
   std::vector<EntryRef> index_;
   std::optional<std::vector<TextureInfo>> textures_;
   std::optional<PackageTables> tables_;
+  const ManifestScale* coarser_ = nullptr;  // the mesh looked at last
+  std::vector<Vec3d> coarser_positions_;
   std::vector<bool> consistent_;  // per plane: textures.json and tables.bin describe the same grid and rungs
   std::map<std::size_t, Bytes> table_packs_;  // per plane
 };

@@ -4,6 +4,7 @@
 
 #include "format/manifest.h"
 #include "format/tables.h"
+#include "format/vec.h"
 #include "pipeline/inspect/finding.h"
 #include "pipeline/inspect/provenance.h"
 #include "stages/run_context.h"
@@ -34,10 +35,16 @@ void check_quality(const Manifest& manifest, const PackageTables& tables, const 
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 
-/// A GLB and what the manifest says about it.
-void check_mesh(const Manifest& manifest, const ManifestScale& scale,
-                const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
-                Findings& findings);
+/// A GLB and what the manifest says about it. Returns its positions, sorted; none when the GLB is broken.
+std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
+                              const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
+                              Findings& findings);
+
+/// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty list says
+/// nothing.
+void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,
+                  const ManifestScale& coarser, const std::vector<Vec3d>& coarser_positions,
+                  Findings& findings);
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 

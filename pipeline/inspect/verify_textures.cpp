@@ -4,7 +4,6 @@
 
 #include "format/layout.h"
 #include "format/sha256.h"
-#include "pipeline/inspect/check_glb.h"
 #include "pipeline/inspect/text_table.h"
 #include "pipeline/inspect/verify_checks.h"
 #include "stages/jpeg.h"
@@ -152,38 +151,6 @@ void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const P
   findings.require(surface <= 1.001, "tables", kTablesPath, plane_field(plane, "surface"),
                    "at most the whole surface, 1", shortest(surface, 6));
   check_total_bytes(plane, t, findings);
-}
-
-void check_mesh(const Manifest& m, const ManifestScale& scale, const std::vector<TextureInfo>& textures,
-                std::span<const std::uint8_t> glb, Findings& findings) {
-  const std::string& entry = scale.glb.path;
-  const std::size_t before = findings.list().size();
-  const GlbFacts facts = check_glb(glb, entry, findings);
-  if (findings.list().size() != before) return;  // counts of a broken file say nothing
-  findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, "mesh-counts", entry, "triangles");
-  findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, "mesh-counts", entry, "vertices");
-  const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
-  for (int k = 0; k < 3 && facts.has_bounds; ++k)
-    findings.require(
-        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
-        "mesh-bounds", entry, std::string("axis ") + "xyz"[k],
-        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
-        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
-  for (const TextureInfo& t : textures) {
-    const std::string name = "texture/" + std::to_string(t.image);
-    // A scale may have lost every triangle of a material; S_0 has them all.
-    if (scale.scale == 0)
-      findings.require(
-          std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(),
-          "mesh-images", entry, "/images", "an image named " + name, "none");
-  }
-  for (std::size_t k = 0; k < facts.image_names.size(); ++k)
-    findings.require(std::any_of(textures.begin(), textures.end(),
-                                 [&](const TextureInfo& t) {
-                                   return facts.image_names[k] == "texture/" + std::to_string(t.image);
-                                 }),
-                     "mesh-images", entry, "/images/" + std::to_string(k) + "/name",
-                     "texture/<image> of textures.json", facts.image_names[k]);
 }
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings) {

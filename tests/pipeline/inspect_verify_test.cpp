@@ -7,7 +7,6 @@
 #include "format/layout.h"
 #include "pipeline/inspect/verify.h"
 #include "stages/jpeg.h"
-#include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {
@@ -85,8 +84,8 @@ TEST(Verify, UntexturedPackage) {
     p.tables.planes.clear();
     p.quality = {{0, 5}, {100}, {1, 0.9f}, {0, 0.1f}, 2, 64};
     p.manifest.plane_count = 0;
-    p.meshes[0] = testing::make_glb(testing::sphere(6, 8), {}).glb();
-    p.meshes[5] = testing::make_glb(testing::sphere(4, 6), {}).glb();
+    p.meshes[0] = testing::make_glb(testing::fine_mesh(), {}).glb();
+    p.meshes[5] = testing::make_glb(testing::coarse_mesh(), {}).glb();
   });
   EXPECT_EQ(all_of(verify(package)), "");
 }
@@ -327,17 +326,26 @@ TEST(Verify, MeshesAgainstManifest) {
       catches_only(sealed_with([](Manifest& m) { m.scales[0].vertices += 1; }), "mesh-counts", mesh_path(0)));
   EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.bounds_max.x = 0.5; }), "mesh-bounds", mesh_path(0)));
   EXPECT_TRUE(catches_only(
-      built_with([](PackageParts& p) { p.meshes[0] = testing::make_glb(testing::sphere(6, 8), {}).glb(); }),
+      built_with([](PackageParts& p) { p.meshes[0] = testing::make_glb(testing::fine_mesh(), {}).glb(); }),
       "mesh-images", mesh_path(0)));
   EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
                              GlbParts g =
-                                 testing::make_glb(testing::sphere(4, 6), p.streams[preview_path(0)]);
+                                 testing::make_glb(testing::coarse_mesh(), p.streams[preview_path(0)]);
                              g.json["images"][0]["name"] = "texture/7";
                              p.meshes[5] = g.glb();
                            }),
                            "mesh-images", mesh_path(5)));
   EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.meshes[5].back() ^= 1, p.meshes[5][8] ^= 4; }),
                            "glb-container", mesh_path(5)));
+}
+
+TEST(Verify, NestedMeshes) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             Mesh moved = testing::coarse_mesh();
+                             moved.positions[9].x *= 1.0001f;
+                             p.meshes[5] = testing::make_glb(moved, p.streams[preview_path(0)]).glb();
+                           }),
+                           "mesh-nested", mesh_path(5)));
 }
 
 // Images

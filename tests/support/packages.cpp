@@ -226,11 +226,19 @@ GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg) {
   return g;
 }
 
+Mesh fine_mesh() { return sphere(6, 8); }
+
+Mesh coarse_mesh() {
+  Mesh mesh = fine_mesh();
+  mesh.triangles.resize(mesh.triangles.size() / 2);
+  return mesh;
+}
+
 PackageParts make_package_parts() {
   PackageParts p;
   add_texture(p);
-  add_scale(p, 0, sphere(6, 8));
-  add_scale(p, 5, sphere(4, 6));
+  add_scale(p, 0, fine_mesh());
+  add_scale(p, 5, coarse_mesh());
   p.manifest.title = "Two spheres";
   p.manifest.origin = {10, 20, 30};
   p.manifest.bounds_min = {-1, -1, -1};

@@ -23,8 +23,12 @@ struct GlbParts {
 /// empty.
 GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg);
 
-/// A small but true package: spheres as S_0 and S_5, one 64 x 48 texture of 2 x 2 fragments of which one is
-/// uncovered, two rungs. Tests change a part, then build().
+/// The meshes of make_package_parts(): the coarser one has half of the finer one's triangles.
+Mesh fine_mesh();
+Mesh coarse_mesh();
+
+/// A small but true package: fine_mesh() as S_0 and coarse_mesh() as S_5, one 64 x 48 texture of 2 x 2
+/// fragments of which one is uncovered, two rungs. Tests change a part, then build().
 struct PackageParts {
   Manifest manifest;
   std::vector<TextureInfo> textures;
