@@ -153,7 +153,7 @@ class GlbChecker {
     const auto& indices = accessor(json, "indices", place);
     if (indices.components != 1 || indices.count % 3 != 0 || indices.component_type == 5126)
       d_.fail("glb-accessor", place + "/indices", "a multiple of 3 integers", std::to_string(indices.count));
-    Primitive p{indices.count / 3, position.count, {}};
+    Primitive p{indices.count / 3, position.count, {}, {}};
     const auto extensions = json.find("extensions");
     const bool draco = extensions != json.end() && extensions->is_object() &&
                        extensions->contains("KHR_draco_mesh_compression");
