@@ -22,14 +22,6 @@ std::uint64_t sum(const std::vector<std::uint32_t>& v) {
   return std::accumulate(v.begin(), v.end(), std::uint64_t{0});
 }
 
-/// Readers check that the grid covers the plane; JPEG blocks of 16 px must not straddle fragments either.
-void check_grid(const TextureInfo& t, std::size_t plane, Findings& findings) {
-  findings.require(
-      t.fragment_width_px % 16 == 0 && t.fragment_height_px % 16 == 0, "texture-grid", kTexturesPath,
-      "/textures/" + std::to_string(plane), "fragments with sides of multiples of 16 px",
-      std::to_string(t.fragment_width_px) + " x " + std::to_string(t.fragment_height_px) + " px");
-}
-
 /// Exactly the covered fragments are stored, by falling importance. (Readers check that `order` names those
 /// once that have bytes.)
 void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
@@ -113,7 +105,6 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
     const TextureInfo& info = textures[k];
     const PlaneTables& t = tables.planes[k];
     const std::string place = "/" + std::to_string(k);
-    check_grid(info, k, findings);
     findings.require(seen.insert({info.image, info.role == "alpha"}).second, "textures", kTexturesPath, place,
                      "one plane for the colours and one for the alpha of image " + std::to_string(info.image),
                      "another");

@@ -246,8 +246,6 @@ TEST(Verify, Textures) {
                           .seal()
                           .package(),
                       "textures", kTexturesPath));
-  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.textures[0].fragment_width_px = 40; }),
-                      "texture-grid", kTexturesPath));
 }
 
 TEST(Verify, TablesAgainstTextures) {
