@@ -11,3 +11,5 @@ if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its us
   add_test(NAME house_install COMMAND ${house}/check_install ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/consumer
     ${CMAKE_CURRENT_BINARY_DIR}/install ${CMAKE_COMMAND} $<TARGET_FILE:make_scan>)
 endif()
+add_test(NAME house_make_scan COMMAND ${house}/check_make_scan $<TARGET_FILE:make_scan> $<TARGET_FILE:texmesh>
+  ${CMAKE_CURRENT_BINARY_DIR}/make_scan)
