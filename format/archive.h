@@ -14,9 +14,11 @@
 namespace texmesh {
 
 // Serialisation of plain data for cached stage artefacts (not for packages: their layouts stand in SPEC.md).
-// A struct names its members once, in `template <class S, class A> static void archive(S& s, A& a)`; both archives
-// below walk that list. Numbers are little-endian; a vector or string is a u64 count and its elements.
-static_assert(std::endian::native == std::endian::little, "artefact and package codecs copy little-endian memory");
+// A struct names its members once, in `template <class S, class A> static void archive(S& s, A& a)`; both
+// archives below walk that list. Numbers are little-endian; a vector or string is a u64 count and its
+// elements.
+static_assert(std::endian::native == std::endian::little,
+              "artefact and package codecs copy little-endian memory");
 
 namespace archive_detail {
 template <class T>
@@ -34,7 +36,9 @@ struct IsFlat<std::array<T, N>> : IsFlat<T> {};
 class ArchiveWriter {
  public:
   template <class... T>
-  void operator()(const T&... values) { (put(values), ...); }
+  void operator()(const T&... values) {
+    (put(values), ...);
+  }
   std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
  private:
@@ -67,13 +71,16 @@ class ArchiveWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Reads what ArchiveWriter wrote; throws FormatError on any truncation or on bytes left over (see finish()). A count
-/// is checked against the bytes that remain before anything is allocated.
+/// Reads what ArchiveWriter wrote; throws FormatError on any truncation or on bytes left over (see finish()).
+/// A count is checked against the bytes that remain before anything is allocated.
 class ArchiveReader {
  public:
-  ArchiveReader(std::span<const std::uint8_t> bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
+  ArchiveReader(std::span<const std::uint8_t> bytes, std::string name)
+      : bytes_(bytes), name_(std::move(name)) {}
   template <class... T>
-  void operator()(T&... values) { (get(values), ...); }
+  void operator()(T&... values) {
+    (get(values), ...);
+  }
   void finish() const {
     if (at_ != bytes_.size()) fail("end of artefact", std::to_string(bytes_.size() - at_) + " more bytes");
   }

@@ -10,7 +10,8 @@
 
 namespace texmesh {
 
-// Little-endian building and bounded reading of binary entries: shared by the codecs of this folder, no interface.
+// Little-endian building and bounded reading of binary entries: shared by the codecs of this folder, no
+// interface.
 
 class BytesOut {
  public:
@@ -38,7 +39,8 @@ class BytesIn {
   std::uint64_t number(int width) {
     const auto p = raw(static_cast<std::size_t>(width));
     std::uint64_t v = 0;
-    for (int i = 0; i < width; ++i) v |= static_cast<std::uint64_t>(p[static_cast<std::size_t>(i)]) << (8 * i);
+    for (int i = 0; i < width; ++i)
+      v |= static_cast<std::uint64_t>(p[static_cast<std::size_t>(i)]) << (8 * i);
     return v;
   }
   std::uint8_t u8() { return static_cast<std::uint8_t>(number(1)); }

@@ -6,9 +6,9 @@
 
 namespace texmesh {
 
-/// What every texmesh error carries: the file (or document), the place in it, what was expected and what was found.
-/// Any of them may be empty; what() joins those that are not into one line:
-/// `bunny.glb: /accessors/3/count: expected <= 100000, found 2147483648`.
+/// What every texmesh error carries: the file (or document), the place in it, what was expected and what was
+/// found. Any of them may be empty; what() joins those that are not into one line: `bunny.glb:
+/// /accessors/3/count: expected <= 100000, found 2147483648`.
 class Error : public std::runtime_error {
  public:
   Error(std::string file, std::string place, std::string expected, std::string found)
@@ -42,15 +42,24 @@ class Error : public std::runtime_error {
 };
 
 /// A model, an image, an options file or anything else a user hands in is not what it must be.
-struct InputError : Error { using Error::Error; };
+struct InputError : Error {
+  using Error::Error;
+};
 
 /// A package, a table, an index or a cached artefact does not follow its format.
-struct FormatError : Error { using Error::Error; };
+struct FormatError : Error {
+  using Error::Error;
+};
 
-/// A stage could not do its work on data that import and condition had let through. `file` holds the stage's name.
-struct StageError : Error { using Error::Error; };
+/// A stage could not do its work on data that import and condition had let through. `file` holds the stage's
+/// name.
+struct StageError : Error {
+  using Error::Error;
+};
 
 /// Thrown by RunContext::check_cancelled; never an error of the model.
-struct Cancelled : std::runtime_error { Cancelled() : std::runtime_error("cancelled") {} };
+struct Cancelled : std::runtime_error {
+  Cancelled() : std::runtime_error("cancelled") {}
+};
 
 }  // namespace texmesh

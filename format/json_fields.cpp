@@ -107,7 +107,8 @@ void JsonAt::fail_type(const char* expected) const { fail(expected, excerpt(valu
 JsonAt JsonAt::operator[](std::string_view name) const {
   if (!value_.is_object()) fail_type("an object");
   const auto it = value_.find(name);
-  if (it == value_.end()) JsonAt(value_, file_, pointer_ + "/" + std::string(name)).fail("a value", "nothing");
+  if (it == value_.end())
+    JsonAt(value_, file_, pointer_ + "/" + std::string(name)).fail("a value", "nothing");
   return {*it, file_, pointer_ + "/" + std::string(name)};
 }
 

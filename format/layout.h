@@ -14,16 +14,27 @@ inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
 
-std::string mesh_path(int scale);                                        // mesh/s07.glb
-std::string preview_path(std::uint32_t plane);                           // preview/003.jpg
-std::string table_streams_path(std::uint32_t plane);                     // texture/3/tables.pack
-std::string rung_path(std::uint32_t plane, std::uint32_t rung);          // texture/3/r07.pack; 0 = lowest rung
-/// texture/3/r07/0123.jpg: one fragment as a complete JPEG, in trees made with `unpack --fragments files` only.
+std::string mesh_path(int scale);                                // mesh/s07.glb
+std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
+std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack
+std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r07.pack; 0 = lowest rung
+/// texture/3/r07/0123.jpg: one fragment as a complete JPEG, in trees made with `unpack --fragments files`
+/// only.
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
 
 /// What a path stands for; kOther for paths that version 1.0 does not define.
 enum class EntryKind : std::uint8_t {
-  kManifest, kIndex, kTables, kTextures, kQuality, kMesh, kPreview, kTableStreams, kRung, kFragmentFile, kOther,
+  kManifest,
+  kIndex,
+  kTables,
+  kTextures,
+  kQuality,
+  kMesh,
+  kPreview,
+  kTableStreams,
+  kRung,
+  kFragmentFile,
+  kOther,
   kProvenance
 };
 struct EntryName {
@@ -34,8 +45,9 @@ struct EntryName {
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
 
-/// The one order that SPEC.md prescribes for a set of entries: what the first picture needs first, then meshes from
-/// coarse to fine between texture rungs from low to high, provenance last. Depends on the set only, not on its order.
+/// The one order that SPEC.md prescribes for a set of entries: what the first picture needs first, then
+/// meshes from coarse to fine between texture rungs from low to high, provenance last. Depends on the set
+/// only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

@@ -10,7 +10,8 @@
 namespace texmesh {
 
 inline constexpr int kFormatMajor = 1, kFormatMinor = 0;
-/// The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client.
+/// The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
+/// client.
 inline constexpr std::uint64_t kBootstrapBytes = 16384;
 /// "Enough at any size": display_px of S_0 and the last step's up_to_px.
 inline constexpr double kAnyDisplayPx = 1e9;
@@ -27,7 +28,8 @@ struct EntryRef {
   friend bool operator==(const EntryRef&, const EntryRef&) = default;
 };
 
-/// An entry that a client may read in pages: its first head_bytes bytes tell where the pages are and their digests.
+/// An entry that a client may read in pages: its first head_bytes bytes tell where the pages are and their
+/// digests.
 struct PagedRef : EntryRef {
   std::uint64_t head_bytes = 0;
   Sha256 head_digest{};
@@ -41,18 +43,19 @@ struct ByteRange {
 
 /// The measured figures (errors, p95, p99, display_px_*) are written with six significant digits.
 struct ManifestScale {
-  int scale = 0;                          // scale number; 0 = S_0
+  int scale = 0;  // scale number; 0 = S_0
   std::uint32_t triangles = 0, vertices = 0;
-  EntryRef glb;                           // path is always mesh_path(scale)
+  EntryRef glb;  // path is always mesh_path(scale)
   bool major = false;
-  double error_max = 0, error_rms = 0;    // object units
-  double p95 = 0, p99 = 0;                // relative distance to S_0 (perceptual value), 0 for S_0
+  double error_max = 0, error_rms = 0;  // object units
+  double p95 = 0, p99 = 0;              // relative distance to S_0 (perceptual value), 0 for S_0
   // Displayed object height in px up to which the scale is enough; kAnyDisplayPx for S_0:
   double display_px_jnd = 0, display_px_error = 0, display_px_edge = 0;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
 
-/// One step of the step function displayed size -> scale, coarse to fine; the last step's up_to_px is kAnyDisplayPx.
+/// One step of the step function displayed size -> scale, coarse to fine; the last step's up_to_px is
+/// kAnyDisplayPx.
 struct ManifestStep {
   double up_to_px = 0;
   int scale = 0;
@@ -62,46 +65,49 @@ struct ManifestStep {
 /// manifest.json (SPEC.md, section Manifest; schemas/manifest.v1.schema.json).
 struct Manifest {
   int major = kFormatMajor, minor = kFormatMinor;
-  std::vector<std::string> required_features;   // a reader must know every one of them
-  std::string title;                            // option; "" by default
-  Vec3d origin;                                 // local frame -> source coordinates
-  Vec3d bounds_min, bounds_max;                 // local frame, object units
-  double object_height = 0;                     // O_V
+  std::vector<std::string> required_features;  // a reader must know every one of them
+  std::string title;                           // option; "" by default
+  Vec3d origin;                                // local frame -> source coordinates
+  Vec3d bounds_min, bounds_max;                // local frame, object units
+  double object_height = 0;                    // O_V
   double jnd = 0.1;
-  std::vector<ManifestScale> scales;            // S_0 first
-  std::vector<ManifestStep> steps;              // default rule: finer of JND and <= 1 px error
-  std::uint32_t plane_count = 0;                // texture planes, see textures.json
-  // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between them; its SHA-256.
+  std::vector<ManifestScale> scales;  // S_0 first
+  std::vector<ManifestStep> steps;    // default rule: finer of JND and <= 1 px error
+  std::uint32_t plane_count = 0;      // texture planes, see textures.json
+  // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between them; its
+  // SHA-256.
   std::uint64_t first_picture_offset = 0, first_picture_bytes = 0;
   Sha256 first_picture_digest{};
-  std::vector<ByteRange> previews;              // of planes 0.., at most kMaxManifestPreviews; inside the first picture
+  std::vector<ByteRange> previews;  // of planes 0.., at most kMaxManifestPreviews; inside the first picture
   PagedRef index, tables;
   EntryRef textures, quality, provenance;
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 
-/// Canonical JSON: fixed key order, shortest round-trip numbers, no blanks. FormatError when the manifest breaks a rule
-/// that read_manifest checks, or does not fit kBootstrapBytes with its ZIP header.
+/// Canonical JSON: fixed key order, shortest round-trip numbers, no blanks. FormatError when the manifest
+/// breaks a rule that read_manifest checks, or does not fit kBootstrapBytes with its ZIP header.
 std::string write_manifest(const Manifest& manifest);
-/// Strict for what this version defines (types, ranges, order, digests), ignores unknown fields, refuses an unknown
-/// major version and unknown required features. FormatError names the JSON pointer. Blanks after the JSON are allowed.
+/// Strict for what this version defines (types, ranges, order, digests), ignores unknown fields, refuses an
+/// unknown major version and unknown required features. FormatError names the JSON pointer. Blanks after the
+/// JSON are allowed.
 Manifest read_manifest(std::span<const std::uint8_t> json);
 
-/// textures.json: one element per texture plane, in plane order. It says what the planes are; where their bytes stand
-/// is said by the index only, so the file needs no offsets: writing leaves offset, bytes and digest of the refs out,
-/// reading fills in the paths, and resolve_textures() the rest.
+/// textures.json: one element per texture plane, in plane order. It says what the planes are; where their
+/// bytes stand is said by the index only, so the file needs no offsets: writing leaves offset, bytes and
+/// digest of the refs out, reading fills in the paths, and resolve_textures() the rest.
 struct TextureInfo {
-  std::uint32_t image = 0;             // GLB image "texture/<image>"
-  std::string role;                    // base-colour, emissive, normal, occlusion-roughness-metallic, alpha
-  std::string name;                    // as the source names the image
-  std::string colour_space;            // srgb | linear
+  std::uint32_t image = 0;   // GLB image "texture/<image>"
+  std::string role;          // base-colour, emissive, normal, occlusion-roughness-metallic, alpha
+  std::string name;          // as the source names the image
+  std::string colour_space;  // srgb | linear
   std::string codec = "jpeg";
   std::uint32_t width_px = 0, height_px = 0, channels = 3;
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;
   std::string grid_reason;
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
-  EntryRef preview, tables;            // preview/NNN.jpg; texture/<plane>/tables.pack, all rungs' table streams in rung order
-  std::vector<EntryRef> rungs;         // texture/<plane>/rNN.pack, rising quality: fragments in PlaneTables::order
+  EntryRef preview,
+      tables;  // preview/NNN.jpg; texture/<plane>/tables.pack, all rungs' table streams in rung order
+  std::vector<EntryRef> rungs;  // texture/<plane>/rNN.pack, rising quality: fragments in PlaneTables::order
   std::vector<int> rung_quality;
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;
 };
@@ -110,8 +116,9 @@ std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json);
 /// Fills offset, bytes and digest of every ref from the index; FormatError when an entry is not there.
 void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<EntryRef>& index);
 
-/// index.bin: every entry except manifest.json and index.bin itself. Page 0 holds the entries that belong to no texture
-/// plane, then one page per plane (SPEC.md). A client that needs one plane reads the head and that page.
+/// index.bin: every entry except manifest.json and index.bin itself. Page 0 holds the entries that belong to
+/// no texture plane, then one page per plane (SPEC.md). A client that needs one plane reads the head and that
+/// page.
 inline constexpr std::uint32_t kNoPlane = 0xffffffffu;
 struct IndexPage {
   std::uint32_t plane = kNoPlane;
@@ -130,7 +137,8 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries);
 /// `bytes` may stop after the head.
 IndexHead read_index_head(std::span<const std::uint8_t> bytes);
 /// One page's bytes, digest checked; entries in container order.
-std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page, std::span<const std::uint8_t> bytes);
+std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
+                                      std::span<const std::uint8_t> bytes);
 /// All pages, every digest checked, merged into container order.
 std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes);
 

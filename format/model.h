@@ -12,18 +12,19 @@ namespace texmesh {
 /// Three indices. In a Mesh they index wedges.
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// An indexed triangle mesh with wedges: a *position* is a point in space, a *wedge* is a position together with the
-/// attributes it has on one side of a seam. Two triangles share an edge geometrically when they share two positions,
-/// and also in texture when they share two wedges. Right-handed, +Y up, counter-clockwise front faces, as glTF.
+/// An indexed triangle mesh with wedges: a *position* is a point in space, a *wedge* is a position together
+/// with the attributes it has on one side of a seam. Two triangles share an edge geometrically when they
+/// share two positions, and also in texture when they share two wedges. Right-handed, +Y up,
+/// counter-clockwise front faces, as glTF.
 struct Mesh {
-  Vec3d origin;                       // add to a position to get the source's coordinates; object units
-  std::vector<Vec3f> positions;       // local frame, object units, finite
+  Vec3d origin;                  // add to a position to get the source's coordinates; object units
+  std::vector<Vec3f> positions;  // local frame, object units, finite
   std::vector<std::uint32_t> wedge_position;  // per wedge: index into positions
   // Per wedge, each either empty (the mesh has no such attribute) or as long as wedge_position:
-  std::vector<Vec2f> uv0, uv1;        // glTF convention, v grows downwards; may lie outside 0..1
-  std::vector<Vec3f> normals;         // unit length
-  std::vector<Vec4f> colours;         // linear RGBA, 0..1
-  std::vector<Triangle> triangles;    // wedge indices
+  std::vector<Vec2f> uv0, uv1;                   // glTF convention, v grows downwards; may lie outside 0..1
+  std::vector<Vec3f> normals;                    // unit length
+  std::vector<Vec4f> colours;                    // linear RGBA, 0..1
+  std::vector<Triangle> triangles;               // wedge indices
   std::vector<std::uint16_t> triangle_material;  // per triangle: index into Model::materials
   std::vector<std::uint16_t> triangle_part;      // per triangle: index into part_names
   std::vector<std::string> part_names;           // node names of the source; at least one
@@ -35,22 +36,25 @@ struct Mesh {
   friend bool operator==(const Mesh&, const Mesh&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.triangles, s.triangle_material,
-      s.triangle_part, s.part_names);
+    a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.triangles,
+      s.triangle_material, s.triangle_part, s.part_names);
   }
 };
 
 enum class Wrap : std::uint8_t { kRepeat = 0, kClamp = 1, kMirror = 2 };
 enum class AlphaMode : std::uint8_t { kOpaque = 0, kMask = 1, kBlend = 2 };
 
-/// Affine map of a UV before sampling: uv' = offset + rotate(rotation) * (scale * uv), as KHR_texture_transform.
+/// Affine map of a UV before sampling: uv' = offset + rotate(rotation) * (scale * uv), as
+/// KHR_texture_transform.
 struct UvTransform {
   Vec2f offset{0, 0}, scale{1, 1};
   float rotation = 0;  // radians, counter-clockwise in the extension's sense
   bool is_identity() const { return *this == UvTransform{}; }
   friend bool operator==(const UvTransform&, const UvTransform&) = default;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.offset, s.scale, s.rotation); }
+  static void archive(S& s, A& a) {
+    a(s.offset, s.scale, s.rotation);
+  }
 };
 
 /// Use of an image by a material.
@@ -58,7 +62,7 @@ struct TextureRef {
   std::int32_t image = -1;    // index into Model::images, -1 = none
   std::uint8_t texcoord = 0;  // 0 -> uv0, 1 -> uv1
   Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
-  bool nearest = false;       // magnification without interpolation
+  bool nearest = false;  // magnification without interpolation
   UvTransform transform;
   bool used() const { return image >= 0; }
   friend bool operator==(const TextureRef&, const TextureRef&) = default;
@@ -78,20 +82,21 @@ struct Material {
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   float alpha_cutoff = 0.5f;
   bool double_sided = false, unlit = false;
-  TextureRef base_colour_texture, metallic_roughness_texture, normal_texture, occlusion_texture, emissive_texture;
+  TextureRef base_colour_texture, metallic_roughness_texture, normal_texture, occlusion_texture,
+      emissive_texture;
   friend bool operator==(const Material&, const Material&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.name, s.base_colour, s.metallic, s.roughness, s.emissive, s.normal_scale, s.occlusion_strength, s.alpha_mode,
-      s.alpha_cutoff, s.double_sided, s.unlit, s.base_colour_texture, s.metallic_roughness_texture, s.normal_texture,
-      s.occlusion_texture, s.emissive_texture);
+    a(s.name, s.base_colour, s.metallic, s.roughness, s.emissive, s.normal_scale, s.occlusion_strength,
+      s.alpha_mode, s.alpha_cutoff, s.double_sided, s.unlit, s.base_colour_texture,
+      s.metallic_roughness_texture, s.normal_texture, s.occlusion_texture, s.emissive_texture);
   }
 };
 
 enum class ImageFormat : std::uint8_t { kJpeg = 0, kPng = 1, kTiff = 2, kWebp = 3, kExr = 4 };
 
-/// An encoded image file. Import has read its header and checked it against the limits; pixels are decoded later by
-/// stages/decode_image.h.
+/// An encoded image file. Import has read its header and checked it against the limits; pixels are decoded
+/// later by stages/decode_image.h.
 struct Image {
   std::string name;  // as the source names it; no folder
   ImageFormat format = ImageFormat::kPng;
@@ -108,9 +113,9 @@ struct Image {
 
 /// A cylindrical range scan: r(alpha, y), the distance of the surface from the axis of rotation (thesis 2.2).
 struct RangeGrid {
-  std::uint32_t columns = 0, rows = 0;  // alpha index (periodic when full_turn), y index (top row first)
-  std::vector<float> radius;            // rows x columns, object units; <= 0 = no sample
-  float alpha_step_rad = 0, y_step = 0; // spacing; y in object units
+  std::uint32_t columns = 0, rows = 0;   // alpha index (periodic when full_turn), y index (top row first)
+  std::vector<float> radius;             // rows x columns, object units; <= 0 = no sample
+  float alpha_step_rad = 0, y_step = 0;  // spacing; y in object units
   bool full_turn = true;
   std::vector<std::uint32_t> position;  // per sample: index of the mesh position, 0xffffffff = none
   friend bool operator==(const RangeGrid&, const RangeGrid&) = default;
@@ -120,16 +125,19 @@ struct RangeGrid {
   }
 };
 
-/// What import gives. Every texture reference, material and part index is in range; images nobody uses are gone.
+/// What import gives. Every texture reference, material and part index is in range; images nobody uses are
+/// gone.
 struct Model {
   Mesh mesh;
   std::vector<Material> materials;  // at least one
   std::vector<Image> images;
-  RangeGrid range;                  // columns == 0 unless the source is a range scan
+  RangeGrid range;  // columns == 0 unless the source is a range scan
   Notes notes;
   friend bool operator==(const Model&, const Model&) = default;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.mesh, s.materials, s.images, s.range, s.notes); }
+  static void archive(S& s, A& a) {
+    a(s.mesh, s.materials, s.images, s.range, s.notes);
+  }
 };
 
 }  // namespace texmesh

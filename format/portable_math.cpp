@@ -26,10 +26,14 @@ double sin_quadrant(double x, int add) {
   const double q = std::nearbyint(x / (kPi / 2));
   const double r = (x - q * kPio2Hi) - q * kPio2Lo;
   switch ((static_cast<long long>(q) + add) & 3) {
-    case 0: return sin_reduced(r);
-    case 1: return cos_reduced(r);
-    case 2: return -sin_reduced(r);
-    default: return -cos_reduced(r);
+    case 0:
+      return sin_reduced(r);
+    case 1:
+      return cos_reduced(r);
+    case 2:
+      return -sin_reduced(r);
+    default:
+      return -cos_reduced(r);
   }
 }
 double atan_positive(double t) {  // 0 <= t <= 1
@@ -56,7 +60,8 @@ double exp(double x) {
 }
 
 double log(double x) {
-  if (!(x > 0)) return x == 0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+  if (!(x > 0))
+    return x == 0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
   if (std::isinf(x)) return x;
   int e = 0;
   double m = std::frexp(x, &e);  // m in [0.5, 1)

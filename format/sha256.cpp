@@ -9,7 +9,8 @@ namespace texmesh {
 Sha256 sha256(std::span<const std::uint8_t> bytes) {
   Sha256 digest{};
   unsigned size = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1 || size != digest.size())
+  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1 ||
+      size != digest.size())
     throw std::runtime_error("SHA-256 is not available from OpenSSL");
   return digest;
 }
@@ -27,7 +28,9 @@ std::string to_hex(const Sha256& digest) {
 
 bool from_hex(std::string_view hex, Sha256& digest) {
   if (hex.size() != 64) return false;
-  auto value = [](char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1; };
+  auto value = [](char c) {
+    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+  };
   for (std::size_t i = 0; i < 32; ++i) {
     const int hi = value(hex[2 * i]), lo = value(hex[2 * i + 1]);
     if (hi < 0 || lo < 0) return false;

@@ -99,8 +99,8 @@ void check_order(const PlaneTables& t, const std::string& place) {
             "fragment " + std::to_string(f));
 }
 
-/// Everything that holds for the tables of a plane. `rounding` is how far fractions may be out of their range: a writer
-/// tolerates what arithmetic does and clamps it, a reader nothing.
+/// Everything that holds for the tables of a plane. `rounding` is how far fractions may be out of their
+/// range: a writer tolerates what arithmetic does and clamps it, a reader nothing.
 void check_plane(const PlaneTables& t, float rounding, const std::string& place) {
   check_shape(t, place);
   check_counts(t, place);

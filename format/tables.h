@@ -8,33 +8,35 @@
 
 namespace texmesh {
 
-/// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising quality,
-/// rung 0 here is the lowest stored one; "skipped" has no entry), N = scales + 1 feature scales.
+/// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising
+/// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N = scales + 1 feature scales.
 struct PlaneTables {
   std::uint32_t columns = 0, rows = 0;
-  std::uint32_t scales = 0;                  // N - 1
-  std::vector<std::uint8_t> rung_quality;    // [R], IJG quality, strictly rising
-  std::vector<std::uint32_t> table_bytes;    // [R]: size of the rung's table stream
+  std::uint32_t scales = 0;                // N - 1
+  std::vector<std::uint8_t> rung_quality;  // [R], IJG quality, strictly rising
+  std::vector<std::uint32_t> table_bytes;  // [R]: size of the rung's table stream
   // [R * F], index rung * F + fragment; 0 where the fragment is not stored:
-  std::vector<std::uint32_t> size_bytes;     // of the abbreviated stream, exact
-  std::vector<std::uint64_t> digest;         // first 8 bytes of the stream's SHA-256, as a big-endian number
+  std::vector<std::uint32_t> size_bytes;  // of the abbreviated stream, exact
+  std::vector<std::uint64_t> digest;      // first 8 bytes of the stream's SHA-256, as a big-endian number
   // over covered texels of luma (8-bit scale, 0..65025) | 1 - SSIM (0..2); stored as IEEE binary16:
   std::vector<float> mse, dssim;
   // [F]:
   std::vector<std::uint32_t> covered_texels;
-  std::vector<float> surface_fraction;       // of the object's surface
-  std::vector<float> z, i, zeta, m, vqp;     // 0..1, stored as multiples of 1 / 65535
-  std::vector<std::uint16_t> order;          // fragments that are stored, by falling importance (eta_0, surface, index)
+  std::vector<float> surface_fraction;    // of the object's surface
+  std::vector<float> z, i, zeta, m, vqp;  // 0..1, stored as multiples of 1 / 65535
+  std::vector<std::uint16_t>
+      order;  // fragments that are stored, by falling importance (eta_0, surface, index)
   // [N * F], index scale * F + fragment:
-  std::vector<std::uint32_t> features;       // f_i < 2^24
+  std::vector<std::uint32_t> features;  // f_i < 2^24
   // [N]:
-  std::vector<float> quality;                // Q_i
+  std::vector<float> quality;  // Q_i
   // [N * 21]: D_i(Gamma), Gamma = 0, 0.05 .. 1: bytes of the plane at the rungs nearest to q_i(x, y)
   std::vector<std::uint64_t> total_bytes;
-  std::uint8_t allocation = 1;               // 0 thesis (3.2), 1 log-quantiser; with the widths and clip used:
+  std::uint8_t allocation = 1;  // 0 thesis (3.2), 1 log-quantiser; with the widths and clip used:
   float quality_width = 60, log_width = 0.7f, quality_min = 5, quality_max = 97;
   // Size model S = A R^Q + c with exponent B from (8.8), fitted over the plane's rungs (thesis 8.6-8.8)
-  float model_a = 0, model_b = 0, model_r = 0, model_correlation = 0, model_error = 0;  // error: mean |S' - S| / S
+  float model_a = 0, model_b = 0, model_r = 0, model_correlation = 0,
+        model_error = 0;  // error: mean |S' - S| / S
 
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   std::size_t rung_count() const { return rung_quality.size(); }
@@ -42,15 +44,15 @@ struct PlaneTables {
   static void archive(S& s, A& a) {
     a(s.columns, s.rows, s.scales, s.rung_quality, s.table_bytes, s.size_bytes, s.digest, s.mse, s.dssim,
       s.covered_texels, s.surface_fraction, s.z, s.i, s.zeta, s.m, s.vqp, s.order, s.features, s.quality,
-      s.total_bytes, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.model_a, s.model_b,
-      s.model_r, s.model_correlation, s.model_error);
+      s.total_bytes, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.model_a,
+      s.model_b, s.model_r, s.model_correlation, s.model_error);
   }
 };
 
 /// eta_i (3.1) of one scale: feature counts min-max over covered fragments; 0 for the others.
 std::vector<float> eta_of(const PlaneTables& tables, std::uint32_t scale);
-/// q_i(x, y): the quality that the tables' allocation asks for (3.2, or its log-quantiser form), clipped. Gamma in 0..1;
-/// the default Gamma is the mean of eta over covered fragments.
+/// q_i(x, y): the quality that the tables' allocation asks for (3.2, or its log-quantiser form), clipped.
+/// Gamma in 0..1; the default Gamma is the mean of eta over covered fragments.
 std::vector<float> quality_of(const PlaneTables& tables, std::uint32_t scale, double gamma);
 double mean_eta(const PlaneTables& tables, std::uint32_t scale);
 /// Index of the rung whose quality is nearest in log-quantiser space (ties: the lower).
@@ -59,11 +61,14 @@ std::uint32_t nearest_rung(const PlaneTables& tables, double quality);
 struct PackageTables {
   std::vector<PlaneTables> planes;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.planes); }
+  static void archive(S& s, A& a) {
+    a(s.planes);
+  }
 };
 
-/// tables.bin, see SPEC.md. The reader checks magic, version, every count against the bytes, and every value's range,
-/// and throws FormatError. write(read(x)) == x; values that the file stores in 16 bits are rounded by the writer.
+/// tables.bin, see SPEC.md. The reader checks magic, version, every count against the bytes, and every
+/// value's range, and throws FormatError. write(read(x)) == x; values that the file stores in 16 bits are
+/// rounded by the writer.
 std::vector<std::uint8_t> write_tables(const PackageTables& tables);
 PackageTables read_tables(std::span<const std::uint8_t> bytes);
 /// The head alone tells where each plane's section stands, so that a client can read one plane by a range.
@@ -77,21 +82,24 @@ struct TablesHead {
   std::vector<TablesSection> planes;
 };
 TablesHead read_tables_head(std::span<const std::uint8_t> bytes);  // `bytes` may stop after the head
-PlaneTables read_tables_section(const TablesHead& head, std::size_t plane, std::span<const std::uint8_t> section);
+PlaneTables read_tables_section(const TablesHead& head, std::size_t plane,
+                                std::span<const std::uint8_t> section);
 
 /// Measured quality of scale x rung samples (design 8.11): quality.json.
 struct QualityTable {
-  std::vector<int> scales;          // scale numbers, rising (0 = S_0)
-  std::vector<int> rungs;           // IJG qualities, rising; {100} for untextured models
-  std::vector<float> ssim;          // [scale index * rungs + rung index], 0..1, 1 = equal
-  std::vector<float> difference;    // FLIP-like mean colour difference, 0..1, 0 = equal
+  std::vector<int> scales;        // scale numbers, rising (0 = S_0)
+  std::vector<int> rungs;         // IJG qualities, rising; {100} for untextured models
+  std::vector<float> ssim;        // [scale index * rungs + rung index], 0..1, 1 = equal
+  std::vector<float> difference;  // FLIP-like mean colour difference, 0..1, 0 = equal
   std::uint32_t views = 0, size_px = 0;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.scales, s.rungs, s.ssim, s.difference, s.views, s.size_px); }
+  static void archive(S& s, A& a) {
+    a(s.scales, s.rungs, s.ssim, s.difference, s.views, s.size_px);
+  }
   friend bool operator==(const QualityTable&, const QualityTable&) = default;
 };
 
-std::string write_quality(const QualityTable& table);        // canonical JSON
+std::string write_quality(const QualityTable& table);           // canonical JSON
 QualityTable read_quality(std::span<const std::uint8_t> json);  // strict; FormatError
 
 }  // namespace texmesh

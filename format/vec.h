@@ -37,18 +37,26 @@ using Vec3d = Vec3<double>;
 using Vec4f = Vec4<float>;
 
 template <class T>
-T dot(Vec2<T> a, Vec2<T> b) { return a.x * b.x + a.y * b.y; }
+T dot(Vec2<T> a, Vec2<T> b) {
+  return a.x * b.x + a.y * b.y;
+}
 template <class T>
-T cross(Vec2<T> a, Vec2<T> b) { return a.x * b.y - a.y * b.x; }
+T cross(Vec2<T> a, Vec2<T> b) {
+  return a.x * b.y - a.y * b.x;
+}
 template <class T>
-T dot(Vec3<T> a, Vec3<T> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+T dot(Vec3<T> a, Vec3<T> b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 template <class T>
 Vec3<T> cross(Vec3<T> a, Vec3<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 /// std::sqrt is correctly rounded everywhere, so length() is the same on every machine.
 template <class T>
-T length(Vec3<T> a) { return std::sqrt(dot(a, a)); }
+T length(Vec3<T> a) {
+  return std::sqrt(dot(a, a));
+}
 template <class T>
 Vec3<T> normalized(Vec3<T> a) {
   const T l = length(a);

@@ -19,7 +19,9 @@ namespace {
 
 struct Descriptor {
   int fd = -1;
-  ~Descriptor() { if (fd >= 0) ::close(fd); }
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
 };
 
 [[noreturn]] void fail(const std::string& path, const char* step) {
@@ -51,7 +53,8 @@ std::string own_temporary(const std::string& path) {
 
 }  // namespace
 
-void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes, const std::string& temporary) {
+void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
+                           const std::string& temporary) {
   const std::string temp = temporary.empty() ? own_temporary(path) : temporary;
   try {
     {
@@ -74,7 +77,8 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
 bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes) {
   Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat st {};
-  if (d.fd < 0 || ::fstat(d.fd, &st) != 0 || !S_ISREG(st.st_mode) || static_cast<std::uint64_t>(st.st_size) != bytes.size())
+  if (d.fd < 0 || ::fstat(d.fd, &st) != 0 || !S_ISREG(st.st_mode) ||
+      static_cast<std::uint64_t>(st.st_size) != bytes.size())
     return false;
   std::vector<std::uint8_t> buffer(1 << 20);
   while (!bytes.empty()) {

@@ -41,8 +41,9 @@ std::optional<std::vector<std::string>> uris_of(const std::string& note) {
   return uris;
 }
 
-/// The model file with the files it refers to. Which those are is known only after an import, so the store remembers
-/// the list of the last one (as ccache's manifest does): while every file on it reads as it did, import need not run.
+/// The model file with the files it refers to. Which those are is known only after an import, so the store
+/// remembers the list of the last one (as ccache's manifest does): while every file on it reads as it did,
+/// import need not run.
 class ModelSource {
  public:
   ModelSource(const CompileRequest& request, Store& store, const RunContext& context)
@@ -73,9 +74,11 @@ class ModelSource {
 
   /// Input digests for provenance: the model's own references, never the paths of this machine.
   Json inputs() const {
-    Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_digest_)}, {"bytes", bytes_.size()}}});
+    Json list =
+        Json::array({{{"role", "model"}, {"sha256", to_hex(main_digest_)}, {"bytes", bytes_.size()}}});
     for (const FileRequest& r : requests_)
-      if (r.found) list.push_back({{"role", "file"}, {"uri", r.uri}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
+      if (r.found)
+        list.push_back({{"role", "file"}, {"uri", r.uri}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
     return list;
   }
 
@@ -140,7 +143,8 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
 void refuse_warnings(const Notes& notes, const std::string& input) {
   for (const Note& n : notes)
     if (n.severity == Severity::kWarning)
-      throw InputError(fs::path(input).filename().string(), n.place, "no warning (--strict)", n.code + ": " + n.text);
+      throw InputError(fs::path(input).filename().string(), n.place, "no warning (--strict)",
+                       n.code + ": " + n.text);
 }
 
 }  // namespace
@@ -152,7 +156,8 @@ CompileOutcome compile_model(const CompileRequest& request, Store& store, const 
 
   GraphRun graph(stage_table(), request.options, store, context, observer);
   graph.give("source", object(source.source()), source.digest(), 0);
-  const std::span provenance_bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()), provenance_json.size());
+  const std::span provenance_bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
+                                   provenance_json.size());
   graph.give("provenance", object(provenance_json), sha256(provenance_bytes), provenance_json.size());
   const Object package = graph.run("package");
   const auto& bytes = *static_cast<const std::vector<std::uint8_t>*>(package.get());

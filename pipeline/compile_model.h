@@ -13,7 +13,7 @@ struct CompileRequest {
   std::string output;     // path of the package; "" = compile, check, write nothing
   std::string temporary;  // sibling of output that is renamed to it; "" = a name of its own
   CompileOptions options;
-  bool strict = false;    // warnings are errors
+  bool strict = false;  // warnings are errors
 };
 
 struct CompileOutcome {
@@ -22,9 +22,9 @@ struct CompileOutcome {
   Notes notes;
 };
 
-/// Compiles one model in this process: reads the input and what it refers to beneath its folder, runs the graph over
-/// the store, writes the package atomically. Throws InputError, FormatError, StageError or Cancelled; then nothing is
-/// left under the output's name that was not there before.
+/// Compiles one model in this process: reads the input and what it refers to beneath its folder, runs the
+/// graph over the store, writes the package atomically. Throws InputError, FormatError, StageError or
+/// Cancelled; then nothing is left under the output's name that was not there before.
 CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
                              const StageObserver& observer);
 

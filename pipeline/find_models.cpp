@@ -24,7 +24,8 @@ bool is_range_scan(const fs::path& path) {
 bool is_model(const fs::path& path) {
   std::string e = path.extension().string();
   std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
-  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || (e == ".json" && is_range_scan(path));
+  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" ||
+         (e == ".json" && is_range_scan(path));
 }
 
 struct Found {
@@ -33,12 +34,15 @@ struct Found {
 
 void add_folder(const fs::path& folder, std::vector<Found>& found) {
   const std::size_t first = found.size();
-  for (const auto& entry : fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
+  for (const auto& entry :
+       fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
     if (entry.path().filename().string().front() == '.') continue;
-    if (entry.is_regular_file() && is_model(entry.path())) found.push_back({entry.path(), entry.path().lexically_relative(folder)});
+    if (entry.is_regular_file() && is_model(entry.path()))
+      found.push_back({entry.path(), entry.path().lexically_relative(folder)});
   }
   if (found.size() == first) throw InputError(folder.string(), "", "a folder with models", "none");
-  std::sort(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), [](const Found& a, const Found& b) { return a.path < b.path; });
+  std::sort(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(),
+            [](const Found& a, const Found& b) { return a.path < b.path; });
 }
 
 }  // namespace
@@ -54,13 +58,16 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
       found.push_back({input, fs::path(input).filename()});
     }
   }
-  const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" && !fs::is_directory(output);
+  const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" &&
+                        !fs::is_directory(output);
   if (one_file) return {{inputs[0], output}};
   if (fs::path(output).extension() == ".texmesh" && !fs::is_directory(output))
     throw InputError(output, "", "a folder for the packages of several models", "the name of one package");
 
   std::map<fs::path, int> sharing;
-  auto package_of = [&](const Found& f) { return fs::path(output) / fs::path(f.relative).replace_extension(".texmesh"); };
+  auto package_of = [&](const Found& f) {
+    return fs::path(output) / fs::path(f.relative).replace_extension(".texmesh");
+  };
   for (const Found& f : found) ++sharing[package_of(f)];
   std::vector<ModelPath> models;
   std::map<fs::path, fs::path> taken;
@@ -68,7 +75,9 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
     fs::path package = package_of(f);
     if (sharing[package] > 1) package = fs::path(output) / (f.relative.string() + ".texmesh");
     const auto [other, fresh] = taken.emplace(package, f.path);
-    if (!fresh) throw InputError(f.path.string(), "", "a package of its own", package.string() + ", which is that of " + other->second.string());
+    if (!fresh)
+      throw InputError(f.path.string(), "", "a package of its own",
+                       package.string() + ", which is that of " + other->second.string());
     models.push_back({f.path.string(), package.string()});
   }
   return models;

@@ -29,19 +29,20 @@ struct GraphRun::State {
     Object object;
     Sha256 digest{};
     std::uint64_t bytes = 0;
-    bool known = false;               // digest stands
+    bool known = false;  // digest stands
     int uses_left = 0;
     std::shared_ptr<std::recursive_mutex> mutex = std::make_shared<std::recursive_mutex>();
   };
   struct Node {
     const Stage* stage = nullptr;
-    std::vector<StoredBlob> blobs;    // of a stored stage that is up to date
+    std::vector<StoredBlob> blobs;  // of a stored stage that is up to date
     Notes notes;
     bool done = false;
     std::exception_ptr error;
   };
 
-  State(const std::vector<Stage>& stages, const CompileOptions& opts, Store& st, const RunContext& ctx, StageObserver obs)
+  State(const std::vector<Stage>& stages, const CompileOptions& opts, Store& st, const RunContext& ctx,
+        StageObserver obs)
       : options(opts), store(st), context(ctx), observer(std::move(obs)) {
     for (std::size_t i = 0; i < stages.size(); ++i) {
       nodes.push_back({&stages[i], {}, {}, false, nullptr});
@@ -66,14 +67,17 @@ struct GraphRun::State {
     CompileOptions copy = options;
     for (const OptionField& f : list_options(copy))
       if (names_field(stage.options, f)) key.add("option " + f.path(), option_text(f));
-    for (const std::string& library : stage.libraries) key.add("library " + library, library_versions().at(library));
+    for (const std::string& library : stage.libraries)
+      key.add("library " + library, library_versions().at(library));
     const std::lock_guard lock(mutex);
-    for (const std::string& input : stage.inputs) key.add_input(input, slots.at(input).digest, slots.at(input).bytes);
+    for (const std::string& input : stage.inputs)
+      key.add_input(input, slots.at(input).digest, slots.at(input).bytes);
     return key;
   }
 
   bool is_ready(const Stage& stage) const {
-    return std::all_of(stage.inputs.begin(), stage.inputs.end(), [&](const std::string& i) { return slots.at(i).known; });
+    return std::all_of(stage.inputs.begin(), stage.inputs.end(),
+                       [&](const std::string& i) { return slots.at(i).known; });
   }
 
   /// The object of an artefact: at hand, from the store, or by running its stage (again).
@@ -113,9 +117,11 @@ struct GraphRun::State {
     notify(stage, StageEvent::kStarted);
     const auto start = std::chrono::steady_clock::now();
     StageOutputs outputs = stage.run(inputs);
-    notify(stage, StageEvent::kRan, 1, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    notify(stage, StageEvent::kRan, 1,
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     const std::lock_guard lock(mutex);
-    for (std::size_t k = 0; k < outputs.objects.size(); ++k) slots.at(stage.outputs[k].name).object = outputs.objects[k];
+    for (std::size_t k = 0; k < outputs.objects.size(); ++k)
+      slots.at(stage.outputs[k].name).object = outputs.objects[k];
     node.notes = outputs.notes;
     return outputs;
   }
@@ -161,8 +167,8 @@ struct GraphRun::State {
     }
   }
 
-  /// Counts down the uses of a stage's inputs. Derived data holds on to its own inputs until its last use is over: it
-  /// may still have to be computed from them.
+  /// Counts down the uses of a stage's inputs. Derived data holds on to its own inputs until its last use is
+  /// over: it may still have to be computed from them.
   void release_inputs(const Stage& stage) {
     const std::lock_guard lock(mutex);
     release_locked(stage);
@@ -248,7 +254,8 @@ Object GraphRun::run(const std::string& wanted) {
   for (const State::Node& node : state_->nodes)
     if (node.error) std::rethrow_exception(node.error);
   for (const State::Node& node : state_->nodes)
-    if (!node.done) throw std::logic_error("stage " + node.stage->name + " waits for an input that nothing gives");
+    if (!node.done)
+      throw std::logic_error("stage " + node.stage->name + " waits for an input that nothing gives");
   return state_->fetch(wanted);
 }
 

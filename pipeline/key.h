@@ -12,13 +12,14 @@ namespace texmesh {
 /// Raise when the way keys are made changes.
 inline constexpr int kKeySchema = 1;
 
-/// What a stage run depends on, as labelled parts; the key is the SHA-256 over the length-prefixed labels and values in
-/// order. The parts are kept beside each cache entry so that a miss can be explained.
+/// What a stage run depends on, as labelled parts; the key is the SHA-256 over the length-prefixed labels and
+/// values in order. The parts are kept beside each cache entry so that a miss can be explained.
 class Key {
  public:
   Key(std::string_view stage, int stage_version);
   Key& add(std::string label, std::string value);
-  /// An input artefact: role, digest and size. Downstream keys hold *output* digests, so an equal result stops the wave.
+  /// An input artefact: role, digest and size. Downstream keys hold *output* digests, so an equal result
+  /// stops the wave.
   Key& add_input(std::string_view role, const Sha256& digest, std::uint64_t bytes);
   Sha256 digest() const;
   const std::vector<std::pair<std::string, std::string>>& parts() const { return parts_; }

@@ -9,11 +9,12 @@
 
 int main(int argc, char** argv) {
   using namespace texmesh;
-  if (argc == 2 && std::string(argv[1]) == "worker") return worker_main();  // started by compile, see pipeline/worker.h
+  if (argc == 2 && std::string(argv[1]) == "worker")
+    return worker_main();  // started by compile, see pipeline/worker.h
 
   CLI::App app{"texmesh compiles textured 3D scans into packages that any static web server can stream."};
-  app.set_version_flag("--version", "texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
-                                        std::to_string(kFormatMinor));
+  app.set_version_flag("--version", "texmesh " + tool_version() + ", package format " +
+                                        std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor));
   app.require_subcommand(1);
   app.footer(
       "Start here:\n"

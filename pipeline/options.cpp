@@ -65,24 +65,25 @@ class FieldReader {
   FieldReader(std::string file, std::string place) : file_(std::move(file)), place_(std::move(place)) {}
 
   void read(OptionField& field, const Json& json) const {
-    std::visit(Overload{
-                   [&](bool* v) { *v = json.is_boolean() ? json.get<bool>() : fail<bool>("true or false", json); },
-                   [&](int* v) { *v = static_cast<int>(integer(json, *field.range)); },
-                   [&](double* v) { *v = number(json, *field.range); },
-                   [&](std::string* v) {
-                     if (!json.is_string() || json.get_ref<const std::string&>().size() > 200)
-                       fail<int>("a text of at most 200 bytes", json);
-                     *v = json.get<std::string>();
-                   },
-                   [&](std::vector<int>* v) {
-                     *v = list<int>(json, [&](const Json& x) { return static_cast<int>(integer(x, *field.range)); });
-                   },
-                   [&](std::vector<double>* v) {
-                     *v = list<double>(json, [&](const Json& x) { return number(x, *field.range); });
-                   },
-                   [&](EnumField& e) { enumerator(e, json); },
-               },
-               field.value);
+    std::visit(
+        Overload{
+            [&](bool* v) { *v = json.is_boolean() ? json.get<bool>() : fail<bool>("true or false", json); },
+            [&](int* v) { *v = static_cast<int>(integer(json, *field.range)); },
+            [&](double* v) { *v = number(json, *field.range); },
+            [&](std::string* v) {
+              if (!json.is_string() || json.get_ref<const std::string&>().size() > 200)
+                fail<int>("a text of at most 200 bytes", json);
+              *v = json.get<std::string>();
+            },
+            [&](std::vector<int>* v) {
+              *v = list<int>(json, [&](const Json& x) { return static_cast<int>(integer(x, *field.range)); });
+            },
+            [&](std::vector<double>* v) {
+              *v = list<double>(json, [&](const Json& x) { return number(x, *field.range); });
+            },
+            [&](EnumField& e) { enumerator(e, json); },
+        },
+        field.value);
   }
 
  private:
@@ -102,7 +103,8 @@ class FieldReader {
   }
   template <class T, class F>
   std::vector<T> list(const Json& json, F&& element) const {
-    if (!json.is_array() || json.empty() || json.size() > 64) return fail<std::vector<T>>("a list of 1 to 64 numbers", json);
+    if (!json.is_array() || json.empty() || json.size() > 64)
+      return fail<std::vector<T>>("a list of 1 to 64 numbers", json);
     std::vector<T> v;
     for (const Json& x : json) v.push_back(element(x));
     return v;
@@ -116,7 +118,8 @@ class FieldReader {
   std::string file_, place_;
 };
 
-/// Command-line text of a field as JSON: numbers and booleans as they stand, lists by commas, everything else a string.
+/// Command-line text of a field as JSON: numbers and booleans as they stand, lists by commas, everything else
+/// a string.
 Json parse_text(const OptionField& field, const std::string& text) {
   auto scalar = [](const std::string& t) {
     Json j = Json::parse(t, nullptr, false);
@@ -125,7 +128,8 @@ Json parse_text(const OptionField& field, const std::string& text) {
   const bool is_list = std::holds_alternative<std::vector<int>*>(field.value) ||
                        std::holds_alternative<std::vector<double>*>(field.value);
   if (!is_list) {
-    const bool is_text = std::holds_alternative<std::string*>(field.value) || std::holds_alternative<EnumField>(field.value);
+    const bool is_text =
+        std::holds_alternative<std::string*>(field.value) || std::holds_alternative<EnumField>(field.value);
     return is_text ? Json(text) : scalar(text);
   }
   Json list = Json::array();
@@ -140,8 +144,10 @@ int json_depth(const std::string& text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (quoted) {
-      if (c == '\\') ++i;
-      else if (c == '"') quoted = false;
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        quoted = false;
     } else if (c == '"') {
       quoted = true;
     } else if (c == '{' || c == '[') {
@@ -154,7 +160,8 @@ int json_depth(const std::string& text) {
 }
 
 Json parse_profile_text(const std::string& json, const std::string& file_name) {
-  if (json.size() > 1 << 20) throw InputError(file_name, "", "at most 1 MiB", std::to_string(json.size()) + " bytes");
+  if (json.size() > 1 << 20)
+    throw InputError(file_name, "", "at most 1 MiB", std::to_string(json.size()) + " bytes");
   if (json_depth(json) > 16) throw InputError(file_name, "", "JSON at most 16 levels deep", "more");
   try {
     return Json::parse(json);
@@ -167,20 +174,28 @@ Json field_schema(const OptionField& f) {
   Json s = Json::object();
   auto numeric = [&](const char* type) {
     Json n{{"type", type}};
-    auto bound = [type](double v) { return type == std::string("integer") ? Json(static_cast<std::int64_t>(v)) : Json(v); };
+    auto bound = [type](double v) {
+      return type == std::string("integer") ? Json(static_cast<std::int64_t>(v)) : Json(v);
+    };
     n["minimum"] = bound(f.range->lo);
     n["maximum"] = bound(f.range->hi);
     return n;
   };
-  auto list_of = [&](const char* type) { return Json{{"type", "array"}, {"minItems", 1}, {"maxItems", 64}, {"items", numeric(type)}}; };
+  auto list_of = [&](const char* type) {
+    return Json{{"type", "array"}, {"minItems", 1}, {"maxItems", 64}, {"items", numeric(type)}};
+  };
   std::visit(Overload{
                  [&](const bool*) { s["type"] = "boolean"; },
                  [&](const int*) { s = numeric("integer"); },
                  [&](const double*) { s = numeric("number"); },
-                 [&](const std::string*) { s = Json{{"type", "string"}, {"maxLength", 200}}; },
+                 [&](const std::string*) {
+                   s = Json{{"type", "string"}, {"maxLength", 200}};
+                 },
                  [&](const std::vector<int>*) { s = list_of("integer"); },
                  [&](const std::vector<double>*) { s = list_of("number"); },
-                 [&](const EnumField& e) { s = Json{{"enum", Json(std::vector<std::string>(e.names.begin(), e.names.end()))}}; },
+                 [&](const EnumField& e) {
+                   s = Json{{"enum", Json(std::vector<std::string>(e.names.begin(), e.names.end()))}};
+                 },
              },
              f.value);
   s["description"] = f.help;
@@ -209,18 +224,22 @@ void read_profile(CompileOptions& options, const std::string& json, const std::s
   const Json root = parse_profile_text(json, file_name);
   if (!root.is_object()) throw InputError(file_name, "", "an object", root.type_name());
   if (!root.contains("version") || root["version"] != 1)
-    throw InputError(file_name, "/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
+    throw InputError(file_name, "/version", "1",
+                     root.contains("version") ? root["version"].dump() : "nothing");
   std::vector<OptionField> fields = list_options(options);
   for (const auto& [stage, section] : root.items()) {
     if (stage == "version" || stage == "$schema") continue;
-    const bool known = std::any_of(fields.begin(), fields.end(), [&s = stage](const OptionField& f) { return f.stage == s; });
+    const bool known = std::any_of(fields.begin(), fields.end(),
+                                   [&s = stage](const OptionField& f) { return f.stage == s; });
     if (!known) throw InputError(file_name, "/" + stage, "the name of a stage", "\"" + stage + "\"");
     if (!section.is_object()) throw InputError(file_name, "/" + stage, "an object", section.type_name());
     for (const auto& [name, value] : section.items()) {
       const std::string place = "/" + stage + "/" + name;
-      auto field = std::find_if(fields.begin(), fields.end(),
-                                [&s = stage, &n = name](const OptionField& f) { return f.stage == s && f.name == n; });
-      if (field == fields.end()) throw InputError(file_name, place, "an option of " + stage, "\"" + name + "\"");
+      auto field = std::find_if(fields.begin(), fields.end(), [&s = stage, &n = name](const OptionField& f) {
+        return f.stage == s && f.name == n;
+      });
+      if (field == fields.end())
+        throw InputError(file_name, place, "an option of " + stage, "\"" + name + "\"");
       FieldReader(file_name, place).read(*field, value);
     }
   }
@@ -239,14 +258,16 @@ std::string profile_schema() {
   Json sections = Json::object();
   for (const OptionField& f : list_options(defaults)) {
     Json& section = sections[f.stage];
-    if (section.is_null()) section = Json{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
+    if (section.is_null())
+      section = Json{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
     section["properties"][f.name] = field_schema(f);
   }
   Json properties{{"$schema", {{"type", "string"}}}, {"version", {{"const", 1}}}};
   for (auto& [stage, section] : sections.items()) properties[stage] = section;
   const Json root{{"$schema", "http://json-schema.org/draft-07/schema#"},
                   {"title", "texmesh profile, version 1"},
-                  {"description", "Options of texmesh compile, by stage. Generated by `texmesh stages --profile-schema`."},
+                  {"description",
+                   "Options of texmesh compile, by stage. Generated by `texmesh stages --profile-schema`."},
                   {"type", "object"},
                   {"required", {"version"}},
                   {"additionalProperties", false},
@@ -256,7 +277,8 @@ std::string profile_schema() {
 
 void check_options(const CompileOptions& o, const std::string& source) {
   const auto& rungs = o.ladder.rungs;
-  if (rungs.size() > 16) throw InputError(source, "ladder.rungs", "at most 16 qualities", std::to_string(rungs.size()));
+  if (rungs.size() > 16)
+    throw InputError(source, "ladder.rungs", "at most 16 qualities", std::to_string(rungs.size()));
   for (std::size_t i = 1; i < rungs.size(); ++i)
     if (rungs[i] <= rungs[i - 1])
       throw InputError(source, "ladder.rungs", "strictly rising qualities",
@@ -265,7 +287,8 @@ void check_options(const CompileOptions& o, const std::string& source) {
     throw InputError(source, "lut.quality_min", "<= lut.quality_max (" + number_text(o.lut.quality_max) + ")",
                      number_text(o.lut.quality_min));
   if (o.lut.quality_fine < o.lut.quality_coarse)
-    throw InputError(source, "lut.quality_fine", ">= lut.quality_coarse (" + number_text(o.lut.quality_coarse) + ")",
+    throw InputError(source, "lut.quality_fine",
+                     ">= lut.quality_coarse (" + number_text(o.lut.quality_coarse) + ")",
                      number_text(o.lut.quality_fine));
   const auto& z = o.zim;
   if (z.weight_eta + z.weight_z + z.weight_i + z.weight_m <= 0)

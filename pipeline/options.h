@@ -25,8 +25,9 @@
 
 namespace texmesh {
 
-/// Every option that can change a package, by stage. A profile file, the command line, the cache keys, provenance and
-/// `dump` all speak of these fields under the same names: `ssf.scales` is {"ssf":{"scales":..}} and --ssf.scales.
+/// Every option that can change a package, by stage. A profile file, the command line, the cache keys,
+/// provenance and `dump` all speak of these fields under the same names: `ssf.scales` is
+/// {"ssf":{"scales":..}} and --ssf.scales.
 struct CompileOptions {
   ImportOptions import;
   ConditionOptions condition;
@@ -83,14 +84,16 @@ std::string option_text(const OptionField& field);
 /// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
 void set_option(OptionField& field, const std::string& text, const std::string& source);
 
-/// Reads a profile (schemas/profile.v1.schema.json) over the given options; absent fields keep their values. Strict:
-/// unknown fields, wrong types and values out of range throw InputError{file_name, JSON pointer, ...}.
+/// Reads a profile (schemas/profile.v1.schema.json) over the given options; absent fields keep their values.
+/// Strict: unknown fields, wrong types and values out of range throw InputError{file_name, JSON pointer,
+/// ...}.
 void read_profile(CompileOptions& options, const std::string& json, const std::string& file_name);
 
 /// Every option, after defaults, as a profile: what provenance records.
 std::string write_profile(const CompileOptions& options);
 
-/// The JSON schema of profiles, generated from the fields; schemas/profile.v1.schema.json is this text (a test).
+/// The JSON schema of profiles, generated from the fields; schemas/profile.v1.schema.json is this text (a
+/// test).
 std::string profile_schema();
 
 /// Checks that go beyond one field (rungs strictly rising, quality_min <= quality_max ...). InputError.

@@ -14,21 +14,29 @@ using Json = nlohmann::ordered_json;
 
 /// Shares of a model's time that the stages took on the sample scans; they only shape the progress bar.
 double share(const std::string& stage) {
-  static const std::map<std::string, double> shares{
-      {"import", .03}, {"condition", .04}, {"skeletonization", .2}, {"ssf", .2}, {"simplification", .15},
-      {"perceptual_values", .05}, {"fragmentation", .03}, {"zim", .02}, {"ladder", .08}, {"lut", .08},
-      {"scales", .05}, {"quality", .06}, {"package", .01}};
+  static const std::map<std::string, double> shares{{"import", .03},         {"condition", .04},
+                                                    {"skeletonization", .2}, {"ssf", .2},
+                                                    {"simplification", .15}, {"perceptual_values", .05},
+                                                    {"fragmentation", .03},  {"zim", .02},
+                                                    {"ladder", .08},         {"lut", .08},
+                                                    {"scales", .05},         {"quality", .06},
+                                                    {"package", .01}};
   const auto it = shares.find(stage);
   return it == shares.end() ? 0 : it->second;
 }
 
 const char* result_name(ModelResult r) {
   switch (r) {
-    case ModelResult::kOk: return "ok";
-    case ModelResult::kUnchanged: return "unchanged";
-    case ModelResult::kFailed: return "failed";
-    case ModelResult::kInternal: return "internal-error";
-    default: return "cancelled";
+    case ModelResult::kOk:
+      return "ok";
+    case ModelResult::kUnchanged:
+      return "unchanged";
+    case ModelResult::kFailed:
+      return "failed";
+    case ModelResult::kInternal:
+      return "internal-error";
+    default:
+      return "cancelled";
   }
 }
 
@@ -58,7 +66,8 @@ Progress::Progress(std::ostream& out, OutputMode mode, std::vector<std::string> 
 
 void Progress::started(std::size_t job, const std::string& output) {
   if (mode_ == OutputMode::kJson)
-    out_ << Json{{"event", "model-started"}, {"model", models_[job]}, {"output", output}}.dump() << '\n' << std::flush;
+    out_ << Json{{"event", "model-started"}, {"model", models_[job]}, {"output", output}}.dump() << '\n'
+         << std::flush;
 }
 
 void Progress::event(std::size_t job, const std::string& json_line) {
@@ -82,7 +91,8 @@ void Progress::event(std::size_t job, const std::string& json_line) {
     else if (verbose_)
       line(fmt::format("{}: {} from the cache", models_[job], stage));
   } else if (event == "note" && (e.value("severity", "") == "warning" || verbose_)) {
-    line(fmt::format("{}: {}: {}", models_[job], e.value("severity", "") == "warning" ? "warning" : "note", sentence(e)));
+    line(fmt::format("{}: {}: {}", models_[job], e.value("severity", "") == "warning" ? "warning" : "note",
+                     sentence(e)));
   } else if (event == "error") {
     line(fmt::format("error: {}", e.value("message", "")));
   }
@@ -94,17 +104,26 @@ void Progress::finished(std::size_t job, const WorkerReport& r, const std::strin
   running_.erase(job);
   fraction_[job] = 1;
   if (mode_ == OutputMode::kJson) {
-    out_ << Json{{"event", "model-finished"}, {"model", models_[job]}, {"result", result_name(r.result)},
-                 {"output", output}, {"bytes", r.package_bytes}, {"seconds", r.seconds},
-                 {"peak_memory_bytes", r.peak_memory_bytes}, {"stages_ran", r.stages_ran}, {"stages_from_cache", r.stages_hit}}
+    out_ << Json{{"event", "model-finished"},
+                 {"model", models_[job]},
+                 {"result", result_name(r.result)},
+                 {"output", output},
+                 {"bytes", r.package_bytes},
+                 {"seconds", r.seconds},
+                 {"peak_memory_bytes", r.peak_memory_bytes},
+                 {"stages_ran", r.stages_ran},
+                 {"stages_from_cache", r.stages_hit}}
                 .dump()
-         << '\n' << std::flush;
+         << '\n'
+         << std::flush;
     return;
   }
   if (r.result == ModelResult::kOk && mode_ != OutputMode::kQuiet)
     line(fmt::format("{}: {}, {}, {}, peak memory {}{}", models_[job], output, format_bytes(r.package_bytes),
                      format_seconds(r.seconds), format_bytes(r.peak_memory_bytes),
-                     r.stages_hit ? fmt::format(" ({} of {} stages from the cache)", r.stages_hit, r.stages_hit + r.stages_ran) : ""));
+                     r.stages_hit ? fmt::format(" ({} of {} stages from the cache)", r.stages_hit,
+                                                r.stages_hit + r.stages_ran)
+                                  : ""));
   else if (r.result == ModelResult::kUnchanged && mode_ != OutputMode::kQuiet)
     line(fmt::format("{}: {} is up to date", models_[job], output));
   redraw();
@@ -112,16 +131,19 @@ void Progress::finished(std::size_t job, const WorkerReport& r, const std::strin
 
 void Progress::summary(const std::vector<WorkerReport>& reports, double seconds) {
   auto count = [&](ModelResult r) {
-    return std::count_if(reports.begin(), reports.end(), [r](const WorkerReport& x) { return x.result == r; });
+    return std::count_if(reports.begin(), reports.end(),
+                         [r](const WorkerReport& x) { return x.result == r; });
   };
-  const auto ok = count(ModelResult::kOk), same = count(ModelResult::kUnchanged), cancelled = count(ModelResult::kCancelled);
+  const auto ok = count(ModelResult::kOk), same = count(ModelResult::kUnchanged),
+             cancelled = count(ModelResult::kCancelled);
   const auto failed = static_cast<std::ptrdiff_t>(reports.size()) - ok - same - cancelled;
   if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
   if (mode_ == OutputMode::kJson) {
-    out_ << Json{{"event", "summary"}, {"models", reports.size()}, {"compiled", ok}, {"unchanged", same},
-                 {"failed", failed}, {"cancelled", cancelled}, {"seconds", seconds}}
+    out_ << Json{{"event", "summary"}, {"models", reports.size()}, {"compiled", ok},    {"unchanged", same},
+                 {"failed", failed},   {"cancelled", cancelled},   {"seconds", seconds}}
                 .dump()
-         << '\n' << std::flush;
+         << '\n'
+         << std::flush;
     return;
   }
   if (reports.size() < 2 && cancelled == 0) return;

@@ -21,9 +21,10 @@ StageOutputs plain(T value) {
 StageOutputs run_import(const StageInputs& in) {
   ImportedModel m = in.get<Source>("source").import(in.context);
   Notes notes = std::move(m.model.notes);
-  return {{object(ImportedMesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification}),
-           object(std::move(m.model.materials)), object(std::move(m.model.images))},
-          std::move(notes)};
+  return {
+      {object(ImportedMesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification}),
+       object(std::move(m.model.materials)), object(std::move(m.model.images))},
+      std::move(notes)};
 }
 
 StageOutputs run_condition(const StageInputs& in) {
@@ -32,15 +33,18 @@ StageOutputs run_condition(const StageInputs& in) {
 }
 
 StageOutputs run_skeletonization(const StageInputs& in) {
-  return with_notes(skeletonize(in.get<ConditionedMesh>("condition"), in.options.skeletonization, in.context));
+  return with_notes(
+      skeletonize(in.get<ConditionedMesh>("condition"), in.options.skeletonization, in.context));
 }
 
-/// Range scans are filtered on their own grid; condition's map says which conditioned position a sample became.
+/// Range scans are filtered on their own grid; condition's map says which conditioned position a sample
+/// became.
 StageOutputs run_ssf(const StageInputs& in) {
   const auto& conditioned = in.get<ConditionedMesh>("condition");
   const RangeGrid& range = in.get<ImportedMesh>("import.mesh").range;
   if (range.columns == 0) return with_notes(filter_scale_space(conditioned, in.options.ssf, in.context));
-  std::vector<std::uint32_t> conditioned_position(in.get<ImportedMesh>("import.mesh").mesh.positions.size(), 0xffffffffu);
+  std::vector<std::uint32_t> conditioned_position(in.get<ImportedMesh>("import.mesh").mesh.positions.size(),
+                                                  0xffffffffu);
   for (std::size_t i = conditioned.position_source.size(); i-- > 0;)
     conditioned_position.at(conditioned.position_source[i]) = static_cast<std::uint32_t>(i);
   RangeGrid grid = range;
@@ -50,19 +54,20 @@ StageOutputs run_ssf(const StageInputs& in) {
 }
 
 StageOutputs run_simplification(const StageInputs& in) {
-  return with_notes(simplify(in.get<ConditionedMesh>("condition"), in.get<ScaleMap>("ssf"), in.options.simplification,
-                             in.context));
+  return with_notes(simplify(in.get<ConditionedMesh>("condition"), in.get<ScaleMap>("ssf"),
+                             in.options.simplification, in.context));
 }
 
 StageOutputs run_perceptual_values(const StageInputs& in) {
-  return plain(measure_perceptual_values(in.get<NestedScales>("simplification"), in.get<Skeleton>("skeletonization"),
-                                         in.options.perceptual_values, in.context));
+  return plain(measure_perceptual_values(in.get<NestedScales>("simplification"),
+                                         in.get<Skeleton>("skeletonization"), in.options.perceptual_values,
+                                         in.context));
 }
 
 StageOutputs run_fragmentation(const StageInputs& in) {
-  return with_notes(fragment_textures(in.get<ConditionedMesh>("condition"), in.get<Materials>("import.materials"),
-                                      in.get<Images>("import.images"), in.get<ScaleMap>("ssf"),
-                                      in.options.fragmentation, in.context));
+  return with_notes(fragment_textures(in.get<ConditionedMesh>("condition"),
+                                      in.get<Materials>("import.materials"), in.get<Images>("import.images"),
+                                      in.get<ScaleMap>("ssf"), in.options.fragmentation, in.context));
 }
 
 StageOutputs run_fill(const StageInputs& in) {
@@ -71,77 +76,175 @@ StageOutputs run_fill(const StageInputs& in) {
 }
 
 StageOutputs run_zim(const StageInputs& in) {
-  return plain(predict_quality(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.options.zim, in.context));
+  return plain(predict_quality(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.options.zim,
+                               in.context));
 }
 
 StageOutputs run_ladder(const StageInputs& in) {
-  return plain(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.options.ladder, in.context));
+  return plain(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.options.ladder,
+                             in.context));
 }
 
 StageOutputs run_lut(const StageInputs& in) {
-  return plain(build_tables(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.get<Predictors>("zim"),
-                            in.get<Ladder>("ladder"), in.options.lut, in.context));
+  return plain(build_tables(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
+                            in.get<Predictors>("zim"), in.get<Ladder>("ladder"), in.options.lut, in.context));
 }
 
 StageOutputs run_scales(const StageInputs& in) {
-  return with_notes(write_scales(in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
-                                 in.get<Materials>("import.materials"), in.get<Images>("import.images"),
-                                 in.get<Fragments>("fragmentation"), in.get<Ladder>("ladder"), in.options.scales,
-                                 in.context));
+  return with_notes(write_scales(
+      in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
+      in.get<Materials>("import.materials"), in.get<Images>("import.images"),
+      in.get<Fragments>("fragmentation"), in.get<Ladder>("ladder"), in.options.scales, in.context));
 }
 
 StageOutputs run_quality(const StageInputs& in) {
-  return plain(measure_quality(in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
-                               in.get<Materials>("import.materials"), in.get<Fragments>("fragmentation"),
-                               in.get<Planes>("fill"), in.get<Ladder>("ladder"), in.options.quality, in.context));
+  return plain(
+      measure_quality(in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
+                      in.get<Materials>("import.materials"), in.get<Fragments>("fragmentation"),
+                      in.get<Planes>("fill"), in.get<Ladder>("ladder"), in.options.quality, in.context));
 }
 
 StageOutputs run_package(const StageInputs& in) {
-  return plain(assemble_package(in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
-                                in.get<Images>("import.images"), in.get<Fragments>("fragmentation"),
-                                in.get<Ladder>("ladder"), in.get<PackageTables>("lut"), in.get<ScaleFiles>("scales"),
-                                in.get<QualityTable>("quality"), in.options.perceptual_values.jnd,
-                                in.get<std::string>("provenance"), in.options.package, in.context));
+  return plain(assemble_package(
+      in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
+      in.get<Images>("import.images"), in.get<Fragments>("fragmentation"), in.get<Ladder>("ladder"),
+      in.get<PackageTables>("lut"), in.get<ScaleFiles>("scales"), in.get<QualityTable>("quality"),
+      in.options.perceptual_values.jnd, in.get<std::string>("provenance"), in.options.package, in.context));
 }
 
 Artefact derived(std::string name) { return {std::move(name), nullptr, nullptr}; }
 
 std::vector<Stage> make_table() {
   return {
-      {"import", kImportVersion, "file -> mesh, materials, images", {"source"},
-       {artefact<ImportedMesh>("import.mesh"), artefact<Materials>("import.materials"), artefact<Images>("import.images")},
-       {"import"}, {"draco", "meshoptimizer", "openimageio", "tinygltf"}, true, run_import},
-      {"condition", kConditionVersion, "mesh -> 2-manifold mesh: weld, drop degenerates, split, components",
-       {"import.mesh"}, {artefact<ConditionedMesh>("condition")}, {"condition"}, {}, true, run_condition},
-      {"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)",
-       {"condition"}, {artefact<Skeleton>("skeletonization")}, {"skeletonization"}, {"cgal", "meshoptimizer"}, true, run_skeletonization},
-      {"ssf", kSsfVersion, "mesh -> scale map: the highest scale at which a vertex is a feature",
-       {"import.mesh", "condition"}, {artefact<ScaleMap>("ssf")}, {"ssf"}, {}, true, run_ssf},
-      {"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales",
-       {"condition", "ssf"}, {artefact<NestedScales>("simplification")}, {"simplification"}, {}, true, run_simplification},
-      {"perceptual_values", kPerceptualValuesVersion, "scales, R -> perceptual values, major scales, step function",
-       {"simplification", "skeletonization"}, {artefact<PerceptualValues>("perceptual_values")}, {"perceptual_values"}, {}, true,
+      {"import",
+       kImportVersion,
+       "file -> mesh, materials, images",
+       {"source"},
+       {artefact<ImportedMesh>("import.mesh"), artefact<Materials>("import.materials"),
+        artefact<Images>("import.images")},
+       {"import"},
+       {"draco", "meshoptimizer", "openimageio", "tinygltf"},
+       true,
+       run_import},
+      {"condition",
+       kConditionVersion,
+       "mesh -> 2-manifold mesh: weld, drop degenerates, split, components",
+       {"import.mesh"},
+       {artefact<ConditionedMesh>("condition")},
+       {"condition"},
+       {},
+       true,
+       run_condition},
+      {"skeletonization",
+       kSkeletonizationVersion,
+       "mesh -> curve skeleton, R(v)",
+       {"condition"},
+       {artefact<Skeleton>("skeletonization")},
+       {"skeletonization"},
+       {"cgal", "meshoptimizer"},
+       true,
+       run_skeletonization},
+      {"ssf",
+       kSsfVersion,
+       "mesh -> scale map: the highest scale at which a vertex is a feature",
+       {"import.mesh", "condition"},
+       {artefact<ScaleMap>("ssf")},
+       {"ssf"},
+       {},
+       true,
+       run_ssf},
+      {"simplification",
+       kSimplificationVersion,
+       "mesh, scale map -> collapse sequence, nested scales",
+       {"condition", "ssf"},
+       {artefact<NestedScales>("simplification")},
+       {"simplification"},
+       {},
+       true,
+       run_simplification},
+      {"perceptual_values",
+       kPerceptualValuesVersion,
+       "scales, R -> perceptual values, major scales, step function",
+       {"simplification", "skeletonization"},
+       {artefact<PerceptualValues>("perceptual_values")},
+       {"perceptual_values"},
+       {},
+       true,
        run_perceptual_values},
-      {"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta",
-       {"condition", "import.materials", "import.images", "ssf"}, {artefact<Fragments>("fragmentation")},
-       {"fragmentation"}, {"openimageio"}, true, run_fragmentation},
-      {"fill", kFragmentationVersion * 100 + kDecodeImageVersion, "images, coverage -> filled texels (derived, never stored)",
-       {"fragmentation", "import.images"}, {derived("fill")}, {"fragmentation.fill"}, {"libjpeg-turbo", "openimageio"}, false, run_fill},
-      {"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP",
-       {"fragmentation", "fill"}, {artefact<Predictors>("zim")}, {"zim"}, {}, true, run_zim},
-      {"ladder", kLadderVersion, "fragments -> rungs of abbreviated JPEGs, previews",
-       {"fragmentation", "fill"}, {artefact<Ladder>("ladder")}, {"ladder"}, {"libjpeg-turbo"}, true, run_ladder},
-      {"lut", kLutVersion, "fragments, predictors, ladder -> quality and size tables",
-       {"fragmentation", "fill", "zim", "ladder"}, {artefact<PackageTables>("lut")}, {"lut"}, {"libjpeg-turbo"}, true, run_lut},
-      {"scales", kScalesVersion, "kept scales -> standalone GLB files",
-       {"simplification", "perceptual_values", "import.materials", "import.images", "fragmentation", "ladder"},
-       {artefact<ScaleFiles>("scales")}, {"scales"}, {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, true, run_scales},
-      {"quality", kQualityVersion, "scales x rungs -> measured quality of rendered samples",
+      {"fragmentation",
+       kFragmentationVersion,
+       "images, mesh -> grids, coverage, feature counts, eta",
+       {"condition", "import.materials", "import.images", "ssf"},
+       {artefact<Fragments>("fragmentation")},
+       {"fragmentation"},
+       {"openimageio"},
+       true,
+       run_fragmentation},
+      {"fill",
+       kFragmentationVersion * 100 + kDecodeImageVersion,
+       "images, coverage -> filled texels (derived, never stored)",
+       {"fragmentation", "import.images"},
+       {derived("fill")},
+       {"fragmentation.fill"},
+       {"libjpeg-turbo", "openimageio"},
+       false,
+       run_fill},
+      {"zim",
+       kZimVersion,
+       "fragments -> predictors Z, I, M, VQP",
+       {"fragmentation", "fill"},
+       {artefact<Predictors>("zim")},
+       {"zim"},
+       {},
+       true,
+       run_zim},
+      {"ladder",
+       kLadderVersion,
+       "fragments -> rungs of abbreviated JPEGs, previews",
+       {"fragmentation", "fill"},
+       {artefact<Ladder>("ladder")},
+       {"ladder"},
+       {"libjpeg-turbo"},
+       true,
+       run_ladder},
+      {"lut",
+       kLutVersion,
+       "fragments, predictors, ladder -> quality and size tables",
+       {"fragmentation", "fill", "zim", "ladder"},
+       {artefact<PackageTables>("lut")},
+       {"lut"},
+       {"libjpeg-turbo"},
+       true,
+       run_lut},
+      {"scales",
+       kScalesVersion,
+       "kept scales -> standalone GLB files",
+       {"simplification", "perceptual_values", "import.materials", "import.images", "fragmentation",
+        "ladder"},
+       {artefact<ScaleFiles>("scales")},
+       {"scales"},
+       {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
+       true,
+       run_scales},
+      {"quality",
+       kQualityVersion,
+       "scales x rungs -> measured quality of rendered samples",
        {"simplification", "perceptual_values", "import.materials", "fragmentation", "fill", "ladder"},
-       {artefact<QualityTable>("quality")}, {"quality"}, {"libjpeg-turbo"}, true, run_quality},
-      {"package", kPackageVersion, "everything -> the container",
-       {"simplification", "perceptual_values", "import.images", "fragmentation", "ladder", "lut", "scales", "quality", "provenance"},
-       {artefact<PackageBytes>("package")}, {"package", "perceptual_values.jnd"}, {}, true, run_package},
+       {artefact<QualityTable>("quality")},
+       {"quality"},
+       {"libjpeg-turbo"},
+       true,
+       run_quality},
+      {"package",
+       kPackageVersion,
+       "everything -> the container",
+       {"simplification", "perceptual_values", "import.images", "fragmentation", "ladder", "lut", "scales",
+        "quality", "provenance"},
+       {artefact<PackageBytes>("package")},
+       {"package", "perceptual_values.jnd"},
+       {},
+       true,
+       run_package},
   };
 }
 

@@ -18,7 +18,7 @@ using Object = std::shared_ptr<const void>;
 
 /// One output of a stage: how to get it into and out of the store.
 struct Artefact {
-  std::string name;   // "condition", or "stage.part" where a stage has several outputs
+  std::string name;  // "condition", or "stage.part" where a stage has several outputs
   std::function<std::vector<std::uint8_t>(const void*)> encode;
   std::function<Object(std::span<const std::uint8_t>)> decode;
 };
@@ -29,7 +29,9 @@ class StageInputs {
   StageInputs(const CompileOptions& all_options, const RunContext& run_context)
       : options(all_options), context(run_context) {}
   template <class T>
-  const T& get(const std::string& artefact) const { return *static_cast<const T*>(objects.at(artefact).get()); }
+  const T& get(const std::string& artefact) const {
+    return *static_cast<const T*>(objects.at(artefact).get());
+  }
 
   const CompileOptions& options;
   const RunContext& context;
@@ -41,17 +43,18 @@ struct StageOutputs {
   Notes notes;
 };
 
-/// One node of the graph. `options` names what of CompileOptions the stage reads, as sections ("ssf") or single fields
+/// One node of the graph. `options` names what of CompileOptions the stage reads, as sections ("ssf") or
+/// single fields
 /// ("perceptual_values.jnd"); together with version, libraries and input digests that is its key.
 struct Stage {
   std::string name;
   int version = 1;
-  std::string summary;                  // one line for `texmesh stages`
-  std::vector<std::string> inputs;      // artefact names; "source" and "provenance" come from outside the graph
+  std::string summary;              // one line for `texmesh stages`
+  std::vector<std::string> inputs;  // artefact names; "source" and "provenance" come from outside the graph
   std::vector<Artefact> outputs;
   std::vector<std::string> options;
-  std::vector<std::string> libraries;   // whose versions change bytes; see library_versions.h
-  bool stored = true;                   // false: derived data, computed when somebody needs it, never kept
+  std::vector<std::string> libraries;  // whose versions change bytes; see library_versions.h
+  bool stored = true;                  // false: derived data, computed when somebody needs it, never kept
   std::function<StageOutputs(const StageInputs&)> run;
 };
 
@@ -66,7 +69,9 @@ Artefact artefact(std::string name) {
   return a;
 }
 template <class T>
-Object object(T value) { return std::make_shared<const T>(std::move(value)); }
+Object object(T value) {
+  return std::make_shared<const T>(std::move(value));
+}
 
 /// What import hands on, apart from images and materials.
 struct ImportedMesh {
@@ -74,7 +79,9 @@ struct ImportedMesh {
   RangeGrid range;
   bool normals_by_specification = false;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.mesh, s.range, s.normals_by_specification); }
+  static void archive(S& s, A& a) {
+    a(s.mesh, s.range, s.normals_by_specification);
+  }
 };
 
 /// The artefact "source": the model file behind its import.
@@ -82,7 +89,8 @@ struct Source {
   std::function<ImportedModel(const RunContext&)> import;
 };
 
-/// The whole graph, in an order in which every input stands before its use. This is the one place where it can be read.
+/// The whole graph, in an order in which every input stands before its use. This is the one place where it
+/// can be read.
 const std::vector<Stage>& stage_table();
 
 }  // namespace texmesh

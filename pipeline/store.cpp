@@ -170,7 +170,9 @@ bool MemoryStore::put_note(const Sha256& key, const std::string& text) {
   return true;
 }
 
-std::unique_ptr<Store> open_disk_store(const std::string& folder) { return std::make_unique<DiskStore>(folder); }
+std::unique_ptr<Store> open_disk_store(const std::string& folder) {
+  return std::make_unique<DiskStore>(folder);
+}
 
 std::string default_cache_folder(const std::string& flag) {
   if (!flag.empty()) return flag;

@@ -46,7 +46,8 @@ class InterruptGuard {
   }
 
  private:
-  struct sigaction old_int_ {}, old_term_ {};
+  struct sigaction old_int_ {
+  }, old_term_{};
 };
 
 struct Child {
@@ -86,7 +87,9 @@ void write_all(int fd, const std::string& text) {
 Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits) {
   Child child;
   child.job = index;
-  child.temporary = job.output.empty() ? "" : job.output + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(index);
+  child.temporary = job.output.empty()
+                        ? ""
+                        : job.output + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(index);
   Pipe in, out, err;
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -101,9 +104,15 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, Json{{"input", job.input}, {"output", job.output}, {"temporary", child.temporary},
-                           {"profile", job.profile}, {"cache", job.cache}, {"strict", job.strict},
-                           {"threads", job.threads}, {"memory_bytes", limits.memory_bytes}, {"cpu_s", limits.cpu_s}}
+  write_all(in.write, Json{{"input", job.input},
+                           {"output", job.output},
+                           {"temporary", child.temporary},
+                           {"profile", job.profile},
+                           {"cache", job.cache},
+                           {"strict", job.strict},
+                           {"threads", job.threads},
+                           {"memory_bytes", limits.memory_bytes},
+                           {"cpu_s", limits.cpu_s}}
                           .dump());
   ::close(in.write);
   child.out = out.read;
@@ -138,9 +147,12 @@ bool drain(int fd, std::string& into) {
   char buffer[65536];
   for (;;) {
     const ssize_t n = ::read(fd, buffer, sizeof buffer);
-    if (n > 0) into.append(buffer, static_cast<std::size_t>(n));
-    else if (n == 0) return false;
-    else if (errno != EINTR) return errno == EAGAIN;
+    if (n > 0)
+      into.append(buffer, static_cast<std::size_t>(n));
+    else if (n == 0)
+      return false;
+    else if (errno != EINTR)
+      return errno == EAGAIN;
   }
 }
 
@@ -154,8 +166,10 @@ void read_events(Child& child, WorkerReport& report, const EventSink& sink) {
   }
 }
 
-void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& job, std::string expected, std::string found) {
-  const InputError e(std::filesystem::path(job.input).filename().string(), "", std::move(expected), std::move(found));
+void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& job, std::string expected,
+               std::string found) {
+  const InputError e(std::filesystem::path(job.input).filename().string(), "", std::move(expected),
+                     std::move(found));
   report.error_kind = kind;
   report.error_file = e.file();
   report.error_expected = e.expected();
@@ -164,8 +178,8 @@ void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& j
 }
 
 /// What the end of a child means for its model.
-void conclude(const Child& child, int status, const rusage& usage, const WorkerLimits& limits, const WorkerJob& job,
-              bool interrupted, WorkerReport& report) {
+void conclude(const Child& child, int status, const rusage& usage, const WorkerLimits& limits,
+              const WorkerJob& job, bool interrupted, WorkerReport& report) {
   report.seconds = std::chrono::duration<double>(Clock::now() - child.start).count();
   report.peak_memory_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
   const bool finished = WIFEXITED(status) && WEXITSTATUS(status) == kExitOk;
@@ -181,27 +195,32 @@ void conclude(const Child& child, int status, const rusage& usage, const WorkerL
     return;
   }
   if (child.timed_out) {
-    set_error(report, "resource", job, "at most " + std::to_string(limits.wall_s) + " s", "a model that takes longer");
+    set_error(report, "resource", job, "at most " + std::to_string(limits.wall_s) + " s",
+              "a model that takes longer");
   } else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
-    set_error(report, "resource", job, "at most " + std::to_string(limits.cpu_s) + " s of processor time", "a model that takes more");
+    set_error(report, "resource", job, "at most " + std::to_string(limits.cpu_s) + " s of processor time",
+              "a model that takes more");
   } else {
     report.result = ModelResult::kInternal;
     const std::string how = WIFSIGNALED(status) ? std::string("signal ") + strsignal(WTERMSIG(status))
                                                 : "exit code " + std::to_string(WEXITSTATUS(status));
-    set_error(report, "internal", job, "a worker that finishes", how + (child.last_words.empty() ? "" : ": " + child.last_words));
+    set_error(report, "internal", job, "a worker that finishes",
+              how + (child.last_words.empty() ? "" : ": " + child.last_words));
   }
 }
 
 std::string error_line(const WorkerReport& r) {
-  return Json{{"event", "error"}, {"kind", r.error_kind}, {"file", r.error_file}, {"place", r.error_place},
-              {"expected", r.error_expected}, {"found", r.error_found}, {"message", r.error_message}}
+  return Json{{"event", "error"},          {"kind", r.error_kind},         {"file", r.error_file},
+              {"place", r.error_place},    {"expected", r.error_expected}, {"found", r.error_found},
+              {"message", r.error_message}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 /// All children of one run.
 class Pool {
  public:
-  Pool(const std::vector<WorkerJob>& jobs, const WorkerLimits& limits, const EventSink& sink, const FinishSink& finished)
+  Pool(const std::vector<WorkerJob>& jobs, const WorkerLimits& limits, const EventSink& sink,
+       const FinishSink& finished)
       : jobs_(jobs), limits_(limits), sink_(sink), finished_(finished), reports_(jobs.size()) {
     for (WorkerReport& r : reports_) r.result = ModelResult::kCancelled;
   }
@@ -210,7 +229,8 @@ class Pool {
     std::size_t next = 0;
     bool stop = false;
     while (!children_.empty() || (next < jobs_.size() && !stop && !g_interrupted)) {
-      while (next < jobs_.size() && !stop && !g_interrupted && children_.size() < static_cast<std::size_t>(parallel)) {
+      while (next < jobs_.size() && !stop && !g_interrupted &&
+             children_.size() < static_cast<std::size_t>(parallel)) {
         reports_[next].result = ModelResult::kInternal;
         children_.push_back(start_child(jobs_[next], next, limits_));
         ++next;
@@ -293,8 +313,9 @@ class Pool {
 
 }  // namespace
 
-std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel, const WorkerLimits& limits,
-                                      bool stop_on_failure, const EventSink& sink, const FinishSink& finished) {
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel,
+                                      const WorkerLimits& limits, bool stop_on_failure, const EventSink& sink,
+                                      const FinishSink& finished) {
   const InterruptGuard guard;
   return Pool(jobs, limits, sink, finished).run(std::max(parallel, 1), stop_on_failure);
 }

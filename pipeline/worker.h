@@ -18,8 +18,8 @@ struct WorkerLimits {
 /// One model for a child process.
 struct WorkerJob {
   std::string input, output;
-  std::string profile;         // JSON of every option
-  std::string cache;           // folder, "" = none
+  std::string profile;  // JSON of every option
+  std::string cache;    // folder, "" = none
   bool strict = false;
   int threads = 1;
 };
@@ -39,14 +39,17 @@ struct WorkerReport {
 using EventSink = std::function<void(std::size_t job, const std::string& json_line)>;
 using FinishSink = std::function<void(std::size_t job, const WorkerReport& report)>;
 
-/// Compiles the jobs, each in a fresh child process of this executable (posix_spawn, never a fork of a threaded
-/// parent), at most `parallel` side by side, and returns a report per job in their order. A child that dies, hangs or
-/// outgrows its limits costs its own model only. SIGINT and SIGTERM end all children within two seconds and leave no
-/// temporary file; what had not finished is kCancelled. stop_on_failure: no further child starts after a failure.
-std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel, const WorkerLimits& limits,
-                                      bool stop_on_failure, const EventSink& sink, const FinishSink& finished);
+/// Compiles the jobs, each in a fresh child process of this executable (posix_spawn, never a fork of a
+/// threaded parent), at most `parallel` side by side, and returns a report per job in their order. A child
+/// that dies, hangs or outgrows its limits costs its own model only. SIGINT and SIGTERM end all children
+/// within two seconds and leave no temporary file; what had not finished is kCancelled. stop_on_failure: no
+/// further child starts after a failure.
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel,
+                                      const WorkerLimits& limits, bool stop_on_failure, const EventSink& sink,
+                                      const FinishSink& finished);
 
-/// The child's side: reads a job from standard input, writes event lines to standard output, returns the exit code.
+/// The child's side: reads a job from standard input, writes event lines to standard output, returns the exit
+/// code.
 int worker_main();
 
 }  // namespace texmesh

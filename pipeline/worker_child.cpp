@@ -63,29 +63,38 @@ void apply_limits(const Json& job) {
 }
 
 StageObserver stage_events(EventWriter& events) {
-  return [&events, last = std::chrono::steady_clock::time_point{}](const Stage& stage, StageEvent event, double fraction,
-                                                                  double seconds) mutable {
+  return [&events, last = std::chrono::steady_clock::time_point{}](const Stage& stage, StageEvent event,
+                                                                   double fraction, double seconds) mutable {
     const auto now = std::chrono::steady_clock::now();
     switch (event) {
-      case StageEvent::kStarted: events.write({{"event", "stage-started"}, {"stage", stage.name}}); break;
+      case StageEvent::kStarted:
+        events.write({{"event", "stage-started"}, {"stage", stage.name}});
+        break;
       case StageEvent::kProgress:
         if (now - last < std::chrono::milliseconds(100)) return;
         last = now;
         events.write({{"event", "stage-progress"}, {"stage", stage.name}, {"fraction", fraction}});
         break;
       case StageEvent::kHit:
-        events.write({{"event", "stage-finished"}, {"stage", stage.name}, {"result", "hit"}, {"seconds", 0.0}});
+        events.write(
+            {{"event", "stage-finished"}, {"stage", stage.name}, {"result", "hit"}, {"seconds", 0.0}});
         break;
       case StageEvent::kRan:
-        events.write({{"event", "stage-finished"}, {"stage", stage.name}, {"result", "ran"}, {"seconds", seconds}});
+        events.write(
+            {{"event", "stage-finished"}, {"stage", stage.name}, {"result", "ran"}, {"seconds", seconds}});
         break;
     }
   };
 }
 
 int report_error(EventWriter& events, const char* kind, const Error& e) {
-  events.write({{"event", "error"}, {"kind", kind}, {"file", e.file()}, {"place", e.place()},
-                {"expected", e.expected()}, {"found", e.found()}, {"message", e.what()}});
+  events.write({{"event", "error"},
+                {"kind", kind},
+                {"file", e.file()},
+                {"place", e.place()},
+                {"expected", e.expected()},
+                {"found", e.found()},
+                {"message", e.what()}});
   return kExitModelFailed;
 }
 
@@ -104,8 +113,11 @@ int compile(const Json& job, EventWriter& events) {
 
   const CompileOutcome outcome = compile_model(request, *store, context, stage_events(events));
   for (const Note& n : outcome.notes)
-    events.write({{"event", "note"}, {"severity", n.severity == Severity::kWarning ? "warning" : "info"},
-                  {"code", n.code}, {"place", n.place}, {"text", n.text}});
+    events.write({{"event", "note"},
+                  {"severity", n.severity == Severity::kWarning ? "warning" : "info"},
+                  {"code", n.code},
+                  {"place", n.place},
+                  {"text", n.text}});
   events.write({{"event", "result"}, {"unchanged", outcome.unchanged}, {"bytes", outcome.package_bytes}});
   return kExitOk;
 }
@@ -129,10 +141,11 @@ int worker_main() {
   } catch (const Cancelled&) {
     return kExitModelFailed;
   } catch (const std::bad_alloc&) {
-    const std::string limit_text = std::to_string(job.value("memory_bytes", std::uint64_t{0}) >> 20) + " MiB of memory";
+    const std::string limit_text =
+        std::to_string(job.value("memory_bytes", std::uint64_t{0}) >> 20) + " MiB of memory";
     return report_error(events, "resource",
-                        InputError(std::filesystem::path(job.value("input", "")).filename().string(), "", "at most " + limit_text,
-                                   "a need for more"));
+                        InputError(std::filesystem::path(job.value("input", "")).filename().string(), "",
+                                   "at most " + limit_text, "a need for more"));
   } catch (const std::exception& e) {
     return report_error(events, "internal", StageError("texmesh", "", "", e.what())), kExitInternal;
   }

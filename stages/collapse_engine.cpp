@@ -7,7 +7,7 @@ namespace texmesh {
 namespace {
 
 constexpr double kLeastNormalCosine = 0.2;  // between a triangle's normal before and after
-constexpr double kFadeBelow = 0.02;         // of the vertices: there the attributes' weight starts to fall to 0
+constexpr double kFadeBelow = 0.02;  // of the vertices: there the attributes' weight starts to fall to 0
 // A little of the moved distance keeps flat places, where every collapse is free, from growing slivers.
 constexpr double kDistanceWeight = 1e-6;
 
@@ -25,8 +25,10 @@ void CollapseQueue::set(std::uint32_t p, double key) {
   }
   const double old = key_[p];
   key_[p] = key;
-  if (key < old) sift_up(at_[p]);
-  else if (key > old) sift_down(at_[p]);
+  if (key < old)
+    sift_up(at_[p]);
+  else if (key > old)
+    sift_down(at_[p]);
 }
 
 void CollapseQueue::erase(std::uint32_t p) {
@@ -99,7 +101,8 @@ void CollapseEngine::add_shape_quadrics() {
   }
 }
 
-/// Planes that stand on open borders and on borders of materials and parts, so that their lines stay where they are.
+/// Planes that stand on open borders and on borders of materials and parts, so that their lines stay where
+/// they are.
 void CollapseEngine::add_border_quadrics() {
   for (std::uint32_t u = 0; u < mesh_.point_count(); ++u) {
     gather(u);
@@ -116,7 +119,8 @@ void CollapseEngine::add_border_quadrics() {
         }
       if (n.valence == 2 && !use_border) continue;
       const Vec3d a = mesh_.point(u), edge = mesh_.point(n.point) - a;
-      const Vec3d normal = face_normal(mesh_.point(face.point[0]), mesh_.point(face.point[1]), mesh_.point(face.point[2]));
+      const Vec3d normal =
+          face_normal(mesh_.point(face.point[0]), mesh_.point(face.point[1]), mesh_.point(face.point[2]));
       const Vec3d across = normalized(cross(edge, normal));
       const double weight = options_.boundary_weight * dot(edge, edge);
       if (!(weight > 0) || across == Vec3d{}) continue;
@@ -126,15 +130,16 @@ void CollapseEngine::add_border_quadrics() {
   }
 }
 
-/// Per material: how long one unit of UV is on the surface (in the unit-diagonal frame), so that the texture's
-/// distortion is a length like the shape's.
+/// Per material: how long one unit of UV is on the surface (in the unit-diagonal frame), so that the
+/// texture's distortion is a length like the shape's.
 std::vector<double> CollapseEngine::attribute_scales(const Mesh& mesh) const {
   std::vector<double> surface, texture, scale;
   for (std::uint32_t f = 0; f < mesh_.faces().size(); ++f) {
     const CollapseMesh::Face& face = mesh_.faces()[f];
     const std::size_t material = mesh.triangle_material[mesh_.face_source(f)];
     if (material >= surface.size()) surface.resize(material + 1), texture.resize(material + 1);
-    surface[material] += length(face_normal(mesh_.point(face.point[0]), mesh_.point(face.point[1]), mesh_.point(face.point[2])));
+    surface[material] += length(
+        face_normal(mesh_.point(face.point[0]), mesh_.point(face.point[1]), mesh_.point(face.point[2])));
     const Vec2d a = to_double(mesh.uv0[mesh_.wedge_source(face.wedge[0])]);
     texture[material] += std::fabs(cross(to_double(mesh.uv0[mesh_.wedge_source(face.wedge[1])]) - a,
                                          to_double(mesh.uv0[mesh_.wedge_source(face.wedge[2])]) - a));
@@ -145,11 +150,14 @@ std::vector<double> CollapseEngine::attribute_scales(const Mesh& mesh) const {
 }
 
 void CollapseEngine::add_attribute_quadrics(const Mesh& mesh) {
-  // Colours guide the collapse only where nothing else carries the look; a full step of a channel then counts as much
-  // as a shift by a twentieth of the diagonal.
+  // Colours guide the collapse only where nothing else carries the look; a full step of a channel then counts
+  // as much as a shift by a twentieth of the diagonal.
   constexpr double kColourLength = 0.05;
   const bool uv = !mesh.uv0.empty(), colour = !uv && !mesh.colours.empty();
-  channels_ = options_.uv_weight > 0 && options_.order != CollapseOrder::kThesis ? (uv ? 2 : colour ? 3 : 0) : 0;
+  channels_ = options_.uv_weight > 0 && options_.order != CollapseOrder::kThesis ? (uv       ? 2
+                                                                                    : colour ? 3
+                                                                                             : 0)
+                                                                                 : 0;
   attribute_quadric_ = AttributeQuadrics(channels_);
   if (channels_ == 0) return;
   attribute_.assign(mesh_.wedge_count() * channels_, 0);
@@ -179,14 +187,16 @@ void CollapseEngine::add_attribute_quadrics(const Mesh& mesh) {
     double steepest = 0;
     for (std::size_t k = 0; k < channels_; ++k) {
       const double s0 = attributes(face.wedge[0])[k];
-      gradient[k] = along1 * (attributes(face.wedge[1])[k] - s0) + along2 * (attributes(face.wedge[2])[k] - s0);
+      gradient[k] =
+          along1 * (attributes(face.wedge[1])[k] - s0) + along2 * (attributes(face.wedge[2])[k] - s0);
       steepest = std::max(steepest, dot(gradient[k], gradient[k]));
     }
     // Where charts are folded to slivers the gradient runs away; its weight must not.
     if (steepest > 64) area *= 64 / steepest;
     for (std::uint32_t w : face.wedge) {
       for (std::size_t k = 0; k < channels_; ++k)
-        attribute_quadric_.add_channel(w, k, gradient[k], attributes(face.wedge[0])[k] - dot(gradient[k], p0), area);
+        attribute_quadric_.add_channel(w, k, gradient[k], attributes(face.wedge[0])[k] - dot(gradient[k], p0),
+                                       area);
       attribute_quadric_.add_area(w, area);
     }
   }
@@ -201,8 +211,8 @@ std::uint32_t CollapseEngine::slot_of(std::uint32_t point) {
   return slot_[point];
 }
 
-/// Fills corners_, neighbours_ and ring_wedges_ for a point, and counts its odd edges: those that are not inside a
-/// surface of two faces per edge (or of four where two sheets lie on each other).
+/// Fills corners_, neighbours_ and ring_wedges_ for a point, and counts its odd edges: those that are not
+/// inside a surface of two faces per edge (or of four where two sheets lie on each other).
 void CollapseEngine::gather(std::uint32_t u) {
   ++now_;
   corners_.clear();
@@ -245,9 +255,9 @@ bool CollapseEngine::allowed_by_borders(const Neighbour& n) const {
   return odd_edges_ == 2 && !odd_mixed_ && n.valence == odd_valence_;
 }
 
-/// Sets target_ from the faces that the collapse removes. Every wedge must be mapped, to one wedge. A junction of
-/// charts may move along a seam or border all the same: the wedges of the charts that are not beside the edge then
-/// keep their attributes.
+/// Sets target_ from the faces that the collapse removes. Every wedge must be mapped, to one wedge. A
+/// junction of charts may move along a seam or border all the same: the wedges of the charts that are not
+/// beside the edge then keep their attributes.
 bool CollapseEngine::map_wedges(std::uint32_t u, const Neighbour& n) {
   target_.assign(ring_wedges_.size(), kNone);
   std::size_t mapped = 0;
@@ -292,12 +302,17 @@ void CollapseEngine::price(std::uint32_t u, Neighbour& n) {
   double distortion = 0;
   if (channels_ > 0)
     for (std::size_t w = 0; w < ring_wedges_.size(); ++w)
-      distortion += attribute_quadric_.at(ring_wedges_[w], p, attributes(target_[w] == kNone ? ring_wedges_[w] : target_[w]));
-  const double weight = options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
-  n.cost = (shape + options_.uv_weight * fade_ * distortion + kDistanceWeight * q.weight * dot(moved, moved)) * (1 + weight);
+      distortion += attribute_quadric_.at(ring_wedges_[w], p,
+                                          attributes(target_[w] == kNone ? ring_wedges_[w] : target_[w]));
+  const double weight =
+      options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
+  n.cost =
+      (shape + options_.uv_weight * fade_ * distortion + kDistanceWeight * q.weight * dot(moved, moved)) *
+      (1 + weight);
 }
 
-/// The link condition on the welded surface, twins as one: no new non-manifold edge, no new hole, nothing vanishes.
+/// The link condition on the welded surface, twins as one: no new non-manifold edge, no new hole, nothing
+/// vanishes.
 bool CollapseEngine::keeps_topology(std::uint32_t u, std::uint32_t slot) {
   const std::uint32_t v = neighbours_[slot].point;
   for (Neighbour& n : neighbours_) n.faces = n.far_valence = 0;
@@ -340,7 +355,8 @@ bool CollapseEngine::keeps_orientation(std::uint32_t u, std::uint32_t slot) cons
     const Vec3d a = mesh_.point(neighbours_[c.a].point), b = mesh_.point(neighbours_[c.b].point);
     const Vec3d before = face_normal(from, a, b), after = face_normal(to, a, b);
     const double square = dot(before, before) * dot(after, after), along = dot(before, after);
-    if (dot(before, before) > 0 && (along <= 0 || along * along <= kLeastNormalCosine * kLeastNormalCosine * square))
+    if (dot(before, before) > 0 &&
+        (along <= 0 || along * along <= kLeastNormalCosine * kLeastNormalCosine * square))
       return false;
     if (input_.uv0.empty() || target_[c.wedge] == kNone) continue;
     const CollapseMesh::Face& face = mesh_.faces()[c.face];
@@ -362,8 +378,10 @@ CollapseEngine::Best CollapseEngine::evaluate(std::uint32_t u) {
     Neighbour& n = neighbours_[slot];
     if (!allowed_by_borders(n) || !map_wedges(u, n)) continue;
     price(u, n);
-    if (n.error > options_.max_error) best.too_far = true;
-    else order_.push_back(slot);
+    if (n.error > options_.max_error)
+      best.too_far = true;
+    else
+      order_.push_back(slot);
   }
   std::sort(order_.begin(), order_.end(), [&](std::uint32_t x, std::uint32_t y) {
     const Neighbour &a = neighbours_[x], &b = neighbours_[y];
@@ -383,8 +401,10 @@ CollapseEngine::Best CollapseEngine::evaluate(std::uint32_t u) {
 
 void CollapseEngine::refresh(std::uint32_t p) {
   const Best best = evaluate(p);
-  if (best.found) queue_.set(p, best.key);
-  else queue_.erase(p);
+  if (best.found)
+    queue_.set(p, best.key);
+  else
+    queue_.erase(p);
   some_too_far_ = some_too_far_ || (best.too_far && !best.found);
 }
 
@@ -393,10 +413,12 @@ void CollapseEngine::apply(std::uint32_t u, const Neighbour& n) {
   const auto error = static_cast<float>(n.error * mesh_.diagonal());
   auto destination = [&](std::uint32_t position) {
     for (std::uint32_t i = 0; i < n.pairs; ++i)
-      if (mesh_.wedge_position(ring_wedges_[n.pair[i].from]) == position) return mesh_.wedge_position(n.pair[i].to);
+      if (mesh_.wedge_position(ring_wedges_[n.pair[i].from]) == position)
+        return mesh_.wedge_position(n.pair[i].to);
     return kNone;
   };
-  for (std::uint32_t position : mesh_.members(u)) collapses_.push_back({position, destination(position), error});
+  for (std::uint32_t position : mesh_.members(u))
+    collapses_.push_back({position, destination(position), error});
   quadric_[v].add(quadric_[u]);
   for (std::size_t w = 0; w < ring_wedges_.size(); ++w) {
     const std::uint32_t wedge = ring_wedges_[w];
@@ -410,12 +432,13 @@ void CollapseEngine::apply(std::uint32_t u, const Neighbour& n) {
     }
   }
   mesh_.collapse(u, v, [&](std::uint32_t wedge) {
-    return target_[static_cast<std::size_t>(std::find(ring_wedges_.begin(), ring_wedges_.end(), wedge) - ring_wedges_.begin())];
+    return target_[static_cast<std::size_t>(std::find(ring_wedges_.begin(), ring_wedges_.end(), wedge) -
+                                            ring_wedges_.begin())];
   });
 }
 
-/// Points without a legal collapse are looked at again when their own ring changes; changes two edges away may free
-/// them as well, so before giving up all of them are tried once more.
+/// Points without a legal collapse are looked at again when their own ring changes; changes two edges away
+/// may free them as well, so before giving up all of them are tried once more.
 bool CollapseEngine::retry_locked() {
   if (given_up_at_ == collapses_.size()) return false;
   given_up_at_ = collapses_.size();
@@ -432,7 +455,8 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
   std::vector<std::uint32_t> ring;
   for (std::uint32_t step = 0; mesh_.alive_positions() > positions; ++step) {
     if (step % 4096 == 0) context.check_cancelled();
-    if (mesh_.alive_faces() <= static_cast<std::uint32_t>(options_.min_triangles)) return CollapseStop::kFewTriangles;
+    if (mesh_.alive_faces() <= static_cast<std::uint32_t>(options_.min_triangles))
+      return CollapseStop::kFewTriangles;
     if (queue_.empty() && (++retries > kRetries || !retry_locked()))
       return some_too_far_ ? CollapseStop::kTooFar : CollapseStop::kLocked;
     const std::uint32_t u = queue_.top();
@@ -453,12 +477,14 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
     for (const Neighbour& n : neighbours_) ring.push_back(n.point);
     apply(u, chosen);
     queue_.erase(u);
-    // Costs changed around u only. Farther neighbours of the target may have become free, or no longer be: the first
-    // are tried now, the second when their turn comes.
+    // Costs changed around u only. Farther neighbours of the target may have become free, or no longer be:
+    // the first are tried now, the second when their turn comes.
     const std::size_t around = ring.size();
     gather(chosen.point);
     for (const Neighbour& n : neighbours_)
-      if (!queue_.contains(n.point) && std::find(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(around), n.point) == ring.begin() + static_cast<std::ptrdiff_t>(around))
+      if (!queue_.contains(n.point) &&
+          std::find(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(around), n.point) ==
+              ring.begin() + static_cast<std::ptrdiff_t>(around))
         ring.push_back(n.point);
     for (std::uint32_t p : ring) refresh(p);
   }

@@ -26,7 +26,9 @@ class CollapseQueue {
 
  private:
   static constexpr std::uint32_t kOut = 0xffffffffu;
-  bool before(std::uint32_t a, std::uint32_t b) const { return key_[a] < key_[b] || (key_[a] == key_[b] && a < b); }
+  bool before(std::uint32_t a, std::uint32_t b) const {
+    return key_[a] < key_[b] || (key_[a] == key_[b] && a < b);
+  }
   void sift_up(std::size_t i);
   void sift_down(std::size_t i);
   std::vector<double> key_;
@@ -36,10 +38,11 @@ class CollapseQueue {
 /// Carries the half-edge collapses out, cheapest first, on a CollapseMesh.
 class CollapseEngine {
  public:
-  CollapseEngine(const ConditionedMesh& input, const ScaleMap& scale_map, const SimplificationOptions& options);
+  CollapseEngine(const ConditionedMesh& input, const ScaleMap& scale_map,
+                 const SimplificationOptions& options);
 
-  /// Collapses until at most `positions` are left, or something else stops it. `scale` bounds the thesis order: it
-  /// only removes points whose persistence is under it.
+  /// Collapses until at most `positions` are left, or something else stops it. `scale` bounds the thesis
+  /// order: it only removes points whose persistence is under it.
   CollapseStop run_to(std::uint32_t positions, int scale, const RunContext& context);
 
   const CollapseMesh& mesh() const { return mesh_; }
@@ -48,14 +51,22 @@ class CollapseEngine {
  private:
   static constexpr std::uint32_t kNone = CollapseMesh::kNone;
   static constexpr int kMaxValence = 4;  // faces at an edge; an edge with more locks
-  struct Pair { std::uint32_t from = 0, to = 0; };  // index into ring_wedges_ -> wedge of the neighbour
+  struct Pair {
+    std::uint32_t from = 0, to = 0;
+  };  // index into ring_wedges_ -> wedge of the neighbour
   struct Neighbour {
     std::uint32_t point = 0, valence = 0, pairs = 0, faces = 0, far_valence = 0;
     std::array<Pair, kMaxValence> pair;
     double cost = 0, error = 0;
   };
-  struct Corner { std::uint32_t face = 0, corner = 0, a = 0, b = 0, wedge = 0; };  // a, b: neighbour slots
-  struct Best { bool found = false, too_far = false; double key = 0; std::uint32_t slot = 0; };
+  struct Corner {
+    std::uint32_t face = 0, corner = 0, a = 0, b = 0, wedge = 0;
+  };  // a, b: neighbour slots
+  struct Best {
+    bool found = false, too_far = false;
+    double key = 0;
+    std::uint32_t slot = 0;
+  };
 
   void add_shape_quadrics();
   void add_border_quadrics();
@@ -80,12 +91,12 @@ class CollapseEngine {
   const SimplificationOptions& options_;
   CollapseMesh mesh_;
   std::uint32_t initial_positions_ = 0;
-  double fade_ = 1;  // of the attributes' weight
-  std::vector<Quadric> quadric_;            // per point
+  double fade_ = 1;               // of the attributes' weight
+  std::vector<Quadric> quadric_;  // per point
   std::size_t channels_ = 0;
-  std::vector<double> attribute_;           // per wedge: its attributes in units of length
-  AttributeQuadrics attribute_quadric_;     // per wedge
-  std::vector<std::uint8_t> persistence_;   // per point: highest of its positions
+  std::vector<double> attribute_;          // per wedge: its attributes in units of length
+  AttributeQuadrics attribute_quadric_;    // per wedge
+  std::vector<std::uint8_t> persistence_;  // per point: highest of its positions
   std::vector<Collapse> collapses_;
   CollapseQueue queue_;
   bool some_too_far_ = false;
@@ -94,9 +105,10 @@ class CollapseEngine {
   // The ring around the point that is being looked at:
   std::vector<Corner> corners_;
   std::vector<Neighbour> neighbours_;
-  std::vector<std::uint32_t> ring_wedges_, target_;  // wedges of the point; where the candidate maps each, kNone = keeps
+  std::vector<std::uint32_t> ring_wedges_,
+      target_;  // wedges of the point; where the candidate maps each, kNone = keeps
   std::vector<std::uint32_t> order_;
-  std::vector<std::uint32_t> stamp_, slot_;          // per point
+  std::vector<std::uint32_t> stamp_, slot_;  // per point
   std::uint32_t now_ = 0;
   std::uint32_t odd_edges_ = 0, odd_valence_ = 0, usual_valence_ = 2;
   bool odd_mixed_ = false;

@@ -19,7 +19,9 @@ std::uint64_t spread_bits(std::uint64_t x) {  // 21 bits -> every third bit
 
 /// `p` in the unit-diagonal frame, so every coordinate lies in [-0.5, 0.5].
 std::uint64_t morton_code(Vec3d p) {
-  auto cell = [](double x) { return static_cast<std::uint64_t>(std::clamp((x + 0.5) * 2097151.0, 0.0, 2097151.0)); };
+  auto cell = [](double x) {
+    return static_cast<std::uint64_t>(std::clamp((x + 0.5) * 2097151.0, 0.0, 2097151.0));
+  };
   return spread_bits(cell(p.x)) | spread_bits(cell(p.y)) << 1 | spread_bits(cell(p.z)) << 2;
 }
 
@@ -33,7 +35,8 @@ CollapseMesh::CollapseMesh(const ConditionedMesh& input) {
   build_lists();
 }
 
-void CollapseMesh::number_points(const ConditionedMesh& input, std::vector<std::uint32_t>& point_of_position) {
+void CollapseMesh::number_points(const ConditionedMesh& input,
+                                 std::vector<std::uint32_t>& point_of_position) {
   const std::vector<Vec3f>& positions = input.mesh.positions;
   const std::size_t n = positions.size();
   Vec3d lo = to_double(positions.at(0)), hi = lo;
@@ -94,7 +97,8 @@ void CollapseMesh::add_faces(const Mesh& mesh, const std::vector<std::uint32_t>&
 void CollapseMesh::number_wedges(const Mesh& mesh) {
   input_wedges_ = static_cast<std::uint32_t>(mesh.wedge_count());
   std::vector<std::uint32_t> first(input_wedges_, kNone), group(input_wedges_, 0);
-  std::map<std::array<std::uint32_t, 2>, std::uint32_t> others;  // wedges that more than one material or part uses
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t>
+      others;  // wedges that more than one material or part uses
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     const std::size_t t = face_source_[f];
     const std::uint32_t use = std::uint32_t{mesh.triangle_material[t]} << 16 | mesh.triangle_part[t];

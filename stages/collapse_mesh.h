@@ -9,10 +9,11 @@
 
 namespace texmesh {
 
-/// The triangle mesh that simplification works on. Its vertices are *points*: groups of twin positions, so that the
-/// position-welded surface is what keeps its topology. Its wedges are the mesh's, split further by material and part,
-/// so that a border of materials behaves like a seam. Points, wedges and triangles are numbered along a space-filling
-/// curve: on a million triangles the collapse loop runs more than twice as fast than in file order.
+/// The triangle mesh that simplification works on. Its vertices are *points*: groups of twin positions, so
+/// that the position-welded surface is what keeps its topology. Its wedges are the mesh's, split further by
+/// material and part, so that a border of materials behaves like a seam. Points, wedges and triangles are
+/// numbered along a space-filling curve: on a million triangles the collapse loop runs more than twice as
+/// fast than in file order.
 class CollapseMesh {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -43,16 +44,16 @@ class CollapseMesh {
   }
   bool is_multiple(std::uint32_t p) const { return member_begin_[p + 1] - member_begin_[p] > 1; }
   std::uint32_t wedge_position(std::uint32_t w) const { return wedge_position_[w]; }  // position of the input
-  std::uint32_t wedge_source(std::uint32_t w) const { return wedge_source_[w]; }      // wedge with the attributes
-  std::uint32_t face_source(std::uint32_t f) const { return face_source_[f]; }        // triangle of the input
+  std::uint32_t wedge_source(std::uint32_t w) const { return wedge_source_[w]; }  // wedge with the attributes
+  std::uint32_t face_source(std::uint32_t f) const { return face_source_[f]; }    // triangle of the input
   std::uint32_t alive_faces() const { return alive_faces_; }
   std::uint32_t alive_positions() const { return alive_positions_; }
   bool is_alive(std::uint32_t p) const { return lists_[p].count != 0; }
 
   /// A wedge with the attributes of `wedge` at `position`.
   std::uint32_t add_wedge(std::uint32_t wedge, std::uint32_t position);
-  /// Merges `from` into `to`: faces with both are removed, other corners of `from` get point `to` and the wedge that
-  /// `wedge_map(old wedge)` names.
+  /// Merges `from` into `to`: faces with both are removed, other corners of `from` get point `to` and the
+  /// wedge that `wedge_map(old wedge)` names.
   template <class WedgeMap>
   void collapse(std::uint32_t from, std::uint32_t to, WedgeMap&& wedge_map) {
     moved_.clear();
@@ -79,7 +80,9 @@ class CollapseMesh {
   const std::vector<NewWedge>& new_wedges() const { return new_wedges_; }
 
  private:
-  struct List { std::uint32_t begin = 0, count = 0, capacity = 0; };
+  struct List {
+    std::uint32_t begin = 0, count = 0, capacity = 0;
+  };
   void number_points(const ConditionedMesh& input, std::vector<std::uint32_t>& point_of_position);
   void add_faces(const Mesh& mesh, const std::vector<std::uint32_t>& point_of_position);
   void number_wedges(const Mesh& mesh);

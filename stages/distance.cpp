@@ -44,7 +44,8 @@ double triangle_distance2(Vec3d a, Vec3d b, Vec3d c) {
 
 }  // namespace
 
-SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions, const std::vector<std::uint32_t>& wedge_position,
+SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions,
+                                 const std::vector<std::uint32_t>& wedge_position,
                                  const std::vector<Triangle>& triangles) {
   const std::size_t n = triangles.size();
   std::vector<Vec3f> centres(n);
@@ -74,8 +75,8 @@ SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions, const std:
   }
 }
 
-void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32_t end, std::vector<std::uint32_t>& order,
-                            const std::vector<Vec3f>& centres) {
+void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
+                            std::vector<std::uint32_t>& order, const std::vector<Vec3f>& centres) {
   if (end - begin <= kLeafTriangles) {
     nodes_[node].first = begin;
     nodes_[node].count = end - begin;
@@ -89,9 +90,11 @@ void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32
   const Vec3f size = hi - lo;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   const std::uint32_t middle = begin + (end - begin) / 2;
-  std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end, [&](std::uint32_t a, std::uint32_t b) {
-    return centres[a][axis] < centres[b][axis] || (centres[a][axis] == centres[b][axis] && a < b);
-  });
+  std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end,
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     return centres[a][axis] < centres[b][axis] ||
+                            (centres[a][axis] == centres[b][axis] && a < b);
+                   });
   const auto child = static_cast<std::uint32_t>(nodes_.size());
   nodes_.resize(nodes_.size() + 2);
   nodes_[node].first = child;
@@ -100,7 +103,10 @@ void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32
 }
 
 double SurfaceDistance::operator()(Vec3d p) const {
-  struct Open { std::uint32_t node; double distance2; };
+  struct Open {
+    std::uint32_t node;
+    double distance2;
+  };
   Open stack[64];
   int depth = 0;
   double best = std::numeric_limits<double>::infinity();
@@ -111,8 +117,9 @@ double SurfaceDistance::operator()(Vec3d p) const {
     const Node& node = nodes_[open.node];
     if (node.count > 0) {
       for (std::uint32_t t = node.first; t < node.first + node.count; ++t)
-        best = std::min(best, triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
-                                                 to_double(corners_[3 * t + 2]) - p));
+        best = std::min(best,
+                        triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
+                                           to_double(corners_[3 * t + 2]) - p));
       continue;
     }
     Open near{node.first, box_distance2(p, nodes_[node.first].lo, nodes_[node.first].hi)};

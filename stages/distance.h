@@ -7,8 +7,8 @@
 
 namespace texmesh {
 
-/// Answers "how far is this point from the surface" exactly (point to triangle), about a million times a second.
-/// Binary tree of boxes, split at the median of the triangles' centres. Deterministic.
+/// Answers "how far is this point from the surface" exactly (point to triangle), about a million times a
+/// second. Binary tree of boxes, split at the median of the triangles' centres. Deterministic.
 class SurfaceDistance {
  public:
   /// Triangles index `wedge_position`, which indexes `positions`. At least one triangle.
@@ -20,7 +20,8 @@ class SurfaceDistance {
  private:
   struct Node {
     Vec3f lo, hi;
-    std::uint32_t first = 0, count = 0;  // leaf: corners_[3 * first ..]; inner (count 0): children at first, first + 1
+    std::uint32_t first = 0,
+                  count = 0;  // leaf: corners_[3 * first ..]; inner (count 0): children at first, first + 1
   };
   void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end, std::vector<std::uint32_t>& order,
              const std::vector<Vec3f>& centres);
@@ -34,8 +35,8 @@ struct SurfaceSample {
   float weight[3] = {1, 0, 0};
 };
 
-/// `count` points spread over the surface in proportion to area: equal steps along the running sum of areas, weights
-/// from a low-discrepancy sequence. Deterministic; empty when no triangle has an area.
+/// `count` points spread over the surface in proportion to area: equal steps along the running sum of areas,
+/// weights from a low-discrepancy sequence. Deterministic; empty when no triangle has an area.
 std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
                                           const std::vector<std::uint32_t>& wedge_position,
                                           const std::vector<Triangle>& triangles, std::size_t count);

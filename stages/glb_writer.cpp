@@ -43,7 +43,8 @@ std::size_t GlbWriter::add_accessor(Json accessor) {
 
 void GlbWriter::use_extension(const std::string& name, bool required) {
   auto add = [&](std::vector<std::string>& list) {
-    if (std::find(list.begin(), list.end(), name) == list.end()) list.insert(std::upper_bound(list.begin(), list.end(), name), name);
+    if (std::find(list.begin(), list.end(), name) == list.end())
+      list.insert(std::upper_bound(list.begin(), list.end(), name), name);
   };
   add(used_);
   if (required) add(required_);
@@ -74,7 +75,8 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
   if (!views_.empty()) root["bufferViews"] = views_;
   root["buffers"] = Json::array({{{"byteLength", bin.size()}}});
   if (fallback_bytes_)
-    root["buffers"].push_back({{"byteLength", fallback_bytes_}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
+    root["buffers"].push_back({{"byteLength", fallback_bytes_},
+                               {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
 
   const std::string text = root.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::vector<std::uint8_t> json(text.begin(), text.end());

@@ -8,8 +8,8 @@
 
 namespace texmesh {
 
-/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB. Included by .cpp files
-/// of that stage only, because it brings the JSON library along.
+/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB. Included by
+/// .cpp files of that stage only, because it brings the JSON library along.
 class GlbWriter {
  public:
   using Json = nlohmann::ordered_json;
@@ -28,7 +28,8 @@ class GlbWriter {
   /// A second buffer of this size that holds nothing (EXT_meshopt_compression's fallback); 0 = none.
   void set_fallback_buffer(std::size_t bytes) { fallback_bytes_ = bytes; }
 
-  /// The file. JSON keys in a fixed order, no blanks, shortest numbers: the same document gives the same bytes.
+  /// The file. JSON keys in a fixed order, no blanks, shortest numbers: the same document gives the same
+  /// bytes.
   std::vector<std::uint8_t> finish() const;
 
   /// A number that prints as the shortest decimal that is this float again.
@@ -37,8 +38,9 @@ class GlbWriter {
  private:
   std::vector<std::uint8_t> bin_;
   Json views_ = Json::array(), accessors_ = Json::array();
-  std::map<std::string, Json> arrays_{{"nodes", Json::array()},    {"meshes", Json::array()}, {"materials", Json::array()},
-                                      {"textures", Json::array()}, {"images", Json::array()}, {"samplers", Json::array()}};
+  std::map<std::string, Json> arrays_{{"nodes", Json::array()},     {"meshes", Json::array()},
+                                      {"materials", Json::array()}, {"textures", Json::array()},
+                                      {"images", Json::array()},    {"samplers", Json::array()}};
   std::vector<std::string> used_, required_;
   std::size_t fallback_bytes_ = 0;
 };

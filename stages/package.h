@@ -25,13 +25,15 @@ struct PackageOptions {
 };
 
 /// Describes the model in a manifest, packs every rung's fragments by importance, and lays out the container
-/// (format/package_writer.h). Throws StageError when the stages' results do not belong together, FormatError when the
-/// title or a value breaks a rule of the format. A pure function of its inputs: nothing runs in parallel here.
-/// `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates, hosts or paths).
+/// (format/package_writer.h). Throws StageError when the stages' results do not belong together, FormatError
+/// when the title or a value breaks a rule of the format. A pure function of its inputs: nothing runs in
+/// parallel here. `provenance_json` is made by the pipeline (options, input digests, stage versions; no
+/// dates, hosts or paths).
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const PackageTables& tables, const ScaleFiles& files,
-                                           const QualityTable& quality, double jnd, const std::string& provenance_json,
-                                           const PackageOptions& options, const RunContext& context);
+                                           const Ladder& ladder, const PackageTables& tables,
+                                           const ScaleFiles& files, const QualityTable& quality, double jnd,
+                                           const std::string& provenance_json, const PackageOptions& options,
+                                           const RunContext& context);
 
 }  // namespace texmesh

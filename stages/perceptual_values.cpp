@@ -17,7 +17,8 @@ struct SampledScale {
   std::vector<double> radius;
 };
 
-SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius, std::size_t count) {
+SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius,
+                          std::size_t count) {
   SampledScale out;
   for (const SurfaceSample& s : sample_surface(mesh.positions, mesh.wedge_position, scale.triangles, count)) {
     Vec3d p;
@@ -47,12 +48,14 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
                                        std::vector<std::uint32_t>& survivor) {
   const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
   // Backwards, so that a chain's end is known before the links that lead to it.
-  for (std::size_t i = end; i-- > begin;) survivor[scales.collapses[i].from] = survivor[scales.collapses[i].to];
+  for (std::size_t i = end; i-- > begin;)
+    survivor[scales.collapses[i].from] = survivor[scales.collapses[i].to];
   CollapseStatistics out;
   double sum = 0, squares = 0, least = 0, most = 0;
   for (std::size_t i = begin; i < end; ++i) {
     const std::uint32_t removed = scales.collapses[i].from, left = survivor[removed];
-    const double rho = std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) / skeleton.radius[left];
+    const double rho = std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) /
+                       skeleton.radius[left];
     sum += rho, squares += rho * rho;
     least = i == begin ? rho : std::min(least, rho);
     most = std::max(most, rho);
@@ -61,7 +64,8 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   if (end == begin) return out;
   const double mean = sum / n;
   out.collapses = static_cast<std::uint32_t>(end - begin);
-  out.mean = static_cast<float>(mean), out.max = static_cast<float>(most), out.min = static_cast<float>(least);
+  out.mean = static_cast<float>(mean), out.max = static_cast<float>(most),
+  out.min = static_cast<float>(least);
   out.deviation = static_cast<float>(std::sqrt(std::max(squares / n - mean * mean, 0.0)));
   out.sum = static_cast<float>(sum), out.rss = static_cast<float>(std::sqrt(squares));
   return out;
@@ -73,7 +77,8 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   const Mesh& mesh = scales.mesh;
   const std::size_t n = scales.scales.size();
   std::vector<SampledScale> sampled;
-  for (std::size_t i = 0; i + 1 < n; ++i) sampled.push_back(sample_scale(mesh, scales.scales[i], skeleton.radius, samples));
+  for (std::size_t i = 0; i + 1 < n; ++i)
+    sampled.push_back(sample_scale(mesh, scales.scales[i], skeleton.radius, samples));
   std::vector<double> error(n, 0);
   for (std::size_t j = 1; j < n; ++j) {
     const SurfaceDistance surface(mesh.positions, mesh.wedge_position, scales.scales[j].triangles);
@@ -93,7 +98,8 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   return error;
 }
 
-void find_majors(const std::vector<float>& value, std::size_t n, double jnd, std::vector<std::uint8_t>& major) {
+void find_majors(const std::vector<float>& value, std::size_t n, double jnd,
+                 std::vector<std::uint8_t>& major) {
   for (std::size_t i = 0; i + 1 < n;) {
     std::size_t last = i + 1;
     while (last + 1 < n && value[i * n + last] < jnd && value[i * n + last + 1] < jnd) ++last;
@@ -106,7 +112,9 @@ void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& 
   const std::size_t n = scales.scales.size();
   out.kept = out.major;
   out.kept[0] = out.kept[n - 1] = 1;
-  auto log_triangles = [&](std::size_t k) { return portable::log(static_cast<double>(scales.scales[k].triangles.size())); };
+  auto log_triangles = [&](std::size_t k) {
+    return portable::log(static_cast<double>(scales.scales[k].triangles.size()));
+  };
   const double top = log_triangles(0), span = top - log_triangles(n - 1);
   const double step = std::max(span / kept_scales, portable::log(2));
   for (int m = 1; m <= kept_scales; ++m) {
@@ -123,7 +131,8 @@ double shortest_edge(const Mesh& mesh, const NestedScale& scale, double percent)
   edges.reserve(3 * scale.triangles.size());
   for (const Triangle& t : scale.triangles)
     for (std::size_t k = 0; k < 3; ++k)
-      edges.push_back(length(to_double(mesh.positions[mesh.wedge_position[t[k]]]) - to_double(mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]])));
+      edges.push_back(length(to_double(mesh.positions[mesh.wedge_position[t[k]]]) -
+                             to_double(mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]])));
   return percentile(edges, percent);
 }
 
@@ -132,14 +141,16 @@ float height_px(double numerator, double denominator) {
   return static_cast<float>(std::min<double>(px, kAnyHeightPx));
 }
 
-void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error, const PerceptualValuesOptions& options,
-                            const std::vector<float>& value, PerceptualValues& out) {
+void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
+                            const PerceptualValuesOptions& options, const std::vector<float>& value,
+                            PerceptualValues& out) {
   Vec3f lo = scales.mesh.positions.at(0), hi = lo;
   for (Vec3f p : scales.mesh.positions)
     for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
   out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
-    out.display_px_edge.push_back(height_px(out.object_height, shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile)));
+    out.display_px_edge.push_back(
+        height_px(out.object_height, shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile)));
     out.display_px_error.push_back(height_px(out.object_height, error[k]));
     out.display_px_jnd.push_back(height_px(kJndReferencePx * options.jnd, value[k]));
     if (k == 0) continue;
@@ -151,10 +162,12 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
 }  // namespace
 
 PerceptualValues measure_perceptual_values(const NestedScales& scales, const Skeleton& skeleton,
-                                           const PerceptualValuesOptions& options, const RunContext& context) {
+                                           const PerceptualValuesOptions& options,
+                                           const RunContext& context) {
   const std::size_t n = scales.scales.size(), positions = scales.mesh.positions.size();
   if (skeleton.distance.size() != positions || skeleton.radius.size() != positions)
-    throw StageError("perceptual_values", "skeleton", std::to_string(positions) + " positions", std::to_string(skeleton.distance.size()));
+    throw StageError("perceptual_values", "skeleton", std::to_string(positions) + " positions",
+                     std::to_string(skeleton.distance.size()));
   PerceptualValues out;
   out.step.resize(n);
   out.p95.assign(n * n, 0), out.p99.assign(n * n, 0);
@@ -162,7 +175,8 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
   std::vector<std::uint32_t> survivor(positions);
   for (std::size_t p = 0; p < positions; ++p) survivor[p] = static_cast<std::uint32_t>(p);
   for (std::size_t k = 1; k < n; ++k) out.step[k] = collapse_statistics(scales, k, skeleton, survivor);
-  const std::vector<double> error = compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
+  const std::vector<double> error =
+      compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
   const std::vector<float>& value = options.statistic == PerceptualStatistic::kP99 ? out.p99 : out.p95;
   find_majors(value, n, options.jnd, out.major);
   choose_kept(scales, options.kept_scales, out);

@@ -21,57 +21,69 @@ struct EnumNames<PerceptualStatistic> {
 struct PerceptualValuesOptions {
   double jnd = 0.10;  // just-noticeable relative change of the skeleton distance
   PerceptualStatistic statistic = PerceptualStatistic::kP95;
-  int samples = 4000;          // points compared per pair of scales: the percentiles' ranks are within 0.5 % then
-  int kept_scales = 8;         // about how many scales a package holds beside S_0 and the major ones
+  int samples = 4000;   // points compared per pair of scales: the percentiles' ranks are within 0.5 % then
+  int kept_scales = 8;  // about how many scales a package holds beside S_0 and the major ones
   double edge_percentile = 5;  // E_S of the O_V / E_S rule: this percentile of the edge lengths; 0 = shortest
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("jnd", s.jnd, Range{0.001, 1}, "just-noticeable relative change of the distance to the skeleton");
-    v("statistic", s.statistic, "which percentile of the relative change decides: p95, or p99 for close views");
+    v("statistic", s.statistic,
+      "which percentile of the relative change decides: p95, or p99 for close views");
     v("samples", s.samples, Range{100, 1000000}, "points compared per pair of scales");
-    v("kept_scales", s.kept_scales, Range{1, 40}, "scales a package holds, about; steps of about 2x between them");
-    v("edge_percentile", s.edge_percentile, Range{0, 50}, "percentile of the edge lengths that counts as shortest edge");
+    v("kept_scales", s.kept_scales, Range{1, 40},
+      "scales a package holds, about; steps of about 2x between them");
+    v("edge_percentile", s.edge_percentile, Range{0, 50},
+      "percentile of the edge lengths that counts as shortest edge");
   }
 };
 
-/// Displayed height in px at which `jnd` is what judges could just tell: the thesis's stimuli stood side by side on
-/// monitors of 1024..1280 px (Table 7.3; Fig. 7.14 speaks of 90..170 px from skeleton to surface). A change of the
-/// surface subtends more when the object is shown larger, so the relative change that is just noticeable at a displayed
-/// height of D px is taken as jnd * kJndReferencePx / D.
+/// Displayed height in px at which `jnd` is what judges could just tell: the thesis's stimuli stood side by
+/// side on monitors of 1024..1280 px (Table 7.3; Fig. 7.14 speaks of 90..170 px from skeleton to surface). A
+/// change of the surface subtends more when the object is shown larger, so the relative change that is just
+/// noticeable at a displayed height of D px is taken as jnd * kJndReferencePx / D.
 inline constexpr double kJndReferencePx = 512;
 /// Stands for "any displayed height" where a scale does not differ from S_0.
 inline constexpr float kAnyHeightPx = 1e9f;
 
-/// The thesis's statistics of rho = |R_R - R_C| / R_C over the collapses of one scale change (Table 7.1). R_R and R_C are
-/// skeleton distances of the removed vertex and of the one that represents it at the coarser scale (chains included);
-/// the divisor is the floored R_eff, because R comes near 0 where the skeleton touches the surface.
-/// rss = root of the sum of squares, which fits the cumulative Table 7.2 where the sum does not.
+/// The thesis's statistics of rho = |R_R - R_C| / R_C over the collapses of one scale change (Table 7.1). R_R
+/// and R_C are skeleton distances of the removed vertex and of the one that represents it at the coarser
+/// scale (chains included); the divisor is the floored R_eff, because R comes near 0 where the skeleton
+/// touches the surface. rss = root of the sum of squares, which fits the cumulative Table 7.2 where the sum
+/// does not.
 struct CollapseStatistics {
   float mean = 0, max = 0, min = 0, deviation = 0, sum = 0, rss = 0;
   std::uint32_t collapses = 0;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.mean, s.max, s.min, s.deviation, s.sum, s.rss, s.collapses); }
+  static void archive(S& s, A& a) {
+    a(s.mean, s.max, s.min, s.deviation, s.sum, s.rss, s.collapses);
+  }
 };
 
-/// rho_ij(p) = dist(p, S_j) / R_eff(p) for points p spread over S_i by area; p95 and p99 are its percentiles. (The
-/// thesis's per-collapse values shrink with the density of the mesh; a distance between surfaces does not.)
-/// Index k below counts NestedScales::scales (0 = S_0), not scale numbers.
+/// rho_ij(p) = dist(p, S_j) / R_eff(p) for points p spread over S_i by area; p95 and p99 are its percentiles.
+/// (The thesis's per-collapse values shrink with the density of the mesh; a distance between surfaces does
+/// not.) Index k below counts NestedScales::scales (0 = S_0), not scale numbers.
 struct PerceptualValues {
-  std::vector<CollapseStatistics> step;   // [k]: change from k-1 to k; [0] all zero
-  std::vector<float> p95, p99;            // [i * n + j], j > i: relative distance of S_i's points to S_j; else 0
-  std::vector<std::uint8_t> major;        // [k]: 1 = last of its tier: walking from S_0 or the last major, the last scale
-                                          // before the value reaches the JND, or the next one where none is under it
-  std::vector<std::uint8_t> kept;         // [k]: 1 = stored in the package: S_0, majors, the coarsest, and the scales
-                                          // nearest to kept_scales equal steps of the triangles' number, of 2x or more
-  // Displayed heights never grow with k; kAnyHeightPx for S_0 (edges excepted) and for what does not differ from it.
-  std::vector<float> display_px_edge;     // [k]: O_V / E_S, the displayed height in px that the scale's edges match
-  std::vector<float> display_px_error;    // [k]: displayed height in px up to which the scale's p95 error is <= 1 px
-  std::vector<float> display_px_jnd;      // [k]: displayed height in px up to which p95 (or p99) against S_0 stays
-                                          // under the JND of that height: kJndReferencePx * jnd / value
-  float object_height = 0;                // O_V: largest extent of the bounding box, object units
+  std::vector<CollapseStatistics> step;  // [k]: change from k-1 to k; [0] all zero
+  std::vector<float> p95, p99;  // [i * n + j], j > i: relative distance of S_i's points to S_j; else 0
+  std::vector<std::uint8_t>
+      major;  // [k]: 1 = last of its tier: walking from S_0 or the last major, the last scale
+              // before the value reaches the JND, or the next one where none is under it
+  std::vector<std::uint8_t>
+      kept;  // [k]: 1 = stored in the package: S_0, majors, the coarsest, and the scales
+             // nearest to kept_scales equal steps of the triangles' number, of 2x or more
+  // Displayed heights never grow with k; kAnyHeightPx for S_0 (edges excepted) and for what does not differ
+  // from it.
+  std::vector<float>
+      display_px_edge;  // [k]: O_V / E_S, the displayed height in px that the scale's edges match
+  std::vector<float>
+      display_px_error;  // [k]: displayed height in px up to which the scale's p95 error is <= 1 px
+  std::vector<float> display_px_jnd;  // [k]: displayed height in px up to which p95 (or p99) against S_0
+                                      // stays under the JND of that height: kJndReferencePx * jnd / value
+  float object_height = 0;  // O_V: largest extent of the bounding box, object units
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.step, s.p95, s.p99, s.major, s.kept, s.display_px_edge, s.display_px_error, s.display_px_jnd, s.object_height);
+    a(s.step, s.p95, s.p99, s.major, s.kept, s.display_px_edge, s.display_px_error, s.display_px_jnd,
+      s.object_height);
   }
 };
 

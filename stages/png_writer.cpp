@@ -19,7 +19,8 @@ void put_chunk(std::vector<std::uint8_t>& out, std::string_view type, const std:
   const std::size_t begin = out.size();
   out.insert(out.end(), type.begin(), type.end());
   out.insert(out.end(), data.begin(), data.end());
-  put_u32(out, static_cast<std::uint32_t>(crc32(0, out.data() + begin, static_cast<uInt>(out.size() - begin))));
+  put_u32(out,
+          static_cast<std::uint32_t>(crc32(0, out.data() + begin, static_cast<uInt>(out.size() - begin))));
 }
 
 int paeth(int left, int up, int corner) {
@@ -44,7 +45,8 @@ std::vector<std::uint8_t> filter_row(const Pixels& image, std::uint32_t y, int f
 
 long cost(const std::vector<std::uint8_t>& row) {
   long sum = 0;
-  for (std::size_t i = 1; i < row.size(); ++i) sum += std::abs(static_cast<int>(static_cast<std::int8_t>(row[i])));
+  for (std::size_t i = 1; i < row.size(); ++i)
+    sum += std::abs(static_cast<int>(static_cast<std::int8_t>(row[i])));
   return sum;
 }
 
@@ -53,7 +55,8 @@ long cost(const std::vector<std::uint8_t>& row) {
 std::vector<std::uint8_t> write_png(const Pixels& image) {
   const std::uint32_t channels = image.channels;
   if (image.width_px == 0 || image.height_px == 0 || (channels != 1 && channels != 3 && channels != 4))
-    throw StageError("png", "image", "1, 3 or 4 channels and at least one pixel", std::to_string(channels) + " channels");
+    throw StageError("png", "image", "1, 3 or 4 channels and at least one pixel",
+                     std::to_string(channels) + " channels");
   std::vector<std::uint8_t> rows;
   for (std::uint32_t y = 0; y < image.height_px; ++y) {
     std::vector<std::uint8_t> best = filter_row(image, y, 0);
@@ -71,7 +74,11 @@ std::vector<std::uint8_t> write_png(const Pixels& image) {
   std::vector<std::uint8_t> header;
   put_u32(header, image.width_px);
   put_u32(header, image.height_px);
-  header.insert(header.end(), {8, static_cast<std::uint8_t>(channels == 1 ? 0 : channels == 3 ? 2 : 6), 0, 0, 0});
+  header.insert(header.end(), {8,
+                               static_cast<std::uint8_t>(channels == 1   ? 0
+                                                         : channels == 3 ? 2
+                                                                         : 6),
+                               0, 0, 0});
   std::vector<std::uint8_t> out{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   put_chunk(out, "IHDR", header);
   put_chunk(out, "IDAT", packed);

@@ -27,14 +27,15 @@ struct Quadric {
   }
   /// Never negative: rounding below zero is cut off.
   double at(Vec3d p) const {
-    const double r = p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z + bx)) + p.y * (yy * p.y + 2 * (yz * p.z + by)) +
-                     p.z * (zz * p.z + 2 * bz) + c;
+    const double r = p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z + bx)) +
+                     p.y * (yy * p.y + 2 * (yz * p.z + by)) + p.z * (zz * p.z + 2 * bz) + c;
     return r > 0 ? r : 0;
   }
 };
 
-/// Per wedge, how far K attributes (texture coordinates, colours) at a point are from the linear functions that the
-/// wedge's triangles carry (Hoppe 1999): sum over triangles t and channels k of area_t (g_tk . p + d_tk - s_k)^2.
+/// Per wedge, how far K attributes (texture coordinates, colours) at a point are from the linear functions
+/// that the wedge's triangles carry (Hoppe 1999): sum over triangles t and channels k of area_t (g_tk . p +
+/// d_tk - s_k)^2.
 class AttributeQuadrics {
  public:
   explicit AttributeQuadrics(std::size_t channels = 0) : channels_(channels), stride_(11 + 4 * channels) {}
@@ -63,8 +64,8 @@ class AttributeQuadrics {
   }
   double at(std::size_t wedge, Vec3d p, const double* s) const {
     const double* q = &data_[wedge * stride_];
-    double r = p.x * (q[0] * p.x + 2 * (q[1] * p.y + q[2] * p.z + q[6])) + p.y * (q[3] * p.y + 2 * (q[4] * p.z + q[7])) +
-               p.z * (q[5] * p.z + 2 * q[8]) + q[9];
+    double r = p.x * (q[0] * p.x + 2 * (q[1] * p.y + q[2] * p.z + q[6])) +
+               p.y * (q[3] * p.y + 2 * (q[4] * p.z + q[7])) + p.z * (q[5] * p.z + 2 * q[8]) + q[9];
     for (std::size_t k = 0; k < channels_; ++k) {
       const double* c = q + 11 + 4 * k;
       r += s[k] * (q[10] * s[k] - 2 * (c[0] * p.x + c[1] * p.y + c[2] * p.z + c[3]));

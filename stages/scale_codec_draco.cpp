@@ -16,11 +16,12 @@ namespace {
 using Json = GlbWriter::Json;
 
 template <class Value>
-int add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, int components, draco::DataType data_type,
-                  bool normalized, std::size_t count, const Value& value) {
+int add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, int components,
+                  draco::DataType data_type, bool normalized, std::size_t count, const Value& value) {
   using Element = decltype(value(0));
   draco::GeometryAttribute attribute;
-  attribute.Init(type, nullptr, static_cast<std::int8_t>(components), data_type, normalized, sizeof(Element), 0);
+  attribute.Init(type, nullptr, static_cast<std::int8_t>(components), data_type, normalized, sizeof(Element),
+                 0);
   const int id = mesh.AddAttribute(attribute, true, static_cast<std::uint32_t>(count));
   for (std::uint32_t i = 0; i < count; ++i) {
     const Element element = value(i);
@@ -29,11 +30,12 @@ int add_attribute(draco::Mesh& mesh, draco::GeometryAttribute::Type type, int co
   return id;
 }
 
-/// Draco keeps options as text and prints floats with six decimals, which would shift every grid and shatter those of
-/// small objects; so the text is written here, with all digits.
+/// Draco keeps options as text and prints floats with six decimals, which would shift every grid and shatter
+/// those of small objects; so the text is written here, with all digits.
 std::string exact(float x) {
   char text[64];
-  const auto end = std::to_chars(text, text + sizeof text, static_cast<double>(x), std::chars_format::scientific).ptr;
+  const auto end =
+      std::to_chars(text, text + sizeof text, static_cast<double>(x), std::chars_format::scientific).ptr;
   return {text, end};
 }
 
@@ -51,7 +53,8 @@ void quantise(draco::ExpertEncoder& encoder, int id, const QuantisationGrid& gri
 /// The attributes of a primitive under way: what Draco needs to know about each, and what glTF says about it.
 class DracoPrimitive {
  public:
-  DracoPrimitive(const ScaleCoding& coding, const ScalePrimitive& primitive) : coding_(coding), primitive_(primitive) {
+  DracoPrimitive(const ScaleCoding& coding, const ScalePrimitive& primitive)
+      : coding_(coding), primitive_(primitive) {
     mesh_.set_num_points(static_cast<std::uint32_t>(primitive.wedges.size()));
     mesh_.SetNumFaces(primitive.indices.size() / 3);
     for (std::size_t f = 0; f < primitive.indices.size() / 3; ++f) {
@@ -67,9 +70,11 @@ class DracoPrimitive {
   }
 
   CodedPrimitive code(GlbWriter& writer) {
-    // Equal values get one index, so that connectivity is that of positions and every other attribute's seams are its own.
+    // Equal values get one index, so that connectivity is that of positions and every other attribute's seams
+    // are its own.
     if (!mesh_.DeduplicateAttributeValues()) fail("attributes without repeats", "a failure");
-    // Points that agree in everything (relaxed junctions make some) are one to a decoder; the encoder would count each.
+    // Points that agree in everything (relaxed junctions make some) are one to a decoder; the encoder would
+    // count each.
     mesh_.DeduplicatePointIds();
     draco::ExpertEncoder encoder(mesh_);
     const int speed = 10 - coding_.options.draco_level;
@@ -91,15 +96,17 @@ class DracoPrimitive {
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(buffer.data());
     const std::size_t view = writer.add_view({bytes, buffer.size()});
     coded.json["attributes"] = attributes;
-    coded.json["indices"] = writer.add_accessor(
-        {{"componentType", coded.vertices > 65535 ? 5125 : 5123}, {"count", std::size_t{coded.triangles} * 3}, {"type", "SCALAR"}});
+    coded.json["indices"] = writer.add_accessor({{"componentType", coded.vertices > 65535 ? 5125 : 5123},
+                                                 {"count", std::size_t{coded.triangles} * 3},
+                                                 {"type", "SCALAR"}});
     coded.json["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", view}, {"attributes", ids}};
     writer.use_extension("KHR_draco_mesh_compression", true);
     return coded;
   }
 
  private:
-  /// What a decoder will find. The encoder's own count of points is too high where seams meet at non-manifold vertices.
+  /// What a decoder will find. The encoder's own count of points is too high where seams meet at non-manifold
+  /// vertices.
   static void count_decoded(const draco::EncoderBuffer& encoded, CodedPrimitive& coded) {
     draco::DecoderBuffer bytes;
     bytes.Init(encoded.data(), encoded.size());
@@ -110,8 +117,16 @@ class DracoPrimitive {
     coded.vertices = mesh.value()->num_points();
   }
 
-  struct Attribute { std::string name; int id; Json accessor; };
-  struct Quantised { int id; QuantisationGrid grid; int dimensions; };
+  struct Attribute {
+    std::string name;
+    int id;
+    Json accessor;
+  };
+  struct Quantised {
+    int id;
+    QuantisationGrid grid;
+    int dimensions;
+  };
 
   [[noreturn]] static void fail(std::string expected, std::string found) {
     throw StageError("scales", "draco", std::move(expected), std::move(found));
@@ -120,43 +135,63 @@ class DracoPrimitive {
   void add_positions() {
     const Mesh& m = coding_.mesh;
     auto position = [&](std::uint32_t i) { return m.positions[m.wedge_position[primitive_.wedges[i]]]; };
-    const int id = add_attribute(mesh_, draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32, false, primitive_.wedges.size(), position);
+    const int id = add_attribute(mesh_, draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32, false,
+                                 primitive_.wedges.size(), position);
     quantised_.push_back({id, coding_.position, 3});
-    Vec3f lo{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
+    Vec3f lo{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
+             std::numeric_limits<float>::infinity()};
     Vec3f hi = lo * -1.0f;
     for (std::uint32_t i = 0; i < primitive_.wedges.size(); ++i) {
       const Vec3f p = coding_.position.bits > 0 ? coding_.position.rounded(position(i)) : position(i);
       for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
     }
-    attributes_.push_back({"POSITION", id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC3"}, {"min", {lo.x, lo.y, lo.z}}, {"max", {hi.x, hi.y, hi.z}}}});
+    attributes_.push_back({"POSITION",
+                           id,
+                           {{"componentType", 5126},
+                            {"count", 0},
+                            {"type", "VEC3"},
+                            {"min", {lo.x, lo.y, lo.z}},
+                            {"max", {hi.x, hi.y, hi.z}}}});
   }
 
   void add_normals() {
-    normal_id_ = add_attribute(mesh_, draco::GeometryAttribute::NORMAL, 3, draco::DT_FLOAT32, false, primitive_.wedges.size(),
+    normal_id_ = add_attribute(mesh_, draco::GeometryAttribute::NORMAL, 3, draco::DT_FLOAT32, false,
+                               primitive_.wedges.size(),
                                [&](std::uint32_t i) { return coding_.mesh.normals[primitive_.wedges[i]]; });
     attributes_.push_back({"NORMAL", normal_id_, {{"componentType", 5126}, {"count", 0}, {"type", "VEC3"}}});
   }
 
   void add_uv(int set) {
-    const int id = add_attribute(mesh_, draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32, false, primitive_.wedges.size(),
-                                 [&](std::uint32_t i) { return coding_.uv_values(set)[primitive_.wedges[i]]; });
+    const int id = add_attribute(
+        mesh_, draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32, false, primitive_.wedges.size(),
+        [&](std::uint32_t i) { return coding_.uv_values(set)[primitive_.wedges[i]]; });
     quantised_.push_back({id, coding_.uv[set], 2});
-    attributes_.push_back({"TEXCOORD_" + std::to_string(set), id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC2"}}});
+    attributes_.push_back(
+        {"TEXCOORD_" + std::to_string(set), id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC2"}}});
   }
 
   template <class Element>
   int add_colour_values(draco::DataType type) {
     constexpr float kOne = std::numeric_limits<Element>::max();
-    return add_attribute(mesh_, draco::GeometryAttribute::COLOR, 4, type, true, primitive_.wedges.size(), [&](std::uint32_t i) {
-      const Vec4f c = coding_.mesh.colours[primitive_.wedges[i]];
-      auto code = [](float x) { return static_cast<Element>(std::floor(std::clamp(x, 0.0f, 1.0f) * kOne + 0.5f)); };
-      return std::array<Element, 4>{code(c.x), code(c.y), code(c.z), code(c.w)};
-    });
+    return add_attribute(mesh_, draco::GeometryAttribute::COLOR, 4, type, true, primitive_.wedges.size(),
+                         [&](std::uint32_t i) {
+                           const Vec4f c = coding_.mesh.colours[primitive_.wedges[i]];
+                           auto code = [](float x) {
+                             return static_cast<Element>(std::floor(std::clamp(x, 0.0f, 1.0f) * kOne + 0.5f));
+                           };
+                           return std::array<Element, 4>{code(c.x), code(c.y), code(c.z), code(c.w)};
+                         });
   }
 
   void add_colours() {
-    const int id = coding_.fine_colours ? add_colour_values<std::uint16_t>(draco::DT_UINT16) : add_colour_values<std::uint8_t>(draco::DT_UINT8);
-    attributes_.push_back({"COLOR_0", id, {{"componentType", coding_.fine_colours ? 5123 : 5121}, {"normalized", true}, {"count", 0}, {"type", "VEC4"}}});
+    const int id = coding_.fine_colours ? add_colour_values<std::uint16_t>(draco::DT_UINT16)
+                                        : add_colour_values<std::uint8_t>(draco::DT_UINT8);
+    attributes_.push_back({"COLOR_0",
+                           id,
+                           {{"componentType", coding_.fine_colours ? 5123 : 5121},
+                            {"normalized", true},
+                            {"count", 0},
+                            {"type", "VEC4"}}});
   }
 
   const ScaleCoding& coding_;

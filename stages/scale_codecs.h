@@ -23,7 +23,8 @@ struct ScaleCoding {
   bool fine_colours = false;  // 16 bits, because 8 would change them
   const std::vector<Vec2f>& uv_values(int set) const { return set == 0 ? mesh.uv0 : mesh.uv1; }
   bool positions_are_indices() const {  // the node's transform then leads from grid indices to positions
-    return position.bits > 0 && (options.mesh_codec == MeshCodec::kMeshopt || options.mesh_codec == MeshCodec::kQuantized);
+    return position.bits > 0 &&
+           (options.mesh_codec == MeshCodec::kMeshopt || options.mesh_codec == MeshCodec::kQuantized);
   }
 };
 
@@ -37,6 +38,7 @@ CodedPrimitive code_draco(GlbWriter& writer, const ScaleCoding& coding, const Sc
 
 /// KHR_mesh_quantization, the same under EXT_meshopt_compression, or plain floats, as the options say.
 /// `fallback_bytes` is the running size of the fallback buffer.
-CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive, std::size_t& fallback_bytes);
+CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive,
+                          std::size_t& fallback_bytes);
 
 }  // namespace texmesh

@@ -18,7 +18,8 @@ std::vector<float> edge_lengths(const Mesh& mesh) {
   lengths.reserve(3 * mesh.triangles.size());
   for (const Triangle& t : mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k)
-      lengths.push_back(length(mesh.positions[mesh.wedge_position[t[k]]] - mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]]));
+      lengths.push_back(length(mesh.positions[mesh.wedge_position[t[k]]] -
+                               mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]]));
   return lengths;
 }
 
@@ -29,8 +30,10 @@ std::size_t collapsed_triangles(const Mesh& mesh, const QuantisationGrid& grid) 
     const Vec3f b = grid.place(mesh.positions[mesh.wedge_position[t[1]]]);
     const Vec3f c = grid.place(mesh.positions[mesh.wedge_position[t[2]]]);
     const Vec3d p = to_double(mesh.positions[mesh.wedge_position[t[0]]]);
-    const Vec3d area = cross(to_double(mesh.positions[mesh.wedge_position[t[1]]]) - p, to_double(mesh.positions[mesh.wedge_position[t[2]]]) - p);
-    if (area != Vec3d{} && cross(to_double(b) - to_double(a), to_double(c) - to_double(a)) == Vec3d{}) ++count;
+    const Vec3d area = cross(to_double(mesh.positions[mesh.wedge_position[t[1]]]) - p,
+                             to_double(mesh.positions[mesh.wedge_position[t[2]]]) - p);
+    if (area != Vec3d{} && cross(to_double(b) - to_double(a), to_double(c) - to_double(a)) == Vec3d{})
+      ++count;
   }
   return count;
 }
@@ -42,10 +45,13 @@ std::uint32_t QuantisationGrid::index(float x, int axis) const {
   return static_cast<std::uint32_t>(std::max(std::floor((x - origin[axis]) * scale + 0.5f), 0.0f));
 }
 
-Vec3f QuantisationGrid::rounded(Vec3f p) const { return {value(index(p.x, 0), 0), value(index(p.y, 1), 1), value(index(p.z, 2), 2)}; }
+Vec3f QuantisationGrid::rounded(Vec3f p) const {
+  return {value(index(p.x, 0), 0), value(index(p.y, 1), 1), value(index(p.z, 2), 2)};
+}
 
 Vec3f QuantisationGrid::place(Vec3f p) const {
-  return {static_cast<float>(index(p.x, 0)), static_cast<float>(index(p.y, 1)), static_cast<float>(index(p.z, 2))};
+  return {static_cast<float>(index(p.x, 0)), static_cast<float>(index(p.y, 1)),
+          static_cast<float>(index(p.z, 2))};
 }
 
 QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits) {
@@ -53,7 +59,8 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   QuantisationGrid grid;
   Vec3f hi = grid.origin = mesh.positions.at(0);
   for (Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) grid.origin[k] = std::min(grid.origin[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+    for (int k = 0; k < 3; ++k)
+      grid.origin[k] = std::min(grid.origin[k], p[k]), hi[k] = std::max(hi[k], p[k]);
   const Vec3f size = hi - grid.origin;
   grid.range = std::max({size.x, size.y, size.z});
   if (!(grid.range > 0)) grid.range = 1;
@@ -66,7 +73,8 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   for (float e : edges) sum += e;
   const std::size_t rank = edges.size() / 20;
   std::nth_element(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(rank), edges.end());
-  const double error = std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
+  const double error =
+      std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
   // The farthest that a point moves is half the diagonal of a cell.
   grid.bits = std::max(kLeastBits, bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range));
   while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
@@ -74,7 +82,8 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   return grid;
 }
 
-QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px, const ScalesOptions& options, int max_bits) {
+QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
+                         const ScalesOptions& options, int max_bits) {
   constexpr int kLeastBits = 8;
   QuantisationGrid grid;
   if (uv.empty()) return grid;

@@ -45,7 +45,8 @@ class TextureTable {
     for (const PreviewImage& p : previews) {
       image_of_[p.image] = writer_.array("images").size();
       const std::size_t view = writer_.add_view(p.bytes);
-      writer_.array("images").push_back({{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}, {"bufferView", view}});
+      writer_.array("images").push_back(
+          {{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}, {"bufferView", view}});
     }
   }
 
@@ -58,9 +59,11 @@ class TextureTable {
     if (ref.texcoord != 0) out["texCoord"] = ref.texcoord;
     if (!ref.transform.is_identity()) {
       Json transform;
-      if (ref.transform.offset != Vec2f{0, 0}) transform["offset"] = vector_json({ref.transform.offset.x, ref.transform.offset.y});
+      if (ref.transform.offset != Vec2f{0, 0})
+        transform["offset"] = vector_json({ref.transform.offset.x, ref.transform.offset.y});
       if (ref.transform.rotation != 0) transform["rotation"] = GlbWriter::shortest(ref.transform.rotation);
-      if (ref.transform.scale != Vec2f{1, 1}) transform["scale"] = vector_json({ref.transform.scale.x, ref.transform.scale.y});
+      if (ref.transform.scale != Vec2f{1, 1})
+        transform["scale"] = vector_json({ref.transform.scale.x, ref.transform.scale.y});
       out["extensions"]["KHR_texture_transform"] = transform;
       writer_.use_extension("KHR_texture_transform", false);
     }
@@ -69,11 +72,15 @@ class TextureTable {
 
  private:
   std::size_t sampler(const TextureRef& ref) {
-    const auto [it, fresh] = samplers_.try_emplace({static_cast<int>(ref.wrap_s), static_cast<int>(ref.wrap_t), ref.nearest}, samplers_.size());
+    const auto [it, fresh] = samplers_.try_emplace(
+        {static_cast<int>(ref.wrap_s), static_cast<int>(ref.wrap_t), ref.nearest}, samplers_.size());
     if (fresh) {
       constexpr int kWrap[] = {10497, 33071, 33648};
-      writer_.array("samplers").push_back({{"magFilter", ref.nearest ? 9728 : 9729}, {"minFilter", ref.nearest ? 9984 : 9987},
-                                           {"wrapS", kWrap[static_cast<int>(ref.wrap_s)]}, {"wrapT", kWrap[static_cast<int>(ref.wrap_t)]}});
+      writer_.array("samplers")
+          .push_back({{"magFilter", ref.nearest ? 9728 : 9729},
+                      {"minFilter", ref.nearest ? 9984 : 9987},
+                      {"wrapS", kWrap[static_cast<int>(ref.wrap_s)]},
+                      {"wrapT", kWrap[static_cast<int>(ref.wrap_t)]}});
     }
     return it->second;
   }
@@ -93,7 +100,8 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
   Json out;
   if (!m.name.empty()) out["name"] = m.name;
   Json pbr;
-  pbr["baseColorFactor"] = vector_json({unit(m.base_colour.x), unit(m.base_colour.y), unit(m.base_colour.z), unit(m.base_colour.w)});
+  pbr["baseColorFactor"] = vector_json(
+      {unit(m.base_colour.x), unit(m.base_colour.y), unit(m.base_colour.z), unit(m.base_colour.w)});
   if (Json t = textures.info(m.base_colour_texture); !t.is_null()) pbr["baseColorTexture"] = t;
   pbr["metallicFactor"] = GlbWriter::shortest(unit(m.metallic));
   pbr["roughnessFactor"] = GlbWriter::shortest(unit(m.roughness));
@@ -108,7 +116,8 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
     out["occlusionTexture"] = t;
   }
   if (Json t = textures.info(m.emissive_texture); !t.is_null()) out["emissiveTexture"] = t;
-  if (m.emissive != Vec3f{}) out["emissiveFactor"] = vector_json({unit(m.emissive.x), unit(m.emissive.y), unit(m.emissive.z)});
+  if (m.emissive != Vec3f{})
+    out["emissiveFactor"] = vector_json({unit(m.emissive.x), unit(m.emissive.y), unit(m.emissive.z)});
   if (m.alpha_mode == AlphaMode::kMask) {
     out["alphaMode"] = "MASK";
     out["alphaCutoff"] = GlbWriter::shortest(std::max(m.alpha_cutoff, 0.0f));
@@ -132,17 +141,19 @@ std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladde
     if (plane.role == TextureRole::kAlpha) continue;
     PreviewImage image{plane.image, "image/jpeg", ladder.planes[i].preview};
     for (std::size_t j = 0; j < fragments.planes.size(); ++j) {
-      if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha) continue;
+      if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha)
+        continue;
       image.mime_type = "image/png";
-      image.bytes = combine(decode_jpeg(ladder.planes[i].preview, kMaxPreviewPixels), decode_jpeg(ladder.planes[j].preview, kMaxPreviewPixels));
+      image.bytes = combine(decode_jpeg(ladder.planes[i].preview, kMaxPreviewPixels),
+                            decode_jpeg(ladder.planes[j].preview, kMaxPreviewPixels));
     }
     out.push_back(std::move(image));
   }
   return out;
 }
 
-void write_materials(GlbWriter& writer, const std::vector<Material>& materials, const std::vector<PreviewImage>& previews,
-                     bool has_uv0, bool has_uv1) {
+void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
+                     const std::vector<PreviewImage>& previews, bool has_uv0, bool has_uv1) {
   TextureTable textures(writer, previews, {has_uv0, has_uv1});
   for (const Material& m : materials) writer.array("materials").push_back(material_json(m, textures, writer));
 }

@@ -15,12 +15,13 @@ struct PreviewImage {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane stands beside it.
+/// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane
+/// stands beside it.
 std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladder& ladder);
 
-/// Materials, textures, samplers and images of the document. Textures whose texture coordinates or previews do not
-/// exist are left out. Factors are clipped to the ranges of glTF.
-void write_materials(GlbWriter& writer, const std::vector<Material>& materials, const std::vector<PreviewImage>& previews,
-                     bool has_uv0, bool has_uv1);
+/// Materials, textures, samplers and images of the document. Textures whose texture coordinates or previews
+/// do not exist are left out. Factors are clipped to the ranges of glTF.
+void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
+                     const std::vector<PreviewImage>& previews, bool has_uv0, bool has_uv1);
 
 }  // namespace texmesh

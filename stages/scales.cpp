@@ -15,10 +15,12 @@ using Json = GlbWriter::Json;
 
 /// Largest factor by which a material stretches texture coordinates, times the largest image's side.
 double largest_texture_px(const std::vector<Material>& materials, const std::vector<Image>& images, int set) {
-  constexpr double kUntextured = 4096;  // coordinates without a texture are kept as if there were one of this size
+  constexpr double kUntextured =
+      4096;  // coordinates without a texture are kept as if there were one of this size
   double largest = 0;
   for (const Material& m : materials)
-    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture, &m.emissive_texture}) {
+    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture,
+                                &m.occlusion_texture, &m.emissive_texture}) {
       if (!t->used() || t->texcoord != set) continue;
       const Image& image = images.at(static_cast<std::size_t>(t->image));
       const double stretch = std::max(std::fabs(t->transform.scale.x), std::fabs(t->transform.scale.y));
@@ -29,7 +31,8 @@ double largest_texture_px(const std::vector<Material>& materials, const std::vec
 
 bool uses_texcoord(const std::vector<Material>& materials, int set) {
   for (const Material& m : materials)
-    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture, &m.emissive_texture})
+    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture,
+                                &m.occlusion_texture, &m.emissive_texture})
       if (t->used() && t->texcoord == set) return true;
   return false;
 }
@@ -40,11 +43,12 @@ bool needs_fine_colours(const std::vector<Vec4f>& colours) {
     const float scaled = std::clamp(x, 0.0f, 1.0f) * 255;
     return std::fabs(scaled - std::floor(scaled + 0.5f)) < 1e-3f;
   };
-  return !std::all_of(colours.begin(), colours.end(), [&](Vec4f c) { return coarse(c.x) && coarse(c.y) && coarse(c.z) && coarse(c.w); });
+  return !std::all_of(colours.begin(), colours.end(),
+                      [&](Vec4f c) { return coarse(c.x) && coarse(c.y) && coarse(c.z) && coarse(c.w); });
 }
 
-ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials, const std::vector<Image>& images,
-                        const ScalesOptions& options) {
+ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials,
+                        const std::vector<Image>& images, const ScalesOptions& options) {
   constexpr int kDracoBits = 24, kShortBits = 16;  // floats hold no more than 24; an unsigned short 16
   ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours)};
   const bool draco = options.mesh_codec == MeshCodec::kDraco;
@@ -55,21 +59,25 @@ ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials
   for (int set = 0; set < 2; ++set) {
     if (!coding.write_uv[set]) continue;
     QuantisationGrid& grid = coding.uv[set];
-    grid = uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), options, draco ? kDracoBits : kShortBits);
+    grid = uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), options,
+                   draco ? kDracoBits : kShortBits);
     if (draco) continue;
-    const bool unit = grid.bits > 0 && grid.origin.x >= 0 && grid.origin.y >= 0 && grid.origin.x + grid.range <= 1 && grid.origin.y + grid.range <= 1;
+    const bool unit = grid.bits > 0 && grid.origin.x >= 0 && grid.origin.y >= 0 &&
+                      grid.origin.x + grid.range <= 1 && grid.origin.y + grid.range <= 1;
     grid = QuantisationGrid{};
     if (unit) grid.bits = kShortBits;
   }
   return coding;
 }
 
-/// Above this many parts they are merged: each costs 0.8 KB of JSON and a code stream of its own in every scale (a
-/// SketchUp model of 5,391 groups took 5.9 MB per scale, 4.2 MB of it JSON).
+/// Above this many parts they are merged: each costs 0.8 KB of JSON and a code stream of its own in every
+/// scale (a SketchUp model of 5,391 groups took 5.9 MB per scale, 4.2 MB of it JSON).
 constexpr std::size_t kMostNodes = 256;
 
-/// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and go.
-std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale, const QuantisationGrid& grid) {
+/// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
+/// go.
+std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale,
+                                             const QuantisationGrid& grid) {
   std::map<std::array<std::uint16_t, 2>, ScalePrimitive> primitives;
   for (std::size_t i = 0; i < scale.triangles.size(); ++i) {
     const Triangle& t = scale.triangles[i];
@@ -79,7 +87,8 @@ std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale
       if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
     }
     const std::uint32_t source = scale.triangle_source[i];
-    const std::uint16_t part = mesh.part_names.size() > kMostNodes ? std::uint16_t{0} : mesh.triangle_part[source];
+    const std::uint16_t part =
+        mesh.part_names.size() > kMostNodes ? std::uint16_t{0} : mesh.triangle_part[source];
     const std::array<std::uint16_t, 2> key{part, mesh.triangle_material[source]};
     ScalePrimitive& p = primitives[key];
     p.part = key[0], p.material = key[1];
@@ -117,8 +126,8 @@ Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_i
   return node;
 }
 
-ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale, const std::vector<Material>& materials,
-                      const std::vector<PreviewImage>& previews) {
+ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
+                      const std::vector<Material>& materials, const std::vector<PreviewImage>& previews) {
   ScaleFile file;
   file.scale = scale.scale;
   GlbWriter writer;
@@ -126,20 +135,23 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale, const
   int open_part = -1;
   for (ScalePrimitive& primitive : split_primitives(coding.mesh, scale, coding.position)) {
     const std::uint16_t part = primitive.part, material = primitive.material;
-    CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco ? code_draco(writer, coding, primitive)
-                                                                          : code_plain(writer, coding, std::move(primitive), fallback_bytes);
+    CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco
+                               ? code_draco(writer, coding, primitive)
+                               : code_plain(writer, coding, std::move(primitive), fallback_bytes);
     coded.json["material"] = material;
     file.triangles += coded.triangles;
     file.vertices += coded.vertices;
     if (open_part != part) {
       open_part = part;
       writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
-      writer.array("meshes").push_back({{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
+      writer.array("meshes").push_back(
+          {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
     }
     writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));
   }
   if (file.triangles == 0)
-    throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid", std::to_string(coding.position.bits) + " bits per coordinate collapse all");
+    throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid",
+                     std::to_string(coding.position.bits) + " bits per coordinate collapse all");
   writer.set_fallback_buffer(fallback_bytes);
   write_materials(writer, materials, previews, coding.write_uv[0], coding.write_uv[1]);
   file.glb = writer.finish();
@@ -158,9 +170,10 @@ double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
 
 }  // namespace
 
-ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Material>& materials,
-                        const std::vector<Image>& images, const Fragments& fragments, const Ladder& ladder,
-                        const ScalesOptions& options, const RunContext& context) {
+ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                        const std::vector<Material>& materials, const std::vector<Image>& images,
+                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const RunContext& context) {
   const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
   const std::vector<PreviewImage> previews = preview_images(fragments, ladder);
   std::vector<std::size_t> kept;
@@ -168,8 +181,9 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
     if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
   ScaleFiles result;
   if (scales.mesh.part_names.size() > kMostNodes)
-    add_info(result.notes, "parts-merged", "", std::to_string(scales.mesh.part_names.size()) + " parts became one node, because more than " +
-                                                 std::to_string(kMostNodes) + " would cost more bytes than the mesh");
+    add_info(result.notes, "parts-merged", "",
+             std::to_string(scales.mesh.part_names.size()) + " parts became one node, because more than " +
+                 std::to_string(kMostNodes) + " would cost more bytes than the mesh");
   result.position_bits = coding.position.bits;
   result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
   result.position_error = largest_rounding(scales.mesh, coding.position);

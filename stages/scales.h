@@ -22,45 +22,52 @@ struct EnumNames<MeshCodec> {
 
 struct ScalesOptions {
   MeshCodec mesh_codec = MeshCodec::kDraco;
-  int draco_level = 7;        // compression level
-  // At most 24 (a float's mantissa; Draco takes minutes beyond) and 16 for the codecs on unsigned shorts; where 0 would
-  // need more, coordinates stay floats.
-  int position_bits = 0;      // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
-  int uv_bits = 0;            // 0 = error <= 1/4 texel of the largest texture
+  int draco_level = 7;  // compression level
+  // At most 24 (a float's mantissa; Draco takes minutes beyond) and 16 for the codecs on unsigned shorts;
+  // where 0 would need more, coordinates stay floats.
+  int position_bits = 0;  // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
+  int uv_bits = 0;        // 0 = error <= 1/4 texel of the largest texture
   int normal_bits = 10;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
-    v("position_bits", s.position_bits, Range{0, 24}, "bits per position coordinate; 0 = from the edge lengths");
-    v("uv_bits", s.uv_bits, Range{0, 24}, "bits per texture coordinate; 0 = so that the error is under 1/4 texel");
+    v("position_bits", s.position_bits, Range{0, 24},
+      "bits per position coordinate; 0 = from the edge lengths");
+    v("uv_bits", s.uv_bits, Range{0, 24},
+      "bits per texture coordinate; 0 = so that the error is under 1/4 texel");
     v("normal_bits", s.normal_bits, Range{4, 16}, "bits per normal component");
   }
 };
 
 struct ScaleFile {
-  int scale = 0;                     // scale number
-  std::vector<std::uint8_t> glb;     // a standalone glTF 2.0 binary with preview textures inside
+  int scale = 0;                              // scale number
+  std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
   std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.scale, s.glb, s.triangles, s.vertices); }
+  static void archive(S& s, A& a) {
+    a(s.scale, s.glb, s.triangles, s.vertices);
+  }
 };
 struct ScaleFiles {
-  std::vector<ScaleFile> files;      // kept scales, S_0 first
+  std::vector<ScaleFile> files;        // kept scales, S_0 first
   int position_bits = 0, uv_bits = 0;  // as used; 0 = float
-  double position_error = 0;         // largest rounding of a coordinate, object units
+  double position_error = 0;           // largest rounding of a coordinate, object units
   Notes notes;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.files, s.position_bits, s.uv_bits, s.position_error, s.notes); }
+  static void archive(S& s, A& a) {
+    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.notes);
+  }
 };
 
-/// Writes every kept scale as a GLB: one node per part (one for all where there are more than 256), one primitive per material in it, the source's materials with
-/// the previews of the planes as images (RGBA PNG where a material needs alpha). GLB image k is named "texture/<k>" for
-/// source image k. Positions are quantised on one grid for all scales, so shared vertices are bit-equal between scales;
-/// triangles with two corners in one place of the grid are left out. Texture coordinates of unused sets are left out,
-/// and textures whose coordinates the mesh does not have. Positions stay in the local frame (Mesh::origin is the
-/// manifest's). draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same under
-/// EXT_meshopt_compression; none = plain floats. Throws StageError when nothing is left on the grid.
+/// Writes every kept scale as a GLB: one node per part (one for all where there are more than 256), one
+/// primitive per material in it, the source's materials with the previews of the planes as images (RGBA PNG
+/// where a material needs alpha). GLB image k is named "texture/<k>" for source image k. Positions are
+/// quantised on one grid for all scales, so shared vertices are bit-equal between scales; triangles with two
+/// corners in one place of the grid are left out. Texture coordinates of unused sets are left out, and
+/// textures whose coordinates the mesh does not have. Positions stay in the local frame (Mesh::origin is the
+/// manifest's). draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same
+/// under EXT_meshopt_compression; none = plain floats. Throws StageError when nothing is left on the grid.
 /// Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,

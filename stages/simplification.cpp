@@ -12,8 +12,10 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kErrorSamples = 4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
-// A scale that was stopped before its target is left out when it has more than this share of the next finer's triangles.
+constexpr std::size_t kErrorSamples =
+    4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
+// A scale that was stopped before its target is left out when it has more than this share of the next finer's
+// triangles.
 constexpr double kRepeatedShare = 0.97;
 
 /// #{p >= i} for i = 0..scales, scaled down so that the last is at most the share that the options ask for.
@@ -34,10 +36,14 @@ std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const Simpl
 
 std::string stop_reason(CollapseStop stop, const SimplificationOptions& options) {
   switch (stop) {
-    case CollapseStop::kReached: return "";
-    case CollapseStop::kFewTriangles: return "min_triangles is " + std::to_string(options.min_triangles);
-    case CollapseStop::kTooFar: return "every collapse left exceeds max_error";
-    case CollapseStop::kLocked: return "no collapse is left that keeps seams, borders and orientation";
+    case CollapseStop::kReached:
+      return "";
+    case CollapseStop::kFewTriangles:
+      return "min_triangles is " + std::to_string(options.min_triangles);
+    case CollapseStop::kTooFar:
+      return "every collapse left exceeds max_error";
+    case CollapseStop::kLocked:
+      return "no collapse is left that keeps seams, borders and orientation";
   }
   return "";
 }
@@ -52,7 +58,8 @@ NestedScale take_scale(const CollapseEngine& engine, int scale, std::string reas
   return s;
 }
 
-/// Appends the wedges of relaxed junctions that some scale uses to the mesh and renumbers the scales' triangles.
+/// Appends the wedges of relaxed junctions that some scale uses to the mesh and renumbers the scales'
+/// triangles.
 void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<NestedScale>& scales) {
   const auto old_count = static_cast<std::uint32_t>(mesh.wedge_count());
   std::vector<std::uint32_t> index(engine.new_wedges().size(), 0xffffffffu);
@@ -65,7 +72,12 @@ void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<Neste
           const CollapseMesh::NewWedge& wedge = engine.new_wedges()[w - old_count];
           id = static_cast<std::uint32_t>(mesh.wedge_count());
           mesh.wedge_position.push_back(wedge.position);
-          auto repeat = [&](auto& values) { if (!values.empty()) { const auto value = values[wedge.source]; values.push_back(value); }; };
+          auto repeat = [&](auto& values) {
+            if (!values.empty()) {
+              const auto value = values[wedge.source];
+              values.push_back(value);
+            };
+          };
           repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals), repeat(mesh.colours);
         }
         w = id;
@@ -73,17 +85,22 @@ void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<Neste
 }
 
 /// Distances of points spread over one surface to another: sum of squares and largest.
-struct Deviation { double square = 0, largest = 0; std::size_t count = 0; };
+struct Deviation {
+  double square = 0, largest = 0;
+  std::size_t count = 0;
+};
 
 Deviation deviation(const Mesh& mesh, const std::vector<Triangle>& from, const SurfaceDistance& to,
                     const RunContext& context) {
-  const std::vector<SurfaceSample> samples = sample_surface(mesh.positions, mesh.wedge_position, from, kErrorSamples);
+  const std::vector<SurfaceSample> samples =
+      sample_surface(mesh.positions, mesh.wedge_position, from, kErrorSamples);
   std::vector<double> distance(samples.size());
   parallel_for(context, samples.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Vec3d p;
       for (std::size_t k = 0; k < 3; ++k)
-        p = p + to_double(mesh.positions[mesh.wedge_position[from[samples[i].triangle][k]]]) * samples[i].weight[k];
+        p = p + to_double(mesh.positions[mesh.wedge_position[from[samples[i].triangle][k]]]) *
+                    samples[i].weight[k];
       distance[i] = to(p);
     }
   });
@@ -93,9 +110,11 @@ Deviation deviation(const Mesh& mesh, const std::vector<Triangle>& from, const S
   return d;
 }
 
-/// Vertices of S_0 are where it deviates most from a coarser scale; about kErrorSamples of them are looked at.
+/// Vertices of S_0 are where it deviates most from a coarser scale; about kErrorSamples of them are looked
+/// at.
 double vertex_deviation(const Mesh& mesh, const SurfaceDistance& to, const RunContext& context) {
-  const std::size_t step = mesh.positions.size() / kErrorSamples + 1, count = (mesh.positions.size() + step - 1) / step;
+  const std::size_t step = mesh.positions.size() / kErrorSamples + 1,
+                    count = (mesh.positions.size() + step - 1) / step;
   std::vector<double> distance(count);
   parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) distance[i] = to(to_double(mesh.positions[i * step]));
@@ -111,9 +130,11 @@ void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const Ru
     const SurfaceDistance coarse(mesh.positions, mesh.wedge_position, scale.triangles);
     const Deviation there = deviation(mesh, mesh.triangles, coarse, context);
     const Deviation back = deviation(mesh, scale.triangles, original, context);
-    const double square = (there.square + back.square) / static_cast<double>(std::max<std::size_t>(there.count + back.count, 1));
+    const double square = (there.square + back.square) /
+                          static_cast<double>(std::max<std::size_t>(there.count + back.count, 1));
     scale.error_rms = static_cast<float>(std::sqrt(square));
-    scale.error_max = static_cast<float>(std::max({there.largest, back.largest, vertex_deviation(mesh, coarse, context)}));
+    scale.error_max =
+        static_cast<float>(std::max({there.largest, back.largest, vertex_deviation(mesh, coarse, context)}));
     context.report(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scales.size()));
   }
 }
@@ -122,8 +143,8 @@ void note_floor(NestedScales& result, const std::vector<std::uint32_t>& target, 
   const NestedScale& last = result.scales.back();
   if (last.position_count <= target.back()) return;
   add_info(result.notes, "scale-floor", "scale " + std::to_string(last.scale),
-           "the coarsest scale has " + std::to_string(last.position_count) + " vertices where the scale map asks for " +
-               std::to_string(target.back()) + ": " + reason);
+           "the coarsest scale has " + std::to_string(last.position_count) +
+               " vertices where the scale map asks for " + std::to_string(target.back()) + ": " + reason);
 }
 
 /// Leaves out trailing scales that deviate by more than max_error, and what only they use.
@@ -134,15 +155,18 @@ void drop_far_scales(NestedScales& result, double limit) {
   std::uint32_t last = 0;
   for (const NestedScale& scale : scales)
     for (const Triangle& t : scale.triangles) last = std::max({last, t[0], t[1], t[2]});
-  Mesh& m = result.mesh;  // new wedges stand behind the input's, in the order of the scales that need them first
-  auto cut = [last](auto& values) { if (values.size() > last + 1) values.resize(last + 1); };
+  Mesh& m =
+      result.mesh;  // new wedges stand behind the input's, in the order of the scales that need them first
+  auto cut = [last](auto& values) {
+    if (values.size() > last + 1) values.resize(last + 1);
+  };
   cut(m.wedge_position), cut(m.uv0), cut(m.uv1), cut(m.normals), cut(m.colours);
 }
 
 }  // namespace
 
-NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, const SimplificationOptions& options,
-                      const RunContext& context) {
+NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
+                      const SimplificationOptions& options, const RunContext& context) {
   if (scale_map.persistence.size() != mesh.mesh.positions.size())
     throw StageError("simplification", "scale map", std::to_string(mesh.mesh.positions.size()) + " positions",
                      std::to_string(scale_map.persistence.size()));
@@ -156,10 +180,12 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, co
   for (std::size_t i = 1; i < target.size(); ++i) {
     floor = stop_reason(engine.run_to(target[i], static_cast<int>(i), context), options);
     const NestedScale& finer = result.scales.back();
-    const bool repeated = !floor.empty() && engine.mesh().alive_faces() > kRepeatedShare * static_cast<double>(finer.triangles.size());
+    const bool repeated = !floor.empty() && engine.mesh().alive_faces() >
+                                                kRepeatedShare * static_cast<double>(finer.triangles.size());
     if (engine.collapses().size() > finer.collapse_count && !repeated)
       result.scales.push_back(take_scale(engine, static_cast<int>(i), floor));
-    context.report(0.7 * (1 - static_cast<double>(engine.mesh().alive_positions()) / static_cast<double>(mesh.mesh.positions.size())));
+    context.report(0.7 * (1 - static_cast<double>(engine.mesh().alive_positions()) /
+                                  static_cast<double>(mesh.mesh.positions.size())));
   }
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
@@ -187,8 +213,11 @@ Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
     if (wedge[w] == kNone) continue;
     wedge[w] = static_cast<std::uint32_t>(out.wedge_position.size());
     out.wedge_position.push_back(position[in.wedge_position[w]]);
-    auto keep = [w](const auto& from, auto& to) { if (!from.empty()) to.push_back(from[w]); };
-    keep(in.uv0, out.uv0), keep(in.uv1, out.uv1), keep(in.normals, out.normals), keep(in.colours, out.colours);
+    auto keep = [w](const auto& from, auto& to) {
+      if (!from.empty()) to.push_back(from[w]);
+    };
+    keep(in.uv0, out.uv0), keep(in.uv1, out.uv1), keep(in.normals, out.normals),
+        keep(in.colours, out.colours);
   }
   out.triangles.reserve(scale.triangles.size());
   for (std::size_t i = 0; i < scale.triangles.size(); ++i) {

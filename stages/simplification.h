@@ -25,19 +25,26 @@ struct SimplificationOptions {
   double persistence_weight = 0.05;  // cost x (1 + weight * p)
   double uv_weight = 0.1;            // of the UV quadric against the geometric one
   double boundary_weight = 10;       // of the border quadrics
-  double max_error = 0.05;           // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
-  int min_triangles = 100;           // no scale is asked to go below
-  // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no scale small
-  // enough for a first picture; targets are then scaled down geometrically so that the coarsest is asked for this share.
-  double coarsest = 0.03;            // of S_0's vertices; 1 = the scale map's counts as they are; not for order thesis
+  double max_error =
+      0.05;  // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
+  int min_triangles = 100;  // no scale is asked to go below
+  // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no
+  // scale small enough for a first picture; targets are then scaled down geometrically so that the coarsest
+  // is asked for this share.
+  double coarsest = 0.03;  // of S_0's vertices; 1 = the scale map's counts as they are; not for order thesis
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("order", s.order, "texmesh = quadrics weighted by persistence; qem = quadrics alone; thesis = scale map, closest neighbour");
-    v("persistence_weight", s.persistence_weight, Range{0, 10}, "cost of removing a vertex grows by this per scale it persists");
+    v("order", s.order,
+      "texmesh = quadrics weighted by persistence; qem = quadrics alone; thesis = scale map, closest "
+      "neighbour");
+    v("persistence_weight", s.persistence_weight, Range{0, 10},
+      "cost of removing a vertex grows by this per scale it persists");
     v("uv_weight", s.uv_weight, Range{0, 10}, "weight of the texture's distortion against the shape's");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
-    v("max_error", s.max_error, Range{0.0001, 1}, "no scale deviates more than this fraction of the diagonal");
-    v("coarsest", s.coarsest, Range{0.0001, 1}, "share of the vertices that the coarsest scale is asked for at most");
+    v("max_error", s.max_error, Range{0.0001, 1},
+      "no scale deviates more than this fraction of the diagonal");
+    v("coarsest", s.coarsest, Range{0.0001, 1},
+      "share of the vertices that the coarsest scale is asked for at most");
     v("min_triangles", s.min_triangles, Range{1, 1000000}, "no scale is asked to have fewer triangles");
   }
 };
@@ -47,18 +54,21 @@ struct Collapse {
   std::uint32_t from = 0, to = 0;
   float error = 0;  // object units: square root of the quadric error
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.from, s.to, s.error); }
+  static void archive(S& s, A& a) {
+    a(s.from, s.to, s.error);
+  }
 };
 
 /// One scale S_i. Triangles index the wedges of NestedScales::mesh.
 struct NestedScale {
-  int scale = 0;                               // scale number, 0 = S_0
-  std::uint32_t collapse_count = 0;            // how many of the collapses lead here
+  int scale = 0;                     // scale number, 0 = S_0
+  std::uint32_t collapse_count = 0;  // how many of the collapses lead here
   std::vector<Triangle> triangles;
-  std::vector<std::uint32_t> triangle_source;  // per triangle: index of the S_0 triangle it comes from (material, part)
-  std::uint32_t position_count = 0;            // positions in use
-  float error_max = 0, error_rms = 0;          // distance between S_0 and S_i, sampled both ways, object units
-  std::string floor_reason;                    // why the scale has more vertices than asked for, "" when it has not
+  std::vector<std::uint32_t>
+      triangle_source;               // per triangle: index of the S_0 triangle it comes from (material, part)
+  std::uint32_t position_count = 0;  // positions in use
+  float error_max = 0, error_rms = 0;  // distance between S_0 and S_i, sampled both ways, object units
+  std::string floor_reason;            // why the scale has more vertices than asked for, "" when it has not
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,
@@ -66,28 +76,32 @@ struct NestedScale {
   }
 };
 
-/// Nested scales: positions of a coarse scale are a subset of those of every finer one, and no UV is ever made.
+/// Nested scales: positions of a coarse scale are a subset of those of every finer one, and no UV is ever
+/// made.
 struct NestedScales {
-  Mesh mesh;                         // S_0; its wedge table may be longer than the conditioned mesh's (relaxed junctions)
-  std::vector<std::uint32_t> twin;   // as ConditionedMesh::twin
+  Mesh mesh;  // S_0; its wedge table may be longer than the conditioned mesh's (relaxed junctions)
+  std::vector<std::uint32_t> twin;  // as ConditionedMesh::twin
   std::vector<Collapse> collapses;
-  std::vector<NestedScale> scales;   // S_0 first, then coarser; scales that would repeat a mesh (within 3 % of
-                                     // the triangles) or deviate by more than max_error are left out
+  std::vector<NestedScale> scales;  // S_0 first, then coarser; scales that would repeat a mesh (within 3 % of
+                                    // the triangles) or deviate by more than max_error are left out
   Notes notes;
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.mesh, s.twin, s.collapses, s.scales, s.notes); }
+  static void archive(S& s, A& a) {
+    a(s.mesh, s.twin, s.collapses, s.scales, s.notes);
+  }
 };
 
 /// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}, see
 /// SimplificationOptions::coarsest), seam- and
-/// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV triangle; border
-/// vertices move along the border only, seams along the seam, twins together (see facts/geometry.md, section 3).
-/// Deterministic: ties by place along a space-filling curve. About 5 us per removed vertex on one core.
-/// Throws StageError when the scale map is of another mesh.
-NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map, const SimplificationOptions& options,
-                      const RunContext& context);
+/// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV
+/// triangle; border vertices move along the border only, seams along the seam, twins together (see
+/// facts/geometry.md, section 3). Deterministic: ties by place along a space-filling curve. About 5 us per
+/// removed vertex on one core. Throws StageError when the scale map is of another mesh.
+NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
+                      const SimplificationOptions& options, const RunContext& context);
 
-/// The mesh of one scale with unused positions and wedges dropped; materials, parts and attributes carried over.
+/// The mesh of one scale with unused positions and wedges dropped; materials, parts and attributes carried
+/// over.
 Mesh extract_scale(const NestedScales& scales, const NestedScale& scale);
 
 }  // namespace texmesh

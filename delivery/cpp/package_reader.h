@@ -13,30 +13,34 @@
 
 namespace texmesh {
 
-/// Where a package's entries come from: a .texmesh file (or anything that serves ranges of one), or the same tree
-/// unpacked into a folder.
+/// Where a package's entries come from: a .texmesh file (or anything that serves ranges of one), or the same
+/// tree unpacked into a folder.
 class PackageStore {
  public:
   virtual ~PackageStore() = default;
-  virtual std::string name() const = 0;     // for errors
+  virtual std::string name() const = 0;  // for errors
   virtual bool is_folder() const = 0;
   /// The bytes of manifest.json. From a container this is one read of kBootstrapBytes at offset 0.
   virtual std::vector<std::uint8_t> read_manifest() = 0;
-  /// Exactly `bytes` bytes from `offset` within an entry. A container goes by entry.offset, a folder by entry.path.
-  /// FormatError when they are not there.
-  virtual std::vector<std::uint8_t> read(const EntryRef& entry, std::uint64_t offset, std::uint64_t bytes) = 0;
-  /// What is really there, manifest.json and index.bin included: a container's entries in file order (every rule of the
-  /// profile checked), a folder's regular files by path (offsets and CRCs are 0). FormatError on anything else in it.
+  /// Exactly `bytes` bytes from `offset` within an entry. A container goes by entry.offset, a folder by
+  /// entry.path. FormatError when they are not there.
+  virtual std::vector<std::uint8_t> read(const EntryRef& entry, std::uint64_t offset,
+                                         std::uint64_t bytes) = 0;
+  /// What is really there, manifest.json and index.bin included: a container's entries in file order (every
+  /// rule of the profile checked), a folder's regular files by path (offsets and CRCs are 0). FormatError on
+  /// anything else in it.
   virtual std::vector<ContainerEntry> list() = 0;
 };
 std::unique_ptr<PackageStore> open_container(std::unique_ptr<ByteSource> source);
-std::unique_ptr<PackageStore> open_folder(const std::string& path);  // InputError; no symlinks are followed beneath it
+std::unique_ptr<PackageStore> open_folder(
+    const std::string& path);  // InputError; no symlinks are followed beneath it
 /// A folder or a file, by what `path` is.
 std::unique_ptr<PackageStore> open_store(const std::string& path);
 
-/// Reads a package on demand. The constructor reads the manifest only; index, textures and tables are read when they
-/// are first asked for. Everything handed out has been checked: entries against their SHA-256, fragments against the
-/// truncated digest in the tables, documents against each other. FormatError says what does not fit. Not thread-safe.
+/// Reads a package on demand. The constructor reads the manifest only; index, textures and tables are read
+/// when they are first asked for. Everything handed out has been checked: entries against their SHA-256,
+/// fragments against the truncated digest in the tables, documents against each other. FormatError says what
+/// does not fit. Not thread-safe.
 class PackageReader {
  public:
   explicit PackageReader(std::unique_ptr<PackageStore> store);
@@ -47,21 +51,22 @@ class PackageReader {
 
   /// Every entry but manifest.json and index.bin, in container order.
   const std::vector<EntryRef>& index();
-  const EntryRef& find(const std::string& path);   // FormatError when the index has no such entry
-  const std::vector<TextureInfo>& textures();      // refs resolved
-  const PackageTables& tables();                   // one element per texture plane, consistent with textures()
+  const EntryRef& find(const std::string& path);  // FormatError when the index has no such entry
+  const std::vector<TextureInfo>& textures();     // refs resolved
+  const PackageTables& tables();                  // one element per texture plane, consistent with textures()
   const QualityTable& quality();
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
-  std::vector<std::uint8_t> scale_glb(int scale);                                   // needs no index
+  std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
   std::vector<std::uint8_t> preview(std::uint32_t plane);
   std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);  // SOI DQT DHT EOI
   /// Where a fragment's abbreviated stream stands within its rung's entry; bytes 0 = not stored.
   ByteRange fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
   std::vector<std::uint8_t> fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
   /// Table stream and fragment joined into a JPEG that any decoder takes.
-  std::vector<std::uint8_t> complete_fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
+  std::vector<std::uint8_t> complete_fragment(std::uint32_t plane, std::uint32_t rung,
+                                              std::uint32_t fragment);
 
  private:
   std::vector<std::uint8_t> read_all(const EntryRef& ref);
@@ -81,8 +86,10 @@ class PackageReader {
   std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane
 };
 
-/// Tables without their EOI, then the fragment without its SOI. FormatError when either does not look like one.
-std::vector<std::uint8_t> join_jpeg(std::span<const std::uint8_t> tables, std::span<const std::uint8_t> fragment);
+/// Tables without their EOI, then the fragment without its SOI. FormatError when either does not look like
+/// one.
+std::vector<std::uint8_t> join_jpeg(std::span<const std::uint8_t> tables,
+                                    std::span<const std::uint8_t> fragment);
 
 /// The step function: the scale to show an object at that is `displayed_px` pixels high on screen.
 int select_scale(const Manifest& manifest, double displayed_px);

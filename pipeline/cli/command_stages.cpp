@@ -29,14 +29,21 @@ std::vector<std::string> output_names(const Stage& s) {
 
 void print_table() {
   for (const Stage& s : stage_table())
-    std::cout << fmt::format("{:<18} v{:<4} {}\n{:<25}from {}\n", s.name, s.version, s.summary, "", joined(s.inputs));
+    std::cout << fmt::format("{:<18} v{:<4} {}\n{:<25}from {}\n", s.name, s.version, s.summary, "",
+                             joined(s.inputs));
 }
 
 void print_json() {
   Json list = Json::array();
   for (const Stage& s : stage_table())
-    list.push_back({{"stage", s.name}, {"version", s.version}, {"summary", s.summary}, {"inputs", s.inputs},
-                    {"outputs", output_names(s)}, {"options", s.options}, {"libraries", s.libraries}, {"stored", s.stored}});
+    list.push_back({{"stage", s.name},
+                    {"version", s.version},
+                    {"summary", s.summary},
+                    {"inputs", s.inputs},
+                    {"outputs", output_names(s)},
+                    {"options", s.options},
+                    {"libraries", s.libraries},
+                    {"stored", s.stored}});
   std::cout << Json{{"stages", list}}.dump(2) << '\n';
 }
 
@@ -61,10 +68,14 @@ void add_stages_command(CLI::App& app, int& exit_code) {
   c->add_flag("--profile-schema", args->schema, "The JSON schema of profiles (options files)");
   c->footer("Examples:\n  texmesh stages\n  texmesh stages --dot | dot -Tsvg > stages.svg");
   c->callback([args, &exit_code] {
-    if (args->schema) std::cout << profile_schema();
-    else if (args->json) print_json();
-    else if (args->dot) print_dot();
-    else print_table();
+    if (args->schema)
+      std::cout << profile_schema();
+    else if (args->json)
+      print_json();
+    else if (args->dot)
+      print_dot();
+    else
+      print_table();
     exit_code = kExitOk;
   });
 }

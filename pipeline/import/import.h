@@ -27,10 +27,10 @@ struct EnumNames<UpAxis> {
 };
 
 struct ImportOptions {
-  int max_vertices = 50'000'000;    // positions, and wedges
+  int max_vertices = 50'000'000;  // positions, and wedges
   int max_triangles = 100'000'000;
   int max_images = 4096;
-  double max_file_bytes = 8e9;      // of one file
+  double max_file_bytes = 8e9;  // of one file
   double max_image_pixels = 4e8;
   KdPolicy obj_kd = KdPolicy::kIgnore;
   UpAxis up = UpAxis::kKeep;
@@ -41,19 +41,20 @@ struct ImportOptions {
     v("max_images", s.max_images, Range{0, 65535}, "refuse models with more images");
     v("max_file_bytes", s.max_file_bytes, Range{1, 1e12}, "refuse larger files");
     v("max_image_pixels", s.max_image_pixels, Range{1, 4e9}, "refuse larger images");
-    v("obj_kd", s.obj_kd, "OBJ: Kd beside map_Kd is ignored (as in MeshLab, Blender) or multiplied (as the MTL text says)");
+    v("obj_kd", s.obj_kd,
+      "OBJ: Kd beside map_Kd is ignored (as in MeshLab, Blender) or multiplied (as the MTL text says)");
     v("up", s.up, "up axis of the source: keep and y leave coordinates alone, z turns them to glTF's y up");
   }
 };
 
-/// Gives import the files a model refers to. The pipeline's resolver opens beneath the model's folder only; tests use
-/// memory. What was asked for, found or not, becomes part of the cache key (design 8.8).
+/// Gives import the files a model refers to. The pipeline's resolver opens beneath the model's folder only;
+/// tests use memory. What was asked for, found or not, becomes part of the cache key (design 8.8).
 class Resolver {
  public:
   virtual ~Resolver() = default;
-  /// The bytes of `uri` (relative, already percent-decoded where the format says so), nothing when there is no such
-  /// file. Throws InputError when the name is not allowed (absolute, drive letter, scheme, "..", symbolic link, not a
-  /// regular file) or the file exceeds max_bytes.
+  /// The bytes of `uri` (relative, already percent-decoded where the format says so), nothing when there is
+  /// no such file. Throws InputError when the name is not allowed (absolute, drive letter, scheme, "..",
+  /// symbolic link, not a regular file) or the file exceeds max_bytes.
   virtual std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) = 0;
 };
 
@@ -61,47 +62,53 @@ class Resolver {
 struct ImportedModel {
   Model model;
   bool normals_by_specification = false;
-  std::string format;   // "glb", "gltf", "obj", "ply", "stl", "range"
+  std::string format;  // "glb", "gltf", "obj", "ply", "stl", "range"
   template <class S, class A>
-  static void archive(S& s, A& a) { a(s.model, s.normals_by_specification, s.format); }
+  static void archive(S& s, A& a) {
+    a(s.model, s.normals_by_specification, s.format);
+  }
 };
 
-/// Reads a model. The format follows the content (GLB, PLY and STL magic) and then the extension of `file_name`; see the
-/// readers below. Pure: bytes and resolver in, model out. Hard faults throw InputError{file_name, place, expected,
-/// found}; softer ones (a missing texture, some NaN positions) are notes of Model.
-ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                           const ImportOptions& options, const RunContext& context);
+/// Reads a model. The format follows the content (GLB, PLY and STL magic) and then the extension of
+/// `file_name`; see the readers below. Pure: bytes and resolver in, model out. Hard faults throw
+/// InputError{file_name, place, expected, found}; softer ones (a missing texture, some NaN positions) are
+/// notes of Model.
+ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                           Resolver& resolver, const ImportOptions& options, const RunContext& context);
 
-ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                          const ImportOptions& options, const RunContext& context);  // .gltf and .glb
-ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
+ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                          Resolver& resolver, const ImportOptions& options,
+                          const RunContext& context);  // .gltf and .glb
+ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                         Resolver& resolver, const ImportOptions& options, const RunContext& context);
+ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                         Resolver& resolver, const ImportOptions& options, const RunContext& context);
+ImportedModel import_stl(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          const ImportOptions& options, const RunContext& context);
-ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                         const ImportOptions& options, const RunContext& context);
-ImportedModel import_stl(const std::string& file_name, std::span<const std::uint8_t> bytes, const ImportOptions& options,
-                         const RunContext& context);
-/// `bytes` is the JSON that describes a cylindrical range scan (schemas/range-scan.v1.schema.json) or a Cyberware-style
-/// file; the grid image and the texture come through the resolver.
-ImportedModel import_range_scan(const std::string& file_name, std::span<const std::uint8_t> bytes, Resolver& resolver,
-                                const ImportOptions& options, const RunContext& context);
+/// `bytes` is the JSON that describes a cylindrical range scan (schemas/range-scan.v1.schema.json) or a
+/// Cyberware-style file; the grid image and the texture come through the resolver.
+ImportedModel import_range_scan(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                                Resolver& resolver, const ImportOptions& options, const RunContext& context);
 
 // Shared by the readers (pipeline/import/import_common.cpp):
 
-/// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index returned; -1
-/// and a warning "missing-texture" when it is not there. Content that no allow-listed reader takes throws InputError.
+/// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index
+/// returned; -1 and a warning "missing-texture" when it is not there. Content that no allow-listed reader
+/// takes throws InputError.
 std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
                        const std::string& place, const ImportOptions& options);
 std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
-                             const std::string& file_name, const std::string& place, const ImportOptions& options);
+                             const std::string& file_name, const std::string& place,
+                             const ImportOptions& options);
 
-/// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless the
-/// bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the box's centre,
-/// rounded to a float-exact value.
+/// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
+/// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
+/// box's centre, rounded to a float-exact value.
 void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions);
 
-/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings "non-finite-position",
-/// "non-finite-uv": such UVs become 0), unused images and materials; sets part names; checks the limits; throws
-/// InputError when no triangle is left.
+/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
+/// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
+/// checks the limits; throws InputError when no triangle is left.
 void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
 
 }  // namespace texmesh

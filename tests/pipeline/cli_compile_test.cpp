@@ -26,7 +26,8 @@ class CompileCommand : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new TemporaryFolder;
-    const CommandResult made = run_command({TEXMESH_MAKE_SCAN, "--triangles", "3000", "--texture", "512", "-o", scan()});
+    const CommandResult made =
+        run_command({TEXMESH_MAKE_SCAN, "--triangles", "3000", "--texture", "512", "-o", scan()});
     ASSERT_EQ(made.exit_code, 0) << made.errors;
     const CommandResult r = texmesh({"compile", scan(), "-o", *shared_ / "scan.texmesh", "--no-cache"});
     ASSERT_EQ(r.exit_code, 0) << r.output << r.errors;
@@ -74,7 +75,9 @@ TEST_F(CompileCommand, SameBytesFromAnotherFolderNameAndLocale) {
 
 TEST_F(CompileCommand, SameBytesOnOtherProcessorFeatures) {
   // Another libm and libjpeg path: what a machine without AVX2 and FMA would run.
-  EXPECT_EQ(compile({"--no-cache"}, {"GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F,-ERMS", "JSIMD_FORCENONE=1"}), package_);
+  EXPECT_EQ(compile({"--no-cache"},
+                    {"GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F,-ERMS", "JSIMD_FORCENONE=1"}),
+            package_);
 }
 
 TEST_F(CompileCommand, SameBytesThroughTheCacheAndNothingRunsTwice) {
@@ -103,7 +106,8 @@ TEST_F(CompileCommand, SameBytesThroughTheCacheAndNothingRunsTwice) {
   run();
   EXPECT_EQ(read_text(out), package_);
   // An option of one stage: that stage and what follows from other bytes, nothing else.
-  const CommandResult third = texmesh({"compile", scan(), "-o", out, "--json", "--cache", cache, "--title", "Turtle"});
+  const CommandResult third =
+      texmesh({"compile", scan(), "-o", out, "--json", "--cache", cache, "--title", "Turtle"});
   EXPECT_EQ(stages(third, "ran"), std::set<std::string>{"package"});
 }
 
@@ -147,7 +151,9 @@ TEST_F(CompileCommand, UsageErrorsExitWithTwo) {
   EXPECT_EQ(texmesh({"compile"}).exit_code, 2);
   EXPECT_EQ(texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--ssf.scales", "0"}).exit_code, 2);
   EXPECT_EQ(texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--ssf.scale", "4"}).exit_code, 2);
-  EXPECT_EQ(texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--profile", folder_ / "none.json"}).exit_code, 2);
+  EXPECT_EQ(
+      texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--profile", folder_ / "none.json"}).exit_code,
+      2);
   EXPECT_EQ(texmesh({"compile", scan(), scan(), "-o", folder_ / "x.texmesh"}).exit_code, 2);
   EXPECT_TRUE(files_beneath(folder_.path().string()).empty());
   EXPECT_EQ(texmesh({"--help"}).exit_code, 0);
@@ -156,7 +162,8 @@ TEST_F(CompileCommand, UsageErrorsExitWithTwo) {
 }
 
 TEST_F(CompileCommand, MemoryLimitIsAnErrorOfTheModel) {
-  const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--no-cache", "--memory", "120MB"});
+  const CommandResult r =
+      texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--no-cache", "--memory", "120MB"});
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   EXPECT_NE(r.exit_code, 0) << r.output;
 #endif
@@ -164,20 +171,25 @@ TEST_F(CompileCommand, MemoryLimitIsAnErrorOfTheModel) {
 }
 
 TEST_F(CompileCommand, WallLimitIsAnErrorOfTheModel) {
-  const CommandResult made = run_command({TEXMESH_MAKE_SCAN, "--triangles", "400000", "--texture", "0", "-o", folder_ / "big.ply"});
+  const CommandResult made =
+      run_command({TEXMESH_MAKE_SCAN, "--triangles", "400000", "--texture", "0", "-o", folder_ / "big.ply"});
   ASSERT_EQ(made.exit_code, 0) << made.errors;
-  const CommandResult r = texmesh({"compile", folder_ / "big.ply", "-o", folder_ / "x.texmesh", "--no-cache", "--timeout", "1"});
+  const CommandResult r =
+      texmesh({"compile", folder_ / "big.ply", "-o", folder_ / "x.texmesh", "--no-cache", "--timeout", "1"});
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_NE(r.output.find("expected at most 1 s"), std::string::npos) << r.output;
   EXPECT_EQ(files_beneath(folder_.path().string()), std::vector<std::string>{"big.ply"});
 }
 
 TEST_F(CompileCommand, TerminationEndsCleanlyWithinTwoSeconds) {
-  const CommandResult made = run_command({TEXMESH_MAKE_SCAN, "--triangles", "400000", "--texture", "0", "-o", folder_ / "big.ply"});
+  const CommandResult made =
+      run_command({TEXMESH_MAKE_SCAN, "--triangles", "400000", "--texture", "0", "-o", folder_ / "big.ply"});
   ASSERT_EQ(made.exit_code, 0);
-  const std::string command = std::string(TEXMESH_BINARY) + " compile '" + (folder_ / "big.ply") + "' -o '" +
-                              (folder_ / "x.texmesh") + "' --no-cache & p=$!; sleep 1; kill -TERM $p; s=$(date +%s%N); wait $p; c=$?; " +
-                              "e=$(date +%s%N); echo took $(( (e - s) / 1000000 )); exit $c";
+  const std::string command =
+      std::string(TEXMESH_BINARY) + " compile '" + (folder_ / "big.ply") + "' -o '" +
+      (folder_ / "x.texmesh") +
+      "' --no-cache & p=$!; sleep 1; kill -TERM $p; s=$(date +%s%N); wait $p; c=$?; " +
+      "e=$(date +%s%N); echo took $(( (e - s) / 1000000 )); exit $c";
   const CommandResult r = run_command({"bash", "-c", command});
   EXPECT_EQ(r.exit_code, 1) << r.output << r.errors;
   const std::size_t at = r.output.rfind("took ");
@@ -188,8 +200,9 @@ TEST_F(CompileCommand, TerminationEndsCleanlyWithinTwoSeconds) {
 
 TEST_F(CompileCommand, AFullDiskLeavesNothing) {
   // A file size limit stands for the full disk: the same failing write() in the middle of the package.
-  const CommandResult r = run_command({"bash", "-c", std::string("ulimit -f 8; exec ") + TEXMESH_BINARY + " compile '" + scan() +
-                                                         "' -o '" + (folder_ / "x.texmesh") + "' --no-cache"});
+  const CommandResult r = run_command({"bash", "-c",
+                                       std::string("ulimit -f 8; exec ") + TEXMESH_BINARY + " compile '" +
+                                           scan() + "' -o '" + (folder_ / "x.texmesh") + "' --no-cache"});
   EXPECT_EQ(r.exit_code, 1) << r.output;
   EXPECT_NE(r.output.find("writable file"), std::string::npos) << r.output;
   EXPECT_TRUE(files_beneath(folder_.path().string()).empty());
@@ -197,7 +210,8 @@ TEST_F(CompileCommand, AFullDiskLeavesNothing) {
 
 TEST_F(CompileCommand, AFullTemporaryFileSystemLeavesNothing) {
   fs::create_directories(folder_ / "small");
-  if (::mount("tmpfs", (folder_ / "small").c_str(), "tmpfs", 0, "size=16k") != 0) GTEST_SKIP() << "mounting needs root";
+  if (::mount("tmpfs", (folder_ / "small").c_str(), "tmpfs", 0, "size=16k") != 0)
+    GTEST_SKIP() << "mounting needs root";
   const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "small/x.texmesh", "--no-cache"});
   const auto left = files_beneath(folder_ / "small");
   ::umount((folder_ / "small").c_str());
@@ -209,12 +223,14 @@ TEST_F(CompileCommand, AnUnwritableOutputIsAnError) {
   const CommandResult r = texmesh({"compile", scan(), "-o", "/proc/none/x.texmesh", "--no-cache"});
   EXPECT_EQ(r.exit_code, 1) << r.output << r.errors;
   fs::create_directories(folder_ / "x.texmesh/inside");
-  EXPECT_EQ(texmesh({"compile", scan(), "-o", folder_ / "x.texmesh/inside/..", "--no-cache"}).exit_code, 0);  // a folder: x.texmesh/scan.texmesh
+  EXPECT_EQ(texmesh({"compile", scan(), "-o", folder_ / "x.texmesh/inside/..", "--no-cache"}).exit_code,
+            0);  // a folder: x.texmesh/scan.texmesh
 }
 
 TEST_F(CompileCommand, AnUnusableCacheIsAnErrorWithItsName) {
   write_text(folder_ / "file", "");
-  const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--cache", folder_ / "file/cache"});
+  const CommandResult r =
+      texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--cache", folder_ / "file/cache"});
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_NE(r.output.find("cache folder"), std::string::npos) << r.output;
 }

@@ -1,5 +1,5 @@
-// What nobody should feed to a compiler, and what everybody does: refused with exit 1, an error and no file, or compiled
-// with a warning that --strict turns into an error (design section 6).
+// What nobody should feed to a compiler, and what everybody does: refused with exit 1, an error and no file,
+// or compiled with a warning that --strict turns into an error (design section 6).
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,8 +20,10 @@ std::string base64(const std::string& bytes) {
   std::string out;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     std::uint32_t v = 0;
-    for (std::size_t k = 0; k < 3; ++k) v = v << 8 | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k <= bytes.size() ? kAlphabet[v >> (18 - 6 * k) & 63] : '=';
+    for (std::size_t k = 0; k < 3; ++k)
+      v = v << 8 | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += i + k <= bytes.size() ? kAlphabet[v >> (18 - 6 * k) & 63] : '=';
   }
   return out;
 }
@@ -33,28 +35,41 @@ Json tetrahedron() {
   const std::uint16_t f[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   std::string bytes(reinterpret_cast<const char*>(p), sizeof p);
   bytes.append(reinterpret_cast<const char*>(t), sizeof t).append(reinterpret_cast<const char*>(f), sizeof f);
-  return {{"asset", {{"version", "2.0"}}},
-          {"scene", 0},
-          {"scenes", {{{"nodes", {0}}}}},
-          {"nodes", {{{"mesh", 0}}}},
-          {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 2}, {"material", 0}}}}}}},
-          {"materials", {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}}},
-          {"textures", {{{"source", 0}}}},
-          {"images", {{{"uri", "t.png"}}}},
-          {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}, {"min", {0, 0, 0}}, {"max", {1, 1, 1}}},
-                         {{"bufferView", 1}, {"componentType", 5126}, {"count", 4}, {"type", "VEC2"}},
-                         {{"bufferView", 2}, {"componentType", 5123}, {"count", 12}, {"type", "SCALAR"}}}},
-          {"bufferViews", {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 48}}, {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 32}},
-                           {{"buffer", 0}, {"byteOffset", 80}, {"byteLength", 24}}}},
-          {"buffers", {{{"byteLength", bytes.size()}, {"uri", "data:application/octet-stream;base64," + base64(bytes)}}}}};
+  return {
+      {"asset", {{"version", "2.0"}}},
+      {"scene", 0},
+      {"scenes", {{{"nodes", {0}}}}},
+      {"nodes", {{{"mesh", 0}}}},
+      {"meshes",
+       {{{"primitives",
+          {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 2}, {"material", 0}}}}}}},
+      {"materials", {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}}},
+      {"textures", {{{"source", 0}}}},
+      {"images", {{{"uri", "t.png"}}}},
+      {"accessors",
+       {{{"bufferView", 0},
+         {"componentType", 5126},
+         {"count", 4},
+         {"type", "VEC3"},
+         {"min", {0, 0, 0}},
+         {"max", {1, 1, 1}}},
+        {{"bufferView", 1}, {"componentType", 5126}, {"count", 4}, {"type", "VEC2"}},
+        {{"bufferView", 2}, {"componentType", 5123}, {"count", 12}, {"type", "SCALAR"}}}},
+      {"bufferViews",
+       {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 48}},
+        {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 32}},
+        {{"buffer", 0}, {"byteOffset", 80}, {"byteLength", 24}}}},
+      {"buffers",
+       {{{"byteLength", bytes.size()}, {"uri", "data:application/octet-stream;base64," + base64(bytes)}}}}};
 }
 
 /// A valid PNG of 1 x 1 px, grey.
 const std::string kPng = [] {
   static const unsigned char bytes[] = {
-      0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, 0, 1, 0, 0, 0, 1, 8, 0, 0, 0, 0,
-      0x3a, 0x7e, 0x9b, 0x55, 0, 0, 0, 10, 'I', 'D', 'A', 'T', 0x78, 0xda, 0x63, 0x68, 0, 0, 0, 0x82, 0, 0x81,
-      0xda, 0x45, 0x08, 0x3b, 0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xae, 0x42, 0x60, 0x82};
+      0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0,    0,    0,    13,  'I',  'H',  'D',  'R',  0,
+      0,    0,    1,    0,    0,    0,    1,    8,    0,    0,    0,    0,   0x3a, 0x7e, 0x9b, 0x55, 0,
+      0,    0,    10,   'I',  'D',  'A',  'T',  0x78, 0xda, 0x63, 0x68, 0,   0,    0,    0x82, 0,    0x81,
+      0xda, 0x45, 0x08, 0x3b, 0,    0,    0,    0,    'I',  'E',  'N',  'D', 0xae, 0x42, 0x60, 0x82};
   return std::string(reinterpret_cast<const char*>(bytes), sizeof bytes);
 }();
 
@@ -79,7 +94,8 @@ const std::string kObj =
 class Hostile : public ::testing::Test {
  protected:
   CommandResult compile(const std::string& model, std::vector<std::string> extra = {}) {
-    std::vector<std::string> arguments{TEXMESH_BINARY, "compile", in(model), "-o", folder_ / "out/x.texmesh", "--no-cache"};
+    std::vector<std::string> arguments{TEXMESH_BINARY, "compile", in(model), "-o", folder_ / "out/x.texmesh",
+                                       "--no-cache"};
     arguments.insert(arguments.end(), extra.begin(), extra.end());
     fs::create_directories(folder_ / "out");
     const auto start = std::chrono::steady_clock::now();
@@ -159,7 +175,10 @@ TEST_F(Hostile, TruncatedModels) {
   }
 }
 TEST_F(Hostile, IndexOutOfRange) {
-  expect_refused_gltf([](Json& j) { j["accessors"][0]["count"] = 3; j["accessors"][1]["count"] = 3; });
+  expect_refused_gltf([](Json& j) {
+    j["accessors"][0]["count"] = 3;
+    j["accessors"][1]["count"] = 3;
+  });
   write_text(in("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
   expect_refused("m.obj");
   write_text(in("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n");
@@ -180,8 +199,10 @@ TEST_F(Hostile, OnlyDegenerateTriangles) {
 TEST_F(Hostile, TwoToThe31DeclaredVertices) {
   expect_refused_gltf([](Json& j) { j["accessors"][0]["count"] = 2147483648u; });
   expect_refused_gltf([](Json& j) { j["accessors"][0]["count"] = 4611686018427387904ull; });
-  write_text(in("m.ply"), "ply\nformat ascii 1.0\nelement vertex 2147483648\nproperty float x\nproperty float y\nproperty float z\n"
-                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n");
+  write_text(in("m.ply"),
+             "ply\nformat ascii 1.0\nelement vertex 2147483648\nproperty float x\nproperty float y\nproperty "
+             "float z\n"
+             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n");
   expect_refused("m.ply");
 }
 TEST_F(Hostile, AnImageThatLiesAboutItsSize) {
@@ -200,8 +221,9 @@ TEST_F(Hostile, AnImageOfNoAllowedFormat) {
 }
 TEST_F(Hostile, UrisThatLeaveTheFolder) {
   write_text(folder_ / "secret.png", kPng);
-  for (const std::string uri : {"../secret.png", "%2e%2e/secret.png", "a/../../secret.png", "/etc/hostname", "file:///etc/hostname",
-                                "http://127.0.0.1/t.png", "https://127.0.0.1/t.png", "c:/t.png", "\\\\host\\t.png"})
+  for (const std::string uri :
+       {"../secret.png", "%2e%2e/secret.png", "a/../../secret.png", "/etc/hostname", "file:///etc/hostname",
+        "http://127.0.0.1/t.png", "https://127.0.0.1/t.png", "c:/t.png", "\\\\host\\t.png"})
     expect_refused_gltf([&](Json& j) { j["images"][0]["uri"] = uri; });
   write_text(in("m.mtl"), "newmtl a\nmap_Kd ../secret.png\n");
   write_text(in("m.obj"), "mtllib m.mtl\nusemtl a\n" + kObj);
@@ -227,7 +249,8 @@ TEST_F(Hostile, DeepJson) {
   expect_refused("m.gltf");
   Json j = tetrahedron();
   const std::string text = j.dump();
-  write_text(in("m.gltf"), text.substr(0, text.size() - 1) + ",\"extras\":" + std::string(100000, '[') + std::string(100000, ']') + "}");
+  write_text(in("m.gltf"), text.substr(0, text.size() - 1) + ",\"extras\":" + std::string(100000, '[') +
+                               std::string(100000, ']') + "}");
   expect_refused("m.gltf");
 }
 TEST_F(Hostile, UnreadableModel) {
@@ -279,11 +302,14 @@ TEST_F(Hostile, AFarAwayOriginKeepsMillimetres) {
   write_text(in("m.obj"), obj + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
   const CommandResult r = compile("m.obj");
   ASSERT_EQ(r.exit_code, 0) << r.output;
-  const CommandResult d = run_command({TEXMESH_BINARY, "dump", folder_ / "out/x.texmesh", "summary", "--json"});
+  const CommandResult d =
+      run_command({TEXMESH_BINARY, "dump", folder_ / "out/x.texmesh", "summary", "--json"});
   const Json j = Json::parse(d.output);
   const Json& o = j.at("object");
-  EXPECT_NEAR(o.at("origin")[0].get<double>() + o.at("bounds_min")[0].get<double>(), 5000000, 1e-5) << d.output;
-  EXPECT_NEAR(o.at("bounds_max")[0].get<double>() - o.at("bounds_min")[0].get<double>(), 0.001, 1e-5) << d.output;
+  EXPECT_NEAR(o.at("origin")[0].get<double>() + o.at("bounds_min")[0].get<double>(), 5000000, 1e-5)
+      << d.output;
+  EXPECT_NEAR(o.at("bounds_max")[0].get<double>() - o.at("bounds_min")[0].get<double>(), 0.001, 1e-5)
+      << d.output;
 }
 
 }  // namespace

@@ -28,7 +28,8 @@ TEST(FindModels, SeveralNeedAFolder) {
 TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "sub/deep");
-  for (const char* f : {"b.GLB", "a.obj", "a.mtl", "sub/deep/c.stl", "texture.png", ".hidden.glb"}) write_text(folder / f, "x");
+  for (const char* f : {"b.GLB", "a.obj", "a.mtl", "sub/deep/c.stl", "texture.png", ".hidden.glb"})
+    write_text(folder / f, "x");
   write_text(folder / "sub/options.json", "{}");
   write_text(folder / "sub/scan.json", R"({"version":1,"type":"cylindrical-range-scan"})");
   const auto m = find_models({folder.path().string()}, "out");
@@ -49,7 +50,9 @@ TEST(FindModels, ModelsThatWouldShareAPackageKeepTheirExtension) {
   EXPECT_EQ(m[2].output, "out/yurt.texmesh");
 }
 
-TEST(FindModels, TheSameNameTwiceIsRefused) { EXPECT_THROW(find_models({"x/a.glb", "y/a.glb"}, "out"), InputError); }
+TEST(FindModels, TheSameNameTwiceIsRefused) {
+  EXPECT_THROW(find_models({"x/a.glb", "y/a.glb"}, "out"), InputError);
+}
 
 TEST(FindModels, AFolderWithoutModelsIsRefused) {
   const TemporaryFolder folder;

@@ -15,7 +15,7 @@ using Text = std::string;
 struct Fake {
   std::mutex mutex;
   std::multiset<std::string> ran;
-  std::string left_suffix;   // changes what "left" computes without changing its key: a silent change of code
+  std::string left_suffix;  // changes what "left" computes without changing its key: a silent change of code
   std::string fail;
 
   StageOutputs text(const std::string& name, Text value) {
@@ -32,18 +32,51 @@ struct Fake {
   std::vector<Stage> table() {
     auto get = [](const StageInputs& in, const char* n) { return in.get<Text>(n); };
     return {
-        {"left", 1, "", {"source"}, {artefact<Text>("left")}, {"ssf.scales"}, {}, true,
-         [=, this](const StageInputs& in) { return text("left", get(in, "source").substr(0, 1) + left_suffix); }},
-        {"right", 1, "", {"source"}, {artefact<Text>("right")}, {"zim"}, {"draco"}, true,
+        {"left",
+         1,
+         "",
+         {"source"},
+         {artefact<Text>("left")},
+         {"ssf.scales"},
+         {},
+         true,
+         [=, this](const StageInputs& in) {
+           return text("left", get(in, "source").substr(0, 1) + left_suffix);
+         }},
+        {"right",
+         1,
+         "",
+         {"source"},
+         {artefact<Text>("right")},
+         {"zim"},
+         {"draco"},
+         true,
          [=, this](const StageInputs& in) { return text("right", get(in, "source") + "R"); }},
-        {"middle", 1, "", {"left", "right"}, {{"middle", nullptr, nullptr}}, {}, {}, false,
+        {"middle",
+         1,
+         "",
+         {"left", "right"},
+         {{"middle", nullptr, nullptr}},
+         {},
+         {},
+         false,
          [=, this](const StageInputs& in) { return text("middle", get(in, "left") + get(in, "right")); }},
-        {"join", 1, "", {"middle", "left"}, {artefact<Text>("join")}, {}, {}, true,
-         [=, this](const StageInputs& in) { return text("join", get(in, "middle") + "+" + get(in, "left")); }},
+        {"join",
+         1,
+         "",
+         {"middle", "left"},
+         {artefact<Text>("join")},
+         {},
+         {},
+         true,
+         [=, this](const StageInputs& in) {
+           return text("join", get(in, "middle") + "+" + get(in, "left"));
+         }},
     };
   }
 
-  Text run(Store& store, const Text& source, const CompileOptions& options = {}, int threads = 2, Notes* notes = nullptr) {
+  Text run(Store& store, const Text& source, const CompileOptions& options = {}, int threads = 2,
+           Notes* notes = nullptr) {
     ran.clear();
     RunContext context;
     context.threads = threads;

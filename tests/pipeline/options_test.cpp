@@ -13,7 +13,8 @@ namespace texmesh {
 namespace {
 
 OptionField& field(std::vector<OptionField>& fields, const std::string& path) {
-  auto it = std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
+  auto it =
+      std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
   if (it == fields.end()) throw std::out_of_range(path);
   return *it;
 }
@@ -55,9 +56,10 @@ TEST(Options, FlagsAndProfilesMeanTheSame) {
   set_option(field(fields, "ladder.rungs"), "8,18,53", "--rungs");
   set_option(field(fields, "scales.mesh_codec"), "none", "--mesh-codec");
   set_option(field(fields, "package.title"), "12", "--title");
-  read_profile(by_profile,
-               R"({"version":1,"ssf":{"scales":12},"ladder":{"rungs":[8,18,53]},"scales":{"mesh_codec":"none"},"package":{"title":"12"}})",
-               "p");
+  read_profile(
+      by_profile,
+      R"({"version":1,"ssf":{"scales":12},"ladder":{"rungs":[8,18,53]},"scales":{"mesh_codec":"none"},"package":{"title":"12"}})",
+      "p");
   EXPECT_EQ(write_profile(by_flag), write_profile(by_profile));
 }
 
@@ -79,8 +81,9 @@ TEST_P(BadProfile, NamesThePlace) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Options, BadProfile,
-    ::testing::Values(Bad{"[]", ""}, Bad{"{", "byte 2"}, Bad{"{}", "/version"}, Bad{R"({"version":2})", "/version"},
-                      Bad{R"({"version":1,"sfs":{}})", "/sfs"}, Bad{R"({"version":1,"ssf":3})", "/ssf"},
+    ::testing::Values(Bad{"[]", ""}, Bad{"{", "byte 2"}, Bad{"{}", "/version"},
+                      Bad{R"({"version":2})", "/version"}, Bad{R"({"version":1,"sfs":{}})", "/sfs"},
+                      Bad{R"({"version":1,"ssf":3})", "/ssf"},
                       Bad{R"({"version":1,"ssf":{"scale":3}})", "/ssf/scale"},
                       Bad{R"({"version":1,"ssf":{"scales":"3"}})", "/ssf/scales"},
                       Bad{R"({"version":1,"ssf":{"scales":0}})", "/ssf/scales"},

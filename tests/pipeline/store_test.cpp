@@ -14,13 +14,16 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Folder {
-  fs::path path = fs::temp_directory_path() / ("texmesh-store-" + std::to_string(::getpid()) + "-" +
-                                               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path path =
+      fs::temp_directory_path() / ("texmesh-store-" + std::to_string(::getpid()) + "-" +
+                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
   Folder() { fs::remove_all(path); }
   ~Folder() { fs::remove_all(path); }
 };
 
-Bytes bytes_of(const std::string& s) { return std::make_shared<const std::vector<std::uint8_t>>(s.begin(), s.end()); }
+Bytes bytes_of(const std::string& s) {
+  return std::make_shared<const std::vector<std::uint8_t>>(s.begin(), s.end());
+}
 Key key_of(const std::string& option) { return Key("ladder", 3).add("option ladder.rungs", option); }
 
 std::vector<fs::path> files_in(const fs::path& folder) {
@@ -38,7 +41,8 @@ TEST(Key, DependsOnEveryPartAndOnItsLimits) {
   EXPECT_NE(base, Key("lut", 3).add("option ladder.rungs", "[8]").digest());
   // Labels and values are length-prefixed: moving a character across the border changes the key.
   EXPECT_NE(Key("s", 1).add("ab", "c").digest(), Key("s", 1).add("a", "bc").digest());
-  EXPECT_NE(Key("s", 1).add("a", "b").add("c", "d").digest(), Key("s", 1).add("c", "d").add("a", "b").digest());
+  EXPECT_NE(Key("s", 1).add("a", "b").add("c", "d").digest(),
+            Key("s", 1).add("c", "d").add("a", "b").digest());
 }
 
 TEST(DiskStore, GivesBackWhatWasPut) {
@@ -67,8 +71,10 @@ TEST(DiskStore, EveryTruncationAndEveryFlippedByteIsAMiss) {
     const std::string good((std::istreambuf_iterator<char>(in)), {});
     for (std::size_t i = 0; i < 2 * good.size(); ++i) {
       std::string bad = good;
-      if (i < good.size()) bad[i] = static_cast<char>(bad[i] ^ 1);
-      else bad.resize(i - good.size());
+      if (i < good.size())
+        bad[i] = static_cast<char>(bad[i] ^ 1);
+      else
+        bad.resize(i - good.size());
       std::ofstream(file, std::ios::binary | std::ios::trunc) << bad;
       EXPECT_FALSE(store->find(key_of("[8]").digest())) << file << " " << i;
       fs::create_directories(file.parent_path());
@@ -84,7 +90,8 @@ TEST(DiskStore, LeavesNoTemporaryFiles) {
   ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("x")}}));
   ASSERT_TRUE(store->put_note(key_of("n").digest(), "note"));
   EXPECT_EQ(*store->find_note(key_of("n").digest()), "note");
-  for (const fs::path& f : files_in(folder.path)) EXPECT_EQ(f.filename().string().find("tmp"), std::string::npos) << f;
+  for (const fs::path& f : files_in(folder.path))
+    EXPECT_EQ(f.filename().string().find("tmp"), std::string::npos) << f;
 }
 
 TEST(DiskStore, AFolderThatCannotBeMadeIsAnInputError) {
@@ -114,7 +121,9 @@ TEST(AtomicFile, AFullDiskLeavesNothing) {
   fs::create_directories(folder.path);
   fs::create_symlink(full, folder.path / "link");
   // The temporary is opened with O_NOFOLLOW: a planted symbolic link is refused, not written through.
-  EXPECT_THROW(write_file_atomically((folder.path / "a").string(), *bytes_of("x"), (folder.path / "link").string()), InputError);
+  EXPECT_THROW(
+      write_file_atomically((folder.path / "a").string(), *bytes_of("x"), (folder.path / "link").string()),
+      InputError);
   EXPECT_FALSE(fs::exists(folder.path / "a"));
 }
 

@@ -75,7 +75,7 @@ TEST(PerceptualValues, StatisticsFollowChainsToTheSurvivor) {
   const PerceptualValues values = measure_perceptual_values(scales, skeleton, {}, kOneThread);
   EXPECT_EQ(values.step[0].collapses, 0u);
   EXPECT_EQ(values.step[1].collapses, 2u);
-  EXPECT_FLOAT_EQ(values.step[1].max, 0.75f);   // vertex 1 against 3, not against 2
+  EXPECT_FLOAT_EQ(values.step[1].max, 0.75f);  // vertex 1 against 3, not against 2
   EXPECT_FLOAT_EQ(values.step[1].min, 0.25f);
   EXPECT_FLOAT_EQ(values.step[1].mean, 0.5f);
   EXPECT_FLOAT_EQ(values.step[1].sum, 1.0f);
@@ -90,7 +90,8 @@ TEST(PerceptualValues, MajorsAreTheLastOfTheirTier) {
   const std::size_t n = scales.scales.size();
   for (double jnd : {0.005, 0.02, 0.1, 1.0}) {
     for (PerceptualStatistic statistic : {PerceptualStatistic::kP95, PerceptualStatistic::kP99}) {
-      const PerceptualValues values = measure_perceptual_values(scales, skeleton, {.jnd = jnd, .statistic = statistic}, kOneThread);
+      const PerceptualValues values =
+          measure_perceptual_values(scales, skeleton, {.jnd = jnd, .statistic = statistic}, kOneThread);
       const std::vector<float>& table = statistic == PerceptualStatistic::kP95 ? values.p95 : values.p99;
       EXPECT_EQ(values.major[0], 0);
       EXPECT_EQ(values.major[n - 1], 1);
@@ -120,7 +121,8 @@ TEST(PerceptualValues, KeepsAboutAsManyScalesAsAsked) {
   const NestedScales scales = make_scales(testing::bumpy_sphere(48, 64), 20);
   const Skeleton skeleton = centre_skeleton(scales.mesh);
   for (int asked : {1, 4, 8}) {
-    const PerceptualValues values = measure_perceptual_values(scales, skeleton, {.jnd = 1, .kept_scales = asked}, kOneThread);
+    const PerceptualValues values =
+        measure_perceptual_values(scales, skeleton, {.jnd = 1, .kept_scales = asked}, kOneThread);
     EXPECT_EQ(values.kept.front(), 1);
     EXPECT_EQ(values.kept.back(), 1);
     const auto count = std::count(values.kept.begin(), values.kept.end(), 1);
@@ -130,7 +132,9 @@ TEST(PerceptualValues, KeepsAboutAsManyScalesAsAsked) {
     std::size_t last = 0;
     for (std::size_t k = 1; k < values.kept.size(); ++k) {
       if (!values.kept[k]) continue;
-      EXPECT_LT(static_cast<double>(scales.scales[last].triangles.size()) / static_cast<double>(scales.scales[k].triangles.size()), 3.2);
+      EXPECT_LT(static_cast<double>(scales.scales[last].triangles.size()) /
+                    static_cast<double>(scales.scales[k].triangles.size()),
+                3.2);
       last = k;
     }
   }
@@ -138,7 +142,8 @@ TEST(PerceptualValues, KeepsAboutAsManyScalesAsAsked) {
 
 TEST(PerceptualValues, DisplayedHeights) {
   const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48));
-  const PerceptualValues values = measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.jnd = 0.08}, kOneThread);
+  const PerceptualValues values =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.jnd = 0.08}, kOneThread);
   const std::size_t n = scales.scales.size();
   EXPECT_NEAR(values.object_height, 2.1, 0.15);
   EXPECT_EQ(values.display_px_error[0], kAnyHeightPx);
@@ -153,14 +158,16 @@ TEST(PerceptualValues, DisplayedHeights) {
     EXPECT_LE(pixel, scales.scales[k].error_max * 1.1f);
     EXPECT_GE(pixel, scales.scales[k].error_rms * 0.3f);
   }
-  const PerceptualValues shortest = measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.edge_percentile = 0}, kOneThread);
+  const PerceptualValues shortest =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.edge_percentile = 0}, kOneThread);
   EXPECT_GE(shortest.display_px_edge[0], values.display_px_edge[0]);
 }
 
 TEST(PerceptualValues, OneScaleOnly) {
   const NestedScales scales = make_scales(testing::cube());
   ASSERT_EQ(scales.scales.size(), 1u);
-  const PerceptualValues values = measure_perceptual_values(scales, centre_skeleton(scales.mesh), {}, kOneThread);
+  const PerceptualValues values =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {}, kOneThread);
   EXPECT_EQ(values.kept, std::vector<std::uint8_t>{1});
   EXPECT_EQ(values.major, std::vector<std::uint8_t>{0});
   EXPECT_EQ(values.display_px_error, std::vector<float>{kAnyHeightPx});

@@ -21,11 +21,13 @@ namespace {
 
 using Json = nlohmann::json;
 const RunContext kOneThread{};
-constexpr MeshCodec kCodecs[] = {MeshCodec::kDraco, MeshCodec::kMeshopt, MeshCodec::kQuantized, MeshCodec::kNone};
+constexpr MeshCodec kCodecs[] = {MeshCodec::kDraco, MeshCodec::kMeshopt, MeshCodec::kQuantized,
+                                 MeshCodec::kNone};
 
 Pixels picture(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
   Pixels p{width, height, channels, {}};
-  for (std::uint32_t i = 0; i < width * height * channels; ++i) p.data.push_back(static_cast<std::uint8_t>(i * 7 / 3));
+  for (std::uint32_t i = 0; i < width * height * channels; ++i)
+    p.data.push_back(static_cast<std::uint8_t>(i * 7 / 3));
   return p;
 }
 
@@ -38,7 +40,8 @@ struct Case {
   Fragments fragments;
   Ladder ladder;
 
-  explicit Case(const Mesh& mesh, std::size_t material_count = 1, int scale_count = 8) : materials(material_count) {
+  explicit Case(const Mesh& mesh, std::size_t material_count = 1, int scale_count = 8)
+      : materials(material_count) {
     const ConditionedMesh conditioned = condition_mesh(mesh, false, {}, kOneThread);
     ScaleMap map;
     map.scales = scale_count;
@@ -115,7 +118,8 @@ std::vector<std::uint8_t> view_bytes(const Glb& glb, std::size_t index) {
     return {begin, begin + view["byteLength"].get<std::ptrdiff_t>()};
   }
   const Json& e = view["extensions"]["EXT_meshopt_compression"];
-  EXPECT_LE(view["byteOffset"].get<std::size_t>() + view["byteLength"].get<std::size_t>(), glb.json["buffers"][1]["byteLength"].get<std::size_t>());
+  EXPECT_LE(view["byteOffset"].get<std::size_t>() + view["byteLength"].get<std::size_t>(),
+            glb.json["buffers"][1]["byteLength"].get<std::size_t>());
   const std::size_t count = e["count"], stride = e["byteStride"];
   std::vector<std::uint8_t> out(count * stride);
   EXPECT_EQ(out.size(), view["byteLength"].get<std::size_t>());
@@ -180,7 +184,8 @@ Primitive read_draco_primitive(const Glb& glb, const Json& json) {
   const draco::Mesh& mesh = *decoded.value();
   Primitive p;
   const Json& ids = e["attributes"];
-  EXPECT_EQ(glb.json["accessors"][json["attributes"]["POSITION"].get<std::size_t>()]["count"], mesh.num_points());
+  EXPECT_EQ(glb.json["accessors"][json["attributes"]["POSITION"].get<std::size_t>()]["count"],
+            mesh.num_points());
   EXPECT_EQ(glb.json["accessors"][json["indices"].get<std::size_t>()]["count"], mesh.num_faces() * 3);
   p.positions = read_draco<3>(mesh, ids["POSITION"], 1);
   if (ids.contains("NORMAL")) p.normals = read_draco<3>(mesh, ids["NORMAL"], 1);
@@ -212,7 +217,8 @@ std::vector<Primitive> read(const Glb& glb, Vec3d& translation, double& step) {
         if (a.contains("TEXCOORD_0")) p.uv0 = read_accessor<2>(glb, a["TEXCOORD_0"]);
         if (a.contains("TEXCOORD_1")) p.uv1 = read_accessor<2>(glb, a["TEXCOORD_1"]);
         if (a.contains("COLOR_0")) p.colours = read_accessor<4>(glb, a["COLOR_0"]);
-        for (const auto& i : read_accessor<1>(glb, json["indices"])) p.indices.push_back(static_cast<std::uint32_t>(i[0]));
+        for (const auto& i : read_accessor<1>(glb, json["indices"]))
+          p.indices.push_back(static_cast<std::uint32_t>(i[0]));
       }
       const Json& bounds = glb.json["accessors"][a["POSITION"].get<std::size_t>()];
       for (std::size_t k = 0; k < 3; ++k) {
@@ -229,7 +235,8 @@ std::vector<Primitive> read(const Glb& glb, Vec3d& translation, double& step) {
   return out;
 }
 
-/// Corner by corner sums over all triangles: enough to tell that every triangle came through with its attributes.
+/// Corner by corner sums over all triangles: enough to tell that every triangle came through with its
+/// attributes.
 struct Sums {
   double triangles = 0, area = 0, uv_area = 0, uv1 = 0, normal = 0, colour = 0;
 };
@@ -240,7 +247,9 @@ Sums expected(const Mesh& m, const NestedScale& s) {
     auto p = [&](std::size_t k) { return to_double(m.positions[m.wedge_position[t[k]]]); };
     const Vec3d n = cross(p(1) - p(0), p(2) - p(0));
     sums.triangles += 1, sums.area += length(n);
-    if (!m.uv0.empty()) sums.uv_area += cross(to_double(m.uv0[t[1]]) - to_double(m.uv0[t[0]]), to_double(m.uv0[t[2]]) - to_double(m.uv0[t[0]]));
+    if (!m.uv0.empty())
+      sums.uv_area += cross(to_double(m.uv0[t[1]]) - to_double(m.uv0[t[0]]),
+                            to_double(m.uv0[t[2]]) - to_double(m.uv0[t[0]]));
     for (std::uint32_t w : t) {
       if (!m.uv1.empty()) sums.uv1 += m.uv1[w].x;
       if (!m.normals.empty()) sums.normal += dot(to_double(m.normals[w]), n);
@@ -255,14 +264,17 @@ Sums found(const std::vector<Primitive>& primitives, double step) {
   for (const Primitive& p : primitives)
     for (std::size_t i = 0; i < p.indices.size(); i += 3) {
       const std::uint32_t* t = &p.indices[i];
-      auto at = [&](std::size_t k) { return Vec3d{p.positions[t[k]][0], p.positions[t[k]][1], p.positions[t[k]][2]} * step; };
+      auto at = [&](std::size_t k) {
+        return Vec3d{p.positions[t[k]][0], p.positions[t[k]][1], p.positions[t[k]][2]} * step;
+      };
       auto uv = [&](std::size_t k) { return Vec2d{p.uv0[t[k]][0], p.uv0[t[k]][1]}; };
       const Vec3d n = cross(at(1) - at(0), at(2) - at(0));
       sums.triangles += 1, sums.area += length(n);
       if (!p.uv0.empty()) sums.uv_area += cross(uv(1) - uv(0), uv(2) - uv(0));
       for (std::size_t k = 0; k < 3; ++k) {
         if (!p.uv1.empty()) sums.uv1 += p.uv1[t[k]][0];
-        if (!p.normals.empty()) sums.normal += dot(Vec3d{p.normals[t[k]][0], p.normals[t[k]][1], p.normals[t[k]][2]}, n);
+        if (!p.normals.empty())
+          sums.normal += dot(Vec3d{p.normals[t[k]][0], p.normals[t[k]][1], p.normals[t[k]][2]}, n);
         if (!p.colours.empty()) sums.colour += p.colours[t[k]][0] + 2 * p.colours[t[k]][2];
       }
     }
@@ -346,7 +358,8 @@ TEST(Scales, SeveralPartsMaterialsTextureSetsAndColours) {
 TEST(Scales, VeryManyPartsBecomeOneNode) {
   Mesh m = testing::bumpy_sphere(16, 24);
   m.part_names.clear();
-  for (std::size_t t = 0; t < m.triangles.size(); ++t) m.triangle_part[t] = static_cast<std::uint16_t>(t % 257);
+  for (std::size_t t = 0; t < m.triangles.size(); ++t)
+    m.triangle_part[t] = static_cast<std::uint16_t>(t % 257);
   for (int i = 0; i < 257; ++i) m.part_names.push_back("part " + std::to_string(i));
   const Case c(m, 1, 1);
   expect_round_trip(c, MeshCodec::kDraco);
@@ -382,7 +395,9 @@ TEST(Scales, MoreThan65535VerticesTakeWideIndices) {
     SCOPED_TRACE(std::string(enum_name(codec)));
     const ScaleFiles files = c.write(codec);
     const Glb glb = open(files.files[0].glb);
-    EXPECT_EQ(glb.json["accessors"][glb.json["meshes"][0]["primitives"][0]["indices"].get<std::size_t>()]["componentType"], 5125);
+    EXPECT_EQ(glb.json["accessors"][glb.json["meshes"][0]["primitives"][0]["indices"].get<std::size_t>()]
+                      ["componentType"],
+              5125);
     Vec3d translation;
     double step = 1;
     const std::vector<Primitive> primitives = read(glb, translation, step);
@@ -395,7 +410,8 @@ TEST(Scales, MoreThan65535VerticesTakeWideIndices) {
 
 TEST(Scales, HugeRangesOfTextureCoordinatesStayFine) {
   Mesh m = testing::bumpy_sphere(14, 20);
-  for (std::size_t w = 0; w < m.wedge_count(); ++w) m.uv0[w] = {m.uv0[w].x + (w % 2 ? 1500.f : -700.f), m.uv0[w].y * 3};
+  for (std::size_t w = 0; w < m.wedge_count(); ++w)
+    m.uv0[w] = {m.uv0[w].x + (w % 2 ? 1500.f : -700.f), m.uv0[w].y * 3};
   Case c(m);
   c.add_image(TextureRole::kBaseColour);
   c.materials[0].base_colour_texture.image = 0;
@@ -426,7 +442,9 @@ TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   double mean = 0, count = 0;
   const Mesh& m = c.scales.mesh;
   for (const Triangle& t : m.triangles)
-    for (std::size_t k = 0; k < 3; ++k) mean += length(m.positions[m.wedge_position[t[k]]] - m.positions[m.wedge_position[t[(k + 1) % 3]]]), ++count;
+    for (std::size_t k = 0; k < 3; ++k)
+      mean += length(m.positions[m.wedge_position[t[k]]] - m.positions[m.wedge_position[t[(k + 1) % 3]]]),
+          ++count;
   EXPECT_LE(automatic.position_error * 1.7321, mean / count / 4);
   EXPECT_GT(automatic.position_error, 0);
   ScalesOptions options;
@@ -489,7 +507,8 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   EXPECT_EQ(j["doubleSided"], true);
   EXPECT_TRUE(j["extensions"].contains("KHR_materials_unlit"));
   const Json& t = j["pbrMetallicRoughness"]["baseColorTexture"];
-  EXPECT_EQ(t["extensions"]["KHR_texture_transform"], Json::parse(R"({"offset":[0.5,0.0],"rotation":0.25,"scale":[2.0,3.0]})"));
+  EXPECT_EQ(t["extensions"]["KHR_texture_transform"],
+            Json::parse(R"({"offset":[0.5,0.0],"rotation":0.25,"scale":[2.0,3.0]})"));
   const Json& texture = glb.json["textures"][t["index"].get<std::size_t>()];
   EXPECT_EQ(glb.json["samplers"][texture["sampler"].get<std::size_t>()],
             Json::parse(R"({"magFilter":9728,"minFilter":9984,"wrapS":33071,"wrapT":33648})"));
@@ -538,7 +557,8 @@ TEST(Scales, SameBytesForAnyNumberOfThreads) {
   Case c(testing::bumpy_sphere(16, 24));
   c.add_image(TextureRole::kBaseColour, true);
   c.materials[0].base_colour_texture.image = 0;
-  for (MeshCodec codec : kCodecs) EXPECT_EQ(encode_artefact(c.write(codec, {}, 1)), encode_artefact(c.write(codec, {}, 8)));
+  for (MeshCodec codec : kCodecs)
+    EXPECT_EQ(encode_artefact(c.write(codec, {}, 1)), encode_artefact(c.write(codec, {}, 8)));
 }
 
 }  // namespace

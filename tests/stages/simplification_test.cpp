@@ -39,7 +39,9 @@ NestedScales run(const ConditionedMesh& mesh, SimplificationOptions options = {}
   return simplify(mesh, random_scale_map(mesh.mesh.positions.size(), scales), options, kOneThread);
 }
 
-struct EdgeCounts { std::size_t border = 0, non_manifold = 0; };
+struct EdgeCounts {
+  std::size_t border = 0, non_manifold = 0;
+};
 
 /// Of the surface with twins welded.
 EdgeCounts count_edges(const NestedScales& scales, const NestedScale& scale) {
@@ -63,7 +65,8 @@ double uv_turn(const Mesh& m, const Triangle& t) {
   return cross(to_double(m.uv0[t[1]]) - a, to_double(m.uv0[t[2]]) - a);
 }
 
-/// What holds for every result: nested positions, no new UV, no degenerate triangle, no crack, sound bookkeeping.
+/// What holds for every result: nested positions, no new UV, no degenerate triangle, no crack, sound
+/// bookkeeping.
 void expect_sound(const NestedScales& scales) {
   ASSERT_FALSE(scales.scales.empty());
   const Mesh& m = scales.mesh;
@@ -176,8 +179,8 @@ TEST(Simplification, MeetsVertexTargetsWhereNothingLocks) {
   const ScaleMap map = random_scale_map(mesh.mesh.positions.size());
   const NestedScales scales = simplify(mesh, map, {.min_triangles = 20, .coarsest = 1}, kOneThread);
   for (const NestedScale& s : scales.scales) {
-    const auto asked = static_cast<std::uint32_t>(
-        std::count_if(map.persistence.begin(), map.persistence.end(), [&](std::uint8_t p) { return p >= s.scale; }));
+    const auto asked = static_cast<std::uint32_t>(std::count_if(
+        map.persistence.begin(), map.persistence.end(), [&](std::uint8_t p) { return p >= s.scale; }));
     if (s.floor_reason.empty()) {
       EXPECT_EQ(s.position_count, asked);
     } else {
@@ -224,7 +227,8 @@ TEST(Simplification, MeshWithoutUv) {
 }
 
 TEST(Simplification, SeveralComponentsStay) {
-  const NestedScales scales = run(condition(testing::side_by_side({bumpy_sphere(16, 24), sheet(12), testing::cube()})));
+  const NestedScales scales =
+      run(condition(testing::side_by_side({bumpy_sphere(16, 24), sheet(12), testing::cube()})));
   expect_sound(scales);
   const Mesh m = extract_scale(scales, scales.scales.back());
   std::vector<int> seen(3);
@@ -257,7 +261,8 @@ TEST(Simplification, NonManifoldSpineNeitherCracksNorSpreads) {
   for (std::size_t p = 0; p < scales.twin.size(); ++p) twins = twins || scales.twin[p] != p;
   ASSERT_TRUE(twins);
   // The spine itself shrinks: its positions go together, one from each page.
-  const EdgeCounts first = count_edges(scales, scales.scales[0]), last = count_edges(scales, scales.scales.back());
+  const EdgeCounts first = count_edges(scales, scales.scales[0]),
+                   last = count_edges(scales, scales.scales.back());
   EXPECT_EQ(first.non_manifold, 12u);
   EXPECT_LT(last.non_manifold, 12u);
   EXPECT_GE(last.non_manifold, 1u);
@@ -266,7 +271,8 @@ TEST(Simplification, NonManifoldSpineNeitherCracksNorSpreads) {
 TEST(Simplification, DoubledSheetStaysDoubled) {
   Mesh m = sheet(10, 0.1f);
   const std::size_t n = m.triangles.size();
-  for (std::size_t t = 0; t < n; ++t) m.triangles.push_back({m.triangles[t][0], m.triangles[t][2], m.triangles[t][1]});
+  for (std::size_t t = 0; t < n; ++t)
+    m.triangles.push_back({m.triangles[t][0], m.triangles[t][2], m.triangles[t][1]});
   m.triangle_material.resize(2 * n), m.triangle_part.resize(2 * n);
   expect_sound(run(condition(m)));
 }
@@ -281,7 +287,8 @@ TEST(Simplification, RelaxedJunctionsOnlyRepeatAttributes) {
     const auto chart = static_cast<std::uint32_t>(t / 8);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t w = m.triangles[t][k];
-      const auto [it, fresh] = ids.try_emplace({w, chart}, static_cast<std::uint32_t>(charts.wedge_position.size()));
+      const auto [it, fresh] =
+          ids.try_emplace({w, chart}, static_cast<std::uint32_t>(charts.wedge_position.size()));
       if (fresh) {
         charts.wedge_position.push_back(m.wedge_position[w]);
         charts.uv0.push_back({m.uv0[w].x + static_cast<float>(chart), m.uv0[w].y});
@@ -317,7 +324,8 @@ TEST(Simplification, QuadricsBeatTheLiteralThesisOrder) {
   const ScaleMap map = random_scale_map(mesh.mesh.positions.size());
   std::size_t applied = 0;
   for (const NestedScale& s : thesis.scales)  // it never removes what persists
-    for (; applied < s.collapse_count; ++applied) EXPECT_LT(map.persistence[thesis.collapses[applied].from], s.scale);
+    for (; applied < s.collapse_count; ++applied)
+      EXPECT_LT(map.persistence[thesis.collapses[applied].from], s.scale);
   EXPECT_LT(ours.scales[3].error_rms, thesis.scales[3].error_rms);
   expect_sound(run(mesh, {.order = CollapseOrder::kQem}));
 }
@@ -330,7 +338,8 @@ TEST(Simplification, PersistentVerticesStayLonger) {
     const NestedScales scales = simplify(mesh, map, options, kOneThread);
     std::vector<bool> gone(map.persistence.size());
     const std::size_t half = map.persistence.size() / 2;
-    for (std::size_t i = 0; i < std::min(half, scales.collapses.size()); ++i) gone[scales.collapses[i].from] = true;
+    for (std::size_t i = 0; i < std::min(half, scales.collapses.size()); ++i)
+      gone[scales.collapses[i].from] = true;
     double sum = 0, count = 0;
     for (std::size_t p = 0; p < gone.size(); ++p)
       if (!gone[p]) sum += map.persistence[p], ++count;
@@ -348,7 +357,8 @@ TEST(Simplification, ColoursGuideTheCollapseWhereThereIsNoTexture) {
   }
   SimplificationOptions options{.min_triangles = 60};
   const ConditionedMesh mesh = condition(m);
-  const NestedScales scales = simplify(mesh, random_scale_map(mesh.mesh.positions.size(), 20), options, kOneThread);
+  const NestedScales scales =
+      simplify(mesh, random_scale_map(mesh.mesh.positions.size(), 20), options, kOneThread);
   double wrong = 0;  // area that spans both colours away from the line between them
   const Mesh coarse = extract_scale(scales, scales.scales.back());
   for (const Triangle& t : coarse.triangles) {
@@ -375,7 +385,8 @@ TEST(Simplification, ExtractDropsWhatIsUnused) {
   EXPECT_EQ(m.part_names, scales.mesh.part_names);
   for (std::size_t t = 0; t < m.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
-      EXPECT_EQ(m.positions[m.wedge_position[m.triangles[t][k]]], scales.mesh.positions[scales.mesh.wedge_position[s.triangles[t][k]]]);
+      EXPECT_EQ(m.positions[m.wedge_position[m.triangles[t][k]]],
+                scales.mesh.positions[scales.mesh.wedge_position[s.triangles[t][k]]]);
       EXPECT_EQ(m.uv0[m.triangles[t][k]], scales.mesh.uv0[s.triangles[t][k]]);
     }
   EXPECT_EQ(extract_scale(scales, scales.scales[0]).triangles.size(), scales.mesh.triangles.size());
@@ -386,7 +397,8 @@ TEST(Simplification, SameBytesForAnyNumberOfThreads) {
   const ScaleMap map = random_scale_map(mesh.mesh.positions.size());
   RunContext eight;
   eight.threads = 8;
-  EXPECT_EQ(encode_artefact(simplify(mesh, map, {}, kOneThread)), encode_artefact(simplify(mesh, map, {}, eight)));
+  EXPECT_EQ(encode_artefact(simplify(mesh, map, {}, kOneThread)),
+            encode_artefact(simplify(mesh, map, {}, eight)));
 }
 
 TEST(Simplification, RefusesAScaleMapOfAnotherMesh) {

@@ -27,7 +27,9 @@ TemporaryFolder::~TemporaryFolder() {
   fs::remove_all(path_, ec);
 }
 
-void write_text(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+void write_text(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
 
 std::string read_text(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
@@ -42,8 +44,9 @@ std::vector<std::string> files_beneath(const std::string& folder) {
   return files;
 }
 
-CommandResult run_command(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
-                          const std::string& folder, int timeout_s) {
+CommandResult run_command(const std::vector<std::string>& arguments,
+                          const std::vector<std::string>& environment, const std::string& folder,
+                          int timeout_s) {
   const TemporaryFolder captured;
   const std::string out = captured / "out", err = captured / "err";
   std::vector<char*> argv;
@@ -52,7 +55,8 @@ CommandResult run_command(const std::vector<std::string>& arguments, const std::
   const pid_t pid = ::fork();  // tests have one thread here
   if (pid == 0) {
     ::setpgid(0, 0);
-    const int o = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600), e = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+    const int o = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600),
+              e = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
     const int in = ::open("/dev/null", O_RDONLY);
     ::dup2(in, 0);
     ::dup2(o, 1);

@@ -20,12 +20,14 @@ void finish(Mesh& m) {
 Mesh radial(int rings, int segments, float amplitude) {
   Mesh m;
   auto radius = [&](double theta, double phi) {
-    return 1.0 + amplitude * (portable::sin(5 * theta + 1) * portable::sin(4 * phi) + 0.5 * portable::sin(9 * phi + 2) * portable::sin(7 * theta));
+    return 1.0 + amplitude * (portable::sin(5 * theta + 1) * portable::sin(4 * phi) +
+                              0.5 * portable::sin(9 * phi + 2) * portable::sin(7 * theta));
   };
   auto point = [&](int ring, int segment) {
     const double phi = portable::kPi * ring / rings, theta = 2 * portable::kPi * segment / segments;
     const double r = ring == 0 || ring == rings ? 1.0 : radius(theta, phi);
-    return to_float(Vec3d{r * portable::sin(phi) * portable::cos(theta), r * portable::cos(phi), r * portable::sin(phi) * portable::sin(theta)});
+    return to_float(Vec3d{r * portable::sin(phi) * portable::cos(theta), r * portable::cos(phi),
+                          r * portable::sin(phi) * portable::sin(theta)});
   };
   m.positions.push_back(point(0, 0));
   for (int i = 1; i < rings; ++i)
@@ -59,7 +61,8 @@ Mesh cube() {
   Mesh m;
   for (int i = 0; i < 8; ++i)
     m.positions.push_back({i & 1 ? 1.f : -1.f, i & 2 ? 1.f : -1.f, i & 4 ? 1.f : -1.f});
-  static constexpr std::uint32_t kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  static constexpr std::uint32_t kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                                 {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   for (int f = 0; f < 6; ++f) {
     const float u = static_cast<float>(f % 3) / 3, v = static_cast<float>(f / 3) / 2, s = 0.3f, t = 0.45f;
     const Vec2f corner[4] = {{u, v}, {u + s, v}, {u + s, v + t}, {u, v + t}};
@@ -81,11 +84,13 @@ Mesh sheet(int n, float amplitude) {
     for (int i = 0; i <= n; ++i) {
       const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
       m.positions.push_back(to_float(Vec3d{x, y, amplitude * portable::sin(9 * x) * portable::cos(7 * y)}));
-      add_wedge(m, static_cast<std::uint32_t>(j * (n + 1) + i), {static_cast<float>(x), static_cast<float>(1 - y)});
+      add_wedge(m, static_cast<std::uint32_t>(j * (n + 1) + i),
+                {static_cast<float>(x), static_cast<float>(1 - y)});
     }
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
-      const auto a = static_cast<std::uint32_t>(j * (n + 1) + i), b = a + 1, c = a + static_cast<std::uint32_t>(n) + 1, d = c + 1;
+      const auto a = static_cast<std::uint32_t>(j * (n + 1) + i), b = a + 1,
+                 c = a + static_cast<std::uint32_t>(n) + 1, d = c + 1;
       m.triangles.push_back({a, b, d});
       m.triangles.push_back({a, d, c});
     }
@@ -98,7 +103,10 @@ Mesh side_by_side(const std::vector<Mesh>& meshes, float gap) {
   float at = 0;
   for (const Mesh& m : meshes) {
     float lo = m.positions[0].x, hi = lo;
-    for (Vec3f p : m.positions) { lo = p.x < lo ? p.x : lo; hi = p.x > hi ? p.x : hi; }
+    for (Vec3f p : m.positions) {
+      lo = p.x < lo ? p.x : lo;
+      hi = p.x > hi ? p.x : hi;
+    }
     const auto positions = static_cast<std::uint32_t>(out.positions.size());
     const auto wedges = static_cast<std::uint32_t>(out.wedge_position.size());
     for (Vec3f p : m.positions) out.positions.push_back({p.x - lo + at, p.y, p.z});

@@ -5,11 +5,14 @@
 
 namespace texmesh::testing {
 
-/// A closed cube of 12 triangles, side 2, one UV chart per face in a 3 x 2 atlas (seams on every edge), no normals.
+/// A closed cube of 12 triangles, side 2, one UV chart per face in a 3 x 2 atlas (seams on every edge), no
+/// normals.
 Mesh cube();
-/// A UV sphere with `rings` x `segments` quads, radius 1, one chart with a seam, poles as triangle fans; smooth normals.
+/// A UV sphere with `rings` x `segments` quads, radius 1, one chart with a seam, poles as triangle fans;
+/// smooth normals.
 Mesh sphere(int rings, int segments);
-/// An open height field of n x n quads over [0,1]^2 in x, y with z = amplitude * waves; one chart covering 0..1.
+/// An open height field of n x n quads over [0,1]^2 in x, y with z = amplitude * waves; one chart covering
+/// 0..1.
 Mesh sheet(int n, float amplitude = 0.05f);
 /// A sphere displaced by deterministic bumps: an organic closed object for feature tests.
 Mesh bumpy_sphere(int rings, int segments, float amplitude = 0.05f);
