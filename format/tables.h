@@ -85,7 +85,7 @@ TablesHead read_tables_head(std::span<const std::uint8_t> bytes);  // `bytes` ma
 PlaneTables read_tables_section(const TablesHead& head, std::size_t plane,
                                 std::span<const std::uint8_t> section);
 
-/// Measured quality of scale x rung samples (design 8.11): quality.json.
+/// Measured quality of scale x rung samples: quality.json.
 struct QualityTable {
   std::vector<int> scales;        // scale numbers, rising (0 = S_0)
   std::vector<int> rungs;         // IJG qualities, rising; {100} for untextured models

@@ -59,7 +59,7 @@ struct ConditionReport {
 struct ConditionedMesh {
   Mesh mesh;
   /// Per position: the lowest index of a position at the very same place (itself when there is no twin).
-  /// Twins come from splits; they collapse together later (design 8.7) so that no crack opens.
+  /// Twins come from splits; they collapse together later so that no crack opens.
   std::vector<std::uint32_t> twin;
   std::vector<std::uint32_t> component;  // per position: connected component over positions *and* twins
   std::uint32_t component_count = 0;

@@ -102,7 +102,7 @@ void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32
   split(child + 1, middle, end, order, centres);
 }
 
-double SurfaceDistance::operator()(Vec3d p) const {
+double SurfaceDistance::operator()(Vec3d p, double enough) const {
   struct Open {
     std::uint32_t node;
     double distance2;
@@ -110,6 +110,7 @@ double SurfaceDistance::operator()(Vec3d p) const {
   Open stack[64];
   int depth = 0;
   double best = std::numeric_limits<double>::infinity();
+  const double enough2 = enough * enough;
   stack[depth++] = {0, box_distance2(p, nodes_[0].lo, nodes_[0].hi)};
   while (depth > 0) {
     const Open open = stack[--depth];
@@ -120,6 +121,7 @@ double SurfaceDistance::operator()(Vec3d p) const {
         best = std::min(best,
                         triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
                                            to_double(corners_[3 * t + 2]) - p));
+      if (best <= enough2) break;
       continue;
     }
     Open near{node.first, box_distance2(p, nodes_[node.first].lo, nodes_[node.first].hi)};

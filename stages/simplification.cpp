@@ -111,15 +111,16 @@ Deviation deviation(const Mesh& mesh, const std::vector<Triangle>& from, const S
 }
 
 /// Vertices of S_0 are where it deviates most from a coarser scale; about kErrorSamples of them are looked
-/// at.
-double vertex_deviation(const Mesh& mesh, const SurfaceDistance& to, const RunContext& context) {
+/// at. `known`: a deviation already found; the result is not smaller.
+double vertex_deviation(const Mesh& mesh, const SurfaceDistance& to, double known,
+                        const RunContext& context) {
   const std::size_t step = mesh.positions.size() / kErrorSamples + 1,
                     count = (mesh.positions.size() + step - 1) / step;
   std::vector<double> distance(count);
   parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) distance[i] = to(to_double(mesh.positions[i * step]));
+    for (std::size_t i = begin; i < end; ++i) distance[i] = to(to_double(mesh.positions[i * step]), known);
   });
-  return *std::max_element(distance.begin(), distance.end());
+  return std::max(known, *std::max_element(distance.begin(), distance.end()));
 }
 
 void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const RunContext& context) {
@@ -134,7 +135,7 @@ void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const Ru
                           static_cast<double>(std::max<std::size_t>(there.count + back.count, 1));
     scale.error_rms = static_cast<float>(std::sqrt(square));
     scale.error_max =
-        static_cast<float>(std::max({there.largest, back.largest, vertex_deviation(mesh, coarse, context)}));
+        static_cast<float>(vertex_deviation(mesh, coarse, std::max(there.largest, back.largest), context));
     context.report(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scales.size()));
   }
 }

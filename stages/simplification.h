@@ -94,8 +94,8 @@ struct NestedScales {
 /// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}, see
 /// SimplificationOptions::coarsest), seam- and
 /// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV
-/// triangle; border vertices move along the border only, seams along the seam, twins together (see
-/// facts/geometry.md, section 3). Deterministic: ties by place along a space-filling curve. About 5 us per
+/// triangle; border vertices move along the border only, seams along the seam, twins together.
+/// Deterministic: ties by place along a space-filling curve. About 5 us per
 /// removed vertex on one core. Throws StageError when the scale map is of another mesh.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
                       const SimplificationOptions& options, const RunContext& context);

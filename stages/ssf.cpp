@@ -17,8 +17,8 @@ namespace {
 
 /// Components below this many vertices are solved whole by one thread each, many at a time.
 constexpr std::size_t kSmallComponent = 8192;
-/// Edges whose rate is capped, beyond which fine scales of the response are off by 20 % (facts/geometry.md
-/// 1c).
+/// Edges whose rate is capped, beyond which fine scales of the response are off by 20 %, as
+/// measured on an unevenly sampled head.
 constexpr double kManyCapped = 0.1;
 
 /// The response of a surface without relief is what discretisation makes of its curvature, some percent of

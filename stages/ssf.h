@@ -56,7 +56,8 @@ struct ScaleMap {
   }
 };
 
-/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (algorithms section 8),
+/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (of the positions
+/// that the heat flow smooths),
 /// all scales in one Chebyshev recurrence over the position graph (twins joined). Independent of
 /// skeletonization. Every component has a sigma ladder of its own, from its mean edge to sigma_max of its
 /// diagonal or the first sigma at which the smoothed component has shrunk to `convergence` of its extent. A

@@ -8,7 +8,7 @@ class App;
 
 namespace texmesh {
 
-/// Stable exit codes (design section 6).
+/// Stable exit codes.
 enum ExitCode : int { kExitOk = 0, kExitModelFailed = 1, kExitUsage = 2, kExitInternal = 3 };
 
 // Each adds one subcommand to `app`; when the user chose it, its callback runs and stores the exit code.

@@ -48,7 +48,7 @@ struct ImportOptions {
 };
 
 /// Gives import the files a model refers to. The pipeline's resolver opens beneath the model's folder only;
-/// tests use memory. What was asked for, found or not, becomes part of the cache key (design 8.8).
+/// tests use memory. What was asked for, found or not, becomes part of the cache key.
 class Resolver {
  public:
   virtual ~Resolver() = default;

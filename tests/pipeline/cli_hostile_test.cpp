@@ -1,5 +1,5 @@
 // What nobody should feed to a compiler, and what everybody does: refused with exit 1, an error and no file,
-// or compiled with a warning that --strict turns into an error (design section 6).
+// or compiled with a warning that --strict turns into an error.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
