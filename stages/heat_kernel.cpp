@@ -249,8 +249,7 @@ HeatOperator make_heat_operator(std::span<const Vec3d> points, std::span<const s
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) leaving[i] += l.rate[k];
   }
   // L has the nonzero eigenvalues of the edges' matrix B M^-1 B^T W, whose row sums are those of both ends
-  // together: a fifth to a third below Gershgorin's bound for L itself, and so a tenth to a sixth fewer
-  // terms.
+  // together: never above Gershgorin's bound for L itself.
   for (std::size_t i = 0; i < points.size(); ++i)
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
       l.bound = std::max(l.bound, leaving[i] + leaving[l.column[k]]);
