@@ -71,42 +71,6 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
-/// rho of every sample of a scale to a coarser surface; values below the 95th percentile may be too large,
-/// but stay below it: percentiles from there on are exact. A twelfth of the samples tells about where the
-/// upper fifth begins; for the others it is enough to know that they lie below, which costs a fraction of the
-/// exact distance.
-std::vector<double> upper_distances(const SampledScale& sampled, const SurfaceDistance& surface,
-                                    const RunContext& context) {
-  constexpr std::size_t kStride = 12;
-  const std::size_t count = sampled.points.size();
-  std::vector<double> rho(count);
-  auto measure = [&](double threshold, auto&& wanted) {
-    parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s)
-        if (wanted(s)) rho[s] = surface(sampled.points[s], threshold * sampled.radius[s]) / sampled.radius[s];
-    });
-  };
-  measure(0, [](std::size_t s) { return s % kStride == 0; });
-  std::vector<double> pilot;
-  for (std::size_t s = 0; s < count; s += kStride) pilot.push_back(rho[s]);
-  const double threshold = percentile(pilot, 80);
-  measure(threshold, [](std::size_t s) { return s % kStride != 0; });
-  const auto above = std::count_if(rho.begin(), rho.end(), [&](double r) { return r > threshold; });
-  // The percentile's rank must lie among the exact values; an unlucky pilot costs a full pass.
-  if (static_cast<double>(above) < 0.05 * static_cast<double>(count) + 2)
-    measure(0, [](std::size_t) { return true; });
-  return rho;
-}
-
-/// The 95th percentile of the samples' distances in object units.
-double error_of(const SampledScale& sampled, const SurfaceDistance& surface, const RunContext& context) {
-  std::vector<double> distance(sampled.points.size());
-  parallel_for(context, distance.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) distance[s] = surface(sampled.points[s]);
-  });
-  return percentile(distance, 95);
-}
-
 /// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
 std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
                                    const RunContext& context, PerceptualValues& out) {
@@ -119,10 +83,15 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   for (std::size_t j = 1; j < n; ++j) {
     const SurfaceDistance surface(mesh.positions, mesh.wedge_position, scales.scales[j].triangles);
     for (std::size_t i = 0; i < j; ++i) {
-      std::vector<double> rho = upper_distances(sampled[i], surface, context);
+      std::vector<double> distance(sampled[i].points.size());
+      parallel_for(context, distance.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) distance[s] = surface(sampled[i].points[s]);
+      });
+      std::vector<double> rho(distance.size());
+      for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
       out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
       out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
-      if (i == 0) error[j] = error_of(sampled[i], surface, context);
+      if (i == 0) error[j] = percentile(distance, 95);
     }
     context.report(static_cast<double>(j) / static_cast<double>(n));
   }
