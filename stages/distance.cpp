@@ -57,8 +57,11 @@ SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions,
   nodes_.emplace_back();
   split(0, 0, static_cast<std::uint32_t>(n), order, centres);
   corners_.resize(3 * n);
-  for (std::size_t i = 0; i < n; ++i)
+  leaf_of_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    leaf_of_[order[i]] = static_cast<std::uint32_t>(i);
     for (std::size_t k = 0; k < 3; ++k) corners_[3 * i + k] = corner(order[i], k);
+  }
   // Children stand behind their parents, so one pass from the back fits all boxes.
   for (std::size_t i = nodes_.size(); i-- > 0;) {
     Node& node = nodes_[i];
@@ -103,13 +106,27 @@ void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32
 }
 
 double SurfaceDistance::operator()(Vec3d p, double enough) const {
+  std::uint32_t leaf = 0;
+  return search(p, enough, std::numeric_limits<double>::infinity(), leaf);
+}
+
+double SurfaceDistance::operator()(Vec3d p, Hint& hint) const {
+  double best = std::numeric_limits<double>::infinity();
+  if (hint.leaf != Hint{}.leaf) {
+    const Vec3f* c = &corners_[3 * std::size_t{hint.leaf}];
+    best = triangle_distance2(to_double(c[0]) - p, to_double(c[1]) - p, to_double(c[2]) - p);
+  }
+  return search(p, 0, best, hint.leaf);
+}
+
+/// `best` is the square of an upper bound that triangle `leaf` gives.
+double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_t& leaf) const {
   struct Open {
     std::uint32_t node;
     double distance2;
   };
   Open stack[64];
   int depth = 0;
-  double best = std::numeric_limits<double>::infinity();
   const double enough2 = enough * enough;
   stack[depth++] = {0, box_distance2(p, nodes_[0].lo, nodes_[0].hi)};
   while (depth > 0) {
@@ -117,10 +134,12 @@ double SurfaceDistance::operator()(Vec3d p, double enough) const {
     if (open.distance2 >= best) continue;
     const Node& node = nodes_[open.node];
     if (node.count > 0) {
-      for (std::uint32_t t = node.first; t < node.first + node.count; ++t)
-        best = std::min(best,
-                        triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
-                                           to_double(corners_[3 * t + 2]) - p));
+      for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
+        const double d =
+            triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
+                               to_double(corners_[3 * t + 2]) - p);
+        if (d < best) best = d, leaf = t;
+      }
       if (best <= enough2) break;
       continue;
     }

@@ -18,6 +18,16 @@ class SurfaceDistance {
   /// distance exceeds `enough` gets some upper bound <= enough, several times faster, where it does not.
   double operator()(Vec3d p, double enough = 0) const;
 
+  /// A triangle to begin with: where one near the point is known, the search is several times shorter.
+  struct Hint {
+    std::uint32_t leaf = 0xffffffffu;  // of the last answer; none at first
+  };
+  /// As operator(), beginning with the triangle of the hint, which becomes the closest one found. With the
+  /// same chain of points and hints the same bits; another chain may differ in the last one.
+  double operator()(Vec3d p, Hint& hint) const;
+  /// The hint that names the triangle with this index in the constructor's list.
+  Hint hint_of(std::uint32_t triangle) const { return {leaf_of_[triangle]}; }
+
  private:
   struct Node {
     Vec3f lo, hi;
@@ -26,8 +36,11 @@ class SurfaceDistance {
   };
   void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end, std::vector<std::uint32_t>& order,
              const std::vector<Vec3f>& centres);
+  double search(Vec3d p, double enough, double best, std::uint32_t& leaf) const;
+
   std::vector<Node> nodes_;
   std::vector<Vec3f> corners_;  // three per triangle, in the order of the leaves
+  std::vector<std::uint32_t> leaf_of_;
 };
 
 /// A point on a triangle: weights of its three corners, summing to 1.

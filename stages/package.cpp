@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "format/layout.h"
+#include "format/viewing.h"
 
 namespace texmesh {
 namespace {
@@ -108,23 +109,6 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
   return result;
 }
 
-/// For a displayed height the coarsest scale that the JND rule and the <= 1 px error rule both accept. A
-/// scale that accepts no more than a coarser one is never the answer and gives no step.
-std::vector<ManifestStep> make_steps(const std::vector<ManifestScale>& scales) {
-  std::vector<ManifestStep> steps;
-  double reached = 0;
-  for (auto s = scales.rbegin(); s != scales.rend(); ++s) {
-    // The last step is always S_0's, so a coarser scale that is enough at any size stops just below.
-    const double limit = s->scale == 0
-                             ? kAnyDisplayPx
-                             : std::min({s->display_px_jnd, s->display_px_error, 0.999 * kAnyDisplayPx});
-    if (limit <= reached * 1.0001) continue;  // also keeps steps apart in the manifest's six digits
-    steps.push_back({limit, s->scale});
-    reached = limit;
-  }
-  return steps;
-}
-
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
                         const ScaleFiles& files, const Fragments& fragments, double jnd,
                         const std::string& title) {
@@ -142,7 +126,7 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   m.object_height = static_cast<double>(perceptual.object_height);
   m.jnd = jnd;
   m.scales = describe_scales(scales, perceptual, files);
-  m.steps = make_steps(m.scales);
+  m.steps = step_function(m.scales, StepRule::kDefault);
   m.plane_count = static_cast<std::uint32_t>(fragments.planes.size());
   return m;
 }

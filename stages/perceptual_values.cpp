@@ -1,9 +1,11 @@
 #include "stages/perceptual_values.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <string>
 
+#include "format/errors.h"
 #include "format/portable_math.h"
 #include "stages/distance.h"
 #include "stages/parallel.h"
@@ -15,6 +17,7 @@ namespace {
 struct SampledScale {
   std::vector<Vec3d> points;
   std::vector<double> radius;
+  std::vector<std::uint32_t> source;  // the triangle of S_0 that the point's triangle comes from
 };
 
 SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius,
@@ -30,6 +33,7 @@ SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std:
     }
     out.points.push_back(p);
     out.radius.push_back(r);
+    out.source.push_back(scale.triangle_source[s.triangle]);
   }
   return out;
 }
@@ -71,30 +75,68 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
+constexpr std::uint32_t kNoTriangle = 0xffffffffu;
+/// A chain of hints begins anew with every so many samples, wherever the threads' pieces begin.
+constexpr std::size_t kHintChain = 64;
+
+/// Per triangle of S_0: the triangle of this scale that it has become.
+std::vector<std::uint32_t> triangle_of_source(const NestedScale& scale, std::size_t source_count) {
+  std::vector<std::uint32_t> of(source_count, kNoTriangle);
+  for (std::size_t t = 0; t < scale.triangles.size(); ++t)
+    of[scale.triangle_source[t]] = static_cast<std::uint32_t>(t);
+  return of;
+}
+
+/// One scale j seen from the samples of finer ones. A sample's own triangle, where j still has it, is the
+/// place to begin the search at; the last answer's, where it has not.
+class ScaleComparison {
+ public:
+  ScaleComparison(const Mesh& mesh, const NestedScale& scale, std::size_t source_count)
+      : surface_(mesh.positions, mesh.wedge_position, scale.triangles),
+        of_source_(triangle_of_source(scale, source_count)) {}
+
+  std::vector<double> distances(const SampledScale& sampled) const {
+    std::vector<double> distance(sampled.points.size());
+    SurfaceDistance::Hint hint;
+    for (std::size_t s = 0; s < distance.size(); ++s) {
+      if (s % kHintChain == 0) hint = {};
+      const std::uint32_t own = of_source_[sampled.source[s]];
+      if (own != kNoTriangle) hint = surface_.hint_of(own);
+      distance[s] = surface_(sampled.points[s], hint);
+    }
+    return distance;
+  }
+
+ private:
+  SurfaceDistance surface_;
+  std::vector<std::uint32_t> of_source_;
+};
+
 /// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
 std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
                                    const RunContext& context, PerceptualValues& out) {
-  const Mesh& mesh = scales.mesh;
   const std::size_t n = scales.scales.size();
-  std::vector<SampledScale> sampled;
-  for (std::size_t i = 0; i + 1 < n; ++i)
-    sampled.push_back(sample_scale(mesh, scales.scales[i], skeleton.radius, samples));
+  std::vector<SampledScale> sampled(n);
+  parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius, samples);
+  });
   std::vector<double> error(n, 0);
-  for (std::size_t j = 1; j < n; ++j) {
-    const SurfaceDistance surface(mesh.positions, mesh.wedge_position, scales.scales[j].triangles);
-    for (std::size_t i = 0; i < j; ++i) {
-      std::vector<double> distance(sampled[i].points.size());
-      parallel_for(context, distance.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s) distance[s] = surface(sampled[i].points[s]);
-      });
-      std::vector<double> rho(distance.size());
-      for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
-      out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
-      out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
-      if (i == 0) error[j] = percentile(distance, 95);
+  std::atomic<std::size_t> done = 0;
+  parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t j = begin + 1; j <= end; ++j) {
+      const ScaleComparison comparison(scales.mesh, scales.scales[j], scales.mesh.triangles.size());
+      for (std::size_t i = 0; i < j; ++i) {
+        context.check_cancelled();
+        std::vector<double> distance = comparison.distances(sampled[i]), rho(distance.size());
+        for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
+        out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
+        out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
+        if (i == 0) error[j] = percentile(distance, 95);
+      }
+      context.report(static_cast<double>(++done) / static_cast<double>(n));
     }
-    context.report(static_cast<double>(j) / static_cast<double>(n));
-  }
+  });
   return error;
 }
 
@@ -143,23 +185,56 @@ float height_px(double numerator, double denominator) {
 
 void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
                             const PerceptualValuesOptions& options, const std::vector<float>& value,
-                            PerceptualValues& out) {
+                            const RunContext& context, PerceptualValues& out) {
   Vec3f lo = scales.mesh.positions.at(0), hi = lo;
   for (Vec3f p : scales.mesh.positions)
     for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
   out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  std::vector<double> edge(scales.scales.size());
+  parallel_for(context, edge.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k)
+      edge[k] = shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile);
+  });
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
-    out.display_px_edge.push_back(
-        height_px(out.object_height, shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile)));
+    out.display_px_edge.push_back(height_px(out.object_height, edge[k]));
     out.display_px_error.push_back(height_px(out.object_height, error[k]));
-    out.display_px_jnd.push_back(height_px(kJndReferencePx * options.jnd, value[k]));
+    out.display_px_jnd.push_back(height_px(options.jnd_reference_px * options.jnd, value[k]));
     if (k == 0) continue;
     for (std::vector<float>* px : {&out.display_px_edge, &out.display_px_error, &out.display_px_jnd})
       (*px)[k] = std::min((*px)[k], (*px)[k - 1]);
   }
 }
 
+double strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy) {
+  if (strategy == PerceptualStatistic::kConservative) return static_cast<double>(s.max);
+  return static_cast<double>(strategy == PerceptualStatistic::kAggressive ? s.min : s.mean);
+}
+
 }  // namespace
+
+std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
+                                    PerceptualStatistic strategy) {
+  if (strategy == PerceptualStatistic::kP95 || strategy == PerceptualStatistic::kP99)
+    throw StageError("perceptual_values", "statistic", "average, conservative or aggressive",
+                     std::string(enum_name(strategy)));
+  const std::size_t n = step.size();
+  std::vector<float> table(n * n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    double squares = 0;
+    for (std::size_t j = i + 1; j < n; ++j) {
+      const double value = strategy_value(step[j], strategy);
+      squares += value * value;
+      table[i * n + j] = static_cast<float>(std::sqrt(squares));
+    }
+  }
+  return table;
+}
+
+std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic) {
+  if (statistic == PerceptualStatistic::kP95) return values.p95;
+  if (statistic == PerceptualStatistic::kP99) return values.p99;
+  return cumulative_table(values.step, statistic);
+}
 
 PerceptualValues measure_perceptual_values(const NestedScales& scales, const Skeleton& skeleton,
                                            const PerceptualValuesOptions& options,
@@ -177,10 +252,10 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
   for (std::size_t k = 1; k < n; ++k) out.step[k] = collapse_statistics(scales, k, skeleton, survivor);
   const std::vector<double> error =
       compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
-  const std::vector<float>& value = options.statistic == PerceptualStatistic::kP99 ? out.p99 : out.p95;
+  const std::vector<float> value = value_table(out, options.statistic);
   find_majors(value, n, options.jnd, out.major);
   choose_kept(scales, options.kept_scales, out);
-  find_displayed_heights(scales, error, options, value, out);
+  find_displayed_heights(scales, error, options, value, context, out);
   return out;
 }
 

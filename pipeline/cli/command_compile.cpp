@@ -12,6 +12,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/file_resolver.h"
 #include "pipeline/find_models.h"
+#include "pipeline/jnd_profile.h"
 #include "pipeline/options.h"
 #include "pipeline/progress.h"
 #include "pipeline/store.h"
@@ -34,7 +35,7 @@ const std::map<std::string, std::string> kShortNames{{"ladder.rungs", "--rungs"}
 
 struct CompileArguments {
   std::vector<std::string> inputs;
-  std::string output, profile, cache, memory = "8GiB";
+  std::string output, profile, jnd_profile, cache, memory = "8GiB";
   int jobs = 0;
   std::uint64_t timeout_s = 3600, cpu_s = 0;
   bool no_cache = false, strict = false, json = false, quiet = false, verbose = false, fail_fast = false;
@@ -82,13 +83,15 @@ void add_stage_options(CLI::App& app, CompileArguments& args) {
   }
 }
 
-/// Profile first, then flags over it.
+/// Profile first, then the JND profile, then flags over both.
 CompileOptions gather_options(const CompileArguments& args) {
   CompileOptions options;
   if (!args.profile.empty()) {
     const auto bytes = read_input_file(args.profile, 1 << 20);
     read_profile(options, std::string(bytes.begin(), bytes.end()), args.profile);
   }
+  if (!args.jnd_profile.empty())
+    read_jnd_profile(options, read_input_file(args.jnd_profile, 1 << 16), args.jnd_profile);
   std::vector<OptionField> fields = list_options(options);
   for (const auto& [path, text] : args.options)
     for (OptionField& f : fields)
@@ -163,6 +166,9 @@ void add_compile_command(CLI::App& app, int& exit_code) {
   c->add_option("-j,--jobs", args->jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
   c->add_option("--profile", args->profile,
                 "JSON file of options (schemas/profile.v1.schema.json); flags win over it");
+  c->add_option("--jnd-profile", args->jnd_profile,
+                "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json); wins over "
+                "--profile, flags win over it");
   c->add_option("--cache", args->cache,
                 "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)");
   c->add_flag("--no-cache", args->no_cache, "Compute everything, keep nothing");

@@ -18,6 +18,7 @@
 #include "pipeline/import/range_scan.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"
+#include "pipeline/jnd_profile.h"
 #include "pipeline/options.h"
 
 namespace texmesh {
@@ -48,6 +49,11 @@ const std::map<std::string, Reader>& readers() {
       {"fragments.v1", [](const std::string& s) { read_fragment_index(bytes_of(s)); }},
       {"collection.v1", [](const std::string& s) { read_collection(s, "collection.json", {}); }},
       {"range-scan.v1", [](const std::string& s) { read_range_scan_description("scan.json", bytes_of(s)); }},
+      {"jnd-profile.v1",
+       [](const std::string& s) {
+         CompileOptions options;
+         read_jnd_profile(options, bytes_of(s), "jnd.json");
+       }},
       {"profile.v1", [](const std::string& s) {
          CompileOptions options;
          read_profile(options, s, "profile.json");

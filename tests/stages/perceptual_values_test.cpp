@@ -6,6 +6,7 @@
 
 #include "format/archive.h"
 #include "stages/condition.h"
+#include "stages/distance.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -186,6 +187,79 @@ TEST(PerceptualValues, SameBytesForAnyNumberOfThreads) {
 TEST(PerceptualValues, RefusesASkeletonOfAnotherMesh) {
   const NestedScales scales = make_scales(testing::cube());
   EXPECT_THROW(measure_perceptual_values(scales, Skeleton{}, {}, kOneThread), StageError);
+}
+
+TEST(PerceptualValues, CumulativeTableIsTheRootOfTheSumOfSquares) {
+  // The thesis's Table 7.1 (averages) and 7.2: 0.0410 0.0616 0.0677 0.0759 0.1080.
+  std::vector<CollapseStatistics> step(6);
+  const float average[6]{0, 0.0410f, 0.0412f, 0.0478f, 0.0468f, 0.0678f};
+  for (std::size_t k = 1; k < 6; ++k)
+    step[k].mean = average[k], step[k].max = 2 * average[k], step[k].min = average[k] / 2;
+  const std::vector<float> table = cumulative_table(step, PerceptualStatistic::kAverage);
+  const float printed[6]{0, 0.0410f, 0.0616f, 0.0677f, 0.0759f, 0.1080f};
+  for (std::size_t j = 1; j < 6; ++j) EXPECT_NEAR(table[j] / printed[j], 1, 0.18) << j;
+  EXPECT_FLOAT_EQ(table[2 * 6 + 3], 0.0478f);
+  EXPECT_EQ(table[3 * 6 + 2], 0);
+  const std::vector<float> most = cumulative_table(step, PerceptualStatistic::kConservative),
+                           least = cumulative_table(step, PerceptualStatistic::kAggressive);
+  for (std::size_t k = 0; k < 36; ++k) {
+    EXPECT_FLOAT_EQ(most[k], 2 * table[k]);
+    EXPECT_FLOAT_EQ(least[k], table[k] / 2);
+  }
+  EXPECT_THROW(cumulative_table(step, PerceptualStatistic::kP95), StageError);
+}
+
+TEST(PerceptualValues, StrategiesDecideMajorsAndHeights) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const auto measure = [&](PerceptualStatistic statistic, double reference = kJndReferencePx) {
+    return measure_perceptual_values(
+        scales, skeleton, {.jnd = 0.05, .jnd_reference_px = reference, .statistic = statistic}, kOneThread);
+  };
+  const auto majors = [](const PerceptualValues& v) { return std::count(v.major.begin(), v.major.end(), 1); };
+  const PerceptualValues careful = measure(PerceptualStatistic::kConservative),
+                         average = measure(PerceptualStatistic::kAverage),
+                         bold = measure(PerceptualStatistic::kAggressive);
+  EXPECT_GE(majors(careful), majors(average));
+  EXPECT_GE(majors(average), majors(bold));
+  EXPECT_GT(majors(careful), majors(bold));
+  const std::vector<float> value = value_table(average, PerceptualStatistic::kAverage);
+  for (std::size_t k = 1; k < scales.scales.size(); ++k) {
+    EXPECT_LE(careful.display_px_jnd[k], average.display_px_jnd[k]);
+    EXPECT_LE(average.display_px_jnd[k], bold.display_px_jnd[k]);
+    EXPECT_FLOAT_EQ(average.display_px_jnd[k], std::min<float>(kAnyHeightPx, 512 * 0.05f / value[k]));
+    EXPECT_EQ(average.p95[k], bold.p95[k]);  // the table of distances stands beside every strategy
+  }
+  // Twice the reference height: the same change is just noticeable at twice the displayed height.
+  const PerceptualValues larger = measure(PerceptualStatistic::kP95, 1024),
+                         usual = measure(PerceptualStatistic::kP95);
+  EXPECT_FLOAT_EQ(larger.display_px_jnd.back(), 2 * usual.display_px_jnd.back());
+  EXPECT_EQ(larger.major, usual.major);
+}
+
+TEST(PerceptualValues, DistancesAgreeWithPlainSearches) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 6);
+  Skeleton skeleton = centre_skeleton(scales.mesh);
+  skeleton.radius.assign(skeleton.radius.size(), 1.0f);
+  const PerceptualValues values = measure_perceptual_values(scales, skeleton, {.samples = 2000}, kOneThread);
+  const std::size_t n = scales.scales.size();
+  for (std::size_t j = 1; j < n; ++j) {
+    const SurfaceDistance surface(scales.mesh.positions, scales.mesh.wedge_position,
+                                  scales.scales[j].triangles);
+    std::vector<double> distance;
+    for (const SurfaceSample& s : sample_surface(scales.mesh.positions, scales.mesh.wedge_position,
+                                                 scales.scales[0].triangles, 2000)) {
+      Vec3d p;
+      for (std::size_t k = 0; k < 3; ++k)
+        p = p +
+            to_double(scales.mesh
+                          .positions[scales.mesh.wedge_position[scales.scales[0].triangles[s.triangle][k]]]) *
+                static_cast<double>(s.weight[k]);
+      distance.push_back(surface(p));
+    }
+    std::sort(distance.begin(), distance.end());
+    EXPECT_NEAR(values.p95[j], distance[static_cast<std::size_t>(0.95 * 1999 + 0.5)], 1e-7) << j;
+  }
 }
 
 }  // namespace
