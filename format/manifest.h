@@ -96,9 +96,9 @@ Manifest read_manifest(std::span<const std::uint8_t> json);
 /// bytes stand is said by the index only, so the file needs no offsets: writing leaves offset, bytes and
 /// digest of the refs out, reading fills in the paths, and resolve_textures() the rest.
 struct TextureInfo {
-  std::uint32_t image = 0;   // GLB image "texture/<image>"
-  std::string role;          // base-colour, emissive, normal, occlusion-roughness-metallic, alpha
-  std::string name;          // as the source names the image
+  std::uint32_t image = 0;  // GLB image "texture/<image>"
+  std::string role;  // base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data
+  std::string name;  // as the source names the image
   std::string colour_space;  // srgb | linear
   std::string codec = "jpeg";
   std::uint32_t width_px = 0, height_px = 0, channels = 3;

@@ -72,7 +72,42 @@ struct TextureRef {
   }
 };
 
-/// The glTF metallic-roughness material. Factors are linear.
+/// A texture of a material extension.
+struct ExtensionTexture {
+  std::string key;  // as format/material_extensions.h lists it
+  TextureRef texture;
+  float scale = 1;  // of a normal map
+  friend bool operator==(const ExtensionTexture&, const ExtensionTexture&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.key, s.texture, s.scale);
+  }
+};
+
+/// Numbers of a material extension.
+struct ExtensionFactor {
+  std::string key;
+  std::vector<float> values;
+  friend bool operator==(const ExtensionFactor&, const ExtensionFactor&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.key, s.values);
+  }
+};
+
+/// A glTF material extension of those that format/material_extensions.h lists, with what the source says.
+struct MaterialExtension {
+  std::string name;
+  std::vector<ExtensionFactor> factors;
+  std::vector<ExtensionTexture> textures;
+  friend bool operator==(const MaterialExtension&, const MaterialExtension&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.name, s.factors, s.textures);
+  }
+};
+
+/// The glTF metallic-roughness material with its extensions. Factors are linear.
 struct Material {
   std::string name;
   Vec4f base_colour{1, 1, 1, 1};
@@ -84,14 +119,27 @@ struct Material {
   bool double_sided = false, unlit = false;
   TextureRef base_colour_texture, metallic_roughness_texture, normal_texture, occlusion_texture,
       emissive_texture;
+  std::vector<MaterialExtension> extensions;  // by name
   friend bool operator==(const Material&, const Material&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.name, s.base_colour, s.metallic, s.roughness, s.emissive, s.normal_scale, s.occlusion_strength,
       s.alpha_mode, s.alpha_cutoff, s.double_sided, s.unlit, s.base_colour_texture,
-      s.metallic_roughness_texture, s.normal_texture, s.occlusion_texture, s.emissive_texture);
+      s.metallic_roughness_texture, s.normal_texture, s.occlusion_texture, s.emissive_texture, s.extensions);
   }
 };
+
+/// Calls f with every texture reference of a material, used or not; extensions' after the core's.
+template <class M, class F>
+void for_each_texture(M& material, F&& f) {
+  f(material.base_colour_texture);
+  f(material.metallic_roughness_texture);
+  f(material.normal_texture);
+  f(material.occlusion_texture);
+  f(material.emissive_texture);
+  for (auto& extension : material.extensions)
+    for (auto& t : extension.textures) f(t.texture);
+}
 
 enum class ImageFormat : std::uint8_t { kJpeg = 0, kPng = 1, kTiff = 2, kWebp = 3, kExr = 4 };
 

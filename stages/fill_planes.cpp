@@ -216,9 +216,7 @@ Pixels padded(Pixels from, const TexturePlane& plane) {
 }
 
 Pixels decode_for(const Image& image, const TexturePlane& plane) {
-  const bool data =
-      plane.role == TextureRole::kNormal || plane.role == TextureRole::kOcclusionRoughnessMetallic;
-  Pixels out = decode_image(image, data ? FloatEncoding::kAsIs : FloatEncoding::kSrgb);
+  Pixels out = decode_image(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
   const std::uint32_t least = plane.role == TextureRole::kAlpha ? 2 : plane.channels;
   if (out.width_px != plane.width_px || out.height_px != plane.height_px || out.channels < least)
     throw StageError("fragmentation", image.name,

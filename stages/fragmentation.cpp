@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "format/material_extensions.h"
 #include "stages/fragment_grid.h"
 #include "stages/parallel.h"
 #include "stages/texel_coverage.h"
@@ -51,13 +52,43 @@ void check(const ConditionedMesh& conditioned, const std::vector<Material>& mate
     if (m >= materials.size()) fail("triangle material: fewer than", materials.size(), m);
 }
 
-const std::pair<TextureRef Material::*, TextureRole> kSlots[] = {
-    {&Material::base_colour_texture, TextureRole::kBaseColour},
-    {&Material::emissive_texture, TextureRole::kEmissive},
-    {&Material::normal_texture, TextureRole::kNormal},
-    {&Material::metallic_roughness_texture, TextureRole::kOcclusionRoughnessMetallic},
-    {&Material::occlusion_texture, TextureRole::kOcclusionRoughnessMetallic},
+/// One texture of a material: what it is for, and which channels of it are read.
+struct Slot {
+  const TextureRef* ref;
+  TextureRole role;
+  TextureChannels channels;
 };
+
+TextureRole role_of(const ExtensionTextureKind& kind) {
+  if (kind.colour) return TextureRole::kColour;
+  return kind.key.ends_with("NormalTexture") ? TextureRole::kNormal : TextureRole::kData;
+}
+
+std::vector<Slot> slots_of(const Material& m) {
+  const TextureChannels base =
+      m.alpha_mode == AlphaMode::kOpaque ? TextureChannels::kColour : TextureChannels::kBoth;
+  std::vector<Slot> slots{
+      {&m.base_colour_texture, TextureRole::kBaseColour, base},
+      {&m.emissive_texture, TextureRole::kEmissive, TextureChannels::kColour},
+      {&m.normal_texture, TextureRole::kNormal, TextureChannels::kColour},
+      {&m.metallic_roughness_texture, TextureRole::kOcclusionRoughnessMetallic, TextureChannels::kColour},
+      {&m.occlusion_texture, TextureRole::kOcclusionRoughnessMetallic, TextureChannels::kColour}};
+  for (const MaterialExtension& e : m.extensions) {
+    const MaterialExtensionKind* kind = find_material_extension(e.name);
+    for (const ExtensionTexture& t : e.textures)
+      if (const ExtensionTextureKind* k = kind ? kind->texture(t.key) : nullptr)
+        slots.push_back({&t.texture, role_of(*k), k->channels});
+  }
+  return slots;
+}
+
+/// The role that names a plane with several: what is seen most, colours before data.
+constexpr TextureRole kFirstOfRoles[] = {TextureRole::kBaseColour,
+                                         TextureRole::kEmissive,
+                                         TextureRole::kColour,
+                                         TextureRole::kNormal,
+                                         TextureRole::kOcclusionRoughnessMetallic,
+                                         TextureRole::kData};
 
 void add_use(std::vector<Use>& uses, std::size_t material, TextureRef ref) {
   ref.image = 0;
@@ -71,25 +102,24 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
                  std::vector<std::vector<Use>>& uses) {
   for (std::size_t image = 0; image < images.size(); ++image) {
     std::vector<Use> colour, alpha;
-    bool role_used[5] = {};
+    bool role_used[EnumNames<TextureRole>::names.size()] = {};
     for (std::size_t m = 0; m < materials.size(); ++m)
-      for (const auto& [slot, role] : kSlots) {
-        const TextureRef& ref = materials[m].*slot;
-        if (ref.image != static_cast<std::int32_t>(image)) continue;
-        role_used[static_cast<int>(role)] = true;
-        add_use(colour, m, ref);
-        if (role == TextureRole::kBaseColour && materials[m].alpha_mode != AlphaMode::kOpaque)
-          add_use(alpha, m, ref);
+      for (const Slot& slot : slots_of(materials[m])) {
+        if (slot.ref->image != static_cast<std::int32_t>(image)) continue;
+        role_used[static_cast<int>(slot.role)] = true;
+        add_use(colour, m, *slot.ref);  // a number in alpha needs its image's colours, for it is one file
+        if (slot.channels != TextureChannels::kColour) add_use(alpha, m, *slot.ref);
       }
     if (colour.empty()) continue;
     TexturePlane plane;
     plane.image = static_cast<std::uint32_t>(image);
-    plane.role = static_cast<TextureRole>(std::find(role_used, role_used + 5, true) - role_used);
     plane.channels = images[image].channels >= 3 ? 3 : 1;
+    plane.role = *std::find_if(std::begin(kFirstOfRoles), std::end(kFirstOfRoles),
+                               [&](TextureRole r) { return role_used[static_cast<int>(r)]; });
     std::string others;
-    for (int r = static_cast<int>(plane.role) + 1; r < 5; ++r)
-      if (role_used[r])
-        others += (others.empty() ? "" : ", ") + std::string(enum_name(static_cast<TextureRole>(r)));
+    for (const TextureRole role : kFirstOfRoles)
+      if (role != plane.role && role_used[static_cast<int>(role)])
+        others += (others.empty() ? "" : ", ") + std::string(enum_name(role));
     if (!others.empty())
       add_info(out.notes, "image-with-several-roles", images[image].name,
                "coded as " + std::string(enum_name(plane.role)) + ", used as " + others + " too");

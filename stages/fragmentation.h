@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFragmentationVersion = 1;
+inline constexpr int kFragmentationVersion = 2;
 
 enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>
@@ -40,16 +40,24 @@ enum class TextureRole : std::uint8_t {
   kEmissive = 1,
   kNormal = 2,
   kOcclusionRoughnessMetallic = 3,
-  kAlpha = 4
+  kAlpha = 4,
+  kColour = 5,  // of material extensions: sheen, specular colours, ...
+  kData = 6     // of material extensions: clearcoat, transmission, thickness, ...
 };
 template <>
 struct EnumNames<TextureRole> {
-  static constexpr std::array<std::string_view, 5> names{"base-colour", "emissive", "normal",
-                                                         "occlusion-roughness-metallic", "alpha"};
+  static constexpr std::array<std::string_view, 7> names{
+      "base-colour", "emissive", "normal", "occlusion-roughness-metallic", "alpha", "colour", "data"};
 };
 
+/// sRGB encoded; the others hold linear numbers.
+constexpr bool is_colour(TextureRole role) {
+  return role == TextureRole::kBaseColour || role == TextureRole::kEmissive || role == TextureRole::kColour;
+}
+
 /// One coded image of the package: the colour or data channels of a source image, or its alpha channel. A
-/// source image with an alpha channel that some material uses (mask or blend) gives two planes, colour first.
+/// source image with an alpha channel that some material uses (mask, blend, or a number that an extension
+/// keeps there) gives two planes, colour first.
 struct TexturePlane {
   std::uint32_t image = 0;  // index into Model::images
   TextureRole role = TextureRole::kBaseColour;

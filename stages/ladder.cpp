@@ -55,8 +55,7 @@ PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, std::size
 }
 
 Subsampling subsampling_of(const TexturePlane& plane, const LadderOptions& options) {
-  const bool colour = plane.role == TextureRole::kBaseColour || plane.role == TextureRole::kEmissive;
-  return colour ? options.subsampling : Subsampling::k444;
+  return is_colour(plane.role) ? options.subsampling : Subsampling::k444;
 }
 
 /// Fragments that the tables are trained on: covered ones, evenly spread in index order.

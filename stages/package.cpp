@@ -137,8 +137,7 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.image = plane.image;
   t.role = enum_name(plane.role);
   t.name = clean_text(images[plane.image].name, 200);
-  const bool colour = plane.role == TextureRole::kBaseColour || plane.role == TextureRole::kEmissive;
-  t.colour_space = colour ? "srgb" : "linear";
+  t.colour_space = is_colour(plane.role) ? "srgb" : "linear";
   t.width_px = plane.width_px;
   t.height_px = plane.height_px;
   t.channels = plane.channels;

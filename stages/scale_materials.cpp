@@ -96,6 +96,23 @@ class TextureTable {
   std::map<std::array<std::size_t, 2>, std::size_t> textures_;
 };
 
+/// As the source had it, less the textures that cannot be shown.
+Json extension_json(const MaterialExtension& extension, TextureTable& textures) {
+  Json out = Json::object();
+  for (const ExtensionFactor& factor : extension.factors) {
+    Json values = Json::array();
+    for (float x : factor.values) values.push_back(GlbWriter::shortest(x));
+    out[factor.key] = values.size() == 1 ? values[0] : values;
+  }
+  for (const ExtensionTexture& t : extension.textures) {
+    Json info = textures.info(t.texture);
+    if (info.is_null()) continue;
+    if (t.scale != 1) info["scale"] = GlbWriter::shortest(t.scale);
+    out[t.key] = std::move(info);
+  }
+  return out;
+}
+
 Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer) {
   Json out;
   if (!m.name.empty()) out["name"] = m.name;
@@ -128,6 +145,10 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
   if (m.unlit) {
     out["extensions"]["KHR_materials_unlit"] = Json::object();
     writer.use_extension("KHR_materials_unlit", false);
+  }
+  for (const MaterialExtension& extension : m.extensions) {
+    out["extensions"][extension.name] = extension_json(extension, textures);
+    writer.use_extension(extension.name, false);
   }
   return out;
 }

@@ -19,22 +19,20 @@ double largest_texture_px(const std::vector<Material>& materials, const std::vec
       4096;  // coordinates without a texture are kept as if there were one of this size
   double largest = 0;
   for (const Material& m : materials)
-    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture,
-                                &m.occlusion_texture, &m.emissive_texture}) {
-      if (!t->used() || t->texcoord != set) continue;
-      const Image& image = images.at(static_cast<std::size_t>(t->image));
-      const double stretch = std::max(std::fabs(t->transform.scale.x), std::fabs(t->transform.scale.y));
+    for_each_texture(m, [&](const TextureRef& t) {
+      if (!t.used() || t.texcoord != set) return;
+      const Image& image = images.at(static_cast<std::size_t>(t.image));
+      const double stretch = std::max(std::fabs(t.transform.scale.x), std::fabs(t.transform.scale.y));
       largest = std::max(largest, stretch * std::max(image.width_px, image.height_px));
-    }
+    });
   return largest > 0 ? largest : kUntextured;
 }
 
 bool uses_texcoord(const std::vector<Material>& materials, int set) {
+  bool used = false;
   for (const Material& m : materials)
-    for (const TextureRef* t : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture,
-                                &m.occlusion_texture, &m.emissive_texture})
-      if (t->used() && t->texcoord == set) return true;
-  return false;
+    for_each_texture(m, [&](const TextureRef& t) { used = used || (t.used() && t.texcoord == set); });
+  return used;
 }
 
 /// 8 bits lose something of these colours.

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 1;
+inline constexpr int kScalesVersion = 2;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>

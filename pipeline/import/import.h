@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 1;
+inline constexpr int kImportVersion = 2;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

@@ -232,15 +232,6 @@ void drop_unused_parts(Mesh& mesh) {
   for (std::uint16_t& p : mesh.triangle_part) p = static_cast<std::uint16_t>(part[p]);
 }
 
-template <class F>
-void for_each_texture(Material& material, F&& f) {
-  f(material.base_colour_texture);
-  f(material.metallic_roughness_texture);
-  f(material.normal_texture);
-  f(material.occlusion_texture);
-  f(material.emissive_texture);
-}
-
 void drop_unused_images(Model& model, const std::string& file_name) {
   std::vector<std::uint32_t> image(model.images.size(), kNone);
   auto mark = [&](TextureRef& ref) {

@@ -328,14 +328,13 @@ std::uint16_t Reader::add_part(const Instance& instance) {
 void Reader::drop_textures_without_uv() {
   const bool has_uv[2] = {!model_.mesh.uv0.empty(), !model_.mesh.uv1.empty()};
   for (Material& m : model_.materials) {
-    for (TextureRef* ref : {&m.base_colour_texture, &m.metallic_roughness_texture, &m.normal_texture,
-                            &m.occlusion_texture, &m.emissive_texture}) {
-      if (!ref->used() || has_uv[ref->texcoord]) continue;
+    for_each_texture(m, [&](TextureRef& ref) {
+      if (!ref.used() || has_uv[ref.texcoord]) return;
       source_.note_once(
           Severity::kWarning, "texture-without-uv", m.name,
-          "no mesh has TEXCOORD_" + std::to_string(ref->texcoord) + "; its textures are left out");
-      *ref = {};
-    }
+          "no mesh has TEXCOORD_" + std::to_string(ref.texcoord) + "; its textures are left out");
+      ref = {};
+    });
   }
 }
 

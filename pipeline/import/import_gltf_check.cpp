@@ -5,6 +5,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "format/material_extensions.h"
 #include "pipeline/import/import_gltf_parts.h"
 
 namespace texmesh::gltf {
@@ -14,16 +15,13 @@ constexpr double kMaxSize = 9007199254740991.0;  // 2^53 - 1
 constexpr double kMaxInt = 2147483647.0;         // tinygltf keeps some sizes as int
 constexpr std::size_t kMaxArray = 1'000'000;
 
-constexpr std::array<std::string_view, 7> kSupported{"KHR_draco_mesh_compression",
-                                                     "KHR_mesh_quantization",
-                                                     "EXT_meshopt_compression",
-                                                     "KHR_texture_transform",
-                                                     "EXT_texture_webp",
-                                                     "KHR_materials_unlit",
-                                                     "KHR_materials_pbrSpecularGlossiness"};
+constexpr std::array<std::string_view, 6> kSupported{"KHR_draco_mesh_compression", "KHR_mesh_quantization",
+                                                     "EXT_meshopt_compression",    "KHR_texture_transform",
+                                                     "EXT_texture_webp",           "KHR_materials_unlit"};
 
 bool supported(const std::string& name) {
-  return std::find(kSupported.begin(), kSupported.end(), name) != kSupported.end();
+  return find_material_extension(name) ||
+         std::find(kSupported.begin(), kSupported.end(), name) != kSupported.end();
 }
 
 std::string shown(const Json& value) {
@@ -262,6 +260,18 @@ void check_texture_info(const Item& info) {
   });
 }
 
+void check_extension(const Item& e, const MaterialExtensionKind& kind) {
+  for (const ExtensionFactorKind& f : kind.factors) {
+    const std::string key(f.key);
+    if (f.components == 1) {
+      e.number(key.c_str());
+    } else {
+      e.numbers(key.c_str(), static_cast<std::size_t>(f.components));
+    }
+  }
+  for (const ExtensionTextureKind& t : kind.textures) e.with(std::string(t.key).c_str(), check_texture_info);
+}
+
 void check_material(const Item& material) {
   material.numbers("emissiveFactor", 3).number("alphaCutoff").boolean("doubleSided");
   material.one_of("alphaMode", {"OPAQUE", "MASK", "BLEND"});
@@ -272,9 +282,9 @@ void check_material(const Item& material) {
   for (const char* key : {"normalTexture", "occlusionTexture", "emissiveTexture"}) {
     material.with(key, check_texture_info);
   }
-  material.extension("KHR_materials_pbrSpecularGlossiness", [](const Item& e) {
-    e.numbers("diffuseFactor", 4).number("glossinessFactor").with("diffuseTexture", check_texture_info);
-  });
+  for (const MaterialExtensionKind& kind : material_extensions()) {
+    material.extension(std::string(kind.name).c_str(), [&](const Item& e) { check_extension(e, kind); });
+  }
   material.with("extensions", [&](const Item& extensions) {
     for (const auto& [name, value] : extensions.value().items()) {
       if (!value.is_object())

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "format/material_extensions.h"
 #include "pipeline/import/import_gltf_parts.h"
 #include "pipeline/import/uri.h"
 
@@ -46,7 +47,9 @@ class MaterialReader {
   std::int32_t image_of_texture(std::size_t index);
   TextureRef texture(const Json* info, const std::string& place);
   void read_specular_glossiness(const Json& e, const std::string& place, Material& out);
-  void note_extensions(const Json& material, const std::string& place) const;
+  MaterialExtension read_extension(const Json& e, const MaterialExtensionKind& kind,
+                                   const std::string& place);
+  void read_extensions(const Json& material, const std::string& place, Material& out);
 
   const Source& source_;
   const Json& document_;
@@ -141,12 +144,13 @@ TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
   return ref;
 }
 
-/// The older PBR model: its diffuse part is shown as a rough dielectric's base colour.
+/// The older PBR model: it is kept, and for the many viewers that have dropped it its diffuse part becomes a
+/// dielectric's base colour.
 void MaterialReader::read_specular_glossiness(const Json& e, const std::string& place, Material& out) {
   source_.note_once(
       Severity::kInfo, "specular-glossiness", place,
-      "KHR_materials_pbrSpecularGlossiness: the diffuse part becomes the base colour, the specular part "
-      "is left out");
+      "KHR_materials_pbrSpecularGlossiness is kept; viewers without it are shown the diffuse part as the "
+      "base colour of a dielectric");
   if (const Json* d = member(e, "diffuseFactor")) {
     const auto at = [&](std::size_t i) { return to_unit((*d)[i].get<double>()); };
     out.base_colour = {at(0), at(1), at(2), at(3)};
@@ -159,16 +163,56 @@ void MaterialReader::read_specular_glossiness(const Json& e, const std::string& 
   out.metallic_roughness_texture = {};
 }
 
-void MaterialReader::note_extensions(const Json& material, const std::string& place) const {
-  const Json* e = member(material, "extensions");
-  if (!e) return;
-  for (const auto& [name, value] : e->items()) {
-    if (name == "KHR_materials_unlit" || name == "KHR_materials_pbrSpecularGlossiness") continue;
-    const std::string text = name + " is left out";
+MaterialExtension MaterialReader::read_extension(const Json& e, const MaterialExtensionKind& kind,
+                                                 const std::string& place) {
+  MaterialExtension out;
+  out.name = kind.name;
+  for (const ExtensionFactorKind& f : kind.factors) {
+    const Json* value = member(e, std::string(f.key).c_str());
+    if (!value) continue;
+    ExtensionFactor factor{std::string(f.key), {}};
+    for (int i = 0; i < f.components; ++i) {
+      const Json& number = f.components == 1 ? *value : (*value)[static_cast<std::size_t>(i)];
+      factor.values.push_back(to_float(std::clamp(number.get<double>(), f.lowest, f.highest)));
+    }
+    out.factors.push_back(std::move(factor));
+  }
+  for (const ExtensionTextureKind& t : kind.textures) {
+    const std::string key(t.key);
+    const Json* info = member(e, key.c_str());
+    const TextureRef ref = texture(info, place + "/" + key);
+    if (ref.used()) out.textures.push_back({key, ref, to_float(info->value("scale", 1.0))});
+  }
+  return out;
+}
+
+/// Keys of the textures that `value` names: "brightnessTexture, maskTexture".
+std::string texture_names(const Json& value) {
+  std::string names;
+  for (const auto& [key, v] : value.items())
+    if (v.is_object() && v.contains("index")) names += (names.empty() ? "" : ", ") + key;
+  return names;
+}
+
+/// Extensions that texmesh knows become part of the material; of others a note says what is lost.
+void MaterialReader::read_extensions(const Json& material, const std::string& place, Material& out) {
+  const Json* extensions = member(material, "extensions");
+  if (!extensions) return;
+  for (const auto& [name, value] : extensions->items()) {
+    if (name == "KHR_materials_unlit") continue;
+    if (const MaterialExtensionKind* kind = find_material_extension(name)) {
+      out.extensions.push_back(read_extension(value, *kind, place + "/extensions/" + name));
+      continue;
+    }
+    const std::string textures = texture_names(value);
+    const std::string text =
+        name + " is left out" + (textures.empty() ? "" : ", and with it the textures " + textures);
     const bool told = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
       return n.code == "unknown-extension" && n.text == text;
     });
-    if (!told) add_info(source_.notes, "unknown-extension", place, text);
+    if (!told)
+      source_.notes.push_back(
+          {textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension", place, text});
   }
 }
 
@@ -202,7 +246,7 @@ Material MaterialReader::read(std::size_t index) {
   out.normal_texture = texture_of(&declared, "normalTexture");
   out.occlusion_texture = texture_of(&declared, "occlusionTexture");
   out.emissive_texture = texture_of(&declared, "emissiveTexture");
-  note_extensions(declared, place);
+  read_extensions(declared, place, out);
   return out;
 }
 

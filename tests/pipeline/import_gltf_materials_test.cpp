@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/material_extensions.h"
 #include "tests/support/gltf_builder.h"
 
 namespace texmesh {
@@ -172,7 +173,7 @@ TEST(ImportGltfMaterials, NeverOpensImagesOfUnusedMaterials) {
   EXPECT_EQ(resolver.asked, (std::vector<std::string>{"a.png"}));
 }
 
-TEST(ImportGltfMaterials, ReadsSpecularGlossinessAsItsDiffusePart) {
+TEST(ImportGltfMaterials, KeepsSpecularGlossinessAndFallsBackToItsDiffusePart) {
   json material = base_colour({{"index", 1}});
   material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {
       {"diffuseFactor", {0.5, 0.25, 1, 1}}, {"glossinessFactor", 0.75}, {"diffuseTexture", {{"index", 0}}}};
@@ -185,6 +186,8 @@ TEST(ImportGltfMaterials, ReadsSpecularGlossinessAsItsDiffusePart) {
   EXPECT_EQ(m.materials.at(0).metallic, 0.0f);
   EXPECT_EQ(m.materials.at(0).roughness, 0.25f);
   EXPECT_TRUE(m.materials.at(0).base_colour_texture.used());
+  ASSERT_EQ(m.materials.at(0).extensions.size(), 1u);
+  EXPECT_EQ(m.materials.at(0).extensions[0].textures.at(0).texture.image, 0);
 }
 
 TEST(ImportGltfMaterials, TexturesThatNoUvReachesAreLeftOut) {
@@ -201,12 +204,95 @@ TEST(ImportGltfMaterials, TexturesThatNoUvReachesAreLeftOut) {
   EXPECT_TRUE(m.images.empty());
 }
 
-TEST(ImportGltfMaterials, NotesEveryUnknownExtensionOnce) {
+/// Every property of every extension that is carried, each texture another image.
+json all_extensions(GltfBuilder& b, MemoryResolver& resolver) {
+  json out;
+  for (const MaterialExtensionKind& kind : material_extensions()) {
+    json& e = out[std::string(kind.name)] = json::object();
+    for (const ExtensionFactorKind& f : kind.factors) {
+      if (f.components == 1)
+        e[std::string(f.key)] = 1;
+      else
+        e[std::string(f.key)] = std::vector<double>(static_cast<std::size_t>(f.components), 0.5);
+    }
+    for (const ExtensionTextureKind& t : kind.textures) {
+      const std::string file = std::string(kind.name) + "." + std::string(t.key) + ".png";
+      resolver.files[file] = testing::png();
+      resolver.files[file].push_back(static_cast<std::uint8_t>(resolver.files.size()));  // no two alike
+      e[std::string(t.key)] = {{"index", b.push("textures", {{"source", b.push("images", {{"uri", file}})}})},
+                               {"texCoord", 1}};
+      if (t.tangent_space) e[std::string(t.key)]["scale"] = 0.25;
+    }
+  }
+  return out;
+}
+
+TEST(ImportGltfMaterials, EveryTextureOfEveryExtensionIsRead) {
+  GltfBuilder b = textured(base_colour());
+  MemoryResolver resolver;
+  resolver.files["a.png"] = png();
+  b.json["materials"][0]["extensions"] = all_extensions(b, resolver);
+  for (const auto& [name, value] : b.json["materials"][0]["extensions"].items()) {
+    b.json["extensionsUsed"].push_back(name);
+    b.json["extensionsRequired"].push_back(name);
+  }
+  const Model m = import(b, resolver);
+  EXPECT_EQ(m.notes.size(), 1u);  // that specular-glossiness has a fallback
+  const Material& r = m.materials.at(0);
+  ASSERT_EQ(r.extensions.size(), material_extensions().size());
+  std::size_t textures = 0;
+  for (std::size_t e = 0; e < r.extensions.size(); ++e) {
+    const MaterialExtensionKind& kind = material_extensions()[e];
+    EXPECT_EQ(r.extensions[e].name, kind.name);
+    ASSERT_EQ(r.extensions[e].factors.size(), kind.factors.size());
+    for (std::size_t f = 0; f < kind.factors.size(); ++f) {
+      EXPECT_EQ(r.extensions[e].factors[f].key, kind.factors[f].key);
+      EXPECT_EQ(r.extensions[e].factors[f].values,
+                std::vector<float>(static_cast<std::size_t>(kind.factors[f].components),
+                                   kind.factors[f].components == 1 ? 1.0f : 0.5f));
+    }
+    ASSERT_EQ(r.extensions[e].textures.size(), kind.textures.size()) << kind.name;
+    for (std::size_t t = 0; t < kind.textures.size(); ++t) {
+      const ExtensionTexture& texture = r.extensions[e].textures[t];
+      EXPECT_EQ(texture.key, kind.textures[t].key);
+      EXPECT_EQ(texture.texture.texcoord, 1);
+      EXPECT_EQ(texture.scale, kind.textures[t].tangent_space ? 0.25f : 1.0f);
+      const std::string name = std::string(kind.name) + "." + std::string(kind.textures[t].key) + ".png";
+      EXPECT_EQ(m.images.at(static_cast<std::size_t>(texture.texture.image)).name, name);
+      ++textures;
+    }
+  }
+  EXPECT_EQ(m.images.size(), textures);  // the plain base colour gave way to the diffuse texture
+  EXPECT_EQ(textures, 16u);
+}
+
+TEST(ImportGltfMaterials, ExtensionsOfTheWrongKindAreRefused) {
+  const auto refused = [](const char* extension, json value, const std::string& place) {
+    json material = base_colour();
+    material["extensions"][extension] = std::move(value);
+    try {
+      import(textured(material));
+      ADD_FAILURE() << place;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.place(), "/materials/0/extensions/" + std::string(extension) + place) << e.what();
+    }
+  };
+  refused("KHR_materials_clearcoat", {{"clearcoatFactor", "much"}}, "/clearcoatFactor");
+  refused("KHR_materials_sheen", {{"sheenColorFactor", {1, 2}}}, "/sheenColorFactor");
+  refused("KHR_materials_volume", {{"thicknessTexture", {{"index", 9}}}}, "/thicknessTexture/index");
+  refused("KHR_materials_specular", json::array(), "");
+}
+
+TEST(ImportGltfMaterials, NotesWhatIsLostWithAnUnknownExtensionOnce) {
   json material = base_colour();
-  material["extensions"] = {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}};
+  material["extensions"] = {{"EXT_plush", {{"fibres", 1}, {"fibreTexture", {{"index", 0}}}}}};
   GltfBuilder b = textured(material);
-  b.json["extensionsUsed"] = {"KHR_materials_clearcoat"};
-  EXPECT_EQ(import(b).notes.size(), 1u);
+  b.json["materials"].push_back(b.json["materials"][0]);
+  b.json["extensionsUsed"] = {"EXT_plush"};
+  const Model m = import(b);
+  ASSERT_EQ(m.notes.size(), 2u);
+  EXPECT_EQ(m.notes[1].text, "EXT_plush is left out, and with it the textures fibreTexture");
+  EXPECT_EQ(m.notes[1].severity, Severity::kWarning);
 }
 
 TEST(ImportGltfMaterials, RefusesImagesOfForeignContentAndForeignPlaces) {

@@ -321,6 +321,32 @@ TEST(Fragmentation, SurfaceFractionIsThatOfTheTexturedPart) {
     EXPECT_TRUE(out.planes[0].covered_texels[f] > 0 || out.planes[0].surface_fraction[f] == 0);
 }
 
+TEST(Fragmentation, TexturesOfExtensionsAreColoursOrData) {
+  Material m = with_base(0);
+  const auto texture = [](const char* key, int image) {
+    ExtensionTexture t;
+    t.key = key;
+    t.texture.image = image;
+    return t;
+  };
+  m.extensions = {
+      {"KHR_materials_clearcoat", {}, {texture("clearcoatTexture", 1), texture("clearcoatNormalTexture", 2)}},
+      {"KHR_materials_sheen", {}, {texture("sheenColorTexture", 3), texture("sheenRoughnessTexture", 3)}},
+      {"KHR_materials_specular", {}, {texture("specularTexture", 0)}},
+      {"EXT_unheard_of", {}, {texture("anyTexture", 4)}}};
+  std::vector<Image> images(5, image_of(64, 64, 4));
+  const Fragments out = run(conditioned(testing::sheet(4)), {m}, images);
+  using Role = TextureRole;
+  const std::vector<std::pair<std::uint32_t, Role>> want{{0, Role::kBaseColour}, {0, Role::kAlpha},
+                                                         {1, Role::kData},       {2, Role::kNormal},
+                                                         {3, Role::kColour},     {3, Role::kAlpha}};
+  ASSERT_EQ(out.planes.size(), want.size());
+  for (std::size_t p = 0; p < want.size(); ++p) {
+    EXPECT_EQ(out.planes[p].image, want[p].first) << p;
+    EXPECT_EQ(out.planes[p].role, want[p].second) << p;
+  }
+}
+
 TEST(Fragmentation, RolesChannelsAndSharing) {
   const ConditionedMesh mesh = conditioned(testing::sheet(4));
   Material m = with_base(0);

@@ -533,6 +533,33 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
     }
 }
 
+TEST(Scales, MaterialExtensionsComeBackAsTheyWere) {
+  Case c(testing::cube());
+  c.add_image(TextureRole::kData);
+  c.add_image(TextureRole::kNormal);
+  TextureRef data, normal, unseen;
+  data.image = 0, normal.image = 1;
+  data.transform.scale = {2, 2};
+  unseen.image = 0, unseen.texcoord = 1;  // the mesh has no such coordinates
+  c.materials[0].extensions = {
+      {"KHR_materials_clearcoat",
+       {{"clearcoatFactor", {0.1f}}},
+       {{"clearcoatTexture", data}, {"clearcoatNormalTexture", normal, 0.5f}}},
+      {"KHR_materials_ior", {{"ior", {1.4f}}}, {}},
+      {"KHR_materials_sheen", {{"sheenColorFactor", {0, 0.5f, 1}}}, {{"sheenColorTexture", unseen}}}};
+  const Glb glb = open(c.write(MeshCodec::kDraco).files[0].glb);
+  const Json& e = glb.json["materials"][0]["extensions"];
+  EXPECT_EQ(e["KHR_materials_clearcoat"], Json::parse(R"({"clearcoatFactor":0.1,
+      "clearcoatTexture":{"index":0,"extensions":{"KHR_texture_transform":{"scale":[2.0,2.0]}}},
+      "clearcoatNormalTexture":{"index":1,"scale":0.5}})"));
+  EXPECT_EQ(e["KHR_materials_ior"], Json::parse(R"({"ior":1.4})"));
+  EXPECT_EQ(e["KHR_materials_sheen"], Json::parse(R"({"sheenColorFactor":[0.0,0.5,1.0]})"));
+  const std::vector<std::string> used = glb.json["extensionsUsed"];
+  for (const char* name : {"KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_sheen"})
+    EXPECT_EQ(std::count(used.begin(), used.end(), name), 1) << name;
+  for (const auto& name : glb.json["extensionsRequired"]) EXPECT_EQ(name, "KHR_draco_mesh_compression");
+}
+
 TEST(Scales, PngOfEveryKindReadsBack) {
   for (std::uint32_t channels : {1u, 3u, 4u}) {
     const Pixels p = picture(37, 21, channels);
