@@ -1,6 +1,8 @@
 #include "format/manifest.h"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "format/container.h"
 #include "format/json_fields.h"
@@ -16,8 +18,11 @@ constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
 constexpr std::uint64_t kMaxPlanes = 10000;
 
-/// Features a package of format 1.0 may require; there are none yet.
-bool is_known_feature(const std::string&) { return false; }
+/// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
+constexpr std::array<std::string_view, 0> kKnownFeatures{};
+bool is_known_feature(const std::string& name) {
+  return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
+}
 
 Json vector_json(Vec3d v) { return Json::array({v.x, v.y, v.z}); }
 

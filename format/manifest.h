@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFormatMajor = 1, kFormatMinor = 0;
+inline constexpr int kFormatMajor = 1, kFormatMinor = 1;
 /// The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
 /// client.
 inline constexpr std::uint64_t kBootstrapBytes = 16384;

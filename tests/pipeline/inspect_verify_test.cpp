@@ -304,7 +304,7 @@ TEST(Verify, Quality) {
 
 TEST(Verify, Provenance) {
   for (const auto& change : std::vector<std::function<void(nlohmann::json&)>>{
-           [](auto& j) { j["format"]["minor"] = 1; },
+           [](auto& j) { j["format"]["minor"] = 9; },
            [](auto& j) { j["options"]["package"]["title"] = "Another"; },
            [](auto& j) {
              j["options"]["ladder"]["rungs"] = {20, 71};
