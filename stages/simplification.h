@@ -49,7 +49,9 @@ struct SimplificationOptions {
   }
 };
 
-/// One half-edge collapse: position `from` merges into its neighbour `to`, which does not move.
+/// One half-edge collapse: position `from` merges into its neighbour `to`, which does not move. Where a whole
+/// component vanishes, all positions it has left go at once, each with `to` == `from`, one record behind the
+/// other, and so do the triangles it has left.
 struct Collapse {
   std::uint32_t from = 0, to = 0;
   float error = 0;  // object units: square root of the quadric error
