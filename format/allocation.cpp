@@ -19,10 +19,9 @@ double ijg_scale(double quality) {
 
 double quality_of_scale(double scale) { return scale > 1 ? 50 / scale : 100 - 50 * scale; }
 
-/// g: grows with quality; a step of ln 2 halves the quantisers.
-double log_quantiser(double quality) { return -portable::log(ijg_scale(quality)); }
-
 }  // namespace
+
+double log_quantiser(double quality) { return -portable::log(ijg_scale(quality)); }
 
 std::vector<float> eta_of(const PlaneTables& tables, std::uint32_t scale) {
   const std::size_t n = tables.fragment_count();
@@ -80,6 +79,28 @@ std::uint32_t nearest_rung(const PlaneTables& tables, double quality) {
     }
   }
   return best;
+}
+
+std::vector<std::int16_t> rungs_of(const PlaneTables& tables, std::uint32_t scale, double gamma) {
+  const std::vector<float> quality = quality_of(tables, scale, gamma);
+  std::vector<std::int16_t> rungs(tables.fragment_count(), kSkipped);
+  for (const std::uint16_t f : tables.order)
+    rungs[f] = static_cast<std::int16_t>(nearest_rung(tables, static_cast<double>(quality[f])));
+  return tables.allocation < 2 ? rungs : allocate_rd(tables, sum_of(bytes_of(tables, rungs)));
+}
+
+std::vector<std::uint32_t> bytes_of(const PlaneTables& tables, const std::vector<std::int16_t>& rungs) {
+  std::vector<std::uint32_t> bytes(tables.fragment_count(), 0);
+  for (std::size_t f = 0; f < bytes.size(); ++f)
+    if (rungs[f] != kSkipped)
+      bytes[f] = tables.size_bytes[static_cast<std::size_t>(rungs[f]) * bytes.size() + f];
+  return bytes;
+}
+
+std::uint64_t sum_of(const std::vector<std::uint32_t>& bytes) {
+  std::uint64_t sum = 0;
+  for (const std::uint32_t b : bytes) sum += b;
+  return sum;
 }
 
 }  // namespace texmesh

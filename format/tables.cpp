@@ -52,6 +52,7 @@ void check_counts(const PlaneTables& t, const std::string& place) {
   require_count(t.covered_texels, f, place + "/covered_texels");
   require_count(t.surface_fraction, f, place + "/surface_fraction");
   for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) require_count(*v, f, place + "/predictors");
+  if (!t.skip_dssim.empty()) require_count(t.skip_dssim, f, place + "/skip_dssim");
   require_count(t.features, n * f, place + "/features");
   require_count(t.quality, n, place + "/quality");
   require_count(t.total_bytes, n * kGammaSteps, place + "/total_bytes");
@@ -71,7 +72,7 @@ void check_shape(const PlaneTables& t, const std::string& place) {
 }
 
 void check_parameters(const PlaneTables& t, const std::string& place) {
-  require(t.allocation <= 1, place + "/allocation", "0 or 1", std::to_string(t.allocation));
+  require(t.allocation <= 2, place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
   require_range({t.quality_width}, 0, 100, place + "/quality_width");
   require_range({t.log_width}, 0, 4, place + "/log_width");
   require_range({t.quality_max}, 1, 100, place + "/quality_max");
@@ -107,6 +108,7 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   check_parameters(t, place);
   require_range(t.mse, 0, kLargestMse, place + "/mse");
   require_range(t.dssim, -rounding, kLargestDssim, place + "/dssim");
+  require_range(t.skip_dssim, -rounding, kLargestDssim, place + "/skip_dssim");
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
     require_range(*v, -rounding, 1 + rounding, place + "/predictors");
@@ -127,6 +129,10 @@ std::uint16_t to_unit16(float v) {
 }
 float from_unit16(std::uint16_t v) { return static_cast<float>(v / 65535.0); }
 
+// What format 1.1 adds to the end of a section.
+constexpr std::uint64_t kExtensionFixed = 4;
+constexpr std::uint8_t kHasSkipDssim = 1;
+
 std::uint64_t section_bytes(std::uint64_t f, std::uint64_t r, std::uint64_t n, std::uint64_t order,
                             std::uint64_t size_width, std::uint64_t feature_width) {
   return kSectionFixed + r * 5 + r * f * (size_width + 8 + 2 + 2) + f * (4 + 4 + 5 * 2) + order * 2 +
@@ -142,7 +148,7 @@ Bytes write_section(const PlaneTables& t) {
   out.u8(t.rung_count());
   out.u8(static_cast<std::uint64_t>(size_width));
   out.u8(static_cast<std::uint64_t>(feature_width));
-  out.u8(t.allocation);
+  out.u8(std::min<std::uint8_t>(t.allocation, 1));  // readers of format 1.0 know 0 and 1
   out.number(0, 3);
   for (const float v : {t.quality_width, t.log_width, t.quality_min, t.quality_max, t.model_a, t.model_b,
                         t.model_r, t.model_correlation, t.model_error})
@@ -163,6 +169,10 @@ Bytes write_section(const PlaneTables& t) {
   for (const auto v : t.features) out.number(v, feature_width);
   for (const auto v : t.quality) out.f32(v);
   for (const auto v : t.total_bytes) out.u64(v);
+  out.u8(t.allocation);
+  out.u8(t.skip_dssim.empty() ? 0 : kHasSkipDssim);
+  out.number(0, 2);
+  for (const auto v : t.skip_dssim) out.u16(to_half(std::max(v, 0.0f)));
   return out.take();
 }
 
@@ -203,6 +213,20 @@ void read_arrays(BytesIn& in, PlaneTables& t, std::uint64_t r, std::uint64_t ord
   fill(t.total_bytes, n * kGammaSteps, [&] { return in.u64(); });
 }
 
+/// What stands behind the fields of format 1.0: nothing in such a file.
+void read_extension(BytesIn& in, PlaneTables& t, int minor) {
+  if (minor < 1) return in.finish();
+  const std::uint8_t allocation = in.u8(), flags = in.u8();
+  if (std::min<std::uint8_t>(allocation, 1) != t.allocation)
+    in.fail("the allocation of the section's head, or 2 where that is 1", std::to_string(allocation));
+  t.allocation = allocation;
+  if (minor <= kFormatMinor && (flags > kHasSkipDssim || in.number(2) != 0))
+    in.fail("flags 0 or 1 and 2 zero bytes", "others");
+  if (minor > kFormatMinor) in.raw(2);
+  if (flags & kHasSkipDssim) fill(t.skip_dssim, t.fragment_count(), [&] { return read_half(in); });
+  if (minor <= kFormatMinor) in.finish();
+}
+
 PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const std::string& place) {
   BytesIn in(bytes, kFile + ": " + place);
   PlaneTables t;
@@ -229,9 +253,10 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   const std::uint64_t expected =
       section_bytes(t.fragment_count(), rungs, t.scales + std::uint64_t{1}, order,
                     static_cast<std::uint64_t>(size_width), static_cast<std::uint64_t>(feature_width));
-  if (bytes.size() < expected || (bytes.size() > expected && minor <= kFormatMinor))
+  if (bytes.size() < expected + (minor < 1 ? 0 : kExtensionFixed))
     in.fail(std::to_string(expected) + " bytes", std::to_string(bytes.size()));
   read_arrays(in, t, rungs, order, size_width, feature_width);
+  read_extension(in, t, minor);
   check_plane(t, 0, place);
   if (size_width != width_of(t.size_bytes) || feature_width != width_of(t.features))
     in.fail("the least width that holds the values", "another");

@@ -290,9 +290,11 @@ void check_options(const CompileOptions& o, const std::string& source) {
     throw InputError(source, "lut.quality_fine",
                      ">= lut.quality_coarse (" + number_text(o.lut.quality_coarse) + ")",
                      number_text(o.lut.quality_fine));
-  const auto& z = o.zim;
-  if (z.weight_eta + z.weight_z + z.weight_i + z.weight_m <= 0)
-    throw InputError(source, "zim.weight_*", "at least one weight above 0", "all 0");
+  try {
+    parse_weights(PredictorRegistry::standard(), o.zim.weights);
+  } catch (const StageError& e) {
+    throw InputError(source, "zim.weights", e.expected(), e.found());
+  }
 }
 
 }  // namespace texmesh

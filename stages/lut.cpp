@@ -82,11 +82,56 @@ std::vector<std::uint8_t> fragment_mask(const TexturePlane& plane, std::size_t f
   return out;
 }
 
-/// Sizes, digests and distortions of one fragment at every rung.
+/// A fragment's luma as the preview shows it: bilinear, in 1/256 of a preview's texel.
+class PreviewLuma {
+ public:
+  PreviewLuma(const TexturePlane& plane, const std::vector<std::uint8_t>& jpeg)
+      : plane_(plane), preview_(decode_jpeg_luma(jpeg, 1u << 26)) {}
+
+  std::vector<std::uint8_t> fragment(std::size_t fragment) const {
+    const std::uint32_t w = plane_.fragment_width_px, h = plane_.fragment_height_px;
+    const auto left = static_cast<std::uint32_t>(fragment % plane_.columns) * w;
+    const auto top = static_cast<std::uint32_t>(fragment / plane_.columns) * h;
+    std::vector<Place> across;
+    for (std::uint32_t x = 0; x < w; ++x)
+      across.push_back(place(left + x, plane_.width_px, preview_.width_px));
+    std::vector<std::uint8_t> out;
+    out.reserve(std::size_t{w} * h);
+    for (std::uint32_t y = 0; y < h; ++y) {
+      const Place v = place(top + y, plane_.height_px, preview_.height_px);
+      const std::uint8_t *a = preview_.at(0, v.first), *b = preview_.at(0, v.second);
+      for (const Place& u : across) {
+        const std::uint32_t upper = a[u.first] * (256 - u.part) + a[u.second] * u.part;
+        const std::uint32_t lower = b[u.first] * (256 - u.part) + b[u.second] * u.part;
+        out.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+      }
+    }
+    return out;
+  }
+
+ private:
+  struct Place {
+    std::uint32_t first, second, part;
+  };
+  static Place place(std::uint32_t at, std::uint32_t size, std::uint32_t preview_size) {
+    const std::int64_t centre =
+        (2 * std::int64_t{at} + 1) * preview_size * 128 / size - 128;  // of a preview's texel, in 1/256
+    const std::int64_t last = (std::int64_t{preview_size} - 1) * 256;
+    const auto clamped = static_cast<std::uint32_t>(std::clamp<std::int64_t>(centre, 0, last));
+    return {clamped / 256, std::min(clamped / 256 + 1, preview_size - 1), clamped % 256};
+  }
+
+  const TexturePlane& plane_;
+  Pixels preview_;
+};
+
+/// Sizes, digests and distortions of one fragment at every rung, and of what the preview shows of it.
 void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
-                      std::size_t fragment, PlaneTables& out) {
+                      const PreviewLuma& preview, std::size_t fragment, PlaneTables& out) {
   const DistortionMeter meter(fragment_luma(plane, pixels, fragment), fragment_mask(plane, fragment),
                               plane.fragment_width_px, plane.fragment_height_px);
+  out.skip_dssim[fragment] =
+      static_cast<float>(std::max(meter.against(preview.fragment(fragment)).dssim, 0.0));
   const std::uint64_t texels = std::uint64_t{plane.fragment_width_px} * plane.fragment_height_px;
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const auto stream = fragment_stream(ladder.rungs[r], fragment);
@@ -119,6 +164,7 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.digest.resize(cells);
   out.mse.resize(cells);
   out.dssim.resize(cells);
+  out.skip_dssim.resize(plane.fragment_count());
   out.covered_texels = plane.covered_texels;
   out.surface_fraction = plane.surface_fraction;
   out.z = predictors.z;
@@ -158,7 +204,7 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
       std::uint64_t sum = 0;
       for (std::uint16_t f : tables.order)
         sum += tables.size_bytes[nearest_rung(tables, quality[f]) * tables.fragment_count() + f];
-      out.push_back(sum);
+      out.push_back(sum);  // with rd, too: that is what rungs_of() then spends
     }
   return out;
 }
@@ -205,6 +251,9 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
                            const RunContext& context) {
   check(fragments, pixels, predictors, ladder, options);
   PackageTables out;
+  std::vector<PreviewLuma> previews;
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
+    previews.emplace_back(fragments.planes[p], ladder.planes[p].preview);
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     out.planes.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],
@@ -216,7 +265,7 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto [p, f] = tasks[t];
-      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], f, out.planes[p]);
+      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], previews[p], f, out.planes[p]);
       context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
     }
   });

@@ -10,12 +10,12 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 1;
+inline constexpr int kLutVersion = 2;
 
-enum class Allocation : std::uint8_t { kThesis, kLog };
+enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>
 struct EnumNames<Allocation> {
-  static constexpr std::array<std::string_view, 2> names{"thesis", "log"};
+  static constexpr std::array<std::string_view, 3> names{"thesis", "log", "rd"};
 };
 
 struct LutOptions {
@@ -27,7 +27,10 @@ struct LutOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("allocate", s.allocate,
-      "thesis = equation 3.2 in quality; log = the same in the logarithm of the quantiser");
+      "how bytes are shared among fragments: thesis = equation 3.2 in quality; log = the same in the "
+      "logarithm "
+      "of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - SSIM x "
+      "surface)");
     v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
     v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
     v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
@@ -39,13 +42,14 @@ struct LutOptions {
 };
 
 /// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the
-/// exact bytes, the digest, MSE and 1 - SSIM of luma (or grey) over covered texels; Q_i, D_i over 21 values
-/// of Gamma (bytes of the fragments' streams, tables not counted); the order of falling importance: eta of
-/// scale 0, then surface, then index; and the size model S = A R^Q + c over the plane's rungs, c = the stored
-/// fragments' constant headers, B from (8.8) with the plane's mean VQP, not below 0.02. The model is 0 where
-/// there are fewer than two rungs or nothing is stored. `pixels` are fill_planes()'s. Throws StageError for
-/// parts that do not fit each other, FormatError for a stream that does not decode. Same result for any
-/// thread count.
+/// exact bytes, the digest, MSE and 1 - SSIM of luma (or grey) over covered texels, and 1 - SSIM of the
+/// preview, scaled up bilinearly, where no rung is shown; Q_i, D_i over 21 values of Gamma (bytes of the
+/// fragments' streams, tables not counted; with `allocate = rd` the bytes of log, which rungs_of() spends);
+/// the order of falling importance: eta of scale 0, then surface, then index; and the size model S = A R^Q +
+/// c over the plane's rungs, c = the stored fragments' constant headers, B from (8.8) with the plane's mean
+/// VQP, not below 0.02. The model is 0 where there are fewer than two rungs or nothing is stored. `pixels`
+/// are fill_planes()'s. Throws StageError for parts that do not fit each other, FormatError for a stream that
+/// does not decode. Same result for any thread count.
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
                            const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
                            const RunContext& context);

@@ -11,8 +11,6 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kPredictors = 4;  // of VQP: eta, Z, I, M
-
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
   throw StageError("zim", std::move(place), std::move(expected), std::move(found));
 }
@@ -118,8 +116,9 @@ void predict_fragment(const Sums& sums, std::uint32_t channels, const ZimOptions
   out.m[f] = static_cast<float>(std::clamp(m, 0.0, 1.0));
 }
 
-void add_spread(const TexturePlane& plane, const float* values, double weight, std::vector<double>& to) {
-  float lo = 0, hi = 0;
+void add_spread(const TexturePlane& plane, const std::vector<double>& values, double weight,
+                std::vector<double>& to) {
+  double lo = 0, hi = 0;
   bool first = true;
   for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
     if (plane.covered_texels[f] == 0) continue;
@@ -129,30 +128,36 @@ void add_spread(const TexturePlane& plane, const float* values, double weight, s
   }
   if (!(hi > lo)) return;  // all alike: 0, as eta
   for (std::size_t f = 0; f < plane.fragment_count(); ++f)
-    if (plane.covered_texels[f] > 0)
-      to[f] += weight * (static_cast<double>(values[f]) - lo) / (static_cast<double>(hi) - lo);
+    if (plane.covered_texels[f] > 0) to[f] += weight * (values[f] - lo) / (hi - lo);
 }
 
-void combine(const TexturePlane& plane, const std::array<double, kPredictors>& weights,
-             PlanePredictors& out) {
-  const std::array<const float*, kPredictors> predictors{plane.eta.data(), out.z.data(), out.i.data(),
-                                                         out.m.data()};
-  std::vector<double> vqp(plane.fragment_count());
-  for (std::size_t k = 0; k < kPredictors; ++k) add_spread(plane, predictors[k], weights[k], vqp);
+/// (8.4)
+void combine(const TexturePlane& plane, const Pixels& pixels, const std::vector<WeightedPredictor>& weights,
+             const RunContext& context, PlanePredictors& out) {
+  std::vector<double> vqp(plane.fragment_count()), values(plane.fragment_count());
+  for (const WeightedPredictor& w : weights) {
+    parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t f = begin; f < end; ++f) {
+        if (plane.covered_texels[f] == 0) continue;
+        values[f] = w.predictor->value({plane, pixels, f, static_cast<double>(out.z[f]),
+                                        static_cast<double>(out.i[f]), static_cast<double>(out.zeta[f]),
+                                        static_cast<double>(out.m[f])});
+        if (!std::isfinite(values[f]))
+          fail("predictor " + w.predictor->name, "finite numbers", std::to_string(values[f]));
+      }
+    });
+    add_spread(plane, values, w.weight, vqp);
+  }
   for (std::size_t f = 0; f < vqp.size(); ++f) out.vqp[f] = static_cast<float>(std::min(vqp[f], 1.0));
 }
 
 }  // namespace
 
 Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const ZimOptions& options, const RunContext& context) {
+                           const ZimOptions& options, const RunContext& context,
+                           const PredictorRegistry& registry) {
   check(fragments, pixels);
-  std::array<double, kPredictors> weights{options.weight_eta, options.weight_z, options.weight_i,
-                                          options.weight_m};
-  const double sum = weights[0] + weights[1] + weights[2] + weights[3];
-  if (!(sum > 0)) fail("weights of VQP", "at least one above 0", "none");
-  for (double& w : weights) w /= sum;
-
+  const std::vector<WeightedPredictor> weights = parse_weights(registry, options.weights);
   Predictors out;
   out.planes.resize(fragments.planes.size());
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
@@ -171,7 +176,7 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
         predict_fragment(sums, plane.channels, options, f, predictors);
       }
     });
-    combine(plane, weights, predictors);
+    combine(plane, pixels[p], weights, context, predictors);
     context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));
   }
   return out;

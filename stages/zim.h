@@ -1,27 +1,30 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "format/fields.h"
 #include "stages/fragmentation.h"
+#include "stages/predictors.h"
 
 namespace texmesh {
 
-inline constexpr int kZimVersion = 1;
+inline constexpr int kZimVersion = 2;
 
 struct ZimOptions {
   int difference = 24;  // neighbours that differ by this in any channel count as different
-  double weight_intensity = 0.5, weight_complexity = 0.5;           // of M (8.3)
-  double weight_eta = 1, weight_z = 1, weight_i = 1, weight_m = 1;  // of VQP (8.4), normalised to sum 1
+  double weight_intensity = 0.5, weight_complexity = 0.5;  // of M (8.3)
+  std::string weights = "eta=1,z=1,i=1,m=1";               // of VQP (8.4), scaled to sum 1; parse_weights()
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("difference", s.difference, Range{1, 255},
       "neighbouring texels that differ by this in any channel count as different");
     v("weight_intensity", s.weight_intensity, Range{0, 1}, "weight of (1 - I) in the masking predictor M");
     v("weight_complexity", s.weight_complexity, Range{0, 1}, "weight of zeta in the masking predictor M");
-    v("weight_eta", s.weight_eta, Range{0, 100}, "weight of feature density in VQP");
-    v("weight_z", s.weight_z, Range{0, 100}, "weight of Z, the colour deviation, in VQP");
-    v("weight_i", s.weight_i, Range{0, 100}, "weight of I, the intensity, in VQP");
-    v("weight_m", s.weight_m, Range{0, 100}, "weight of M, the masking, in VQP");
+    v("weights", s.weights,
+      "weights of VQP's predictors, NAME=WEIGHT,...: eta (feature density), z (colour deviation), i "
+      "(intensity), "
+      "m (masking), zeta (neighbours that differ), area (covered share), surface (share of the object's), "
+      "gradient (mean difference of neighbours)");
   }
 };
 
@@ -30,8 +33,9 @@ struct ZimOptions {
 ///   w_zeta zeta), zeta = share of the pairs of neighbours, east and south, that differ (of 2 (w-1)(h-1)
 ///   pairs in a whole fragment).
 /// Where a fragment is covered in part only its covered texels count, and pairs of them: what fills the rest
-/// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of eta at scale
-/// 0, z, i and m, each min-max over the covered fragments of the plane (0 where all are equal).
+/// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of the predictors
+/// that ZimOptions::weights names, each min-max over the covered fragments of the plane (0 where all are
+/// equal).
 struct PlanePredictors {
   std::vector<float> z, i, zeta, m, vqp;
   template <class S, class A>
@@ -47,9 +51,11 @@ struct Predictors {
   }
 };
 
-/// `pixels` are fill_planes()'s. Throws StageError when they do not fit and when all weights of VQP are 0.
-/// Same result for any thread count.
+/// `pixels` are fill_planes()'s. Throws StageError when they do not fit, and as parse_weights() does. Same
+/// result for any thread count. `registry` is where the names of the weights come from: a program that links
+/// stages may add its own.
 Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const ZimOptions& options, const RunContext& context);
+                           const ZimOptions& options, const RunContext& context,
+                           const PredictorRegistry& registry = PredictorRegistry::standard());
 
 }  // namespace texmesh

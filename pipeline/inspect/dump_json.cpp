@@ -140,18 +140,18 @@ Json ladder_json(PackageReader& p) {
 
 Json allocation_json(const PlaneTables& t, std::uint32_t scale) {
   const AllocationFigures f = allocation_figures(t, scale);
-  const std::vector<float> quality = quality_of(t, scale, f.gamma);
-  Json q = Json::array(), rungs = Json::array(), total = Json::array();
+  Json q = Json::array(), rungs = Json::array(), bytes = Json::array(), total = Json::array();
   for (std::size_t i = 0; i < t.fragment_count(); ++i) {
-    const bool stored = t.size_bytes.size() > i && t.size_bytes[i] > 0;
-    q.push_back(stored ? Json(quality[i]) : Json());
-    rungs.push_back(stored ? Json(nearest_rung(t, static_cast<double>(quality[i]))) : Json());
+    const bool stored = f.fragment_rung[i] != kSkipped;
+    q.push_back(stored ? Json(f.fragment_quality[i]) : Json());
+    rungs.push_back(stored ? Json(f.fragment_rung[i]) : Json());
+    bytes.push_back(stored ? Json(f.fragment_bytes[i]) : Json());
   }
   for (std::size_t g = 0; g < kGammas; ++g) total.push_back(t.total_bytes[scale * kGammas + g]);
-  return {{"scale", scale},        {"quality", t.quality[scale]},
-          {"gamma", f.gamma},      {"bytes_at_gamma", f.bytes},
-          {"total_bytes", total},  {"fragment_quality", q},
-          {"fragment_rung", rungs}};
+  return {{"scale", scale},         {"quality", t.quality[scale]},
+          {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
+          {"total_bytes", total},   {"fragment_quality", q},
+          {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
 }
 
 Json tables_json(PackageReader& p) {
@@ -161,7 +161,7 @@ Json tables_json(PackageReader& p) {
     Json scales = Json::array();
     for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s));
     planes.push_back({{"plane", k},
-                      {"allocation", t.allocation == 0 ? "thesis" : "log"},
+                      {"allocation", allocation_name(t)},
                       {"quality_width", t.quality_width},
                       {"log_width", t.log_width},
                       {"quality_min", t.quality_min},

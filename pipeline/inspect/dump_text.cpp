@@ -139,8 +139,10 @@ std::string fragments_text(PackageReader& p) {
     const PlaneTables& t = p.tables().planes[k];
     const std::vector<float> eta = eta_of(t, 0);
     TextTable table;
-    for (const char* header : {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP"})
+    for (const char* header :
+         {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP", "q_0", "d_0 B"})
       table.column(header);
+    const AllocationFigures finest = allocation_figures(t, 0);
     for (const int q : info.rung_quality) table.column(fmt::format("q{} B", q));
     const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
     for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
@@ -152,14 +154,18 @@ std::string fragments_text(PackageReader& p) {
                                    percent(t.covered_texels[i] / texels),
                                    percent(static_cast<double>(t.surface_fraction[i]), 2),
                                    fixed(static_cast<double>(eta[i]), 3),
-                                   fixed(static_cast<double>(t.vqp[i]), 3)};
+                                   fixed(static_cast<double>(t.vqp[i]), 3),
+                                   fixed(static_cast<double>(finest.fragment_quality[i]), 1),
+                                   std::to_string(finest.fragment_bytes[i])};
       for (std::size_t r = 0; r < t.rung_count(); ++r)
         row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
       table.row(std::move(row));
     }
     s += plane_title(info, k);
     s += "grid: " + printable(info.grid_reason) + "\neta of S_0 in tenths, . = not stored\n";
-    s += eta_map(t, eta) + "fragments by falling importance\n" + table.text() + "\n";
+    s += eta_map(t, eta) +
+         "fragments by falling importance; q_0, d_0: quality and bytes that the tables ask for at S_0\n" +
+         table.text() + "\n";
   }
   return s.empty() ? "no textures\n" : s;
 }
@@ -233,8 +239,7 @@ std::string tables_text(PackageReader& p) {
                      percent(static_cast<double>(t.model_error)));
     s += fmt::format(
         "  allocation {}, width {}, q within {} .. {}; D_i at the default Gamma, then by Gamma\n",
-        t.allocation == 0 ? "thesis" : "log",
-        shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
+        allocation_name(t), shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
         shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)));
     s += allocation_text(t) + "\n";
   }

@@ -71,18 +71,27 @@ std::uint64_t stored_fragments(const PlaneTables& tables) { return tables.order.
 AllocationFigures allocation_figures(const PlaneTables& t, std::uint32_t scale) {
   AllocationFigures f;
   f.gamma = mean_eta(t, scale);
-  const std::vector<float> quality = quality_of(t, scale, f.gamma);
+  f.fragment_quality = quality_of(t, scale, f.gamma);
+  f.fragment_rung = rungs_of(t, scale, f.gamma);
+  f.fragment_bytes = bytes_of(t, f.fragment_rung);
+  f.bytes = sum_of(f.fragment_bytes);
   if (t.order.empty()) return f;
   f.quality_min = 1e9;
   for (const std::uint16_t i : t.order) {
-    const double q = quality[i];
+    if (t.allocation == 2)  // what was bought, not what was asked for
+      f.fragment_quality[i] =
+          f.fragment_rung[i] == kSkipped ? 0 : t.rung_quality[static_cast<std::size_t>(f.fragment_rung[i])];
+    const double q = static_cast<double>(f.fragment_quality[i]);
     f.quality_min = std::min(f.quality_min, q);
     f.quality_max = std::max(f.quality_max, q);
     f.quality_mean += q;
-    f.bytes += t.size_bytes[nearest_rung(t, q) * t.fragment_count() + i];
   }
   f.quality_mean /= static_cast<double>(t.order.size());
   return f;
+}
+
+std::string allocation_name(const PlaneTables& t) {
+  return t.allocation == 0 ? "thesis" : t.allocation == 1 ? "log" : "rd";
 }
 
 }  // namespace texmesh

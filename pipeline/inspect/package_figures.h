@@ -29,9 +29,14 @@ std::uint64_t stored_fragments(const PlaneTables& tables);
 
 /// The texture quality that the tables ask for at one scale and the default Gamma (the mean of eta).
 struct AllocationFigures {
-  double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;
-  std::uint64_t bytes = 0;  // of the nearest rungs, table streams not counted
+  double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;  // quality 0: skipped
+  std::uint64_t bytes = 0;  // of the chosen rungs, table streams not counted
+  // Per fragment: q_i(x, y) (with rd: the quality of the rung), its rung, d_i(x, y)
+  std::vector<float> fragment_quality;
+  std::vector<std::int16_t> fragment_rung;
+  std::vector<std::uint32_t> fragment_bytes;
 };
 AllocationFigures allocation_figures(const PlaneTables& tables, std::uint32_t scale);
+std::string allocation_name(const PlaneTables& tables);  // "thesis", "log" or "rd"
 
 }  // namespace texmesh

@@ -29,6 +29,7 @@ inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::u
   for (std::size_t f = 0; f < fragments; ++f) {
     t.covered_texels.push_back(f < stored ? random() % 65536 + 1 : 0);
     t.surface_fraction.push_back(f < stored ? 1 / static_cast<float>(stored) : 0);
+    t.skip_dssim.push_back(f < stored ? 0.5f + fraction() : 0);
     for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) v->push_back(f < stored ? fraction() : 0);
     if (f < stored) t.order.push_back(static_cast<std::uint16_t>(stored - 1 - f));
   }

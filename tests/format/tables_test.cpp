@@ -54,6 +54,9 @@ TEST(Tables, RoundTrip) {
   EXPECT_EQ(a.quality, b.quality);
   EXPECT_EQ(a.total_bytes, b.total_bytes);
   EXPECT_EQ(a.model_r, b.model_r);
+  EXPECT_EQ(b.allocation, 1);
+  ASSERT_EQ(b.skip_dssim.size(), 6u);
+  for (std::size_t f = 0; f < 6; ++f) EXPECT_NEAR(b.skip_dssim[f], a.skip_dssim[f], a.skip_dssim[f] / 2048);
   for (std::size_t i = 0; i < a.mse.size(); ++i) {
     EXPECT_NEAR(b.mse[i], a.mse[i], a.mse[i] / 2048);
     EXPECT_NEAR(b.dssim[i], a.dssim[i], std::max(a.dssim[i] / 2048, 0x1p-25f));
@@ -70,6 +73,38 @@ TEST(Tables, FullPlaneStaysUnder64KB) {
   EXPECT_LE(bytes.size(), 64000u);
   EXPECT_EQ(read_tables(bytes).planes[0].features, t.features);
   RecordProperty("bytes", static_cast<int>(bytes.size()));
+}
+
+/// As format 1.0 wrote it: without what 1.1 put at the end.
+Bytes as_first_minor(const Bytes& bytes, std::size_t extension) {
+  Bytes old(bytes.begin(), bytes.end() - static_cast<std::ptrdiff_t>(extension));
+  old[6] = 0;
+  const TablesHead head = read_tables_head(bytes);
+  const std::size_t section = head.planes[0].bytes - extension;
+  for (std::size_t k = 0; k < 4; ++k) old[16 + k] = static_cast<std::uint8_t>(section >> (8 * k));
+  const Sha256 digest = sha256(std::span(old).subspan(head.bytes));
+  std::copy(digest.begin(), digest.end(), old.begin() + 20);
+  return old;
+}
+
+TEST(Tables, SectionsOfTheFirstMinorVersionAreRead) {
+  PlaneTables t = make_tables(3, 2, 2, 1);
+  for (const std::uint8_t allocation : {0, 1, 2}) {
+    t.allocation = allocation;
+    const Bytes old = as_first_minor(write_tables({{t}}), 4 + 6 * 2);
+    const PlaneTables back = read_tables(old).planes[0];
+    EXPECT_EQ(back.allocation, std::min<int>(allocation, 1));  // what a reader of 1.0 takes rd for
+    EXPECT_TRUE(back.skip_dssim.empty());
+    EXPECT_EQ(back.total_bytes, t.total_bytes);
+    EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].allocation, allocation);
+    // Written again it is of this version and says that it does not know.
+    EXPECT_TRUE(read_tables(write_tables({{back}})).planes[0].skip_dssim.empty());
+    // Neither form passes for the other.
+    EXPECT_THROW(read_tables(as_first_minor(write_tables({{t}}), 3 + 6 * 2)), FormatError);
+    Bytes newer = old;
+    newer[6] = 1;
+    EXPECT_THROW(read_tables(newer), FormatError);
+  }
 }
 
 TEST(Tables, SectionsCanBeReadOneByOne) {
@@ -97,7 +132,7 @@ TEST(Tables, EveryFlippedBitIsRefusedOrIsTheMinorVersion) {
     for (int bit = 0; bit < 8; ++bit) {
       Bytes damaged = bytes;
       damaged[i] = static_cast<std::uint8_t>(damaged[i] ^ (1 << bit));
-      if (i == 6 || i == 7) {
+      if ((i == 6 && damaged[i] > bytes[i]) || i == 7) {  // a later minor version
         EXPECT_NO_THROW(read_tables(damaged));
       } else {
         EXPECT_THROW(read_tables(damaged), FormatError) << i << " " << bit;
@@ -171,7 +206,9 @@ TEST(Tables, WriterRefusesBadTables) {
   refused([](PlaneTables& t) { t.order.pop_back(); });
   refused([](PlaneTables& t) { t.order[0] = 6; });
   refused([](PlaneTables& t) { t.quality_min = 98; });
-  refused([](PlaneTables& t) { t.allocation = 2; });
+  refused([](PlaneTables& t) { t.allocation = 3; });
+  refused([](PlaneTables& t) { t.skip_dssim.pop_back(); });
+  refused([](PlaneTables& t) { t.skip_dssim[0] = 2.5f; });
   refused([](PlaneTables& t) { t.model_r = std::numeric_limits<float>::infinity(); });
 }
 

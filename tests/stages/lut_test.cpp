@@ -120,7 +120,7 @@ TEST(Lut, DistortionIsMeasuredAndFallsWithTheRung) {
 
 TEST(Lut, OrderQualityAndTotals) {
   const Scene s = make_scene();
-  for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis}) {
+  for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis, Allocation::kRd}) {
     LutOptions options;
     options.allocate = allocate;
     const PlaneTables t = build(s, options).planes[0];
@@ -145,6 +145,45 @@ TEST(Lut, OrderQualityAndTotals) {
         EXPECT_LE(t.total_bytes[scale * 21 + g], t.total_bytes[scale * 21 + (g == 0 ? 0 : g - 1)]);
       }
   }
+}
+
+TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
+  const Scene s = make_scene();
+  for (std::size_t p = 0; p < 2; ++p) {
+    const PlaneTables t = build(s).planes[p];
+    for (std::size_t f = 0; f < t.fragment_count(); ++f) {
+      if (t.covered_texels[f] == 0) {
+        EXPECT_EQ(t.skip_dssim[f], 0);
+        continue;
+      }
+      EXPECT_GT(t.skip_dssim[f], t.dssim[f]);  // noise: an eighth of the resolution shows nothing of it
+      EXPECT_LT(t.skip_dssim[f], 1.5f);
+    }
+  }
+  // A flat texture is as good in the preview.
+  Scene flat = make_scene();
+  for (Pixels& pixels : flat.pixels) std::fill(pixels.data.begin(), pixels.data.end(), std::uint8_t{97});
+  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {});
+  const PlaneTables t = build(flat).planes[0];
+  for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
+}
+
+TEST(Lut, RateDistortionSpendsNoMoreAndLosesLess) {
+  const Scene s = make_scene();
+  LutOptions options;
+  const PlaneTables log = build(s, options).planes[0];
+  options.allocate = Allocation::kRd;
+  const PlaneTables rd = build(s, options).planes[0];
+  EXPECT_EQ(rd.total_bytes, log.total_bytes);
+  EXPECT_EQ(rd.allocation, 2);
+  for (std::uint32_t scale = 0; scale < 3; ++scale)
+    for (std::size_t g = 0; g < 21; g += 4) {
+      const auto a = rungs_of(log, scale, static_cast<double>(g) / 20),
+                 b = rungs_of(rd, scale, static_cast<double>(g) / 20);
+      EXPECT_EQ(sum_of(bytes_of(log, a)), log.total_bytes[scale * 21 + g]);
+      EXPECT_LE(sum_of(bytes_of(rd, b)), log.total_bytes[scale * 21 + g]);
+      EXPECT_LE(surface_dssim(rd, b), surface_dssim(log, a) + 1e-6);
+    }
 }
 
 TEST(Lut, SizeModelFitsAndIsAbsentForOneRung) {

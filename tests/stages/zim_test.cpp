@@ -129,11 +129,53 @@ TEST(Zim, ThresholdAndWeights) {
   EXPECT_FLOAT_EQ(predict(p, options).zeta[0], 0.5f);  // east neighbours differ, south ones do not
   options.difference = 25;
   EXPECT_FLOAT_EQ(predict(p, options).zeta[0], 0);
-  options.weight_z = options.weight_i = options.weight_m = 0;
-  options.weight_eta = 7;
+  options.weights = "eta=7";
   EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
-  options.weight_eta = 0;
-  EXPECT_THROW(predict(p, options), StageError);
+  for (const char* bad : {"", "eta=0", "eta", "eta=", "=1", "eta=1,", "eta=1,eta=2", "eta=x", "eta=-1",
+                          "eta=101", "eta=nan", "eta=1e999", "beauty=1", "eta=1;z=1", "eta==1"}) {
+    options.weights = bad;
+    EXPECT_THROW(predict(p, options), StageError) << bad;
+  }
+}
+
+TEST(Zim, FurtherPredictorsByName) {
+  Plane p = make_plane(3, [](auto x, auto y, auto) { return x < 16 ? 100 : 100 + (x + y) % 2 * 20; });
+  p.fragments.planes[0].surface_fraction = {0.25f, 0.125f};
+  ZimOptions options;
+  options.weights = "gradient=1";  // differences of 20 are under zeta's threshold, not gradient's
+  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
+  EXPECT_EQ(predict(p, options).zeta, (std::vector<float>{0, 0}));
+  options.weights = "surface=1";
+  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{1, 0}));
+  options.weights = " eta=1, surface = 3 ";
+  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0.75f, 0.25f}));
+
+  options.weights = "area=1";
+  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 0}));  // both are whole
+  TexturePlane& plane = p.fragments.planes[0];
+  for (std::uint32_t y = 0; y < 16; ++y) plane.coverage[y * 4] = 0;
+  plane.covered_texels[0] = 128;
+  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
+}
+
+TEST(Zim, AProgramMayRegisterItsOwn) {
+  const Plane p = make_plane(1, [](auto x, auto, auto) { return x; });
+  PredictorRegistry registry = PredictorRegistry::standard();
+  const std::size_t before = registry.all().size();
+  registry.add({"last", "the fragment's number",
+                [](const PredictorInput& in) { return static_cast<double>(in.fragment) * 1e9; }});
+  EXPECT_EQ(registry.all().size(), before + 1);
+  ZimOptions options;
+  options.weights = "last=1";
+  EXPECT_EQ(predict_quality(p.fragments, p.pixels, options, {}, registry).planes[0].vqp,
+            (std::vector<float>{0, 1}));
+  EXPECT_THROW(predict(p, options), StageError);  // the standard ones do not know it
+  for (const char* bad : {"last", "", "A", "a b"})
+    EXPECT_THROW(registry.add({bad, "", [](const PredictorInput&) { return 0.0; }}), StageError) << bad;
+  EXPECT_THROW(registry.add({"empty", "", nullptr}), StageError);
+  registry.add({"wild", "", [](const PredictorInput&) { return std::nan(""); }});
+  options.weights = "wild=1";
+  EXPECT_THROW(predict_quality(p.fragments, p.pixels, options, {}, registry), StageError);
 }
 
 TEST(Zim, SameResultForAnyNumberOfThreadsAndBadInputIsRefused) {

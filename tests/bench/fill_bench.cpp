@@ -1,0 +1,172 @@
+// What filling the texels that no chart covers saves: fill_bench MODEL ... . Bytes of the stored fragments at
+// equal PSNR over covered texels, as a share of those of the atlas's own background. Ratios within one run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <utility>
+
+#include "stages/ladder.h"
+#include "stages/lut.h"
+#include "stages/zim.h"
+#include "tests/bench/bench_model.h"
+
+namespace texmesh {
+namespace {
+
+bool covered(const TexturePlane& plane, std::uint32_t x, std::uint32_t y) {
+  return plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
+}
+
+/// Every uncovered texel becomes the covered one that a brush fire reaches it from first.
+void dilate(Pixels& pixels, const TexturePlane& plane) {
+  std::vector<std::uint32_t> from(std::size_t{plane.width_px} * plane.height_px, 0xffffffffu), queue;
+  for (std::uint32_t y = 0; y < plane.height_px; ++y)
+    for (std::uint32_t x = 0; x < plane.width_px; ++x)
+      if (covered(plane, x, y)) {
+        queue.push_back(y * plane.width_px + x);
+        from[queue.back()] = queue.back();
+      }
+  for (std::size_t k = 0; k < queue.size(); ++k) {
+    const std::uint32_t x = queue[k] % plane.width_px, y = queue[k] / plane.width_px;
+    const auto visit = [&](std::uint32_t u, std::uint32_t v) {
+      if (u >= plane.width_px || v >= plane.height_px) return;
+      const std::uint32_t to = v * plane.width_px + u;
+      if (from[to] != 0xffffffffu) return;
+      from[to] = from[queue[k]];
+      queue.push_back(to);
+    };
+    visit(x + 1, y), visit(x - 1, y), visit(x, y + 1), visit(x, y - 1);
+  }
+  for (std::uint32_t y = 0; y < plane.height_px; ++y)
+    for (std::uint32_t x = 0; x < plane.width_px; ++x) {
+      const std::uint32_t source = from[y * plane.width_px + x];
+      if (source == 0xffffffffu) continue;
+      const std::uint8_t* value = pixels.at(source % plane.width_px, source / plane.width_px);
+      std::copy(value, value + pixels.channels,
+                pixels.data.data() + (std::size_t{y} * pixels.width_px + x) * pixels.channels);
+    }
+}
+
+struct Point {
+  double bytes = 0, psnr = 0;
+};
+
+/// Per rung, over the planes: bytes of the fragments, PSNR of luma over covered texels.
+std::vector<Point> measure(const Fragments& fragments, const std::vector<std::size_t>& shown,
+                           const std::vector<Pixels>& pixels, const RunContext& context) {
+  const Predictors predictors = predict_quality(fragments, pixels, {}, context);
+  const Ladder ladder = encode_ladder(fragments, pixels, {}, context);
+  const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, {}, context);
+  std::vector<Point> out(tables.planes[shown[0]].rung_count());
+  for (std::size_t r = 0; r < out.size(); ++r) {
+    double error = 0, texels = 0;
+    for (const std::size_t p : shown) {
+      const PlaneTables& t = tables.planes[p];
+      for (const std::uint16_t f : t.order) {
+        const std::size_t at = r * t.fragment_count() + f;
+        out[r].bytes += t.size_bytes[at];
+        error += static_cast<double>(t.mse[at]) * t.covered_texels[f];
+        texels += t.covered_texels[f];
+      }
+    }
+    out[r].psnr = 10 * std::log10(65025 * texels / error);
+  }
+  return out;
+}
+
+double bytes_at(const std::vector<Point>& curve, double psnr) {
+  for (std::size_t k = 1; k < curve.size(); ++k) {
+    const Point &a = curve[k - 1], &b = curve[k];
+    if (psnr < a.psnr || psnr > b.psnr) continue;
+    const double t = (psnr - a.psnr) / (b.psnr - a.psnr);
+    return std::exp(std::log(a.bytes) + t * (std::log(b.bytes) - std::log(a.bytes)));
+  }
+  return 0;
+}
+
+/// How many uncovered texels equal their four neighbours: what the source's background costs.
+double flat_share(const Fragments& fragments, const std::vector<std::size_t>& shown,
+                  const std::vector<Pixels>& pixels) {
+  double flat = 0, all = 0;
+  for (const std::size_t p : shown) {
+    const TexturePlane& plane = fragments.planes[p];
+    for (std::uint32_t y = 0; y + 1 < plane.height_px; ++y)
+      for (std::uint32_t x = 0; x + 1 < plane.width_px; ++x) {
+        if (covered(plane, x, y)) continue;
+        ++all;
+        const std::uint8_t *a = pixels[p].at(x, y), *b = pixels[p].at(x + 1, y), *c = pixels[p].at(x, y + 1);
+        int most = 0;
+        for (std::uint32_t k = 0; k < plane.channels; ++k)
+          most = std::max({most, std::abs(a[k] - b[k]), std::abs(a[k] - c[k])});
+        if (most <= 2) ++flat;
+      }
+  }
+  return all > 0 ? flat / all : 1;
+}
+
+void print_model(const std::string& path) {
+  RunContext context;
+  context.threads = 2;
+  BenchModel model = load_bench_model(path, context);
+  // Only what is measured is worth encoding.
+  Fragments shown_only = model.fragments;
+  shown_only.planes.clear();
+  for (const std::size_t p : colour_planes(model.fragments))
+    shown_only.planes.push_back(model.fragments.planes[p]);
+  std::vector<std::size_t> shown(shown_only.planes.size());
+  for (std::size_t p = 0; p < shown.size(); ++p) shown[p] = p;
+  if (shown.empty()) return;
+
+  double texels = 0, stored_texels = 0;
+  for (const TexturePlane& plane : shown_only.planes)
+    for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
+      texels += plane.covered_texels[f];
+      if (plane.covered_texels[f] > 0)
+        stored_texels += static_cast<double>(plane.fragment_width_px) * plane.fragment_height_px;
+    }
+  const std::vector<Pixels> source = fill_planes(shown_only, model.images, Fill::kNone, context);
+  std::vector<Pixels> nearest = source;
+  for (std::size_t p = 0; p < nearest.size(); ++p) dilate(nearest[p], shown_only.planes[p]);
+  const std::vector<Pixels> ours = fill_planes(shown_only, model.images, Fill::kPushPull, context);
+
+  const std::vector<Point> reference = measure(shown_only, shown, source, context);
+  std::cout << fmt::format("{:<22} {:5.1f} {:5.1f} ", model_name(path), 100 * texels / stored_texels,
+                           100 * flat_share(shown_only, shown, source));
+  for (const std::vector<Pixels>* pixels : {&std::as_const(nearest), &ours}) {
+    const std::vector<Point> curve = measure(shown_only, shown, *pixels, context);
+    double sum = 0;
+    int count = 0;
+    std::string at;
+    for (const std::size_t r :
+         {std::size_t{3}, std::size_t{4}, std::size_t{5}, std::size_t{6}, std::size_t{7}}) {
+      const double bytes = bytes_at(curve, reference[r].psnr);
+      if (bytes <= 0) continue;
+      if (r != 4 && r != 6) at += fmt::format(" {:.3f}", bytes / reference[r].bytes);
+      sum += std::log(bytes / reference[r].bytes);
+      ++count;
+    }
+    std::cout << fmt::format("   {:.3f} ({} )", std::exp(sum / count), at);
+  }
+  std::cout << fmt::format("   {:.0f} kB {:.2f} dB at quality 53\n", reference[5].bytes / 1e3,
+                           reference[5].psnr);
+}
+
+}  // namespace
+}  // namespace texmesh
+
+int main(int argc, char** argv) {
+  std::cout << "fill: bytes over the source's background at equal PSNR of covered texels, mean of rungs "
+               "18..86 (rungs "
+               "18 53 86)\n"
+               "                       cov.%  flat%  nearest texel                  push-pull                "
+               " source\n";
+  try {
+    for (int k = 1; k < argc; ++k) texmesh::print_model(argv[k]);
+  } catch (const std::exception& e) {
+    std::cerr << e.what() << '\n';
+    return 1;
+  }
+  return argc > 1 ? 0 : 2;
+}
