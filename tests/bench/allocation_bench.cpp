@@ -1,5 +1,6 @@
 // What sharing the bytes among fragments is worth, and how exact the size table is.
-//   allocation_bench NAME.texmesh ...   bytes of thesis, log and rd over the same quality everywhere
+//   allocation_bench [--log-width DG] NAME.texmesh ...
+//                                       bytes of thesis, log and rd over the same quality everywhere
 //   ("uniform",
 //                                       empty fragments not stored), at equal surface-weighted 1 - SSIM
 //   allocation_bench MODEL ...          sizes: table against streams; error of sizes between the rungs,
@@ -118,6 +119,7 @@ double bytes_at(const Curve& curve, double loss) {
 struct Ratios {
   double mean = 0, worst = 0;
 };
+/// What the figures are summed up from: not the lowest and the highest rung, beside which nothing can be.
 Ratios over_uniform(const Curve& curve, const Curve& reference) {
   Ratios out;
   double sum = 0;
@@ -133,7 +135,7 @@ Ratios over_uniform(const Curve& curve, const Curve& reference) {
   return out;
 }
 
-void print_package(const std::string& path) {
+void print_package(const std::string& path, double log_width) {
   PackageReader package(open_store(path));
   Planes planes;
   for (std::size_t p = 0; p < package.textures().size(); ++p)
@@ -150,10 +152,13 @@ void print_package(const std::string& path) {
   std::size_t fragments = 0;
   for (const PlaneTables& t : planes.tables) fragments += t.order.size();
   const std::uint32_t middle = planes.tables[0].scales / 2;
-  std::cout << fmt::format("{:<26} {:>5}  {}  {}  {}  {}  {}\n", model_name(path), fragments,
-                           text(swept(planes, 0, 0, -1)), text(swept(planes, 1, 0, -1)),
-                           text(swept(planes, 1, middle, -1)), text(swept(planes, 1, 0, 0.35)),
-                           text(rate_distortion(planes, all.front().bytes * 0.5, all.back().bytes)));
+  const Curve rd = rate_distortion(planes, all.front().bytes * 0.5, all.back().bytes);
+  std::string at;
+  for (const std::size_t r : {std::size_t{3}, std::size_t{5}, std::size_t{7}})
+    if (r < rungs) at += fmt::format(" {:.3f}", bytes_at(rd, all[r].loss) / all[r].bytes);
+  std::cout << fmt::format("{:<26} {:>5}  {}  {}  {}  {} ({} )\n", model_name(path), fragments,
+                           text(swept(planes, 0, 0, -1)), text(swept(planes, 1, 0, log_width)),
+                           text(swept(planes, 1, middle, log_width)), text(rd), at);
 }
 
 struct Errors {
@@ -212,8 +217,13 @@ void print_sizes(const std::string& path) {
 int main(int argc, char** argv) {
   using namespace texmesh;
   std::vector<std::string> packages, models;
+  double log_width = -1;  // as in the package
   for (int k = 1; k < argc; ++k) {
     const std::string path = argv[k];
+    if (path == "--log-width" && k + 1 < argc) {
+      log_width = std::stod(argv[++k]);
+      continue;
+    }
     (path.ends_with(".texmesh") ? packages : models).push_back(path);
   }
   try {
@@ -221,9 +231,10 @@ int main(int argc, char** argv) {
       std::cout
           << "bytes over uniform quality at equal surface-weighted 1 - SSIM: geometric mean over the inner "
              "rungs, worst\n"
-             "                           frag.  thesis         log            log, S_mid     log, dg 0.35"
-             "   rd\n";
-    for (const std::string& path : packages) print_package(path);
+             "                           frag.  thesis         log            log, S_mid     rd             "
+             "(at "
+             "rungs 3 5 7)\n";
+    for (const std::string& path : packages) print_package(path, log_width);
     if (!models.empty())
       std::cout
           << "size errors in %, of fragments and of whole textures: at rungs | between: mean, p95, worst | "
