@@ -149,22 +149,29 @@ void refuse_warnings(const Notes& notes, const std::string& input) {
 
 }  // namespace
 
-CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
-                             const StageObserver& observer) {
+Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
+                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes) {
   ModelSource source(request, store, context);
   const std::string provenance_json = provenance(source, request.options);
 
-  GraphRun graph(stage_table(), request.options, store, context, observer);
+  GraphRun graph(stages, request.options, store, context, observer);
   graph.give("source", object(source.source()), source.digest(), 0);
   const std::span provenance_bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
                                    provenance_json.size());
   graph.give("provenance", object(provenance_json), sha256(provenance_bytes), provenance_json.size());
-  const Object package = graph.run("package");
+  Object result = graph.run(wanted);
+  notes = graph.notes();
+  return result;
+}
+
+CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
+                             const StageObserver& observer) {
+  CompileOutcome outcome;
+  const Object package =
+      run_stages(request, stage_table(), "package", store, context, observer, outcome.notes);
   const auto& bytes = *static_cast<const std::vector<std::uint8_t>*>(package.get());
 
-  CompileOutcome outcome;
   outcome.package_bytes = bytes.size();
-  outcome.notes = graph.notes();
   if (request.strict) refuse_warnings(outcome.notes, request.input);
   if (request.output.empty()) return outcome;
   outcome.unchanged = file_holds(request.output, bytes);

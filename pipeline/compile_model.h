@@ -28,4 +28,10 @@ struct CompileOutcome {
 CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
                              const StageObserver& observer);
 
+/// Runs any graph over the model `request.input`, which it is given as "source" (and what made it as
+/// "provenance"), through the same store and keys as compile_model; returns the object of artefact `wanted`.
+/// `stages` must outlive the call. Errors as compile_model.
+Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
+                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes);
+
 }  // namespace texmesh

@@ -1,0 +1,181 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "format/errors.h"
+#include "pipeline/atomic_file.h"
+#include "pipeline/cli/commands.h"
+#include "pipeline/file_resolver.h"
+#include "pipeline/inspect/debug_input.h"
+#include "pipeline/inspect/text_table.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string input, what, output, profile, cache;
+  std::vector<std::string> settings;
+  int jobs = 0, size_px = 640;
+  bool no_cache = false, json = false;
+};
+
+bool is_png(const std::string& path) { return path.ends_with(".png") || path.ends_with(".PNG"); }
+
+/// Profile first, then --set over it.
+CompileOptions gather_options(const Arguments& args) {
+  CompileOptions options;
+  if (!args.profile.empty()) {
+    const auto bytes = read_input_file(args.profile, 1 << 20);
+    read_profile(options, std::string(bytes.begin(), bytes.end()), args.profile);
+  }
+  std::vector<OptionField> fields = list_options(options);
+  for (const std::string& setting : args.settings) {
+    const std::size_t equals = setting.find('=');
+    const std::string path = setting.substr(0, equals);
+    const auto field =
+        std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
+    if (equals == std::string::npos || field == fields.end())
+      throw InputError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help lists",
+                       setting);
+    set_option(*field, setting.substr(equals + 1), "--set " + path);
+  }
+  check_options(options, "command line");
+  return options;
+}
+
+void check_output(const Arguments& args) {
+  if (!is_png(args.output) && !args.output.ends_with(".glb") && !args.output.ends_with(".GLB"))
+    throw InputError("--output", "", "a name that ends in .glb (to turn it in any viewer) or .png",
+                     args.output);
+}
+
+std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
+
+void print_json(const Arguments& args, const DebugLegend& legend, const Notes& notes) {
+  Json stops = Json::array(), list = Json::array();
+  for (const auto& [value, colour] : legend.stops)
+    stops.push_back({{"value", value}, {"colour", hex(colour)}});
+  for (const Note& n : notes)
+    list.push_back({{"severity", n.severity == Severity::kWarning ? "warning" : "info"},
+                    {"code", n.code},
+                    {"place", n.place},
+                    {"text", n.text}});
+  Json out{{"what", args.what}, {"output", args.output}, {"quantity", legend.quantity}};
+  if (legend.coloured) {
+    out["unit"] = legend.unit;
+    out["range"] = {legend.lo, legend.hi};
+    out["logarithmic"] = legend.logarithmic;
+    out["stops"] = stops;
+  }
+  out["remarks"] = legend.remarks;
+  out["notes"] = list;
+  std::cout << out.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+}
+
+void print_text(const Arguments& args, const DebugLegend& legend, const Notes& notes) {
+  static const char* const kColourNames[]{"dark violet", "blue", "teal", "green", "yellow"};
+  std::cout << args.output << "\n" << legend.quantity;
+  if (!legend.unit.empty()) std::cout << ", " << legend.unit;
+  std::cout << '\n';
+  for (std::size_t k = 0; k < legend.stops.size(); ++k)
+    std::cout << fmt::format("  {}  {:<11}  {}\n", hex(legend.stops[k].second), kColourNames[k % 5],
+                             shortest(legend.stops[k].first, 4));
+  if (legend.logarithmic) std::cout << "  (equal steps of colour are equal ratios)\n";
+  for (const std::string& remark : legend.remarks) std::cout << "- " << remark << '\n';
+  for (const Note& n : notes)
+    if (n.severity == Severity::kWarning)
+      std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
+}
+
+DebugView make_view(const Arguments& args, const CompileOptions& options, Notes& notes) {
+  const auto what = static_cast<DebugQuantity>(std::find(kDebugNames.begin(), kDebugNames.end(), args.what) -
+                                               kDebugNames.begin());
+  RunContext context;
+  context.threads =
+      std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
+  if (is_package(args.input)) return view_package(args.input, what, context);
+  CompileRequest request;
+  request.input = args.input;
+  request.options = options;
+  const std::unique_ptr<Store> store =
+      args.no_cache ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(args.cache));
+  return view_input(request, what, *store, context, {}, notes);
+}
+
+void run(const Arguments& args, const CompileOptions& options) {
+  Notes notes;
+  const DebugView view = make_view(args, options, notes);
+  write_file_atomically(args.output, is_png(args.output)
+                                         ? write_debug_png(view, static_cast<std::uint32_t>(args.size_px))
+                                         : write_debug_glb(view));
+  if (args.json)
+    print_json(args, view.legend, notes);
+  else
+    print_text(args, view.legend, notes);
+}
+
+void add_options(CLI::App& c, Arguments& args) {
+  c.add_option("INPUT", args.input,
+               "A model (runs the stages that are needed, through the cache) or a package")
+      ->required();
+  c.add_option("--what", args.what,
+               "persistence: up to which scale a vertex stays a feature. skeleton: the curve skeleton inside "
+               "the shape. R: the distance to it, which errors are measured against. collapse-error: at "
+               "which error a vertex was removed. fragments: the texture's grid and importance (of a package "
+               "too)")
+      ->required()
+      ->check(CLI::IsMember(std::vector<std::string>(kDebugNames.begin(), kDebugNames.end())))
+      ->type_name("QUANTITY");
+  c.add_option("-o,--output", args.output, "x.glb to turn in any viewer, x.png for two views side by side")
+      ->required();
+  c.add_option("--size", args.size_px, "Side of one view of a PNG, px")
+      ->check(CLI::Range(64, 4096))
+      ->capture_default_str();
+  c.add_option("--profile", args.profile, "JSON file of options, as for compile");
+  c.add_option("--set", args.settings,
+               "STAGE.OPTION=VALUE over the profile, as compile's --STAGE.OPTION; "
+               "may be repeated")
+      ->type_name("OPTION=VALUE");
+  c.add_option("-j,--jobs", args.jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
+  c.add_option("--cache", args.cache, "Cache folder, as for compile");
+  c.add_flag("--no-cache", args.no_cache, "Compute everything, keep nothing");
+  c.add_flag("--json", args.json, "The legend as one JSON object");
+}
+
+}  // namespace
+
+void add_debug_command(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<Arguments>();
+  CLI::App* c = app.add_subcommand("debug", "Picture what a stage computed, with a legend of its colours");
+  add_options(*c, *args);
+  c->footer(
+      "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives\n"
+      "their values. A GLB has them as vertex colours (fragments: as textures), the skeleton as lines.\n"
+      "Examples:\n"
+      "  texmesh debug turtle.glb --what persistence -o turtle.png\n"
+      "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=80\n"
+      "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json\n"
+      "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
+  c->callback([args, &exit_code] {
+    CompileOptions options;
+    try {
+      check_output(*args);
+      options = gather_options(*args);
+    } catch (const InputError& e) {  // what was asked for makes no sense
+      std::cerr << "texmesh debug: " << e.what() << '\n';
+      exit_code = kExitUsage;
+      return;
+    }
+    run(*args, options);
+    exit_code = kExitOk;
+  });
+}
+
+}  // namespace texmesh
