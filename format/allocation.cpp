@@ -93,7 +93,16 @@ std::vector<std::uint32_t> bytes_of(const PlaneTables& tables, const std::vector
   std::vector<std::uint32_t> bytes(tables.fragment_count(), 0);
   for (std::size_t f = 0; f < bytes.size(); ++f)
     if (rungs[f] != kSkipped)
-      bytes[f] = tables.size_bytes[static_cast<std::size_t>(rungs[f]) * bytes.size() + f];
+      bytes[f] = static_cast<std::uint32_t>(bytes_to_show(tables, static_cast<std::size_t>(rungs[f]), f));
+  return bytes;
+}
+
+std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment) {
+  const std::size_t fragments = tables.fragment_count();
+  const std::uint64_t own = tables.size_bytes[rung * fragments + fragment];
+  if (!tables.incremental || own == 0) return own;
+  std::uint64_t bytes = 0;
+  for (std::size_t r = 0; r <= rung; ++r) bytes += tables.size_bytes[r * fragments + fragment];
   return bytes;
 }
 

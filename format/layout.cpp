@@ -36,8 +36,9 @@ EntryName parse_texture_path(std::string_view text) {
     name.kind = EntryKind::kTableStreams;
   } else if (take(text, "r") && take_number(text, name.rung)) {
     if (text == ".pack") name.kind = EntryKind::kRung;
-    if (take(text, "/") && take_number(text, name.fragment) && text == ".jpg")
-      name.kind = EntryKind::kFragmentFile;
+    if (take(text, "/") && take_number(text, name.fragment) && take(text, "."))
+      for (const std::string_view extension : {"jpg", "webp"})
+        if (text == extension) name.kind = EntryKind::kFragmentFile, name.extension = extension;
   }
   return name;
 }
@@ -72,7 +73,7 @@ std::string spell(const EntryName& name) {
     case EntryKind::kRung:
       return rung_path(name.number, name.rung);
     case EntryKind::kFragmentFile:
-      return fragment_file_path(name.number, name.rung, name.fragment);
+      return fragment_file_path(name.number, name.rung, name.fragment, name.extension);
     default:
       return "";
   }
@@ -130,8 +131,9 @@ std::string table_streams_path(std::uint32_t plane) { return print("texture/%u/t
 std::string rung_path(std::uint32_t plane, std::uint32_t rung) {
   return print("texture/%u/r%02u.pack", plane, rung);
 }
-std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment) {
-  return print("texture/%u/r%02u/%04u.jpg", plane, rung, fragment);
+std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
+                               std::string_view extension) {
+  return print("texture/%u/r%02u/%04u.", plane, rung, fragment).append(extension);
 }
 
 EntryName parse_entry_path(const std::string& path) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace texmesh {
@@ -18,9 +19,10 @@ std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
 std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack
 std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r07.pack; 0 = lowest rung
-/// texture/3/r07/0123.jpg: one fragment as a complete JPEG, in trees made with `unpack --fragments files`
-/// only.
-std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
+/// texture/3/r07/0123.jpg: one fragment as a complete file of its codec (CodecTraits::extension), in trees
+/// made with `unpack --fragments files` only.
+std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
+                               std::string_view extension = "jpg");
 
 /// What a path stands for; kOther for paths that version 1.0 does not define.
 enum class EntryKind : std::uint8_t {
@@ -41,6 +43,7 @@ struct EntryName {
   EntryKind kind = EntryKind::kOther;
   std::uint32_t number = 0;  // scale of a mesh; plane of everything that belongs to a texture
   std::uint32_t rung = 0, fragment = 0;
+  std::string_view extension = "jpg";  // of a fragment file
 };
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);

@@ -19,7 +19,10 @@ constexpr std::size_t kMaxScales = 100;  // two digits in the path
 constexpr std::uint64_t kMaxPlanes = 10000;
 
 /// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
-constexpr std::array<std::string_view, 0> kKnownFeatures{};
+constexpr std::array<std::string_view, 2> kKnownFeatures{
+    "codec-jpeg-progressive",
+    "codec-webp",
+};
 bool is_known_feature(const std::string& name) {
   return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "format/codec.h"
 #include "format/sha256.h"
 #include "format/vec.h"
 
@@ -100,7 +101,7 @@ struct TextureInfo {
   std::string role;  // base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data
   std::string name;  // as the source names the image
   std::string colour_space;  // srgb | linear
-  std::string codec = "jpeg";
+  Codec codec = Codec::kJpeg;
   std::uint32_t width_px = 0, height_px = 0, channels = 3;
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;
   std::string grid_reason;

@@ -112,7 +112,7 @@ std::vector<RdCurve> rd_curves(const PlaneTables& tables, const std::vector<floa
     for (std::size_t r = 0; r < tables.rung_count(); ++r) {
       const std::size_t at = r * fragments + f;
       // A rung that leaves this fragment out is no way to show it: as dear as skipping, and no better.
-      curve.bytes.push_back(tables.size_bytes[at]);
+      curve.bytes.push_back(bytes_to_show(tables, r, f));
       curve.loss.push_back(tables.size_bytes[at] > 0 ? loss(half_of(tables.dssim[at])) : curve.loss[0]);
     }
   }

@@ -31,8 +31,8 @@ double hermite(const std::vector<double>& x, const std::vector<double>& y, std::
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality) {
   std::vector<double> x, y;  // g, ln bytes
   for (std::size_t r = 0; r < tables.rung_count(); ++r) {
-    const std::uint32_t bytes = tables.size_bytes[r * tables.fragment_count() + fragment];
-    if (bytes == 0) continue;
+    const auto bytes = static_cast<double>(bytes_to_show(tables, r, fragment));
+    if (bytes <= 0) continue;
     if (quality == static_cast<double>(tables.rung_quality[r])) return bytes;
     x.push_back(log_quantiser(tables.rung_quality[r]));
     y.push_back(portable::log(bytes));

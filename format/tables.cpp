@@ -132,6 +132,7 @@ float from_unit16(std::uint16_t v) { return static_cast<float>(v / 65535.0); }
 // What format 1.1 adds to the end of a section.
 constexpr std::uint64_t kExtensionFixed = 4;
 constexpr std::uint8_t kHasSkipDssim = 1;
+constexpr std::uint8_t kIncremental = 2;
 
 std::uint64_t section_bytes(std::uint64_t f, std::uint64_t r, std::uint64_t n, std::uint64_t order,
                             std::uint64_t size_width, std::uint64_t feature_width) {
@@ -170,7 +171,7 @@ Bytes write_section(const PlaneTables& t) {
   for (const auto v : t.quality) out.f32(v);
   for (const auto v : t.total_bytes) out.u64(v);
   out.u8(t.allocation);
-  out.u8(t.skip_dssim.empty() ? 0 : kHasSkipDssim);
+  out.u8((t.skip_dssim.empty() ? 0u : kHasSkipDssim) | (t.incremental ? kIncremental : 0u));
   out.number(0, 2);
   for (const auto v : t.skip_dssim) out.u16(to_half(std::max(v, 0.0f)));
   return out.take();
@@ -220,8 +221,9 @@ void read_extension(BytesIn& in, PlaneTables& t, int minor) {
   if (std::min<std::uint8_t>(allocation, 1) != t.allocation)
     in.fail("the allocation of the section's head, or 2 where that is 1", std::to_string(allocation));
   t.allocation = allocation;
-  if (minor <= kFormatMinor && (flags > kHasSkipDssim || in.number(2) != 0))
-    in.fail("flags 0 or 1 and 2 zero bytes", "others");
+  if (minor <= kFormatMinor && (flags > (kHasSkipDssim | kIncremental) || in.number(2) != 0))
+    in.fail("flags 0 to 3 and 2 zero bytes", "others");
+  t.incremental = (flags & kIncremental) != 0;
   if (minor > kFormatMinor) in.raw(2);
   if (flags & kHasSkipDssim) fill(t.skip_dssim, t.fragment_count(), [&] { return read_half(in); });
   if (minor <= kFormatMinor) in.finish();

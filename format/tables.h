@@ -12,7 +12,8 @@ namespace texmesh {
 /// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N = scales + 1 feature scales.
 struct PlaneTables {
   std::uint32_t columns = 0, rows = 0;
-  std::uint32_t scales = 0;                // N - 1
+  std::uint32_t scales = 0;  // N - 1
+  bool incremental = false;  // a rung's streams continue those of the rungs below (CodecTraits::incremental)
   std::vector<std::uint8_t> rung_quality;  // [R], IJG quality, strictly rising
   std::vector<std::uint32_t> table_bytes;  // [R]: size of the rung's table stream
   // [R * F], index rung * F + fragment; 0 where the fragment is not stored:
@@ -45,13 +46,16 @@ struct PlaneTables {
   std::size_t rung_count() const { return rung_quality.size(); }
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.columns, s.rows, s.scales, s.rung_quality, s.table_bytes, s.size_bytes, s.digest, s.mse, s.dssim,
-      s.covered_texels, s.surface_fraction, s.z, s.i, s.zeta, s.m, s.vqp, s.order, s.skip_dssim, s.features,
-      s.quality, s.total_bytes, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max,
-      s.model_a, s.model_b, s.model_r, s.model_correlation, s.model_error);
+    a(s.columns, s.rows, s.scales, s.incremental, s.rung_quality, s.table_bytes, s.size_bytes, s.digest,
+      s.mse, s.dssim, s.covered_texels, s.surface_fraction, s.z, s.i, s.zeta, s.m, s.vqp, s.order,
+      s.skip_dssim, s.features, s.quality, s.total_bytes, s.allocation, s.quality_width, s.log_width,
+      s.quality_min, s.quality_max, s.model_a, s.model_b, s.model_r, s.model_correlation, s.model_error);
   }
 };
 
+/// What a client must have of a fragment to show it at a rung: the rung's stream, with incremental tables
+/// those below it, too. 0 when it is not stored there.
+std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment);
 /// eta_i (3.1) of one scale: feature counts min-max over covered fragments; 0 for the others.
 std::vector<float> eta_of(const PlaneTables& tables, std::uint32_t scale);
 /// q_i(x, y): the quality that the tables' allocation asks for (3.2, or its log-quantiser form), clipped.

@@ -21,7 +21,7 @@ Json texture_json(const TextureInfo& t) {
   j["role"] = t.role;
   j["name"] = t.name;
   j["colourSpace"] = t.colour_space;
-  j["codec"] = t.codec;
+  j["codec"] = codec_traits(t.codec).id;
   j["widthPx"] = t.width_px;
   j["heightPx"] = t.height_px;
   j["channels"] = t.channels;
@@ -70,8 +70,9 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   t.colour_space = at["colourSpace"].text(100);
   if (t.colour_space != "srgb" && t.colour_space != "linear")
     at["colourSpace"].fail("srgb or linear", t.colour_space);
-  t.codec = at["codec"].text(100);
-  if (t.codec != "jpeg") at["codec"].fail("jpeg", t.codec);
+  const std::string codec = at["codec"].text(100);
+  if (!find_codec(codec)) at["codec"].fail("jpeg, jpeg-progressive or webp", codec);
+  t.codec = *find_codec(codec);
   read_grid(at, t);
   t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
   t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);

@@ -4,6 +4,7 @@
 #include <OpenImageIO/oiioversion.h>
 #include <draco/core/draco_version.h>
 #include <meshoptimizer.h>
+#include <webp/encode.h>
 #include <zlib.h>
 
 #include <jconfig.h>
@@ -13,11 +14,19 @@ namespace texmesh {
 #define TEXMESH_TEXT_(x) #x
 #define TEXMESH_TEXT(x) TEXMESH_TEXT_(x)
 
+namespace {
+std::string webp_version() {  // its headers carry the version of the interface only
+  const int v = WebPGetEncoderVersion();
+  return std::to_string(v >> 16) + "." + std::to_string(v >> 8 & 255) + "." + std::to_string(v & 255);
+}
+}  // namespace
+
 const std::map<std::string, std::string>& library_versions() {
   static const std::map<std::string, std::string> versions{
       {"cgal", CGAL_VERSION_STR},
       {"draco", draco::kDracoVersion},
       {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
+      {"libwebp", webp_version()},
       {"meshoptimizer", std::to_string(MESHOPTIMIZER_VERSION)},
       {"openimageio", OIIO_VERSION_STRING},
       {"tinygltf", "2.7"},  // its headers carry no version

@@ -203,6 +203,14 @@ Json field_schema(const OptionField& f) {
   return s;
 }
 
+void check_rungs(const std::vector<int>& rungs, const std::string& source, const char* name) {
+  if (rungs.size() > 16) throw InputError(source, name, "at most 16 qualities", std::to_string(rungs.size()));
+  for (std::size_t i = 1; i < rungs.size(); ++i)
+    if (rungs[i] <= rungs[i - 1])
+      throw InputError(source, name, "strictly rising qualities",
+                       std::to_string(rungs[i - 1]) + " before " + std::to_string(rungs[i]));
+}
+
 }  // namespace
 
 std::vector<OptionField> list_options(CompileOptions& options) {
@@ -276,13 +284,10 @@ std::string profile_schema() {
 }
 
 void check_options(const CompileOptions& o, const std::string& source) {
-  const auto& rungs = o.ladder.rungs;
-  if (rungs.size() > 16)
-    throw InputError(source, "ladder.rungs", "at most 16 qualities", std::to_string(rungs.size()));
-  for (std::size_t i = 1; i < rungs.size(); ++i)
-    if (rungs[i] <= rungs[i - 1])
-      throw InputError(source, "ladder.rungs", "strictly rising qualities",
-                       std::to_string(rungs[i - 1]) + " before " + std::to_string(rungs[i]));
+  check_rungs(o.ladder.rungs, source, "ladder.rungs");
+  check_rungs(o.ladder.normal_rungs, source, "ladder.normal_rungs");
+  check_rungs(o.ladder.data_rungs, source, "ladder.data_rungs");
+  check_rungs(o.ladder.alpha_rungs, source, "ladder.alpha_rungs");
   if (o.lut.quality_min > o.lut.quality_max)
     throw InputError(source, "lut.quality_min", "<= lut.quality_max (" + number_text(o.lut.quality_max) + ")",
                      number_text(o.lut.quality_min));

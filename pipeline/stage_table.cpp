@@ -81,8 +81,8 @@ StageOutputs run_zim(const StageInputs& in) {
 }
 
 StageOutputs run_ladder(const StageInputs& in) {
-  return plain(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"), in.options.ladder,
-                             in.context));
+  return with_notes(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
+                                  in.options.ladder, in.context));
 }
 
 StageOutputs run_lut(const StageInputs& in) {
@@ -200,11 +200,11 @@ std::vector<Stage> make_table() {
        run_zim},
       {"ladder",
        kLadderVersion,
-       "fragments -> rungs of abbreviated JPEGs, previews",
+       "fragments -> rungs of streams in the chosen codec, previews",
        {"fragmentation", "fill"},
        {artefact<Ladder>("ladder")},
        {"ladder"},
-       {"libjpeg-turbo"},
+       {"libjpeg-turbo", "libwebp"},
        true,
        run_ladder},
       {"lut",
@@ -213,7 +213,7 @@ std::vector<Stage> make_table() {
        {"fragmentation", "fill", "zim", "ladder"},
        {artefact<PackageTables>("lut")},
        {"lut"},
-       {"libjpeg-turbo"},
+       {"libjpeg-turbo", "libwebp"},
        true,
        run_lut},
       {"scales",
@@ -232,7 +232,7 @@ std::vector<Stage> make_table() {
        {"simplification", "perceptual_values", "import.materials", "fragmentation", "fill", "ladder"},
        {artefact<QualityTable>("quality")},
        {"quality"},
-       {"libjpeg-turbo"},
+       {"libjpeg-turbo", "libwebp"},
        true,
        run_quality},
       {"package",

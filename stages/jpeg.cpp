@@ -18,10 +18,6 @@ constexpr int kMaxScans = 100;
   throw FormatError("JPEG", "", std::move(expected), std::move(found));
 }
 
-bool marker_at(std::span<const std::uint8_t> bytes, std::size_t at, std::uint8_t code) {
-  return bytes[at] == 0xff && bytes[at + 1] == code;
-}
-
 struct Decoder {
   jpeg_decompress_struct info{};
   JpegErrors errors;
@@ -69,9 +65,8 @@ Pixels decode(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels, boo
     jpeg_read_header(&info, TRUE);
   }));
   check_header(info, max_pixels);
-  const bool grey = luma_only || info.num_components == 1;
-  if (grey && info.num_components == 3 && info.jpeg_color_space != JCS_YCbCr)
-    fail("YCbCr channels", "RGB channels");
+  const bool has_luma = info.num_components == 1 || info.jpeg_color_space == JCS_YCbCr;
+  const bool grey = info.num_components == 1 || (luma_only && has_luma);
   Pixels out;
   out.width_px = info.image_width;
   out.height_px = info.image_height;
@@ -96,24 +91,10 @@ Pixels decode(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels, boo
   }));
   if (info.src->bytes_in_buffer != 0)
     fail("EOI at the end", std::to_string(info.src->bytes_in_buffer) + " bytes after it");
-  return out;
+  return luma_only && !grey ? luma_of(out) : out;
 }
 
 }  // namespace
-
-std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables,
-                                        std::span<const std::uint8_t> fragment) {
-  constexpr std::uint8_t kSoi = 0xd8, kEoi = 0xd9;
-  if (tables.size() < 4 || !marker_at(tables, 0, kSoi) || !marker_at(tables, tables.size() - 2, kEoi))
-    throw FormatError("JPEG", "table stream", "SOI .. EOI", std::to_string(tables.size()) + " other bytes");
-  if (fragment.size() < 4 || !marker_at(fragment, 0, kSoi))
-    throw FormatError("JPEG", "fragment", "SOI first", std::to_string(fragment.size()) + " other bytes");
-  std::vector<std::uint8_t> out;
-  out.reserve(tables.size() + fragment.size() - 4);
-  out.assign(tables.begin(), tables.end() - 2);
-  out.insert(out.end(), fragment.begin() + 2, fragment.end());
-  return out;
-}
 
 Pixels decode_jpeg(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels) {
   return decode(bytes, max_pixels, false);
@@ -123,12 +104,24 @@ Pixels decode_jpeg_luma(std::span<const std::uint8_t> bytes, std::uint64_t max_p
   return decode(bytes, max_pixels, true);
 }
 
+Pixels luma_of(const Pixels& pixels) {
+  if (pixels.channels == 1) return pixels;
+  Pixels out{pixels.width_px, pixels.height_px, 1, {}};
+  out.data.resize(std::size_t{out.width_px} * out.height_px);
+  const std::uint8_t* from = pixels.data.data();
+  for (std::uint8_t& to : out.data) {  // 0.299, 0.587, 0.114 in 16 bits
+    to = static_cast<std::uint8_t>((19595u * from[0] + 38470u * from[1] + 7471u * from[2] + 32768u) >> 16);
+    from += pixels.channels;
+  }
+  return out;
+}
+
 std::vector<std::uint8_t> encode_jpeg(const Pixels& pixels, int quality, Subsampling subsampling) {
   const std::size_t stride = std::size_t{pixels.width_px} * pixels.channels;
   if (pixels.data.size() != stride * pixels.height_px)
     throw StageError("jpeg", "pixels", std::to_string(stride * pixels.height_px) + " bytes",
                      std::to_string(pixels.data.size()));
-  JpegCoder coder(pixels.channels, quality, subsampling);
+  JpegCoder coder({pixels.channels, quality, subsampling});
   return coder.complete({pixels.data.data(), stride, pixels.width_px, pixels.height_px});
 }
 

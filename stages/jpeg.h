@@ -15,11 +15,6 @@ struct EnumNames<Subsampling> {
   static constexpr std::array<std::string_view, 2> names{"420", "444"};
 };
 
-/// A complete JPEG from a rung's table stream and one abbreviated fragment (ISO 10918-1 B.5): tables without
-/// EOI + fragment without SOI. Throws FormatError when either lacks the markers it must begin and end with.
-std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables,
-                                        std::span<const std::uint8_t> fragment);
-
 /// Decodes a complete Huffman-coded JPEG of 8 bits, 1 or 3 channels, baseline or progressive, with
 /// libjpeg-turbo (ISLOW, fancy upsampling). Throws FormatError on any libjpeg error *or warning*, on bytes
 /// after the end of the image, on more than 100 scans, and when the size exceeds max_pixels; nothing is
@@ -27,8 +22,12 @@ std::vector<std::uint8_t> complete_jpeg(std::span<const std::uint8_t> tables,
 /// through stages/decode_image.h.
 Pixels decode_jpeg(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels);
 
-/// The same, but the luma (Y) channel only, which is cheaper than the colours.
+/// The same, but the luma (Y) channel only, which is cheaper than the colours; of a file whose channels are
+/// not YCbCr, luma_of() of its pixels.
 Pixels decode_jpeg_luma(std::span<const std::uint8_t> bytes, std::uint64_t max_pixels);
+
+/// Luma as JPEG defines it (grey: the value), from 1 or 3 channels.
+Pixels luma_of(const Pixels& pixels);
 
 /// A complete baseline JFIF file with Huffman tables of its own; 1 or 3 channels, sides 1..65500. The
 /// subsampling matters for 3 channels only. Throws StageError for what a JPEG cannot hold.

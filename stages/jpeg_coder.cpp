@@ -1,6 +1,7 @@
 #include "stages/jpeg_coder.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "format/errors.h"
 #include "stages/jpeg_guard.h"
+#include "stages/jpeg_stream.h"
 
 namespace texmesh {
 namespace {
@@ -61,14 +63,42 @@ HuffmanTable copy_of(const JHUFF_TBL& table) {
   return out;
 }
 
+/// Scans of a progressive file (thesis-like refinement, one bit of all coefficients at a time): DC without
+/// its last 3 bits, AC without its last 4, then bit by bit, luma before chroma, because a cut after a luma
+/// pass is worth 0.2 to 0.5 dB more than one within it.
+std::vector<jpeg_scan_info> progressive_scans(int components) {
+  constexpr int kDcShift = 3, kAcShift = 4, kLastCoefficient = 63;
+  std::vector<jpeg_scan_info> scans;
+  const auto add_dc = [&](int from, int to) { scans.push_back({components, {0, 1, 2, 0}, 0, 0, from, to}); };
+  const auto add_ac = [&](int component, int from, int to) {
+    scans.push_back({1, {component, 0, 0, 0}, 1, kLastCoefficient, from, to});
+  };
+  add_dc(0, kDcShift);
+  for (int c = 0; c < components; ++c) add_ac(c, 0, kAcShift);
+  for (int bit = kAcShift; bit > 0; --bit) {
+    add_ac(0, bit, bit - 1);
+    if (bit > 1) add_dc(bit - 1, bit - 2);
+    for (int c = 1; c < components; ++c) add_ac(c, bit, bit - 1);
+  }
+  return scans;
+}
+
+/// What tells decoders that three channels are not YCbCr: APP14 "Adobe", version 100, no flags, no transform.
+constexpr std::array<std::uint8_t, 16> kAdobeMarker{0xff, 0xee, 0,   14, 'A', 'd', 'o', 'b',
+                                                    'e',  0,    100, 0,  0,   0,   0,   0};
+constexpr std::size_t kMarkerBytes = 2;
+
 }  // namespace
 
 struct JpegCoder::State {
+  JpegKind kind;
   jpeg_compress_struct info{};
   JpegErrors errors;
   GrowingBuffer buffer;
   std::vector<JSAMPROW> rows;
+  std::vector<jpeg_scan_info> scans;
 
+  explicit State(const JpegKind& k) : kind(k) {}
   ~State() { jpeg_destroy_compress(&info); }
 
   template <class Body>
@@ -92,46 +122,77 @@ struct JpegCoder::State {
       jpeg_write_scanlines(&info, rows.data() + info.next_scanline, info.image_height - info.next_scanline);
     jpeg_finish_compress(&info);
   }
-  std::vector<std::uint8_t> output() const { return {buffer.data, buffer.data + buffer.size}; }
+  /// SOI SOF [SOS] data EOI of the image into the buffer.
+  void write_abbreviated(const PixelWindow& image) {
+    set_image(image);
+    run([&] {
+      info.write_JFIF_header = FALSE;
+      info.write_Adobe_marker = FALSE;
+      jpeg_suppress_tables(&info, TRUE);
+      write(FALSE);
+    });
+  }
+  std::span<const std::uint8_t> output() const { return {buffer.data, buffer.size}; }
+  /// Bytes of SOI SOF [SOS] in front of an abbreviated stream's own part. A progressive stream has its tables
+  /// in front of each SOS, so there the frame header is all.
+  std::size_t frame_head_bytes() const {
+    const std::size_t n = kind.channels, sof = kMarkerBytes + 8 + 3 * n, sos = kMarkerBytes + 6 + 2 * n;
+    return kMarkerBytes + sof + (kind.progressive ? 0 : sos);
+  }
   std::size_t table_pairs() const { return info.num_components == 1 ? 1 : 2; }
+  void suppress_huffman_tables() {
+    for (JHUFF_TBL** tables : {info.dc_huff_tbl_ptrs, info.ac_huff_tbl_ptrs})
+      for (int k = 0; k < NUM_HUFF_TBLS; ++k)
+        if (tables[k]) tables[k]->sent_table = TRUE;
+  }
+
+  /// Runs within run(): sets colours, sampling and tables up.
+  void set_up() {
+    info.image_width = info.image_height = 16;
+    info.input_components = static_cast<int>(kind.channels);
+    info.in_color_space = kind.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+    jpeg_set_defaults(&info);
+    if (kind.channels == 3 && kind.rgb) jpeg_set_colorspace(&info, JCS_RGB);
+    jpeg_set_quality(&info, kind.quality, TRUE);
+    info.dct_method = JDCT_ISLOW;
+    if (kind.channels == 1) {  // jpeg_write_tables() writes every table there is
+      info.quant_tbl_ptrs[1] = nullptr;
+      info.dc_huff_tbl_ptrs[1] = info.ac_huff_tbl_ptrs[1] = nullptr;
+    } else if (kind.rgb) {
+      use_second_tables_for_last();
+    } else {
+      const int factor = kind.subsampling == Subsampling::k420 ? 2 : 1;
+      info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = factor;
+    }
+    if (kind.progressive) {
+      info.scan_info = scans.data();
+      info.num_scans = static_cast<int>(scans.size());
+    }
+  }
+
+ private:
+  /// Three channels of data are three different things, but there are two pairs of Huffman tables: the last
+  /// channel (z of a normal, metalness) differs most from the others. All are quantised like luma.
+  void use_second_tables_for_last() {
+    info.comp_info[2].dc_tbl_no = info.comp_info[2].ac_tbl_no = 1;
+    info.quant_tbl_ptrs[1] = nullptr;
+  }
 };
 
-JpegCoder::JpegCoder(std::uint32_t channels, int quality, Subsampling subsampling) : state_(new State) {
-  if (channels != 1 && channels != 3)
-    throw StageError("jpeg", "channels", "1 or 3", std::to_string(channels));
+JpegCoder::JpegCoder(const JpegKind& kind) : state_(new State(kind)) {
+  if (kind.channels != 1 && kind.channels != 3)
+    throw StageError("jpeg", "channels", "1 or 3", std::to_string(kind.channels));
+  if (kind.progressive) state_->scans = progressive_scans(static_cast<int>(kind.channels));
   jpeg_compress_struct& info = state_->info;
   info.err = &state_->errors.base;
   state_->run([&] {
     jpeg_create_compress(&info);
     info.dest = &state_->buffer.base;
-    info.image_width = info.image_height = 16;
-    info.input_components = static_cast<int>(channels);
-    info.in_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
-    jpeg_set_defaults(&info);
-    jpeg_set_quality(&info, quality, TRUE);
-    info.dct_method = JDCT_ISLOW;
-    if (channels == 3) {
-      const int factor = subsampling == Subsampling::k420 ? 2 : 1;
-      info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = factor;
-    } else {  // jpeg_write_tables() writes every table there is
-      info.quant_tbl_ptrs[1] = nullptr;
-      info.dc_huff_tbl_ptrs[1] = info.ac_huff_tbl_ptrs[1] = nullptr;
-    }
+    state_->set_up();
   });
 }
 
 JpegCoder::~JpegCoder() = default;
-
-HuffmanTables JpegCoder::train(const PixelWindow& image) {
-  jpeg_compress_struct& info = state_->info;
-  state_->set_image(image);
-  state_->run([&] {
-    info.optimize_coding = TRUE;
-    state_->write(TRUE);
-    info.optimize_coding = FALSE;
-  });
-  return tables();
-}
 
 HuffmanTables JpegCoder::tables() const {
   HuffmanTables out;
@@ -157,90 +218,65 @@ void JpegCoder::use_tables(const HuffmanTables& tables) {
   }
 }
 
-std::vector<std::uint8_t> JpegCoder::table_stream() {
+std::vector<std::uint8_t> JpegCoder::head_stream(std::uint32_t width_px, std::uint32_t height_px) {
+  const std::vector<std::uint8_t> grey(std::size_t{width_px} * height_px * state_->kind.channels, 128);
+  state_->write_abbreviated(
+      {grey.data(), std::size_t{width_px} * state_->kind.channels, width_px, height_px});
+  const auto frame = state_->output().subspan(kMarkerBytes, state_->frame_head_bytes() - kMarkerBytes);
+  std::vector<std::uint8_t> out{0xff, 0xd8};
+  const std::vector<std::uint8_t> frame_bytes(frame.begin(), frame.end());
+  if (state_->kind.rgb) out.insert(out.end(), kAdobeMarker.begin(), kAdobeMarker.end());
   state_->run([&] {
     jpeg_suppress_tables(&state_->info, FALSE);
+    if (state_->kind.progressive) state_->suppress_huffman_tables();
     jpeg_write_tables(&state_->info);
   });
-  return state_->output();
+  const auto tables = state_->output();
+  out.insert(out.end(), tables.begin() + kMarkerBytes, tables.end() - kMarkerBytes);
+  out.insert(out.end(), frame_bytes.begin(), frame_bytes.end());
+  out.insert(out.end(), {0xff, 0xd9});
+  return out;
 }
 
-std::vector<std::uint8_t> JpegCoder::abbreviated(const PixelWindow& image) {
-  jpeg_compress_struct& info = state_->info;
-  state_->set_image(image);
-  state_->run([&] {
-    info.write_JFIF_header = FALSE;
-    info.write_Adobe_marker = FALSE;
-    jpeg_suppress_tables(&info, TRUE);
-    state_->write(FALSE);
-  });
-  return state_->output();
+void JpegCoder::append_body(const PixelWindow& image, std::vector<std::uint8_t>& out) {
+  state_->write_abbreviated(image);
+  const auto body = state_->output().subspan(state_->frame_head_bytes());
+  if (state_->kind.progressive) {
+    out.insert(out.end(), body.begin(), body.end() - kMarkerBytes);
+  } else {
+    out.insert(out.end(), {0xff, 0xd8});
+    out.insert(out.end(), body.begin(), body.end());
+  }
 }
 
 std::vector<std::uint8_t> JpegCoder::complete(const PixelWindow& image) {
   jpeg_compress_struct& info = state_->info;
   state_->set_image(image);
   state_->run([&] {
-    info.write_JFIF_header = TRUE;
+    info.write_JFIF_header = state_->kind.rgb ? FALSE : TRUE;
+    info.write_Adobe_marker = state_->kind.rgb ? TRUE : FALSE;
     info.optimize_coding = TRUE;
     state_->write(TRUE);
-    info.optimize_coding = FALSE;
+    info.optimize_coding = state_->kind.progressive ? TRUE : FALSE;
   });
-  return state_->output();
+  return {state_->output().begin(), state_->output().end()};
 }
 
-HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols,
-                                const std::vector<std::uint64_t>& weights) {
-  // The reserved symbol 256 of weight 1 takes the code of ones only and is dropped afterwards.
-  constexpr int kReserved = 256;
-  struct Node {
-    std::uint64_t weight;
-    int symbol;               // the highest one beneath, for ties
-    std::vector<int> leaves;  // symbols beneath
-  };
-  std::vector<Node> nodes{{1, kReserved, {kReserved}}};
-  for (std::size_t k = 0; k < symbols.size(); ++k) nodes.push_back({weights[k], symbols[k], {symbols[k]}});
-  std::array<int, 257> length{};
-  const auto lighter = [](const Node& a, const Node& b) {
-    return a.weight != b.weight ? a.weight > b.weight : a.symbol < b.symbol;
-  };
-  std::make_heap(nodes.begin(), nodes.end(), lighter);
-  while (nodes.size() > 1) {
-    std::pop_heap(nodes.begin(), nodes.end(), lighter);
-    Node a = std::move(nodes.back());
-    nodes.pop_back();
-    std::pop_heap(nodes.begin(), nodes.end(), lighter);
-    Node& b = nodes.back();
-    b.weight += a.weight;
-    b.symbol = std::max(a.symbol, b.symbol);
-    b.leaves.insert(b.leaves.end(), a.leaves.begin(), a.leaves.end());
-    for (int leaf : b.leaves) ++length[static_cast<std::size_t>(leaf)];
-    std::push_heap(nodes.begin(), nodes.end(), lighter);
+void JpegCoder::count_symbols(const PixelWindow& image, SymbolCounts& counts) {
+  state_->write_abbreviated(image);
+  std::vector<std::uint8_t> mcu;
+  const jpeg_compress_struct& info = state_->info;
+  for (int c = 0; c < info.num_components; ++c) {
+    const jpeg_component_info& component = info.comp_info[c];
+    const int blocks = info.num_components == 1 ? 1 : component.h_samp_factor * component.v_samp_factor;
+    mcu.insert(mcu.end(), static_cast<std::size_t>(blocks), static_cast<std::uint8_t>(component.dc_tbl_no));
   }
-  // Codes longer than 16 bits move up: of a pair of the longest, one takes the parent's place and the other
-  // shares the place of a shorter code (annex K.2, figure K.3).
-  std::vector<std::size_t> count(symbols.size() + 2);
-  for (int l : length) ++count[static_cast<std::size_t>(l)];
-  count[0] = 0;  // numbers that are no symbol
-  for (std::size_t l = count.size() - 1; l > 16; --l)
-    while (count[l] > 0) {
-      std::size_t shorter = l - 2;
-      while (count[shorter] == 0) --shorter;
-      count[l] -= 2;
-      ++count[l - 1];
-      count[shorter + 1] += 2;
-      --count[shorter];
-    }
-  std::size_t longest = std::min<std::size_t>(16, count.size() - 1);
-  while (count[longest] == 0) --longest;
-  --count[longest];  // the reserved one
-  HuffmanTable out;
-  for (std::size_t l = 1; l <= longest; ++l) out.bits[l] = static_cast<std::uint8_t>(count[l]);
-  out.symbols = symbols;
-  std::sort(out.symbols.begin(), out.symbols.end(), [&](std::uint8_t a, std::uint8_t b) {
-    return length[a] != length[b] ? length[a] < length[b] : a < b;
-  });
-  return out;
+  const std::uint32_t side = mcu.size() > 3 ? 16 : 8;
+  const std::size_t mcus =
+      std::size_t{(image.width_px + side - 1) / side} * ((image.height_px + side - 1) / side);
+  const auto stream = state_->output().subspan(state_->frame_head_bytes());
+  texmesh::count_symbols(stream.first(stream.size() - kMarkerBytes), mcu, mcus * mcu.size(), tables(),
+                         counts);
 }
 
 }  // namespace texmesh

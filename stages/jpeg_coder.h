@@ -1,65 +1,54 @@
 #pragma once
 // Inside stages only: libjpeg-turbo's compressor behind an interface that neither leaks its headers nor its
 // longjmp.
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "stages/huffman_table.h"
 #include "stages/jpeg.h"
+#include "stages/texture_codec.h"
 
 namespace texmesh {
 
-/// One Huffman table as a DHT segment has it: bits[k] codes of length k = 1..16 (bits[0] = 0), symbols by
-/// rising length.
-struct HuffmanTable {
-  std::array<std::uint8_t, 17> bits{};
-  std::vector<std::uint8_t> symbols;
+/// What a coder makes.
+struct JpegKind {
+  std::uint32_t channels = 3;  // 1 or 3
+  int quality = 75;            // IJG, 1..100
+  Subsampling subsampling = Subsampling::k420;
+  /// Three channels of data, coded as they are instead of as YCbCr, without subsampling. Streams say so by an
+  /// Adobe marker, which every decoder knows.
+  bool rgb = false;
+  bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
 };
 
-/// The tables of one kind of stream: luma DC, luma AC and, for three channels, chroma DC, chroma AC.
-using HuffmanTables = std::vector<HuffmanTable>;
-
-/// A rectangle of interleaved 8-bit pixels within a larger image.
-struct PixelWindow {
-  const std::uint8_t* data = nullptr;
-  std::size_t stride_bytes = 0;
-  std::uint32_t width_px = 0, height_px = 0;
-};
-
-/// Compresses many images of one kind (channels, quality, subsampling). Not for concurrent use. Throws
-/// StageError.
+/// Compresses many images of one kind. Not for concurrent use. Throws StageError.
 class JpegCoder {
  public:
-  JpegCoder(std::uint32_t channels, int quality, Subsampling subsampling);
+  explicit JpegCoder(const JpegKind& kind);
   ~JpegCoder();
   JpegCoder(const JpegCoder&) = delete;
   JpegCoder& operator=(const JpegCoder&) = delete;
 
-  /// The Huffman tables that are best for this very image. The coder keeps them.
-  HuffmanTables train(const PixelWindow& image);
   void use_tables(const HuffmanTables& tables);
   /// Those in use; a new coder has the typical ones of ISO 10918-1 annex K.3, which have a code for every
   /// symbol.
   HuffmanTables tables() const;
-  /// SOI DQT DHT EOI of the tables in use.
-  std::vector<std::uint8_t> table_stream();
-  /// An abbreviated stream, SOI SOF0 SOS data EOI, coded with the tables in use. Every symbol needs a code
-  /// there.
-  std::vector<std::uint8_t> abbreviated(const PixelWindow& image);
+  /// All that images of one size and kind have in common: SOI [APP14] DQT [DHT] SOF [SOS] EOI. A progressive
+  /// coder's has neither DHT nor SOS: every scan has its own.
+  std::vector<std::uint8_t> head_stream(std::uint32_t width_px, std::uint32_t height_px);
+  /// Appends what follows that head, its SOI and the EOI around it: SOI data EOI. Coded with the tables in
+  /// use, in which every symbol needs a code. For a progressive coder: the scans alone, without SOI and EOI.
+  void append_body(const PixelWindow& image, std::vector<std::uint8_t>& out);
   /// A whole JFIF file with optimised tables of its own.
   std::vector<std::uint8_t> complete(const PixelWindow& image);
+  /// Adds the symbols that coding the image takes. Not for progressive coders.
+  void count_symbols(const PixelWindow& image, SymbolCounts& counts);
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// A table in which every one of `symbols` has a code of at most 16 bits, made from `weights` (same length,
-/// all > 0) as ISO 10918-1 annex K.2 does: no code consists of ones only. Ties by the symbol's value, the
-/// higher one shorter.
-HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols,
-                                const std::vector<std::uint64_t>& weights);
 
 }  // namespace texmesh

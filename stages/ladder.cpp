@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstring>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 
-#include "stages/jpeg_coder.h"
+#include "stages/jpeg.h"
 #include "stages/parallel.h"
 
 namespace texmesh {
@@ -17,22 +19,34 @@ namespace {
 constexpr std::size_t kMaxRungs = 16;
 constexpr std::size_t kFragmentsPerTask = 4;
 constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
-// Share of the trained statistics against the typical tables' in a rung's tables: costs < 0.2 % where the
-// training fits, and bounds what a fragment unlike the others costs.
-constexpr std::uint64_t kTrainedWeight = 256;
+// Below that, scans' headers and tables cost more than refinement saves.
+constexpr std::uint32_t kLeastProgressiveSide = 256;
+
+[[noreturn]] void fail(std::string place, std::string expected, std::string found) {
+  throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
+}
+
+const std::vector<int>& rungs_of(TextureRole role, const LadderOptions& options) {
+  if (is_colour(role)) return options.rungs;
+  if (role == TextureRole::kNormal) return options.normal_rungs;
+  return role == TextureRole::kAlpha ? options.alpha_rungs : options.data_rungs;
+}
+
+void check_rungs(const std::vector<int>& rungs, const char* name) {
+  if (rungs.empty() || rungs.size() > kMaxRungs)
+    fail(name, "1.." + std::to_string(kMaxRungs) + " qualities", std::to_string(rungs.size()));
+  for (std::size_t r = 0; r < rungs.size(); ++r) {
+    if (rungs[r] < 1 || rungs[r] > 100) fail(name, "1..100", std::to_string(rungs[r]));
+    if (r > 0 && rungs[r] <= rungs[r - 1])
+      fail(name, "more than " + std::to_string(rungs[r - 1]), std::to_string(rungs[r]));
+  }
+}
 
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const LadderOptions& options) {
-  const auto fail = [](std::string place, std::string expected, std::string found) {
-    throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
-  };
-  if (options.rungs.empty() || options.rungs.size() > kMaxRungs)
-    fail("rungs", "1.." + std::to_string(kMaxRungs) + " qualities", std::to_string(options.rungs.size()));
-  for (std::size_t r = 0; r < options.rungs.size(); ++r) {
-    const int quality = options.rungs[r];
-    if (quality < 1 || quality > 100) fail("rungs", "1..100", std::to_string(quality));
-    if (r > 0 && quality <= options.rungs[r - 1])
-      fail("rungs", "more than " + std::to_string(options.rungs[r - 1]), std::to_string(quality));
-  }
+  check_rungs(options.rungs, "rungs");
+  check_rungs(options.normal_rungs, "normal_rungs");
+  check_rungs(options.data_rungs, "data_rungs");
+  check_rungs(options.alpha_rungs, "alpha_rungs");
   if (pixels.size() != fragments.planes.size())
     fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
   for (std::size_t p = 0; p < pixels.size(); ++p) {
@@ -54,79 +68,67 @@ PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, std::size
           std::size_t{pixels.width_px} * pixels.channels, plane.fragment_width_px, plane.fragment_height_px};
 }
 
-Subsampling subsampling_of(const TexturePlane& plane, const LadderOptions& options) {
-  return is_colour(plane.role) ? options.subsampling : Subsampling::k444;
+/// What codes a plane, with a note where it is not what the mode asks for.
+Codec codec_of(const TexturePlane& plane, std::size_t index, LadderMode mode, Notes& notes) {
+  const auto stays = [&](const char* code, const std::string& why) {
+    add_info(notes, code, "texture plane " + std::to_string(index), why + ": it is coded as baseline JPEG");
+    return Codec::kJpeg;
+  };
+  if (mode == LadderMode::kProgressive) {
+    if (std::min(plane.fragment_width_px, plane.fragment_height_px) >= kLeastProgressiveSide)
+      return Codec::kJpegProgressive;
+    return stays("small-fragments-not-progressive",
+                 "fragments of " + std::to_string(plane.fragment_width_px) + " x " +
+                     std::to_string(plane.fragment_height_px) + " px are too small for progressive files");
+  }
+  if (mode == LadderMode::kWebp) {
+    if (is_colour(plane.role) && plane.channels == 3) return Codec::kWebp;
+    return stays("not-webp", "WebP halves the chroma resolution of everything and has no grey");
+  }
+  return Codec::kJpeg;
 }
 
-/// Fragments that the tables are trained on: covered ones, evenly spread in index order.
-std::vector<std::size_t> training_fragments(const TexturePlane& plane, int wanted) {
+PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOptions& options) {
+  PlaneCoding coding;
+  coding.channels = plane.channels;
+  coding.fragment_width_px = plane.fragment_width_px;
+  coding.fragment_height_px = plane.fragment_height_px;
+  coding.colour = is_colour(plane.role);
+  coding.subsampling = options.subsampling;
+  coding.qualities = rungs_of(plane.role, options);
+  if (codec == Codec::kJpegProgressive && coding.colour) coding.qualities = {options.progressive_quality};
+  return coding;
+}
+
+/// What the tables are trained on: the middles of covered fragments, evenly spread in index order, together
+/// about 1/16 of the plane but at least 256 x 256 where there is so much. More of them and smaller ones show
+/// more of the plane for the same work.
+std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels& pixels, int wanted) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
     if (plane.covered_texels[f] > 0) covered.push_back(f);
   const std::size_t count = std::min(covered.size(), static_cast<std::size_t>(std::max(wanted, 1)));
-  std::vector<std::size_t> chosen(count);
-  for (std::size_t k = 0; k < count; ++k) chosen[k] = covered[(2 * k + 1) * covered.size() / (2 * count)];
-  return chosen;
-}
-
-/// The middles of the training fragments side by side: about 1/16 of the plane, because coding the mosaic
-/// with optimised tables costs three times as much per pixel as the ladder itself; at least 256 x 256 where
-/// there is so much.
-Pixels training_mosaic(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options) {
-  const std::vector<std::size_t> chosen = training_fragments(plane, options.training_fragments);
-  if (chosen.empty()) return {};
   const std::uint64_t budget =
       std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 65536);
   std::uint32_t side = 16;
-  while (std::uint64_t{side + 16} * (side + 16) * chosen.size() <= budget) side += 16;
-  const std::uint32_t w = std::min(side, plane.fragment_width_px),
-                      h = std::min(side, plane.fragment_height_px);
-  std::uint32_t across = 1;
-  while (std::size_t{across} * across < chosen.size()) ++across;
-  const auto down = static_cast<std::uint32_t>((chosen.size() + across - 1) / across);
-  Pixels mosaic{across * w, down * h, plane.channels, {}};
-  const std::size_t stride = std::size_t{mosaic.width_px} * mosaic.channels;
-  mosaic.data.resize(stride * mosaic.height_px);
-  for (std::size_t k = 0; k < std::size_t{across} * down; ++k) {
-    const PixelWindow from = window_of(plane, pixels, chosen[k % chosen.size()]);
-    const std::size_t left = (from.width_px - w) / 2 * plane.channels, top = (from.height_px - h) / 2;
-    std::uint8_t* to = mosaic.data.data() + k / across * h * stride + k % across * w * plane.channels;
-    for (std::uint32_t y = 0; y < h; ++y)
-      std::memcpy(to + y * stride, from.data + (top + y) * from.stride_bytes + left,
-                  std::size_t{w} * plane.channels);
+  while (std::uint64_t{side + 16} * (side + 16) * count <= budget && side < 4096) side += 16;
+  std::vector<PixelWindow> sample;
+  for (std::size_t k = 0; k < count; ++k) {
+    PixelWindow window = window_of(plane, pixels, covered[(2 * k + 1) * covered.size() / (2 * count)]);
+    const std::uint32_t w = std::min(side, window.width_px), h = std::min(side, window.height_px);
+    window.data += (window.height_px - h) / 2 * window.stride_bytes +
+                   std::size_t{(window.width_px - w) / 2} * plane.channels;
+    window.width_px = w;
+    window.height_px = h;
+    sample.push_back(window);
   }
-  return mosaic;
-}
-
-/// A table like `trained`, with a code for every symbol of `typical`. Weights are read off code lengths: a
-/// code of length l stands for a probability of 2^-l.
-HuffmanTable completed(const HuffmanTable& trained, const HuffmanTable& typical) {
-  std::array<std::uint64_t, 256> weight{};
-  const auto add = [&weight](const HuffmanTable& table, std::uint64_t scale) {
-    std::size_t at = 0;
-    for (std::size_t l = 1; l <= 16; ++l)
-      for (int k = 0; k < table.bits[l]; ++k) weight[table.symbols[at++]] += scale << (16 - l);
-  };
-  add(trained, kTrainedWeight);
-  add(typical, 1);
-  std::vector<std::uint64_t> weights;
-  for (std::uint8_t symbol : typical.symbols) weights.push_back(weight[symbol]);
-  return make_huffman_table(typical.symbols, weights);
-}
-
-HuffmanTables train_tables(const Pixels& mosaic, JpegCoder& coder) {
-  const HuffmanTables typical = coder.tables();
-  if (mosaic.data.empty()) return typical;
-  HuffmanTables tables = coder.train({mosaic.data.data(), std::size_t{mosaic.width_px} * mosaic.channels,
-                                      mosaic.width_px, mosaic.height_px});
-  for (std::size_t k = 0; k < tables.size(); ++k) tables[k] = completed(tables[k], typical[k]);
-  return tables;
+  return sample;
 }
 
 /// Sums over boxes of a plane proper (not its padding); boxes at the right and bottom may be partial.
 struct BoxSums {
   std::uint32_t width = 0, height = 0, channels = 0;
-  std::vector<std::uint32_t> sum, count;  // [box * channels + channel], [box]
+  std::vector<std::uint16_t> sum, count;  // [box * channels + channel], [box]; 256 texels of 255 fit
 };
 
 BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height) {
@@ -135,15 +137,21 @@ BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t hei
   out.sum.resize(out.count.size() * out.channels);
   for (std::uint32_t y = 0; y < height; ++y) {
     const std::uint8_t* p = from.at(0, y);
-    std::uint32_t* sum = out.sum.data() + std::size_t{y / 8} * out.width * out.channels;
-    std::uint32_t* count = out.count.data() + std::size_t{y / 8} * out.width;
+    std::uint16_t* sum = out.sum.data() + std::size_t{y / 8} * out.width * out.channels;
+    std::uint16_t* count = out.count.data() + std::size_t{y / 8} * out.width;
     for (std::uint32_t x = 0; x < width; x += 8, sum += out.channels) {
       const std::uint32_t n = std::min(8u, width - x);
-      *count++ += n;
+      *count++ += static_cast<std::uint16_t>(n);
       if (out.channels == 3) {
-        for (std::uint32_t k = 0; k < n; ++k, p += 3) sum[0] += p[0], sum[1] += p[1], sum[2] += p[2];
+        unsigned a = sum[0], b = sum[1], c = sum[2];
+        for (std::uint32_t k = 0; k < n; ++k, p += 3) a += p[0], b += p[1], c += p[2];
+        sum[0] = static_cast<std::uint16_t>(a);
+        sum[1] = static_cast<std::uint16_t>(b);
+        sum[2] = static_cast<std::uint16_t>(c);
       } else {
-        for (std::uint32_t k = 0; k < n; ++k) sum[0] += *p++;
+        unsigned a = sum[0];
+        for (std::uint32_t k = 0; k < n; ++k) a += *p++;
+        sum[0] = static_cast<std::uint16_t>(a);
       }
     }
   }
@@ -157,9 +165,11 @@ BoxSums sums_of_twice(const BoxSums& from) {
   for (std::uint32_t y = 0; y < from.height; ++y)
     for (std::uint32_t x = 0; x < from.width; ++x) {
       const std::size_t a = std::size_t{y} * from.width + x, b = std::size_t{y / 2} * out.width + x / 2;
-      out.count[b] += from.count[a];
-      for (std::uint32_t c = 0; c < out.channels; ++c)
-        out.sum[b * out.channels + c] += from.sum[a * out.channels + c];
+      out.count[b] = static_cast<std::uint16_t>(out.count[b] + from.count[a]);
+      for (std::uint32_t c = 0; c < out.channels; ++c) {
+        std::uint16_t& sum = out.sum[b * out.channels + c];
+        sum = static_cast<std::uint16_t>(sum + from.sum[a * out.channels + c]);
+      }
     }
   return out;
 }
@@ -168,7 +178,7 @@ Pixels means_of(const BoxSums& boxes) {
   Pixels out{boxes.width, boxes.height, boxes.channels, {}};
   out.data.resize(boxes.sum.size());
   for (std::size_t k = 0; k < out.data.size(); ++k) {
-    const std::uint32_t count = boxes.count[k / boxes.channels];
+    const unsigned count = boxes.count[k / boxes.channels];
     out.data[k] = static_cast<std::uint8_t>((boxes.sum[k] + count / 2) / count);
   }
   return out;
@@ -176,8 +186,9 @@ Pixels means_of(const BoxSums& boxes) {
 
 void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
                     PlaneLadder& out) {
+  const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
   const auto encode = [&](const BoxSums& boxes) {
-    out.preview = encode_jpeg(means_of(boxes), options.preview_quality, subsampling_of(plane, options));
+    out.preview = encode_jpeg(means_of(boxes), options.preview_quality, subsampling);
     out.preview_width_px = boxes.width;
     out.preview_height_px = boxes.height;
   };
@@ -186,51 +197,110 @@ void encode_preview(const TexturePlane& plane, const Pixels& pixels, const Ladde
   if (out.preview.size() >= kPreviewLimitBytes) encode(sums_of_twice(eighth));
 }
 
-/// A few neighbouring fragments at every rung: what one thread encodes at a time. Fragment by fragment, so
-/// that the pixels of one stay in the cache for all its rungs; rung by rung costs a quarter more.
+/// A few neighbouring fragments at every rung: what one thread encodes at a time.
 struct EncodeTask {
   std::size_t plane, first, last;
-  std::vector<std::vector<std::uint8_t>> data;  // [rung]: streams one after the other
-  std::vector<std::vector<std::size_t>> sizes;  // [rung][fragment - first]
 };
 
 std::vector<EncodeTask> encode_tasks(const Fragments& fragments) {
   std::vector<EncodeTask> tasks;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p)
     for (std::size_t f = 0; f < fragments.planes[p].fragment_count(); f += kFragmentsPerTask)
-      tasks.push_back({p, f, std::min(f + kFragmentsPerTask, fragments.planes[p].fragment_count()), {}, {}});
+      tasks.push_back({p, f, std::min(f + kFragmentsPerTask, fragments.planes[p].fragment_count())});
   return tasks;
 }
 
-void encode_fragments(const TexturePlane& plane, const Pixels& pixels, const HuffmanTables* tables,
-                      const LadderOptions& options, EncodeTask& task) {
-  const std::size_t rungs = options.rungs.size();
-  std::vector<std::unique_ptr<JpegCoder>> coders;
-  for (std::size_t r = 0; r < rungs; ++r) {
-    coders.push_back(
-        std::make_unique<JpegCoder>(plane.channels, options.rungs[r], subsampling_of(plane, options)));
-    coders[r]->use_tables(tables[r]);
+/// Streams of one task, on their way into the rungs.
+struct Encoded {
+  std::vector<std::vector<std::uint8_t>> data;   // [rung]: streams one after the other
+  std::vector<std::vector<std::uint64_t>> ends;  // [rung][fragment - first] within data
+};
+
+/// Encoders that no thread uses at the moment. Tasks come plane by plane, so those of other planes go.
+class EncoderPool {
+ public:
+  explicit EncoderPool(const std::vector<std::unique_ptr<TextureCodec>>& codecs) : codecs_(codecs) {}
+  std::unique_ptr<FragmentEncoder> take(std::size_t plane) {
+    const std::lock_guard lock(mutex_);
+    if (plane > plane_) {
+      plane_ = plane;
+      free_.clear();
+    }
+    if (plane < plane_ || free_.empty()) return codecs_[plane]->encoder();
+    auto encoder = std::move(free_.back());
+    free_.pop_back();
+    return encoder;
   }
-  task.data.resize(rungs);
-  task.sizes.assign(rungs, std::vector<std::size_t>(task.last - task.first));
-  for (std::size_t f = task.first; f < task.last; ++f) {
-    if (plane.covered_texels[f] == 0) continue;
-    for (std::size_t r = 0; r < rungs; ++r) {
-      const std::vector<std::uint8_t> stream = coders[r]->abbreviated(window_of(plane, pixels, f));
-      task.sizes[r][f - task.first] = stream.size();
-      task.data[r].insert(task.data[r].end(), stream.begin(), stream.end());
+  void give_back(std::size_t plane, std::unique_ptr<FragmentEncoder> encoder) {
+    const std::lock_guard lock(mutex_);
+    if (plane == plane_) free_.push_back(std::move(encoder));
+  }
+
+ private:
+  const std::vector<std::unique_ptr<TextureCodec>>& codecs_;
+  std::mutex mutex_;
+  std::size_t plane_ = 0;
+  std::vector<std::unique_ptr<FragmentEncoder>> free_;
+};
+
+/// Puts the streams into the rungs in the order of the tasks, whichever thread is done first. Tasks are also
+/// begun in order, so there are never more than a few waiting.
+class OrderedRungs {
+ public:
+  OrderedRungs(std::vector<PlaneLadder>& planes, const std::vector<EncodeTask>& tasks)
+      : planes_(planes), tasks_(tasks) {}
+  void add(std::size_t task, Encoded encoded) {
+    const std::lock_guard lock(mutex_);
+    waiting_.emplace(task, std::move(encoded));
+    for (auto it = waiting_.begin(); it != waiting_.end() && it->first == next_; it = waiting_.erase(it))
+      append(it->second, planes_[tasks_[next_++].plane]);
+  }
+
+ private:
+  static void append(const Encoded& encoded, PlaneLadder& plane) {
+    for (std::size_t r = 0; r < plane.rungs.size(); ++r) {
+      LadderRung& rung = plane.rungs[r];
+      const std::uint64_t base = rung.data.size();
+      for (const std::uint64_t end : encoded.ends[r]) rung.offset.push_back(base + end);
+      rung.data.insert(rung.data.end(), encoded.data[r].begin(), encoded.data[r].end());
     }
   }
+  std::vector<PlaneLadder>& planes_;
+  const std::vector<EncodeTask>& tasks_;
+  std::mutex mutex_;
+  std::size_t next_ = 0;
+  std::map<std::size_t, Encoded> waiting_;
+};
+
+Encoded encode_task(const TexturePlane& plane, const Pixels& pixels, std::size_t rungs,
+                    const EncodeTask& task, FragmentEncoder& encoder) {
+  Encoded out;
+  out.data.resize(rungs);
+  out.ends.resize(rungs);
+  for (std::size_t f = task.first; f < task.last; ++f) {
+    if (plane.covered_texels[f] > 0) encoder.encode(window_of(plane, pixels, f), out.data);
+    for (std::size_t r = 0; r < rungs; ++r) out.ends[r].push_back(out.data[r].size());
+  }
+  return out;
 }
 
-void append(EncodeTask& task, PlaneLadder& plane) {
-  for (std::size_t r = 0; r < plane.rungs.size(); ++r) {
-    LadderRung& rung = plane.rungs[r];
-    if (rung.offset.empty()) rung.offset.push_back(0);
-    for (std::size_t size : task.sizes[r]) rung.offset.push_back(rung.offset.back() + size);
-    rung.data.insert(rung.data.end(), task.data[r].begin(), task.data[r].end());
-  }
-  task.data.clear();
+void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                   const std::vector<std::unique_ptr<TextureCodec>>& codecs, std::vector<PlaneLadder>& planes,
+                   const RunContext& context) {
+  const std::vector<EncodeTask> tasks = encode_tasks(fragments);
+  EncoderPool encoders(codecs);
+  OrderedRungs rungs(planes, tasks);
+  std::atomic<std::size_t> next{0}, done{0};
+  parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t t = next++;  // in order, whatever part of the range a thread was given
+      const std::size_t p = tasks[t].plane;
+      auto encoder = encoders.take(p);
+      rungs.add(t, encode_task(fragments.planes[p], pixels[p], planes[p].rungs.size(), tasks[t], *encoder));
+      encoders.give_back(p, std::move(encoder));
+      context.report(0.2 + 0.8 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
+    }
+  });
 }
 
 }  // namespace
@@ -238,49 +308,57 @@ void append(EncodeTask& task, PlaneLadder& plane) {
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context) {
   check(fragments, pixels, options);
-  const std::size_t planes = fragments.planes.size(), rungs = options.rungs.size();
+  const std::size_t planes = fragments.planes.size();
   Ladder ladder;
   ladder.planes.resize(planes);
-  std::vector<Pixels> mosaic(planes);
+  std::vector<std::unique_ptr<TextureCodec>> codecs(planes);
+  for (std::size_t p = 0; p < planes; ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    PlaneLadder& out = ladder.planes[p];
+    out.codec = codec_of(plane, p, options.mode, ladder.notes);
+    codecs[p] = make_texture_codec(out.codec, coding_of(plane, out.codec, options));
+    const auto sample = training_sample(plane, pixels[p], options.training_fragments);
+    for (CodecRung& rung : codecs[p]->train(sample, context))
+      out.rungs.push_back({rung.quality, std::move(rung.tables), {}, {0}});
+    context.report(0.15 * static_cast<double>(p + 1) / static_cast<double>(planes));
+  }
   parallel_for(context, planes, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      ladder.planes[p].rungs.resize(rungs);
-      mosaic[p] = training_mosaic(fragments.planes[p], pixels[p], options);
+    for (std::size_t p = begin; p < end; ++p)
       encode_preview(fragments.planes[p], pixels[p], options, ladder.planes[p]);
-    }
-  });
-  context.report(0.05);
-
-  std::vector<HuffmanTables> tables(planes * rungs);
-  parallel_for(context, planes * rungs, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const TexturePlane& plane = fragments.planes[k / rungs];
-      LadderRung& rung = ladder.planes[k / rungs].rungs[k % rungs];
-      rung.quality = options.rungs[k % rungs];
-      JpegCoder coder(plane.channels, rung.quality, subsampling_of(plane, options));
-      tables[k] = train_tables(mosaic[k / rungs], coder);
-      coder.use_tables(tables[k]);
-      rung.tables = coder.table_stream();
-    }
   });
   context.report(0.2);
-
-  std::vector<EncodeTask> tasks = encode_tasks(fragments);
-  std::atomic<std::size_t> done{0};
-  parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const std::size_t p = tasks[t].plane;
-      encode_fragments(fragments.planes[p], pixels[p], tables.data() + p * rungs, options, tasks[t]);
-      context.report(0.2 + 0.8 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
-    }
-  });
-  for (EncodeTask& task : tasks) append(task, ladder.planes[task.plane]);
+  encode_planes(fragments, pixels, codecs, ladder.planes, context);
   return ladder;
 }
 
 std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment) {
   return std::span(rung.data).subspan(rung.offset[fragment],
                                       rung.offset[fragment + 1] - rung.offset[fragment]);
+}
+
+std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment) {
+  std::uint64_t bytes = 0;
+  for (std::size_t r = codec_traits(plane.codec).incremental ? 0 : rung; r <= rung; ++r)
+    bytes += fragment_stream(plane.rungs[r], fragment).size();
+  return bytes;
+}
+
+std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment) {
+  const bool incremental = codec_traits(plane.codec).incremental;
+  std::vector<std::span<const std::uint8_t>> streams;
+  for (std::size_t r = incremental ? 0 : rung; r <= rung; ++r)
+    streams.push_back(fragment_stream(plane.rungs[r], fragment));
+  return join_fragment(plane.codec, plane.rungs[incremental ? 0 : rung].tables, streams);
+}
+
+Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels) {
+  return decode_fragment_file(plane.codec, fragment_file(plane, rung, fragment), max_pixels);
+}
+
+Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                            std::uint64_t max_pixels) {
+  return decode_fragment_file_luma(plane.codec, fragment_file(plane, rung, fragment), max_pixels);
 }
 
 }  // namespace texmesh

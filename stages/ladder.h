@@ -4,22 +4,44 @@
 #include <string_view>
 #include <vector>
 
+#include "format/codec.h"
 #include "format/fields.h"
+#include "format/note.h"
 #include "stages/fragmentation.h"
-#include "stages/jpeg.h"
+#include "stages/texture_codec.h"
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 1;
+inline constexpr int kLadderVersion = 2;
+
+enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
+template <>
+struct EnumNames<LadderMode> {
+  static constexpr std::array<std::string_view, 3> names{"jpeg", "progressive", "webp"};
+};
 
 struct LadderOptions {
-  std::vector<int> rungs{5, 8, 11, 18, 30, 53, 75, 86, 93, 97};  // IJG qualities, strictly rising
-  Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes (normal, ORM) are always 4:4:4
-  int training_fragments = 16;
+  LadderMode mode = LadderMode::kJpeg;
+  // IJG qualities, strictly rising, for colours, normals, other data, and alpha:
+  std::vector<int> rungs{5, 8, 11, 18, 30, 53, 75, 86, 93, 97};
+  std::vector<int> normal_rungs{30, 53, 75, 86, 93, 97};
+  std::vector<int> data_rungs{18, 30, 53, 75, 86, 93, 97};
+  std::vector<int> alpha_rungs{18, 30, 53, 75, 86, 93, 97};
+  int progressive_quality = 92;                 // of a colour plane's whole progressive files
+  Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
+  int training_fragments = 64;
   int preview_quality = 60;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of the ladder, strictly rising, at most 16");
+    v("mode", s.mode,
+      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, where "
+      "fragments have 256 px or more; webp = lossy WebP for colours");
+    v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
+    v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
+    v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");
+    v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "the same for alpha channels");
+    v("progressive_quality", s.progressive_quality, Range{10, 100},
+      "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
     v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
@@ -27,12 +49,11 @@ struct LadderOptions {
   }
 };
 
-/// One rung of one plane: SPEC.md's table stream and the fragments as abbreviated baseline JPEGs (ISO 10918-1
-/// B.5).
+/// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
 struct LadderRung {
-  int quality = 0;
-  std::vector<std::uint8_t> tables;   // SOI DQT DHT EOI
-  std::vector<std::uint8_t> data;     // the fragments' streams, in fragment order
+  int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
+  std::vector<std::uint8_t> tables;  // what the rung's streams share
+  std::vector<std::uint8_t> data;    // the fragments' streams, in fragment order
   std::vector<std::uint64_t> offset;  // [fragments + 1] into data; empty range = fragment not stored
   template <class S, class A>
   static void archive(S& s, A& a) {
@@ -40,33 +61,47 @@ struct LadderRung {
   }
 };
 struct PlaneLadder {
+  Codec codec = Codec::kJpeg;
   std::vector<LadderRung> rungs;  // rising quality
   std::vector<std::uint8_t>
       preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.rungs, s.preview, s.preview_width_px, s.preview_height_px);
+    a(s.codec, s.rungs, s.preview, s.preview_width_px, s.preview_height_px);
   }
 };
 struct Ladder {
   std::vector<PlaneLadder> planes;
+  Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.planes);
+    a(s.planes, s.notes);
   }
 };
 
-/// Encodes with libjpeg-turbo, ISLOW DCT; data planes (normal, ORM) and `subsampling = 444` without chroma
-/// subsampling. Huffman tables of a rung are trained on covered fragments spread over the plane, with a small
-/// admixture of the typical tables of ISO 10918-1 annex K.3, so that every symbol that baseline coding can
-/// produce has a code: no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a
-/// covered fragment has tables and a preview but no data. Throws StageError for rungs that do not rise or lie
-/// outside 1..100 and for pixels that do not fit the planes. Same bytes for any thread count.
+/// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
+/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart. Tables are
+/// trained on covered fragments spread over the plane and have a code for every symbol, so that no fragment
+/// needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment has tables and a
+/// preview but no data. Works on the pixels as they stand: beside the result it takes some fragments' streams
+/// per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for pixels that do not
+/// fit the planes. Same bytes for any thread count.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context);
 
-/// The rung's stream of one fragment; empty when it is not stored.
+/// The rung's own stream of one fragment; empty when it is not stored.
 std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment);
+
+/// The bytes a client needs to show a fragment at a rung: its stream, and those below it where they are parts
+/// of one file. 0 when it is not stored.
+std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
+/// The complete image file of a stored fragment at a rung. FormatError when a part is damaged.
+std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
+/// Its pixels, or luma only. FormatError when it is damaged or has more than max_pixels.
+Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels);
+Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                            std::uint64_t max_pixels);
 
 }  // namespace texmesh

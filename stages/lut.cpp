@@ -15,8 +15,8 @@ namespace texmesh {
 namespace {
 
 constexpr int kGammas = 21;  // 0, 0.05 .. 1
-// What is the same in every abbreviated stream: SOI, SOF0 and SOS of one or three components, EOI.
-constexpr double kGreyHeader = 2 + 13 + 10 + 2, kColourHeader = 2 + 19 + 14 + 2;
+// What is the same in every stream: SOI and EOI.
+constexpr double kHeaderBytes = 2 + 2;
 // (8.8) divides by log(100 p): singular at 0.01, negative below.
 constexpr double kLeastPredictor = 0.02;
 
@@ -136,7 +136,7 @@ void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const Pla
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const auto stream = fragment_stream(ladder.rungs[r], fragment);
     const std::size_t at = r * plane.fragment_count() + fragment;
-    const Pixels decoded = decode_jpeg_luma(complete_jpeg(ladder.rungs[r].tables, stream), texels);
+    const Pixels decoded = decode_fragment_luma(ladder, r, fragment, texels);
     if (decoded.width_px != plane.fragment_width_px || decoded.height_px != plane.fragment_height_px)
       throw StageError("lut", "fragment " + std::to_string(fragment), std::to_string(texels) + " texels",
                        std::to_string(decoded.data.size()));
@@ -155,6 +155,7 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.columns = plane.columns;
   out.rows = plane.rows;
   out.scales = scales;
+  out.incremental = codec_traits(ladder.codec).incremental;
   for (const LadderRung& rung : ladder.rungs) {
     out.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
     out.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
@@ -202,8 +203,7 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
     for (int g = 0; g < kGammas; ++g) {
       const std::vector<float> quality = quality_of(tables, scale, g / 20.0);
       std::uint64_t sum = 0;
-      for (std::uint16_t f : tables.order)
-        sum += tables.size_bytes[nearest_rung(tables, quality[f]) * tables.fragment_count() + f];
+      for (std::uint16_t f : tables.order) sum += bytes_to_show(tables, nearest_rung(tables, quality[f]), f);
       out.push_back(sum);  // with rd, too: that is what rungs_of() then spends
     }
   return out;
@@ -211,15 +211,14 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
 
 /// S = A R^Q + c by least squares on log (S - c) (8.7) over the plane's rungs, B from (8.8) with the plane's
 /// mean VQP.
-void fit_size_model(const TexturePlane& plane, PlaneTables& t) {
-  const std::size_t rungs = t.rung_count(), fragments = t.fragment_count();
+void fit_size_model(PlaneTables& t) {
+  const std::size_t rungs = t.rung_count();
   if (t.order.empty() || rungs < 2) return;
-  const double header =
-      (plane.channels == 1 ? kGreyHeader : kColourHeader) * static_cast<double>(t.order.size());
+  const double header = kHeaderBytes * static_cast<double>(t.order.size());
   std::vector<double> size(rungs), q(rungs), s(rungs);
   double mean_q = 0, mean_s = 0, predictor = 0;
   for (std::size_t r = 0; r < rungs; ++r) {
-    for (std::uint16_t f : t.order) size[r] += t.size_bytes[r * fragments + f];
+    for (std::uint16_t f : t.order) size[r] += static_cast<double>(bytes_to_show(t, r, f));
     q[r] = t.rung_quality[r];
     s[r] = portable::log(std::max(size[r] - header, 1.0));
     mean_q += q[r] / static_cast<double>(rungs);
@@ -272,7 +271,7 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   parallel_for(context, out.planes.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       out.planes[p].total_bytes = total_bytes(out.planes[p]);
-      fit_size_model(fragments.planes[p], out.planes[p]);
+      fit_size_model(out.planes[p]);
     }
   });
   return out;

@@ -1,6 +1,7 @@
 #include "stages/package.h"
 
 #include <algorithm>
+#include <set>
 
 #include "format/layout.h"
 #include "format/viewing.h"
@@ -138,6 +139,7 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.role = enum_name(plane.role);
   t.name = clean_text(images[plane.image].name, 200);
   t.colour_space = is_colour(plane.role) ? "srgb" : "linear";
+  t.codec = ladder.codec;
   t.width_px = plane.width_px;
   t.height_px = plane.height_px;
   t.channels = plane.channels;
@@ -150,6 +152,14 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.preview_height_px = ladder.preview_height_px;
   for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
   return t;
+}
+
+/// What a reader must know to show the textures, each once, by name.
+std::vector<std::string> required_features(const Ladder& ladder) {
+  std::set<std::string> features;
+  for (const PlaneLadder& plane : ladder.planes) features.emplace(codec_traits(plane.codec).required_feature);
+  features.erase("");
+  return {features.begin(), features.end()};
 }
 
 /// The fragments of a rung in the order of their importance, so that a prefix of the entry is worth the most.
@@ -195,7 +205,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, tables, files);
-  const Manifest manifest = describe_model(scales, perceptual, files, fragments, jnd, options.title);
+  Manifest manifest = describe_model(scales, perceptual, files, fragments, jnd, options.title);
+  manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(tables)});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 
 #include "format/portable_math.h"
 #include "stages/image_compare.h"
@@ -168,19 +169,19 @@ Pixels cut(const Pixels& pixels, const TexturePlane& plane, std::uint32_t fragme
   return out;
 }
 
-/// A plane as it looks at one rung, or (rung == nullptr) as the source has it. Fragments that no rung stores
-/// are never looked at and stay as in the source.
-MipTexture plane_texture(const TexturePlane& plane, const Pixels& pixels, const LadderRung* rung,
-                         std::uint32_t first_level, const RunContext& context) {
+/// A plane as it looks at one rung, or (ladder == nullptr) as the source has it. Fragments that no rung
+/// stores are never looked at and stay as in the source.
+MipTexture plane_texture(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder* ladder,
+                         std::size_t rung, std::uint32_t first_level, const RunContext& context) {
   MipTexture texture = empty_texture(plane, first_level);
   const std::uint64_t fragment_pixels =
       static_cast<std::uint64_t>(plane.fragment_width_px) * plane.fragment_height_px;
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
-      const auto stream = rung ? fragment_stream(*rung, f) : std::span<const std::uint8_t>();
+      const bool stored = ladder && !fragment_stream(ladder->rungs[rung], f).empty();
       const auto index = static_cast<std::uint32_t>(f);
-      const Pixels block = stream.empty() ? cut(pixels, plane, index)
-                                          : decode_jpeg(complete_jpeg(rung->tables, stream), fragment_pixels);
+      const Pixels block =
+          stored ? decode_fragment(*ladder, rung, f, fragment_pixels) : cut(pixels, plane, index);
       reduce_block(block, index % plane.columns * plane.fragment_width_px,
                    index / plane.columns * plane.fragment_height_px, first_level, texture.levels[0]);
     }
@@ -200,6 +201,14 @@ std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
   return out;
 }
 
+/// Planes of other codecs or roles have other rungs.
+std::size_t nearest_rung(const PlaneLadder& plane, int quality) {
+  std::size_t best = 0;
+  for (std::size_t r = 1; r < plane.rungs.size(); ++r)
+    if (std::abs(plane.rungs[r].quality - quality) < std::abs(plane.rungs[best].quality - quality)) best = r;
+  return best;
+}
+
 struct Textures {
   std::vector<int> quality;                    // per column of the table
   std::vector<MipTexture> source;              // per shown plane
@@ -213,7 +222,7 @@ Textures decode_textures(const ShownPlanes& shown, const Fragments& fragments,
   Textures out;
   for (std::size_t i = 0; i < shown.planes.size(); ++i) {
     const std::uint32_t p = shown.planes[i];
-    out.source.push_back(plane_texture(fragments.planes[p], pixels[p], nullptr, first[i], context));
+    out.source.push_back(plane_texture(fragments.planes[p], pixels[p], nullptr, 0, first[i], context));
   }
   if (shown.planes.empty()) {
     out.quality = {100};
@@ -225,8 +234,9 @@ Textures decode_textures(const ShownPlanes& shown, const Fragments& fragments,
     std::vector<MipTexture>& column = out.rungs.emplace_back();
     for (std::size_t i = 0; i < shown.planes.size(); ++i) {
       const std::uint32_t p = shown.planes[i];
-      column.push_back(
-          plane_texture(fragments.planes[p], pixels[p], &ladder.planes[p].rungs[r], first[i], context));
+      const PlaneLadder& plane = ladder.planes[p];
+      column.push_back(plane_texture(fragments.planes[p], pixels[p], &plane,
+                                     nearest_rung(plane, out.quality.back()), first[i], context));
     }
   }
   return out;

@@ -73,6 +73,11 @@ const std::vector<TextureInfo>& PackageReader::textures() {
   if (textures.size() != manifest_.plane_count)
     throw FormatError(store_->name(), kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
                       std::to_string(textures.size()));
+  for (const TextureInfo& t : textures)
+    if (const auto feature = codec_traits(t.codec).required_feature;
+        !feature.empty() &&
+        std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
+      throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
   resolve_textures(textures, index());
   for (std::size_t p = 0; p < manifest_.previews.size(); ++p)
     if (manifest_.previews[p] != ByteRange{textures[p].preview.offset, textures[p].preview.bytes})
@@ -89,6 +94,8 @@ void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
   if (tables.columns != texture.columns || tables.rows != texture.rows || !same_rungs)
     throw FormatError(store_->name(), plane_place(plane), "the grid and rungs of textures.json in tables.bin",
                       "others");
+  if (tables.incremental != codec_traits(texture.codec).incremental)
+    throw FormatError(store_->name(), plane_place(plane), "tables of the codec in textures.json", "others");
   const auto require_sum = [&](const EntryRef& ref, std::uint64_t sum) {
     if (ref.bytes != sum)
       throw FormatError(store_->name(), "entry " + ref.path,
@@ -189,22 +196,12 @@ Bytes PackageReader::fragment(std::uint32_t plane, std::uint32_t rung, std::uint
 }
 
 Bytes PackageReader::complete_fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment) {
-  return join_jpeg(table_stream(plane, rung), this->fragment(plane, rung, fragment));
-}
-
-Bytes join_jpeg(std::span<const std::uint8_t> tables, std::span<const std::uint8_t> fragment) {
-  const auto is_marker = [](std::span<const std::uint8_t> b, std::size_t at, std::uint8_t code) {
-    return b[at] == 0xff && b[at + 1] == code;
-  };
-  constexpr std::uint8_t kStart = 0xd8, kEnd = 0xd9;
-  if (tables.size() < 4 || !is_marker(tables, 0, kStart) || !is_marker(tables, tables.size() - 2, kEnd))
-    throw FormatError("JPEG", "table stream", "SOI ... EOI", "other bytes");
-  if (fragment.size() < 4 || !is_marker(fragment, 0, kStart) ||
-      !is_marker(fragment, fragment.size() - 2, kEnd))
-    throw FormatError("JPEG", "abbreviated stream", "SOI ... EOI", "other bytes");
-  Bytes out(tables.begin(), tables.end() - 2);
-  out.insert(out.end(), fragment.begin() + 2, fragment.end());
-  return out;
+  const Codec codec = texture(plane).codec;
+  const std::uint32_t first = codec_traits(codec).incremental ? 0 : rung;
+  std::vector<Bytes> streams;
+  for (std::uint32_t r = first; r <= rung; ++r) streams.push_back(this->fragment(plane, r, fragment));
+  return join_fragment(codec, table_stream(plane, first),
+                       std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
 }
 
 int select_scale(const Manifest& manifest, double displayed_px) {

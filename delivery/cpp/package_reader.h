@@ -60,11 +60,12 @@ class PackageReader {
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
   std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
   std::vector<std::uint8_t> preview(std::uint32_t plane);
-  std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);  // SOI DQT DHT EOI
-  /// Where a fragment's abbreviated stream stands within its rung's entry; bytes 0 = not stored.
+  std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);
+  /// Where a fragment's stream stands within its rung's entry; bytes 0 = not stored.
   ByteRange fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
   std::vector<std::uint8_t> fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
-  /// Table stream and fragment joined into a JPEG that any decoder takes.
+  /// The image file, of the plane's codec, that any decoder takes: table stream and fragment joined; for
+  /// incremental codecs with the streams of the lower rungs between them.
   std::vector<std::uint8_t> complete_fragment(std::uint32_t plane, std::uint32_t rung,
                                               std::uint32_t fragment);
 
@@ -85,11 +86,6 @@ class PackageReader {
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
   std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane
 };
-
-/// Tables without their EOI, then the fragment without its SOI. FormatError when either does not look like
-/// one.
-std::vector<std::uint8_t> join_jpeg(std::span<const std::uint8_t> tables,
-                                    std::span<const std::uint8_t> fragment);
 
 /// The step function: the scale to show an object at that is `displayed_px` pixels high on screen.
 int select_scale(const Manifest& manifest, double displayed_px);

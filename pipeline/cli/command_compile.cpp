@@ -23,15 +23,12 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Shorter names of options that people type often.
-const std::map<std::string, std::string> kShortNames{{"ladder.rungs", "--rungs"},
-                                                     {"ladder.subsampling", "--subsampling"},
-                                                     {"scales.mesh_codec", "--mesh-codec"},
-                                                     {"fragmentation.fill", "--fill"},
-                                                     {"lut.allocate", "--allocate"},
-                                                     {"perceptual_values.jnd", "--jnd"},
-                                                     {"simplification.order", "--order"},
-                                                     {"package.title", "--title"},
-                                                     {"import.up", "--up"}};
+const std::map<std::string, std::string> kShortNames{
+    {"ladder.rungs", "--rungs"},        {"ladder.subsampling", "--subsampling"},
+    {"ladder.mode", "--ladder"},        {"scales.mesh_codec", "--mesh-codec"},
+    {"fragmentation.fill", "--fill"},   {"lut.allocate", "--allocate"},
+    {"perceptual_values.jnd", "--jnd"}, {"simplification.order", "--order"},
+    {"package.title", "--title"},       {"import.up", "--up"}};
 
 struct CompileArguments {
   std::vector<std::string> inputs;

@@ -129,7 +129,7 @@ Json ladder_json(PackageReader& p) {
                        {"ssim", figures[r].ssim},
                        {"path", info.rungs[r].path}});
     planes.push_back({{"plane", k},
-                      {"codec", info.codec},
+                      {"codec", codec_traits(info.codec).id},
                       {"preview_width_px", info.preview_width_px},
                       {"preview_height_px", info.preview_height_px},
                       {"preview_bytes", info.preview.bytes},

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 
 #include "format/sha256.h"
 #include "pipeline/inspect/bounded_json.h"
+#include "pipeline/inspect/plane_streams.h"
 
 namespace texmesh {
 namespace {
@@ -67,36 +67,32 @@ FragmentIndex::Plane read_plane(const Json& json, const std::string& place) {
   return plane;
 }
 
-/// Compares the files of one rung with the index and the rung's own entry.
+/// Compares the files of one rung (the one added to `streams` last) with the index and the rung's own entry.
 void check_rung_files(PackageStore& folder, const std::map<std::string, std::uint64_t>& files,
-                      const TextureInfo& info, const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
-                      const FragmentIndex::Rung& stated, Findings& findings) {
-  const std::uint64_t tables_at =
-      std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
-  const Bytes tables = folder.read(info.tables, tables_at, t.table_bytes[rung]);
-  std::uint64_t at = 0;
+                      const TextureInfo& info, const PlaneTables& t, const PlaneStreams& streams,
+                      std::uint32_t plane, std::uint32_t rung, const FragmentIndex::Rung& stated,
+                      Findings& findings) {
   for (std::size_t k = 0; k < t.order.size(); ++k) {
-    const std::uint32_t fragment = t.order[k], bytes = t.size_bytes[rung * t.fragment_count() + fragment];
-    const std::string path = fragment_file_path(plane, rung, fragment);
-    if (bytes == 0) {
+    const std::uint32_t fragment = t.order[k];
+    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension);
+    if (streams.stream(fragment).empty()) {
       findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path,
                        "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
       continue;
     }
-    const Bytes jpeg = join_jpeg(tables, folder.read(info.rungs[rung], at, bytes));
-    at += bytes;
+    const Bytes whole = streams.file(fragment);
     const auto file = files.find(path);
     if (!findings.require(file != files.end(), "fragment-file", path, "", "a file", "none")) continue;
-    if (!findings.require_equal<std::uint64_t>(jpeg.size(), file->second, "fragment-file", path, "bytes"))
+    if (!findings.require_equal<std::uint64_t>(whole.size(), file->second, "fragment-file", path, "bytes"))
       continue;
     EntryRef ref;
     ref.path = path;
-    ref.bytes = jpeg.size();
-    findings.require(folder.read(ref, 0, ref.bytes) == jpeg, "fragment-file", path, "",
+    ref.bytes = whole.size();
+    findings.require(folder.read(ref, 0, ref.bytes) == whole, "fragment-file", path, "",
                      "the fragment of " + info.rungs[rung].path, "other bytes");
-    findings.require(stated.bytes[k] == jpeg.size() && stated.digests[k] == short_digest(jpeg),
+    findings.require(stated.bytes[k] == whole.size() && stated.digests[k] == short_digest(whole),
                      "fragment-file", kFragmentIndexPath, path,
-                     std::to_string(jpeg.size()) + " bytes, " + short_digest(jpeg),
+                     std::to_string(whole.size()) + " bytes, " + short_digest(whole),
                      std::to_string(stated.bytes[k]) + " bytes, " + stated.digests[k]);
   }
 }
@@ -130,21 +126,20 @@ FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink
     const PlaneTables& t = package.tables().planes[plane];
     const TextureInfo& info = package.textures()[plane];
     FragmentIndex::Plane entry{t.order, {}};
+    PlaneStreams streams(info.codec, t, package.entry(info.tables));
     for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung) {
-      const Bytes pack = package.entry(info.rungs[rung]), tables = package.table_stream(plane, rung);
+      streams.add_pack(rung, package.entry(info.rungs[rung]));
       FragmentIndex::Rung files;
       for (const std::uint16_t fragment : t.order) {
-        const ByteRange range = package.fragment_range(plane, rung, fragment);
-        if (range.bytes == 0) {  // not stored on this rung
+        if (streams.stream(fragment).empty()) {  // not stored on this rung
           files.bytes.push_back(0);
           files.digests.push_back(kNoFile);
           continue;
         }
-        const Bytes jpeg = join_jpeg(tables, std::span(pack).subspan(static_cast<std::size_t>(range.offset),
-                                                                     static_cast<std::size_t>(range.bytes)));
-        files.bytes.push_back(jpeg.size());
-        files.digests.push_back(short_digest(jpeg));
-        sink(fragment_file_path(plane, rung, fragment), jpeg);
+        const Bytes file = streams.file(fragment);
+        files.bytes.push_back(file.size());
+        files.digests.push_back(short_digest(file));
+        sink(fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension), file);
       }
       entry.rungs.push_back(std::move(files));
     }
@@ -153,23 +148,22 @@ FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink
   return index;
 }
 
-Bytes join_fragment_files(const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
+Bytes join_fragment_files(Codec codec, const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
                           const Bytes& table_stream,
                           const std::function<Bytes(const std::string&)>& read_file) {
-  if (table_stream.size() < 4)
-    throw FormatError("tables", "", "a table stream", std::to_string(table_stream.size()) + " bytes");
-  const std::size_t head = table_stream.size() - 2;  // without EOI
+  const std::size_t fragments = t.fragment_count();
   Bytes pack;
   for (const std::uint16_t fragment : t.order) {
-    if (t.size_bytes[rung * t.fragment_count() + fragment] == 0) continue;
-    const std::string path = fragment_file_path(plane, rung, fragment);
-    const Bytes jpeg = read_file(path);
-    if (jpeg.size() < head ||
-        !std::equal(table_stream.begin(), table_stream.begin() + static_cast<std::ptrdiff_t>(head),
-                    jpeg.begin()))
-      throw FormatError(path, "byte 0", "the table stream of rung " + std::to_string(rung), "other bytes");
-    pack.insert(pack.end(), {0xff, 0xd8});
-    pack.insert(pack.end(), jpeg.begin() + static_cast<std::ptrdiff_t>(head), jpeg.end());
+    const std::uint32_t bytes = t.size_bytes[rung * fragments + fragment];
+    if (bytes == 0) continue;
+    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(codec).extension);
+    try {
+      const Bytes stream =
+          split_fragment(codec, table_stream, read_file(path), bytes_to_show(t, rung, fragment) - bytes);
+      pack.insert(pack.end(), stream.begin(), stream.end());
+    } catch (const FormatError& e) {
+      throw FormatError(path, e.place(), e.expected(), e.found());
+    }
   }
   return pack;
 }
@@ -187,6 +181,7 @@ void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry
     files[e.path] = e.bytes;
     const bool known = name.number < tables.planes.size() &&
                        name.rung < tables.planes[name.number].rung_count() &&
+                       name.extension == codec_traits(textures[name.number].codec).extension &&
                        std::count(tables.planes[name.number].order.begin(),
                                   tables.planes[name.number].order.end(), name.fragment) > 0;
     findings.require(known, "fragment-file", e.path, "", "a stored fragment of the package",
@@ -203,9 +198,13 @@ void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry
             index.planes[plane].order == t.order && index.planes[plane].rungs.size() == t.rung_count(),
             "fragment-file", kFragmentIndexPath, place, "order and rungs as in the tables", "others"))
       continue;
-    for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung)
-      check_rung_files(folder, files, textures[plane], t, plane, rung, index.planes[plane].rungs[rung],
+    const TextureInfo& info = textures[plane];
+    PlaneStreams streams(info.codec, t, folder.read(info.tables, 0, info.tables.bytes));
+    for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung) {
+      streams.add_pack(rung, folder.read(info.rungs[rung], 0, info.rungs[rung].bytes));
+      check_rung_files(folder, files, info, t, streams, plane, rung, index.planes[plane].rungs[rung],
                        findings);
+    }
   }
 }
 

@@ -153,8 +153,10 @@ class TreeFiles {
     if (sizes_.count(ref.path)) return package_.entry(ref);
     const EntryName name = parse_entry_path(ref.path);
     if (name.kind != EntryKind::kRung) throw FormatError(ref.path, "", "a file of the tree", "none");
-    Bytes bytes = join_fragment_files(package_.tables().planes.at(name.number), name.number, name.rung,
-                                      package_.table_stream(name.number, name.rung),
+    const Codec codec = package_.textures().at(name.number).codec;
+    const std::uint32_t tables_of = codec_traits(codec).incremental ? 0 : name.rung;
+    Bytes bytes = join_fragment_files(codec, package_.tables().planes.at(name.number), name.number, name.rung,
+                                      package_.table_stream(name.number, tables_of),
                                       [&](const std::string& path) { return file(path); });
     if (sha256(bytes) != ref.digest)
       throw FormatError(ref.path, "", "fragment files that make " + to_hex(ref.digest),

@@ -222,14 +222,26 @@ class Verifier {
     const PlaneTables& t = tables_->planes[plane];
     if (name.kind == EntryKind::kTableStreams) {
       check_table_streams(info, t, bytes, findings_);
-      table_packs_[plane] = bytes;
     } else if (name.kind == EntryKind::kRung) {
       if (!findings_.require(name.rung < t.rung_count(), "entry-set", e.path, "", "a rung of textures.json",
                              "none"))
         return;
-      if (!table_packs_.count(plane)) table_packs_[plane] = store_.read(info.tables, 0, info.tables.bytes);
-      report_.fragments += check_rung(info, t, name.rung, table_packs_[plane], bytes, context_, findings_);
+      check_rung_entry(info, t, name, bytes);
     }
+  }
+
+  void check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name, Bytes bytes) {
+    std::uint64_t table_bytes = 0, rung_bytes = 0;
+    for (const std::uint32_t n : t.table_bytes) table_bytes += n;
+    for (std::size_t f = 0; f < t.fragment_count(); ++f)
+      rung_bytes += t.size_bytes[name.rung * t.fragment_count() + f];
+    if (info.tables.bytes != table_bytes || bytes.size() != rung_bytes) return;  // check_textures says so
+    auto streams = streams_.find(name.number);
+    if (streams == streams_.end())
+      streams =
+          streams_.try_emplace(name.number, info.codec, t, store_.read(info.tables, 0, table_bytes)).first;
+    streams->second.add_pack(name.rung, std::move(bytes));
+    report_.fragments += check_rung(info, t, name.rung, streams->second, context_, findings_);
   }
 
   /// Fragment files of `unpack --fragments files`: each is its fragment with the rung's tables in front.
@@ -259,7 +271,7 @@ class Verifier {
   const ManifestScale* coarser_ = nullptr;  // the mesh looked at last
   std::vector<Vec3d> coarser_positions_;
   std::vector<bool> consistent_;  // per plane: textures.json and tables.bin describe the same grid and rungs
-  std::map<std::size_t, Bytes> table_packs_;  // per plane
+  std::map<std::uint32_t, PlaneStreams> streams_;  // per plane
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "format/tables.h"
 #include "format/vec.h"
 #include "pipeline/inspect/finding.h"
+#include "pipeline/inspect/plane_streams.h"
 #include "pipeline/inspect/provenance.h"
 #include "stages/run_context.h"
 
@@ -48,14 +49,13 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 
-/// The table streams of all rungs: each SOI, tables, EOI, of the size the tables say.
+/// The table streams of all rungs: each as the codec has it, of the size the tables say.
 void check_table_streams(const TextureInfo& texture, const PlaneTables& tables,
                          std::span<const std::uint8_t> pack, Findings& findings);
 
-/// All fragments of one rung: digest, and the decoded JPEG's size and channels. `table_pack` holds the
-/// plane's table streams. Returns the number of fragments looked at.
+/// All fragments of the rung that was added to `streams` last: digest, and the decoded image's size and
+/// channels. Returns the number of fragments looked at.
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& tables, std::uint32_t rung,
-                         std::span<const std::uint8_t> table_pack, std::span<const std::uint8_t> pack,
-                         const RunContext& context, Findings& findings);
+                         const PlaneStreams& streams, const RunContext& context, Findings& findings);
 
 }  // namespace texmesh

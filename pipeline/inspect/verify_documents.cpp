@@ -130,6 +130,13 @@ void check_quality(const Manifest& m, const PackageTables& tables, const Quality
                      "a quality of the ladder", std::to_string(q.rungs[k]));
 }
 
+/// Which option has the rungs of a plane.
+static std::string rungs_option(const TextureInfo& texture) {
+  if (texture.colour_space == "srgb") return "rungs";
+  if (texture.role == "normal") return "normal_rungs";
+  return texture.role == "alpha" ? "alpha_rungs" : "data_rungs";
+}
+
 void check_provenance(const Manifest& m, const std::vector<TextureInfo>& textures, const Provenance& p,
                       Findings& findings) {
   findings.require(p.format_major == m.major && p.format_minor == m.minor, "provenance", kProvenancePath,
@@ -148,13 +155,15 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
   if (jnd.is_number() && jnd.get<double>() != m.jnd)
     findings.add("provenance", kProvenancePath, "/options/perceptual_values/jnd",
                  number(m.jnd) + ", as the manifest", jnd.dump());
-  const auto rungs = option("ladder", "rungs");
-  if (!rungs.is_array()) return;
-  for (std::size_t k = 0; k < textures.size(); ++k)
+  for (std::size_t k = 0; k < textures.size(); ++k) {
+    const std::string name = rungs_option(textures[k]);
+    const auto rungs = option("ladder", name.c_str());
+    if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
     for (const int q : textures[k].rung_quality)
       findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), "provenance", kProvenancePath,
-                       "/options/ladder/rungs",
+                       "/options/ladder/" + name,
                        "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());
+  }
 }
 
 }  // namespace texmesh

@@ -8,6 +8,7 @@
 #include "pipeline/inspect/verify_checks.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
+#include "stages/texture_codec.h"
 
 namespace texmesh {
 namespace {
@@ -46,29 +47,24 @@ void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) 
 }
 
 void check_total_bytes(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
-  const std::size_t fragments = t.fragment_count();
   for (std::uint32_t s = 0; s <= t.scales; ++s)
     for (std::size_t g = 0; g < kGammas; ++g) {
       const std::vector<float> quality = quality_of(t, s, static_cast<double>(g) / 20);
       std::uint64_t bytes = 0;
       for (const std::uint16_t i : t.order)
-        bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[i])) * fragments + i];
+        bytes += bytes_to_show(t, nearest_rung(t, static_cast<double>(quality[i])), i);
       findings.require_equal(
           bytes, t.total_bytes[s * kGammas + g], "tables-total", kTablesPath,
           plane_field(plane, "D_" + std::to_string(s) + "(" + fixed(static_cast<double>(g) / 20, 2) + ")"));
     }
 }
 
-bool is_table_stream(std::span<const std::uint8_t> s) {
-  return s.size() >= 6 && s[0] == 0xff && s[1] == 0xd8 && s[s.size() - 2] == 0xff && s[s.size() - 1] == 0xd9;
-}
-
 void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung, std::size_t i,
-                    std::span<const std::uint8_t> tables, std::span<const std::uint8_t> stream,
-                    Findings& findings) {
+                    const PlaneStreams& streams, Findings& findings) {
   const std::string& entry = texture.rungs[rung].path;
   const std::string field = "fragment " + std::to_string(i);
-  const std::uint64_t stated = t.digest[rung * t.fragment_count() + i], real = truncated(sha256(stream));
+  const std::uint64_t stated = t.digest[rung * t.fragment_count() + i],
+                      real = truncated(sha256(streams.stream(i)));
   if (stated != real) {
     const auto hex = [](std::uint64_t v) {
       char text[20];
@@ -80,7 +76,7 @@ void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint3
   try {
     const std::uint64_t texels =
         static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
-    const Pixels pixels = decode_jpeg(complete_jpeg(tables, stream), texels);
+    const Pixels pixels = decode_fragment_file(texture.codec, streams.file(i), texels);
     findings.require(
         pixels.width_px == texture.fragment_width_px && pixels.height_px == texture.fragment_height_px &&
             pixels.channels == texture.channels,
@@ -118,6 +114,16 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
                      "tables-rungs", kTablesPath, plane_field(static_cast<std::uint32_t>(k), "rungs"),
                      std::to_string(info.rung_quality.size()) + " rungs of the qualities in textures.json",
                      std::to_string(t.rung_quality.size()) + " rungs");
+    const CodecTraits& codec = codec_traits(info.codec);
+    findings.require(codec.incremental == t.incremental, "tables-codec", kTablesPath,
+                     plane_field(static_cast<std::uint32_t>(k), "incremental"),
+                     codec.incremental ? "set, for codec " + std::string(codec.id) : "not set",
+                     "the opposite");
+    findings.require(
+        codec.required_feature.empty() ||
+            std::count(m.required_features.begin(), m.required_features.end(), codec.required_feature) > 0,
+        "textures", kManifestPath, "/requiredFeatures", std::string(codec.required_feature),
+        "codec " + std::string(codec.id) + " without it");
     findings.require_equal(sum(t.table_bytes), info.tables.bytes, "tables-size", info.tables.path, "bytes");
     for (std::size_t r = 0; r < std::min(info.rungs.size(), t.rung_count()); ++r) {
       std::uint64_t bytes = 0;
@@ -165,32 +171,23 @@ void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::
   if (pack.size() != sum(t.table_bytes)) return;  // check_textures says so
   std::size_t offset = 0;
   for (std::size_t r = 0; r < t.rung_count(); ++r) {
-    findings.require(is_table_stream(pack.subspan(offset, t.table_bytes[r])), "table-stream",
-                     texture.tables.path, "rung " + std::to_string(r),
-                     "SOI, tables, EOI in " + std::to_string(t.table_bytes[r]) + " bytes", "other bytes");
+    findings.require(
+        is_table_stream(texture.codec, static_cast<std::uint32_t>(r), pack.subspan(offset, t.table_bytes[r])),
+        "table-stream", texture.tables.path, "rung " + std::to_string(r),
+        "a table stream of " + std::string(codec_traits(texture.codec).id) + " in " +
+            std::to_string(t.table_bytes[r]) + " bytes",
+        "other bytes");
     offset += t.table_bytes[r];
   }
 }
 
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung,
-                         std::span<const std::uint8_t> table_pack, std::span<const std::uint8_t> pack,
-                         const RunContext& context, Findings& findings) {
-  std::vector<std::uint64_t> offset{0};
-  for (const std::uint16_t i : t.order)
-    offset.push_back(offset.back() + t.size_bytes[rung * t.fragment_count() + i]);
-  const std::uint64_t tables_at =
-      std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
-  if (offset.back() != pack.size() || tables_at + t.table_bytes[rung] > table_pack.size())
-    return 0;  // check_textures says so
-  const auto tables = table_pack.subspan(static_cast<std::size_t>(tables_at), t.table_bytes[rung]);
+                         const PlaneStreams& streams, const RunContext& context, Findings& findings) {
   std::vector<Findings> per_fragment(t.order.size());
   parallel_for(context, t.order.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k)
-      if (offset[k + 1] > offset[k])  // a fragment may be stored on some rungs only
-        check_fragment(texture, t, rung, t.order[k], tables,
-                       pack.subspan(static_cast<std::size_t>(offset[k]),
-                                    static_cast<std::size_t>(offset[k + 1] - offset[k])),
-                       per_fragment[k]);
+      if (!streams.stream(t.order[k]).empty())  // a fragment may be stored on some rungs only
+        check_fragment(texture, t, rung, t.order[k], streams, per_fragment[k]);
   });
   for (Findings& f : per_fragment) findings.append(std::move(f));
   return t.order.size();

@@ -149,11 +149,14 @@ struct JpegWork {
   std::size_t code() const {
     std::size_t bytes = 0;
     for (int quality : qualities) {
-      JpegCoder coder(channels, quality, colour ? Subsampling::k420 : Subsampling::k444);
-      for (const Pixels& p : fragments)
-        bytes +=
-            coder.abbreviated({p.data.data(), std::size_t{p.width_px} * p.channels, p.width_px, p.height_px})
-                .size();
+      JpegCoder coder({channels, quality, Subsampling::k420, !colour && channels == 3});
+      std::vector<std::uint8_t> body;
+      for (const Pixels& p : fragments) {
+        body.clear();
+        coder.append_body({p.data.data(), std::size_t{p.width_px} * p.channels, p.width_px, p.height_px},
+                          body);
+        bytes += body.size();
+      }
     }
     return bytes;
   }

@@ -276,11 +276,11 @@ TEST(PackageReader, WhatIsNoPackageIsRefused) {
 
 TEST(JoinJpeg, ChecksItsMarkers) {
   const Bytes good = fake_jpeg(10, 1), bad(10, 1);
-  EXPECT_EQ(join_jpeg(good, good).size(), 16u);
-  EXPECT_THROW(join_jpeg(bad, good), FormatError);
-  EXPECT_THROW(join_jpeg(good, bad), FormatError);
-  EXPECT_THROW(join_jpeg({}, good), FormatError);
-  EXPECT_THROW(join_jpeg(good, Bytes{0xff, 0xd8}), FormatError);
+  EXPECT_EQ(join_fragment(Codec::kJpeg, good, good).size(), 16u);
+  EXPECT_THROW(join_fragment(Codec::kJpeg, bad, good), FormatError);
+  EXPECT_THROW(join_fragment(Codec::kJpeg, good, bad), FormatError);
+  EXPECT_THROW(join_fragment(Codec::kJpeg, {}, good), FormatError);
+  EXPECT_THROW(join_fragment(Codec::kJpeg, good, Bytes{0xff, 0xd8}), FormatError);
 }
 
 TEST(SelectScale, FollowsTheStepFunction) {

@@ -233,7 +233,7 @@ TEST(Textures, RulesAreChecked) {
       EXPECT_EQ(e.place(), std::string("/textures/0/") + place);
     }
   };
-  refused("codec", [](Json& j) { j["codec"] = "webp"; });
+  refused("codec", [](Json& j) { j["codec"] = "jpeg-xl"; });
   refused("colourSpace", [](Json& j) { j["colourSpace"] = "p3"; });
   refused("channels", [](Json& j) { j["channels"] = 2; });
   refused("columns", [](Json& j) { j["columns"] = 5; });

@@ -378,12 +378,14 @@ TEST(Verify, Fragments) {
   EXPECT_TRUE(catches_only(broken([](Bytes& b) { b[0] = 0; }), "fragment-decode", rung_path(0, 0)));
   EXPECT_TRUE(
       catches_only(broken([](Bytes& b) { b[b.size() - 2] = 0; }), "fragment-decode", rung_path(0, 0)));
-  EXPECT_TRUE(catches_only(
-      broken([](Bytes& b) {  // another height in the frame header: SOF0, 2 bytes length, precision, height
-        for (std::size_t i = 0; i + 8 < b.size(); ++i)
-          if (b[i] == 0xff && b[i + 1] == 0xc0) b[i + 6] = 16;
-      }),
-      "fragment-decode", rung_path(0, 0)));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             // Another height in the frame header that the lower rung's fragments share:
+                             // SOF0, 2 bytes length, precision, height.
+                             Bytes& b = p.streams[table_streams_path(0)];
+                             for (std::size_t i = 0; i + 8 < p.tables.planes[0].table_bytes[0]; ++i)
+                               if (b[i] == 0xff && b[i + 1] == 0xc0) b[i + 6] = 16;
+                           }),
+                           "fragment-decode", rung_path(0, 0)));
 }
 
 }  // namespace

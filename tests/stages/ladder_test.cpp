@@ -63,8 +63,8 @@ Ladder encode(const Plane& p, LadderOptions options = {}, int threads = 1) {
   return encode_ladder(p.fragments, p.pixels, options, context);
 }
 
-Pixels decode_fragment(const LadderRung& rung, std::size_t fragment) {
-  return decode_jpeg(complete_jpeg(rung.tables, fragment_stream(rung, fragment)), 1 << 24);
+Pixels decode_baseline(const LadderRung& rung, std::size_t fragment) {
+  return decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, fragment_stream(rung, fragment)), 1 << 24);
 }
 
 /// The pixels of one fragment as an image of its own.
@@ -92,7 +92,7 @@ TEST(Ladder, EveryFragmentDecodesToWhatADirectEncodeGives) {
         for (std::size_t f = 0; f < 6; ++f) {
           const Pixels direct = decode_jpeg(
               encode_jpeg(crop(p.pixels[0], p.fragments.planes[0], f), rung.quality, subsampling), 1 << 24);
-          const Pixels ours = decode_fragment(rung, f);
+          const Pixels ours = decode_baseline(rung, f);
           EXPECT_EQ(ours.channels, channels);
           EXPECT_TRUE(ours.data == direct.data) << "rung " << rung.quality << " fragment " << f;
         }
@@ -111,7 +111,7 @@ TEST(Ladder, FragmentsMeetAsInTheWholeImage) {
       const Pixels whole = decode_jpeg(encode_jpeg(p.pixels[0], rung.quality, subsampling), 1 << 24);
       std::size_t inner = 0, ring = 0;
       for (std::size_t f = 0; f < 4; ++f) {
-        const Pixels expected = crop(whole, p.fragments.planes[0], f), got = decode_fragment(rung, f);
+        const Pixels expected = crop(whole, p.fragments.planes[0], f), got = decode_baseline(rung, f);
         for (std::uint32_t y = 0; y < 64; ++y)
           for (std::uint32_t x = 0; x < 64; ++x) {
             if (std::equal(got.at(x, y), got.at(x, y) + 3, expected.at(x, y))) continue;
@@ -124,15 +124,50 @@ TEST(Ladder, FragmentsMeetAsInTheWholeImage) {
   }
 }
 
-TEST(Ladder, DataPlanesKeepFullChroma) {
-  const Plane colour = make_plane(1, 1, 64, 3),
-              data = make_plane(1, 1, 64, 3, Content::kPhoto, TextureRole::kNormal);
-  const Pixels expected = decode_jpeg(encode_jpeg(data.pixels[0], 97, Subsampling::k444), 1 << 24);
-  EXPECT_TRUE(decode_fragment(encode(data).planes[0].rungs.back(), 0).data == expected.data);
-  EXPECT_FALSE(decode_fragment(encode(colour).planes[0].rungs.back(), 0).data == expected.data);
+/// Each channel as a grey image of its own.
+Pixels channels_apart(const Pixels& pixels, int quality) {
+  Pixels out = pixels;
+  for (std::size_t c = 0; c < 3; ++c) {
+    Pixels channel{pixels.width_px, pixels.height_px, 1, {}};
+    for (std::size_t k = c; k < pixels.data.size(); k += 3) channel.data.push_back(pixels.data[k]);
+    const Pixels decoded = decode_jpeg(encode_jpeg(channel, quality, Subsampling::k444), 1 << 24);
+    for (std::size_t k = 0; k < decoded.data.size(); ++k) out.data[3 * k + c] = decoded.data[k];
+  }
+  return out;
 }
 
-TEST(Ladder, StreamsAreAbbreviatedAndLarger) {
+TEST(Ladder, ChannelsOfDataPlanesAreKeptApart) {
+  for (const TextureRole role : {TextureRole::kNormal, TextureRole::kOcclusionRoughnessMetallic}) {
+    const Plane data = make_plane(1, 1, 64, 3, Content::kPhoto, role);
+    const Ladder ladder = encode(data);
+    for (const LadderRung& rung : ladder.planes[0].rungs)
+      EXPECT_TRUE(decode_baseline(rung, 0).data == channels_apart(data.pixels[0], rung.quality).data);
+    EXPECT_TRUE(decode_fragment_luma(ladder.planes[0], 0, 0, 4096).data ==
+                luma_of(decode_fragment(ladder.planes[0], 0, 0, 4096)).data);
+  }
+}
+
+TEST(Ladder, EveryRoleHasItsOwnRungs) {
+  LadderOptions options;
+  options.rungs = {10, 20};
+  options.normal_rungs = {30, 40, 50};
+  options.data_rungs = {60};
+  options.alpha_rungs = {70, 80, 90, 100};
+  const auto rungs = [&](TextureRole role, std::uint32_t channels) {
+    std::vector<int> out;
+    const Ladder ladder = encode(make_plane(1, 1, 16, channels, Content::kPhoto, role), options);
+    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.quality);
+    return out;
+  };
+  for (const TextureRole role : {TextureRole::kBaseColour, TextureRole::kEmissive, TextureRole::kColour})
+    EXPECT_EQ(rungs(role, 3), options.rungs);
+  EXPECT_EQ(rungs(TextureRole::kNormal, 3), options.normal_rungs);
+  EXPECT_EQ(rungs(TextureRole::kOcclusionRoughnessMetallic, 3), options.data_rungs);
+  EXPECT_EQ(rungs(TextureRole::kData, 1), options.data_rungs);
+  EXPECT_EQ(rungs(TextureRole::kAlpha, 1), options.alpha_rungs);
+}
+
+TEST(Ladder, StreamsHoldTheirDataAloneAndRise) {
   const Plane p = make_plane(2, 2, 64, 3);
   const Ladder ladder = encode(p);
   std::size_t last = 0;
@@ -141,13 +176,14 @@ TEST(Ladder, StreamsAreAbbreviatedAndLarger) {
     last = rung.data.size();
     EXPECT_EQ(rung.tables[2], 0xff);
     EXPECT_EQ(rung.tables[3], 0xdb);  // DQT right after SOI
+    EXPECT_EQ(rung.tables[rung.tables.size() - 16], 0xff);
+    EXPECT_EQ(rung.tables[rung.tables.size() - 15], 0xda);  // SOS right before EOI: data follow
     for (std::size_t f = 0; f < 4; ++f) {
       const auto stream = fragment_stream(rung, f);
-      EXPECT_EQ(stream[2], 0xff);
-      EXPECT_EQ(stream[3], 0xc0);  // SOF0 right after SOI: no JFIF, no tables
-      EXPECT_EQ(stream[2 + 19], 0xff);
-      EXPECT_EQ(stream[2 + 19 + 1], 0xda);
+      EXPECT_EQ(stream[1], 0xd8);
       EXPECT_EQ(stream[stream.size() - 1], 0xd9);
+      for (std::size_t k = 2; k + 2 < stream.size(); ++k)
+        if (stream[k] == 0xff) EXPECT_EQ(stream[k + 1], 0) << "entropy-coded data between SOI and EOI only";
     }
   }
 }
@@ -156,15 +192,14 @@ TEST(Ladder, TrainedTablesBeatTypicalOnes) {
   const Plane p = make_plane(4, 4, 64, 3);
   const Ladder ladder = encode(p);
   for (const LadderRung& rung : ladder.planes[0].rungs) {
-    JpegCoder typical(3, rung.quality, Subsampling::k420);
-    std::size_t bytes = 0;
+    JpegCoder typical({3, rung.quality, Subsampling::k420});
+    std::vector<std::uint8_t> bytes;
     for (std::size_t f = 0; f < 16; ++f)
-      bytes += typical
-                   .abbreviated({p.pixels[0].at(static_cast<std::uint32_t>(f % 4) * 64,
-                                                static_cast<std::uint32_t>(f / 4) * 64),
-                                 256 * 3, 64, 64})
-                   .size();
-    EXPECT_LT(rung.data.size(), bytes);
+      typical.append_body(
+          {p.pixels[0].at(static_cast<std::uint32_t>(f % 4) * 64, static_cast<std::uint32_t>(f / 4) * 64),
+           256 * 3, 64, 64},
+          bytes);
+    EXPECT_LT(rung.data.size(), bytes.size());
   }
 }
 
@@ -183,7 +218,7 @@ TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
   for (const LadderRung& rung : ladder.planes[0].rungs) {
     const Pixels direct = decode_jpeg(
         encode_jpeg(crop(p.pixels[0], p.fragments.planes[0], 0), rung.quality, Subsampling::k420), 1 << 24);
-    EXPECT_TRUE(decode_fragment(rung, 0).data == direct.data) << rung.quality;
+    EXPECT_TRUE(decode_baseline(rung, 0).data == direct.data) << rung.quality;
   }
 }
 
@@ -263,11 +298,12 @@ TEST(Ladder, EveryTruncationIsRefused) {
   const LadderRung& rung = ladder.planes[0].rungs[0];
   const auto whole = fragment_stream(rung, 0);
   for (std::size_t n = 0; n < whole.size(); ++n)
-    EXPECT_THROW(decode_jpeg(complete_jpeg(rung.tables, whole.first(n)), 1 << 20), FormatError) << n;
+    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, whole.first(n)), 1 << 20), FormatError)
+        << n;
   const std::span<const std::uint8_t> tables(rung.tables);
   for (std::size_t n = 0; n < tables.size(); ++n)
-    EXPECT_THROW(decode_jpeg(complete_jpeg(tables.first(n), whole), 1 << 20), FormatError) << n;
-  const auto complete = complete_jpeg(rung.tables, whole);
+    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, tables.first(n), whole), 1 << 20), FormatError) << n;
+  const auto complete = join_fragment(Codec::kJpeg, rung.tables, whole);
   for (std::size_t n = 0; n < complete.size(); ++n)
     EXPECT_THROW(decode_jpeg(std::span(complete).first(n), 1 << 20), FormatError) << n;
 }

@@ -1,0 +1,95 @@
+// Baseline JPEG: every rung has Huffman tables trained on a sample of the plane, and everything that
+// fragments have in common stands in the rung's table stream.
+#include "stages/jpeg_coder.h"
+#include "stages/parallel.h"
+#include "stages/texture_codecs.h"
+
+namespace texmesh {
+namespace {
+
+// A coded symbol of the sample weighs this much against one unit of the typical tables (annex K.3), which
+// stand for what the sample does not show: every symbol that baseline coding can produce needs a code,
+// because libjpeg-turbo writes a damaged stream for one that has none.
+constexpr std::uint64_t kSampleWeight = 64;
+
+JpegKind kind_of(const PlaneCoding& plane, int quality) {
+  JpegKind kind;
+  kind.channels = plane.channels;
+  kind.quality = quality;
+  kind.subsampling = plane.colour ? plane.subsampling : Subsampling::k444;
+  kind.rgb = plane.channels == 3 && !plane.colour;
+  return kind;
+}
+
+/// A table for the symbols counted, with a code for every symbol of `typical`, where a code of length l
+/// stands for a frequency of 2^-l.
+HuffmanTable table_for(const std::array<std::uint64_t, 256>& count, const HuffmanTable& typical) {
+  std::vector<std::uint64_t> weights;
+  std::size_t at = 0;
+  for (std::size_t l = 1; l <= 16; ++l)
+    for (int k = 0; k < typical.bits[l]; ++k)
+      weights.push_back(kSampleWeight * count[typical.symbols[at++]] + (std::uint64_t{1} << (16 - l) / 2));
+  return make_huffman_table(typical.symbols, weights);
+}
+
+class JpegCodec : public TextureCodec {
+ public:
+  explicit JpegCodec(const PlaneCoding& plane) : plane_(plane) {}
+  Codec id() const override { return Codec::kJpeg; }
+
+  std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
+    std::vector<CodecRung> rungs(plane_.qualities.size());
+    tables_.resize(rungs.size());
+    parallel_for(context, rungs.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        JpegCoder coder(kind_of(plane_, plane_.qualities[r]));
+        tables_[r] = train_rung(coder, sample);
+        coder.use_tables(tables_[r]);
+        rungs[r] = {plane_.qualities[r],
+                    coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px)};
+      }
+    });
+    return rungs;
+  }
+
+  std::unique_ptr<FragmentEncoder> encoder() const override { return std::make_unique<Encoder>(*this); }
+
+ private:
+  static HuffmanTables train_rung(JpegCoder& coder, std::span<const PixelWindow> sample) {
+    HuffmanTables tables = coder.tables();
+    SymbolCounts counts(tables.size());
+    for (const PixelWindow& window : sample) coder.count_symbols(window, counts);
+    for (std::size_t k = 0; k < tables.size() && !sample.empty(); ++k)
+      tables[k] = table_for(counts[k], tables[k]);
+    return tables;
+  }
+
+  class Encoder : public FragmentEncoder {
+   public:
+    explicit Encoder(const JpegCodec& codec) {
+      for (std::size_t r = 0; r < codec.tables_.size(); ++r) {
+        coders_.push_back(std::make_unique<JpegCoder>(kind_of(codec.plane_, codec.plane_.qualities[r])));
+        coders_.back()->use_tables(codec.tables_[r]);
+      }
+    }
+    // Rung after rung of one fragment, so that its pixels stay in the cache; rung by rung costs a quarter
+    // more.
+    void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
+      for (std::size_t r = 0; r < coders_.size(); ++r) coders_[r]->append_body(fragment, streams[r]);
+    }
+
+   private:
+    std::vector<std::unique_ptr<JpegCoder>> coders_;
+  };
+
+  PlaneCoding plane_;
+  std::vector<HuffmanTables> tables_;
+};
+
+}  // namespace
+
+std::unique_ptr<TextureCodec> make_jpeg_codec(const PlaneCoding& plane) {
+  return std::make_unique<JpegCodec>(plane);
+}
+
+}  // namespace texmesh

@@ -1,0 +1,66 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "format/codec.h"
+#include "stages/jpeg.h"
+#include "stages/run_context.h"
+
+namespace texmesh {
+
+/// A rectangle of interleaved 8-bit pixels within a larger image.
+struct PixelWindow {
+  const std::uint8_t* data = nullptr;
+  std::size_t stride_bytes = 0;
+  std::uint32_t width_px = 0, height_px = 0;
+};
+
+/// What is coded: all fragments of one plane.
+struct PlaneCoding {
+  std::uint32_t channels = 3;                                   // 1 or 3
+  std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
+  bool colour = true;                           // sRGB colours; otherwise data, whose channels are kept apart
+  Subsampling subsampling = Subsampling::k420;  // of colours
+  std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
+};
+
+/// A rung as the package describes it: its quality on IJG's scale and the table stream that its fragments
+/// share.
+struct CodecRung {
+  int quality = 0;
+  std::vector<std::uint8_t> tables;
+};
+
+/// Encodes fragments, one thread's at a time.
+class FragmentEncoder {
+ public:
+  virtual ~FragmentEncoder() = default;
+  /// Appends the fragment's stream of rung r to streams[r].
+  virtual void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) = 0;
+};
+
+/// A way to code the fragments of one plane at all rungs. What is done with the streams afterwards (joining
+/// them to files, cutting files to streams) needs no pixels and stands in format/codec.h.
+class TextureCodec {
+ public:
+  virtual ~TextureCodec() = default;
+  virtual Codec id() const = 0;
+  /// Chooses rungs and makes their shared tables from a sample of the plane; once, before encoder(). The
+  /// sample may be empty. Same result for any thread count.
+  virtual std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) = 0;
+  /// Encoders of several threads may run at once. The codec must outlive them.
+  virtual std::unique_ptr<FragmentEncoder> encoder() const = 0;
+};
+
+/// StageError when the codec cannot code such planes.
+std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding& plane);
+
+/// Pixels of a complete file (join_fragment()), 1 or 3 channels. FormatError when it is damaged, larger than
+/// max_pixels, or not of that codec; nothing is allocated for pixels before their number is checked.
+Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
+/// The same, but luma as JPEG defines it (grey planes: as they are).
+Pixels decode_fragment_file_luma(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
+
+}  // namespace texmesh
