@@ -45,9 +45,10 @@ EntryName parse_texture_path(std::string_view text) {
 
 EntryName parse_any_spelling(std::string_view path) {
   constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest}, {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},     {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},   {kProvenancePath, EntryKind::kProvenance}};
+      {kManifestPath, EntryKind::kManifest},      {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},          {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},        {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -117,6 +118,7 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
     case EntryKind::kProvenance:
       return kLast;
     case EntryKind::kFragmentFile:
+    case EntryKind::kSplitStream:  // readers of 1.0 do not know it and expect it there
     case EntryKind::kOther:
       return kOthers;
   }

@@ -14,6 +14,7 @@ inline constexpr const char* kTablesPath = "tables.bin";
 inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
+inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
 
 std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
@@ -24,7 +25,7 @@ std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r0
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
                                std::string_view extension = "jpg");
 
-/// What a path stands for; kOther for paths that version 1.0 does not define.
+/// What a path stands for; kOther for paths that this version does not define.
 enum class EntryKind : std::uint8_t {
   kManifest,
   kIndex,
@@ -36,6 +37,7 @@ enum class EntryKind : std::uint8_t {
   kTableStreams,
   kRung,
   kFragmentFile,
+  kSplitStream,
   kOther,
   kProvenance
 };

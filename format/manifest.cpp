@@ -44,6 +44,15 @@ Json ref_json(const PagedRef& ref) {
   return j;
 }
 
+Json stream_json(const StreamRef& ref) {
+  Json j;
+  j["offset"] = ref.offset;
+  j["bytes"] = ref.bytes;
+  j["headBytes"] = ref.head_bytes;
+  j["headSha256"] = to_hex(ref.head_digest);
+  return j;
+}
+
 /// One array per property: as objects, forty scales would spend half of the 16 KiB on names.
 Json scales_json(const std::vector<ManifestScale>& scales) {
   Json j;
@@ -95,6 +104,7 @@ Json manifest_json(const Manifest& m) {
   j["textures"] = ref_json(m.textures);
   j["quality"] = ref_json(m.quality);
   j["provenance"] = ref_json(m.provenance);
+  if (m.stream) j["stream"] = stream_json(*m.stream);
   return j;
 }
 
@@ -137,6 +147,15 @@ void read_paged_ref(const JsonAt& at, const char* path, PagedRef& ref) {
   read_ref(at, path, ref);
   ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
   ref.head_digest = at["headSha256"].digest();
+}
+
+StreamRef read_stream(const JsonAt& at) {
+  StreamRef ref;
+  ref.offset = read_offset(at["offset"]);
+  ref.bytes = at["bytes"].integer(1);
+  ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
+  ref.head_digest = at["headSha256"].digest();
+  return ref;
 }
 
 void read_shape(const JsonAt& at, Manifest& m) {
@@ -244,6 +263,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_ref(at["textures"], kTexturesPath, m.textures);
   read_ref(at["quality"], kQualityPath, m.quality);
   read_ref(at["provenance"], kProvenancePath, m.provenance);
+  if (document.contains("stream")) m.stream = read_stream(at["stream"]);
   return m;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +36,14 @@ struct PagedRef : EntryRef {
   std::uint64_t head_bytes = 0;
   Sha256 head_digest{};
   friend bool operator==(const PagedRef&, const PagedRef&) = default;
+};
+
+/// Where mesh/stream.bin stands. Its digest is the index's; a client that takes blocks of it checks the head
+/// by this and the blocks by the head.
+struct StreamRef {
+  std::uint64_t offset = 0, bytes = 0, head_bytes = 0;
+  Sha256 head_digest{};
+  friend bool operator==(const StreamRef&, const StreamRef&) = default;
 };
 
 struct ByteRange {
@@ -82,6 +91,7 @@ struct Manifest {
   std::vector<ByteRange> previews;  // of planes 0.., at most kMaxManifestPreviews; inside the first picture
   PagedRef index, tables;
   EntryRef textures, quality, provenance;
+  std::optional<StreamRef> stream;  // vertex splits (since 1.1)
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 

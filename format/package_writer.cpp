@@ -6,6 +6,7 @@
 
 #include "format/container.h"
 #include "format/layout.h"
+#include "format/split_stream.h"
 #include "format/tables.h"
 
 namespace texmesh {
@@ -47,6 +48,7 @@ class ManifestFiller {
     set_head(manifest_.tables, read_tables_head(*data_.at(kTablesPath)).bytes);
     for (ManifestScale& s : manifest_.scales) set(s.glb, mesh_path(s.scale));
     fill_first_picture();
+    fill_stream();
   }
 
  private:
@@ -54,6 +56,15 @@ class ManifestFiller {
   void set_head(PagedRef& ref, std::uint64_t head_bytes) {
     ref.head_bytes = head_bytes;
     ref.head_digest = sha256(std::span(*data_.at(ref.path)).first(static_cast<std::size_t>(head_bytes)));
+  }
+  void fill_stream() {
+    manifest_.stream.reset();
+    const auto it = by_path_.find(kSplitStreamPath);
+    if (it == by_path_.end()) return;
+    const Bytes& bytes = *data_.at(kSplitStreamPath);
+    const std::uint64_t head_bytes = read_split_head(bytes).bytes;
+    manifest_.stream = StreamRef{it->second->offset, it->second->bytes, head_bytes,
+                                 sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))};
   }
   void fill_first_picture() {
     const EntryRef& coarsest = manifest_.scales.back().glb;

@@ -213,6 +213,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   entries.push_back({kQualityPath, to_bytes(write_quality(quality))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
   for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  if (!files.stream.empty()) entries.push_back({kSplitStreamPath, files.stream});
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     context.check_cancelled();
     textures.push_back(describe_texture(fragments.planes[p], ladder.planes[p], images));

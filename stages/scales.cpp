@@ -7,6 +7,7 @@
 #include "stages/parallel.h"
 #include "stages/scale_codecs.h"
 #include "stages/scale_materials.h"
+#include "stages/vertex_split.h"
 
 namespace texmesh {
 namespace {
@@ -156,6 +157,42 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   return file;
 }
 
+/// What the stream rounds to: as Draco, whatever the files are; at most 24 bits.
+VertexSplitCoding stream_coding(const ScaleCoding& coding, const std::vector<Material>& materials,
+                                const std::vector<Image>& images) {
+  constexpr int kMostBits = 24;
+  VertexSplitCoding out;
+  ScalesOptions most = coding.options;
+  out.position = coding.position;
+  if (out.position.bits == 0) out.position = position_grid(coding.mesh, most, kMostBits);
+  for (int set = 0; set < 2; ++set)
+    if (coding.write_uv[set])
+      out.uv[set] =
+          uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), most, kMostBits);
+  most.position_bits = most.uv_bits = kMostBits;
+  if (out.position.bits == 0) out.position = position_grid(coding.mesh, most, kMostBits);
+  for (int set = 0; set < 2; ++set)
+    if (coding.write_uv[set] && out.uv[set].bits == 0)
+      out.uv[set] = uv_grid(coding.uv_values(set), 1, most, kMostBits);
+  out.normal_bits = coding.options.normal_bits;
+  out.colour_bits = coding.mesh.colours.empty() ? 0 : coding.fine_colours ? 16 : 8;
+  out.merge_parts = coding.mesh.part_names.size() > kMostNodes;
+  return out;
+}
+
+void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
+                  const std::vector<Material>& materials, const std::vector<Image>& images,
+                  const RunContext& context, ScaleFiles& result) {
+  if (!coding.options.stream || kept.size() < 2) return;
+  try {
+    result.stream = write_split_stream(
+        make_vertex_splits(scales, kept, stream_coding(coding, materials, images), context));
+  } catch (const FormatError& e) {
+    add_info(result.notes, "no-stream", "",
+             std::string("the scales have no vertex-split stream: ") + e.what());
+  }
+}
+
 double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
   double largest = 0;
   if (grid.bits == 0) return largest;
@@ -189,9 +226,10 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, previews);
-      context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size()));
+      context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
     }
   });
+  write_stream(coding, scales, kept, materials, images, context, result);
   return result;
 }
 

@@ -28,6 +28,7 @@ struct ScalesOptions {
   int position_bits = 0;  // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
   int uv_bits = 0;        // 0 = error <= 1/4 texel of the largest texture
   int normal_bits = 10;
+  bool stream = true;  // the vertex-split stream beside the files
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
@@ -37,6 +38,7 @@ struct ScalesOptions {
     v("uv_bits", s.uv_bits, Range{0, 24},
       "bits per texture coordinate; 0 = so that the error is under 1/4 texel");
     v("normal_bits", s.normal_bits, Range{4, 16}, "bits per normal component");
+    v("stream", s.stream, "also write all scales as one stream of vertex splits");
   }
 };
 
@@ -53,10 +55,11 @@ struct ScaleFiles {
   std::vector<ScaleFile> files;        // kept scales, S_0 first
   int position_bits = 0, uv_bits = 0;  // as used; 0 = float
   double position_error = 0;           // largest rounding of a coordinate, object units
+  std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.notes);
+    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.stream, s.notes);
   }
 };
 
@@ -67,7 +70,10 @@ struct ScaleFiles {
 /// corners in one place of the grid are left out. Texture coordinates of unused sets are left out, and
 /// textures whose coordinates the mesh does not have. Positions stay in the local frame (Mesh::origin is the
 /// manifest's). draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same
-/// under EXT_meshopt_compression; none = plain floats. Throws StageError when nothing is left on the grid.
+/// under EXT_meshopt_compression; none = plain floats. The stream (format/split_stream.h) holds the same
+/// scales on the same grid, or on one of 24 bits where the files have floats; there is none, and a note says
+/// so, when only one scale is kept or it would break the format's bounds. Throws StageError when nothing is
+/// left on the grid.
 /// Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,

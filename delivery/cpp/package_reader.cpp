@@ -150,6 +150,21 @@ Bytes PackageReader::scale_glb(int scale) {
   throw FormatError(store_->name(), "scale " + std::to_string(scale), "a scale of the package", "none");
 }
 
+SplitStreamHead PackageReader::split_stream_head() {
+  if (!manifest_.stream)
+    throw FormatError(store_->name(), kSplitStreamPath, "a stream of vertex splits", "none");
+  const StreamRef& ref = *manifest_.stream;
+  const Bytes head = store_->read({kSplitStreamPath, ref.offset, ref.bytes, {}}, 0, ref.head_bytes);
+  if (sha256(head) != ref.head_digest)
+    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath, to_hex(ref.head_digest),
+                      to_hex(sha256(head)));
+  SplitStreamHead parsed = read_split_head(head);
+  if (parsed.bytes != ref.head_bytes)
+    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath,
+                      std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+  return parsed;
+}
+
 const TextureInfo& PackageReader::texture(std::uint32_t plane) {
   if (plane >= textures().size())
     throw FormatError(store_->name(), plane_place(plane), "one of " + std::to_string(textures_->size()),

@@ -9,6 +9,7 @@
 #include "format/container.h"
 #include "format/layout.h"
 #include "format/manifest.h"
+#include "format/split_stream.h"
 #include "format/tables.h"
 
 namespace texmesh {
@@ -59,6 +60,9 @@ class PackageReader {
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
   std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
+  /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read
+  /// with store() or entry(kSplitStreamPath).
+  SplitStreamHead split_stream_head();
   std::vector<std::uint8_t> preview(std::uint32_t plane);
   std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);
   /// Where a fragment's stream stands within its rung's entry; bytes 0 = not stored.

@@ -36,6 +36,18 @@ Json summary_json(PackageReader& p) {
                         {"fragments", stored_fragments(p.tables().planes[k])},
                         {"rungs", t.rungs.size()}});
   }
+  Json stream = Json::array();
+  if (m.stream)
+    for (const StreamFigures& f : stream_figures(p.split_stream_head()))
+      stream.push_back({{"scale", f.scale},
+                        {"triangles", f.triangles},
+                        {"points", f.points},
+                        {"blocks", f.blocks},
+                        {"bytes", f.bytes},
+                        {"connectivity", f.connectivity},
+                        {"positions", f.positions},
+                        {"uv", f.uv},
+                        {"others", f.others}});
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
   return {{"package",
            {{"id", to_hex(p.id())},
@@ -51,6 +63,7 @@ Json summary_json(PackageReader& p) {
             {"height", m.object_height},
             {"jnd", m.jnd}}},
           {"steps", steps},
+          {"stream", stream},
           {"textures", textures},
           {"bytes", kinds},
           {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};

@@ -48,6 +48,22 @@ std::string scales_text(PackageReader& p) {
          table.text();
 }
 
+std::string stream_text(PackageReader& p) {
+  if (!p.manifest().stream) return "vertex-split stream: none\n";
+  const SplitStreamHead head = p.split_stream_head();
+  TextTable table;
+  for (const char* header :
+       {"up to", "triangles", "points", "blocks", "kB", "connectivity", "positions", "UV", "others"})
+    table.column(header);
+  for (const StreamFigures& f : stream_figures(head))
+    table.row({fmt::format("S_{}", f.scale), grouped(f.triangles), grouped(f.points), grouped(f.blocks),
+               kilobytes(f.bytes), kilobytes(f.connectivity), kilobytes(f.positions), kilobytes(f.uv),
+               kilobytes(f.others)});
+  return fmt::format("vertex-split stream ({} bits per coordinate; kB from its start, head included)\n",
+                     head.position.bits) +
+         table.text();
+}
+
 std::string steps_text(const Manifest& m) {
   TextTable table;
   table.column("displayed height up to [px]");
@@ -116,8 +132,8 @@ std::string summary_text(PackageReader& p) {
       "start     {} kB show the object: manifest and index, then one range of {} bytes from {}\n\n",
       kilobytes(m.first_picture_offset + m.first_picture_bytes), m.first_picture_bytes,
       m.first_picture_offset);
-  return s + scales_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" + kinds_text(kinds) +
-         "\n" + options_text(provenance);
+  return s + scales_text(p) + "\n" + stream_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" +
+         kinds_text(kinds) + "\n" + options_text(provenance);
 }
 
 /// Where texture detail lies: a digit per fragment, eta of S_0 in tenths, '.' where nothing is stored.

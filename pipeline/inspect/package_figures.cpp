@@ -13,11 +13,12 @@ struct Kind {
   std::vector<EntryKind> kinds;
 };
 
-const std::array<Kind, 6>& kinds() {
-  static const std::array<Kind, 6> list{
+const std::array<Kind, 7>& kinds() {
+  static const std::array<Kind, 7> list{
       {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
        {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
        {"meshes", {EntryKind::kMesh}},
+       {"vertex-split stream", {EntryKind::kSplitStream}},
        {"previews", {EntryKind::kPreview}},
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
@@ -44,6 +45,25 @@ std::vector<KindBytes> bytes_by_kind(const Manifest& manifest, std::uint64_t man
   for (const EntryRef& e : index) add(e.path, e.bytes);
   std::erase_if(sums, [](const KindBytes& k) { return k.entries == 0; });
   return sums;
+}
+
+std::vector<StreamFigures> stream_figures(const SplitStreamHead& head) {
+  std::vector<StreamFigures> scales;
+  StreamFigures sum;
+  sum.bytes = head.bytes;
+  for (const SplitScale& s : head.scales) {
+    for (; sum.blocks < s.blocks; ++sum.blocks) {
+      const SplitBlock& b = head.blocks[sum.blocks];
+      sum.bytes += b.bytes();
+      sum.connectivity += b.parts[0];
+      sum.positions += b.parts[1];
+      for (std::size_t k = 0; k < head.attributes.size(); ++k)
+        (head.attributes[k].kind <= SplitKind::kUv1 ? sum.uv : sum.others) += b.parts[k + 2];
+    }
+    sum.scale = s.scale, sum.points = s.points, sum.triangles = s.triangles;
+    scales.push_back(sum);
+  }
+  return scales;
 }
 
 std::vector<RungFigures> rung_figures(const PlaneTables& t) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "format/manifest.h"
+#include "format/split_stream.h"
 #include "format/tables.h"
 
 namespace texmesh {
@@ -18,6 +19,15 @@ struct KindBytes {
 /// Entries of a package by what they are for, in a fixed order; kinds without entries are left out.
 std::vector<KindBytes> bytes_by_kind(const Manifest& manifest, std::uint64_t manifest_bytes,
                                      const std::vector<EntryRef>& index);
+
+/// A scale of the vertex-split stream: its counts, and the bytes from the stream's start to it.
+struct StreamFigures {
+  int scale = 0;
+  std::uint32_t points = 0, triangles = 0, blocks = 0;
+  std::uint64_t bytes = 0;  // all of: head, connectivity, positions, texture coordinates, others
+  std::uint64_t connectivity = 0, positions = 0, uv = 0, others = 0;
+};
+std::vector<StreamFigures> stream_figures(const SplitStreamHead& head);
 
 struct RungFigures {
   int quality = 0;

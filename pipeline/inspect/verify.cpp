@@ -180,6 +180,8 @@ class Verifier {
       guarded("entry-read", e.path, [&] { check_mesh_entry(e, static_cast<int>(name.number)); });
     } else if (texture) {
       guarded("entry-read", e.path, [&] { check_texture_entry(e, name); });
+    } else if (name.kind == EntryKind::kSplitStream) {
+      guarded("split-stream", e.path, [&] { check_split_stream(manifest_, read(e), context_, findings_); });
     } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
       findings_.require(manifest_.minor > kFormatMinor, "entry-unknown", e.path, "",
                         "an entry that format " + std::to_string(kFormatMajor) + "." +

@@ -47,6 +47,11 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
                   const ManifestScale& coarser, const std::vector<Vec3d>& coarser_positions,
                   Findings& findings);
 
+/// The stream of vertex splits: its head against the manifest, every block, and the triangles of every scale
+/// it passes. FormatError where it cannot be decoded.
+void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes,
+                        const RunContext& context, Findings& findings);
+
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 
 /// The table streams of all rungs: each as the codec has it, of the size the tables say.

@@ -110,6 +110,16 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   check(m.textures, "/textures");
   check(m.quality, "/quality");
   check(m.provenance, "/provenance");
+  if (m.stream) {
+    const auto it = entries.find(kSplitStreamPath);
+    if (it == entries.end())
+      findings.add("reference", kManifestPath, "/stream", std::string("an entry ") + kSplitStreamPath,
+                   "none in the index");
+    else
+      findings.require(it->second->offset == m.stream->offset && it->second->bytes == m.stream->bytes,
+                       "reference", kManifestPath, "/stream", text_of(*it->second) + " as in the index",
+                       std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
+  }
   for (std::size_t k = 0; k < m.scales.size(); ++k) check(m.scales[k].glb, at("scales/offset", k));
   check_previews(m, entries, findings);
   check_first_picture(m, index, findings);

@@ -1,0 +1,86 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace texmesh {
+
+/// A mesh under refinement by vertex splits. Points and wedges are only ever appended; splits change which
+/// wedges a face has.
+class SplitMesh {
+ public:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  using Point = std::array<std::int32_t, 3>;
+
+  /// A corner at a point, as gather() leaves them: the face is (point, a, b) in its own direction.
+  struct Corner {
+    std::uint32_t face = 0, corner = 0, a = 0, b = 0, wedge = 0;
+    bool moves = false;        // goes to the new point of a split,
+    std::uint32_t target = 0;  // and gets this wedge there
+  };
+  /// Corners begin .. end of the gathered ones, each next to the one before. A closed fan goes round.
+  struct Fan {
+    std::uint32_t begin = 0, end = 0;
+    bool closed = false;
+  };
+
+  SplitMesh() = default;
+  /// `components`: per attribute, how many numbers each wedge has.
+  explicit SplitMesh(std::vector<int> components);
+
+  const std::vector<Point>& points() const { return points_; }                       // places on the grid
+  const std::vector<std::uint32_t>& wedge_point() const { return wedge_point_; }     // per wedge
+  const std::vector<std::array<std::uint32_t, 3>>& faces() const { return faces_; }  // wedges
+  const std::vector<std::uint16_t>& face_group() const { return face_group_; }
+  /// Numbers of attribute k of all wedges, one wedge after the other.
+  const std::vector<std::int32_t>& values(std::size_t k) const { return values_[k]; }
+  int components(std::size_t k) const { return components_[k]; }
+  std::size_t attributes() const { return components_.size(); }
+  /// Faces whose three points are at different places; the others show nothing and are no triangles of a
+  /// scale.
+  std::vector<std::uint32_t> visible_faces() const;
+
+  // For the codec:
+  std::uint32_t add_point();
+  std::uint32_t add_wedge(std::uint32_t point);
+  void copy_values(std::uint32_t from, std::uint32_t to);
+  std::uint32_t add_face(std::array<std::uint32_t, 3> wedges, std::uint16_t group);
+  Point& point(std::uint32_t p) { return points_[p]; }
+  std::int32_t* value(std::size_t k, std::uint32_t wedge) {
+    return values_[k].data() + wedge * static_cast<std::size_t>(components_[k]);
+  }
+  std::uint32_t degree(std::uint32_t point) const { return degree_[point]; }
+  std::uint32_t point_at(std::uint32_t face, std::uint32_t corner) const {
+    return wedge_point_[faces_[face][corner % 3]];
+  }
+  std::uint32_t wedge_at(std::uint32_t face, std::uint32_t corner) const { return faces_[face][corner % 3]; }
+  /// Calls visit(face, corner) for the corners at a point.
+  template <class Visit>
+  void each_corner(std::uint32_t point, Visit&& visit) const {
+    for (std::uint32_t c = head_[point]; c != kNone; c = next_[c]) visit(c / 3, c % 3);
+  }
+  /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in the
+  /// point's list.
+  void gather(std::uint32_t point, std::vector<Corner>& corners, std::vector<Fan>& fans);
+  /// Gives the corners that move their target wedges, all of point `to`, which had no corner before.
+  /// `corners` are those of gather(from); both points' corners stand in that order afterwards.
+  void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
+
+ private:
+  void walk(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
+  std::vector<Point> points_;
+  std::vector<std::uint32_t> wedge_point_;
+  std::vector<std::array<std::uint32_t, 3>> faces_;
+  std::vector<std::uint16_t> face_group_;
+  std::vector<int> components_;
+  std::vector<std::vector<std::int32_t>> values_;
+  std::vector<std::uint32_t> head_, degree_;  // per point: its first corner, number of corners
+  std::vector<std::uint32_t> next_;           // per corner (3 * face + corner): the next at its point
+  // Scratch of gather(): per point the first unsorted corner with this a, and how many have this b.
+  std::vector<std::uint32_t> first_a_, count_b_;
+  std::vector<Corner> loose_;
+  std::vector<std::uint32_t> chain_;
+  std::vector<bool> taken_;
+};
+
+}  // namespace texmesh
