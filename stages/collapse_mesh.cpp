@@ -5,24 +5,17 @@
 #include <map>
 #include <numeric>
 
+#include "stages/morton.h"
+
 namespace texmesh {
 namespace {
 
-std::uint64_t spread_bits(std::uint64_t x) {  // 21 bits -> every third bit
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffffull;
-  x = (x | x << 16) & 0x1f0000ff0000ffull;
-  x = (x | x << 8) & 0x100f00f00f00f00full;
-  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-  return (x | x << 2) & 0x1249249249249249ull;
-}
-
 /// `p` in the unit-diagonal frame, so every coordinate lies in [-0.5, 0.5].
-std::uint64_t morton_code(Vec3d p) {
+std::uint64_t curve_code(Vec3d p) {
   auto cell = [](double x) {
-    return static_cast<std::uint64_t>(std::clamp((x + 0.5) * 2097151.0, 0.0, 2097151.0));
+    return static_cast<std::uint32_t>(std::clamp((x + 0.5) * 2097151.0, 0.0, 2097151.0));
   };
-  return spread_bits(cell(p.x)) | spread_bits(cell(p.y)) << 1 | spread_bits(cell(p.z)) << 2;
+  return morton_code(cell(p.x), cell(p.y), cell(p.z));
 }
 
 }  // namespace
@@ -33,6 +26,8 @@ CollapseMesh::CollapseMesh(const ConditionedMesh& input) {
   add_faces(input.mesh, point_of_position);
   number_wedges(input.mesh);
   build_lists();
+  left_.resize(input.mesh.triangles.size());
+  std::iota(left_.begin(), left_.end(), 0u);
 }
 
 void CollapseMesh::number_points(const ConditionedMesh& input,
@@ -48,7 +43,7 @@ void CollapseMesh::number_points(const ConditionedMesh& input,
 
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;  // code, position; one per group of twins
   for (std::size_t p = 0; p < n; ++p)
-    if (input.twin[p] == p) order.emplace_back(morton_code(local(p)), static_cast<std::uint32_t>(p));
+    if (input.twin[p] == p) order.emplace_back(curve_code(local(p)), static_cast<std::uint32_t>(p));
   std::sort(order.begin(), order.end());
 
   point_of_position.assign(n, kNone);
@@ -150,16 +145,47 @@ std::uint32_t CollapseMesh::add_wedge(std::uint32_t wedge, std::uint32_t positio
 }
 
 void CollapseMesh::remove_face(std::uint32_t face, std::uint32_t except_point) {
+  faces_[face].wedge[0] = kNone;
+  --alive_faces_;
   for (std::uint32_t k = 0; k < 3; ++k) {
     const std::uint32_t p = faces_[face].point[k];
     if (p == except_point) continue;
     List& list = lists_[p];
+    if (list.count > kLongList) {
+      // A search through the list of a hub for every face it loses would take quadratic time.
+      if (++list.dead * 2 >= list.count) drop_dead(list);
+      continue;
+    }
     std::uint32_t* begin = pool_.data() + list.begin;
     std::uint32_t* last = std::remove(begin, begin + list.count, face * 4 + k);
     list.count = static_cast<std::uint32_t>(last - begin);
   }
-  faces_[face].wedge[0] = kNone;
-  --alive_faces_;
+}
+
+void CollapseMesh::drop_dead(List& list) {
+  std::uint32_t* begin = pool_.data() + list.begin;
+  std::uint32_t* last =
+      std::remove_if(begin, begin + list.count, [&](std::uint32_t e) { return !faces_[e / 4].alive(); });
+  list.count = static_cast<std::uint32_t>(last - begin);
+  list.dead = 0;
+}
+
+void CollapseMesh::remove(std::span<const std::uint32_t> points) {
+  for (std::uint32_t p : points) {
+    if (!is_alive(p)) continue;
+    List& list = lists_[p];
+    for (std::uint32_t i = 0; i < list.count; ++i) {
+      Face& face = faces_[pool_[list.begin + i] / 4];
+      if (!face.alive()) continue;
+      face.wedge[0] = kNone;
+      --alive_faces_;
+    }
+  }
+  for (std::uint32_t p : points) {
+    if (lists_[p].count == lists_[p].dead) continue;
+    lists_[p].count = lists_[p].dead = 0;
+    alive_positions_ -= static_cast<std::uint32_t>(members(p).size());
+  }
 }
 
 void CollapseMesh::append(std::uint32_t to) {
@@ -167,25 +193,22 @@ void CollapseMesh::append(std::uint32_t to) {
   const auto more = static_cast<std::uint32_t>(moved_.size());
   if (list.count + more > list.capacity) {
     const auto begin = static_cast<std::uint32_t>(pool_.size());
-    const std::uint32_t capacity = list.count + more + 4;
+    const std::uint32_t capacity = list.count + more + list.count / 2 + 4;
     pool_.resize(pool_.size() + capacity);
     std::copy_n(pool_.begin() + list.begin, list.count, pool_.begin() + begin);
-    list = {begin, list.count, capacity};
+    list = {begin, list.count, capacity, list.dead};
   }
   std::copy(moved_.begin(), moved_.end(), pool_.begin() + list.begin + list.count);
   list.count += more;
 }
 
-void CollapseMesh::snapshot(std::vector<Triangle>& triangles, std::vector<std::uint32_t>& source) const {
-  triangles.clear();
-  source.clear();
-  triangles.reserve(alive_faces_);
-  source.reserve(alive_faces_);
-  for (std::size_t t = 0; t < face_of_source_.size(); ++t) {
-    const Face& face = faces_[face_of_source_[t]];
-    if (!face.alive()) continue;
-    triangles.push_back({wedge_real_[face.wedge[0]], wedge_real_[face.wedge[1]], wedge_real_[face.wedge[2]]});
-    source.push_back(static_cast<std::uint32_t>(t));
+void CollapseMesh::snapshot(std::vector<Triangle>& triangles, std::vector<std::uint32_t>& source) {
+  std::erase_if(left_, [&](std::uint32_t t) { return !faces_[face_of_source_[t]].alive(); });
+  source = left_;
+  triangles.resize(left_.size());
+  for (std::size_t i = 0; i < left_.size(); ++i) {
+    const Face& face = faces_[face_of_source_[left_[i]]];
+    triangles[i] = {wedge_real_[face.wedge[0]], wedge_real_[face.wedge[1]], wedge_real_[face.wedge[2]]};
   }
 }
 

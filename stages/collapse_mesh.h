@@ -35,7 +35,8 @@ class CollapseMesh {
   /// In a frame where the bounding box is centred and its diagonal is 1.
   Vec3d point(std::uint32_t p) const { return points_[p]; }
   double diagonal() const { return diagonal_; }  // object units
-  /// Corners at a point, as face * 4 + corner.
+  /// Corners at a point, as face * 4 + corner. Those of removed faces may stand among them where there are
+  /// many.
   std::span<const std::uint32_t> corners(std::uint32_t p) const {
     return {pool_.data() + lists_[p].begin, lists_[p].count};
   }
@@ -48,7 +49,8 @@ class CollapseMesh {
   std::uint32_t face_source(std::uint32_t f) const { return face_source_[f]; }    // triangle of the input
   std::uint32_t alive_faces() const { return alive_faces_; }
   std::uint32_t alive_positions() const { return alive_positions_; }
-  bool is_alive(std::uint32_t p) const { return lists_[p].count != 0; }
+  bool is_alive(std::uint32_t p) const { return lists_[p].count != lists_[p].dead; }
+  std::uint32_t corner_count(std::uint32_t p) const { return lists_[p].count - lists_[p].dead; }
 
   /// A wedge with the attributes of `wedge` at `position`.
   std::uint32_t add_wedge(std::uint32_t wedge, std::uint32_t position);
@@ -61,6 +63,7 @@ class CollapseMesh {
     for (std::uint32_t i = 0; i < list.count; ++i) {
       const std::uint32_t entry = pool_[list.begin + i];
       Face& face = faces_[entry / 4];
+      if (!face.alive()) continue;
       const std::uint32_t c = entry % 4;
       if (face.point[(c + 1) % 3] == to || face.point[(c + 2) % 3] == to) {
         remove_face(entry / 4, from);
@@ -70,25 +73,31 @@ class CollapseMesh {
         moved_.push_back(entry);
       }
     }
-    lists_[from].count = 0;
+    lists_[from].count = lists_[from].dead = 0;
     alive_positions_ -= static_cast<std::uint32_t>(members(from).size());
     append(to);
   }
 
+  /// Removes what is left of a component: all its points, with their faces.
+  void remove(std::span<const std::uint32_t> points);
+
   /// The faces left, in the input's order, as wedges of the input followed by new_wedges().
-  void snapshot(std::vector<Triangle>& triangles, std::vector<std::uint32_t>& source) const;
+  void snapshot(std::vector<Triangle>& triangles, std::vector<std::uint32_t>& source);
   const std::vector<NewWedge>& new_wedges() const { return new_wedges_; }
 
  private:
   struct List {
     std::uint32_t begin = 0, count = 0, capacity = 0;
+    std::uint32_t dead = 0;  // entries of removed faces; they go when they are half of a long list
   };
+  static constexpr std::uint32_t kLongList = 64;
   void number_points(const ConditionedMesh& input, std::vector<std::uint32_t>& point_of_position);
   void add_faces(const Mesh& mesh, const std::vector<std::uint32_t>& point_of_position);
   void number_wedges(const Mesh& mesh);
   void build_lists();
   void remove_face(std::uint32_t face, std::uint32_t except_point);
   void append(std::uint32_t to);
+  void drop_dead(List& list);
 
   std::uint32_t input_wedges_ = 0, alive_faces_ = 0, alive_positions_ = 0;
   double diagonal_ = 1;
@@ -96,6 +105,7 @@ class CollapseMesh {
   std::vector<std::uint32_t> members_, member_begin_;
   std::vector<Face> faces_;
   std::vector<std::uint32_t> face_source_, face_of_source_;
+  std::vector<std::uint32_t> left_;  // triangles of the input that were left at the last snapshot
   std::vector<std::uint32_t> wedge_real_, wedge_position_, wedge_source_;
   std::vector<NewWedge> new_wedges_;
   std::vector<List> lists_;

@@ -6,14 +6,11 @@
 
 #include "format/portable_math.h"
 #include "stages/collapse_engine.h"
-#include "stages/distance.h"
-#include "stages/parallel.h"
+#include "stages/scale_error.h"
 
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kErrorSamples =
-    4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
 // A scale that was stopped before its target is left out when it has more than this share of the next finer's
 // triangles.
 constexpr double kRepeatedShare = 0.97;
@@ -41,14 +38,14 @@ std::string stop_reason(CollapseStop stop, const SimplificationOptions& options)
     case CollapseStop::kFewTriangles:
       return "min_triangles is " + std::to_string(options.min_triangles);
     case CollapseStop::kTooFar:
-      return "every collapse left exceeds max_error";
+      return "every collapse left exceeds max_error or max_shift";
     case CollapseStop::kLocked:
       return "no collapse is left that keeps seams, borders and orientation";
   }
   return "";
 }
 
-NestedScale take_scale(const CollapseEngine& engine, int scale, std::string reason) {
+NestedScale take_scale(CollapseEngine& engine, int scale, std::string reason) {
   NestedScale s;
   s.scale = scale;
   s.collapse_count = static_cast<std::uint32_t>(engine.collapses().size());
@@ -82,62 +79,6 @@ void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<Neste
         }
         w = id;
       }
-}
-
-/// Distances of points spread over one surface to another: sum of squares and largest.
-struct Deviation {
-  double square = 0, largest = 0;
-  std::size_t count = 0;
-};
-
-Deviation deviation(const Mesh& mesh, const std::vector<Triangle>& from, const SurfaceDistance& to,
-                    const RunContext& context) {
-  const std::vector<SurfaceSample> samples =
-      sample_surface(mesh.positions, mesh.wedge_position, from, kErrorSamples);
-  std::vector<double> distance(samples.size());
-  parallel_for(context, samples.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Vec3d p;
-      for (std::size_t k = 0; k < 3; ++k)
-        p = p + to_double(mesh.positions[mesh.wedge_position[from[samples[i].triangle][k]]]) *
-                    samples[i].weight[k];
-      distance[i] = to(p);
-    }
-  });
-  Deviation d;
-  d.count = distance.size();
-  for (double x : distance) d.square += x * x, d.largest = std::max(d.largest, x);
-  return d;
-}
-
-/// Vertices of S_0 are where it deviates most from a coarser scale; about kErrorSamples of them are looked
-/// at. `known`: a deviation already found; the result is not smaller.
-double vertex_deviation(const Mesh& mesh, const SurfaceDistance& to, double known,
-                        const RunContext& context) {
-  const std::size_t step = mesh.positions.size() / kErrorSamples + 1,
-                    count = (mesh.positions.size() + step - 1) / step;
-  std::vector<double> distance(count);
-  parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) distance[i] = to(to_double(mesh.positions[i * step]), known);
-  });
-  return std::max(known, *std::max_element(distance.begin(), distance.end()));
-}
-
-void measure_errors(const Mesh& mesh, std::vector<NestedScale>& scales, const RunContext& context) {
-  if (scales.size() < 2) return;
-  const SurfaceDistance original(mesh.positions, mesh.wedge_position, mesh.triangles);
-  for (std::size_t i = 1; i < scales.size(); ++i) {
-    NestedScale& scale = scales[i];
-    const SurfaceDistance coarse(mesh.positions, mesh.wedge_position, scale.triangles);
-    const Deviation there = deviation(mesh, mesh.triangles, coarse, context);
-    const Deviation back = deviation(mesh, scale.triangles, original, context);
-    const double square = (there.square + back.square) /
-                          static_cast<double>(std::max<std::size_t>(there.count + back.count, 1));
-    scale.error_rms = static_cast<float>(std::sqrt(square));
-    scale.error_max =
-        static_cast<float>(vertex_deviation(mesh, coarse, std::max(there.largest, back.largest), context));
-    context.report(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scales.size()));
-  }
 }
 
 void note_floor(NestedScales& result, const std::vector<std::uint32_t>& target, const std::string& reason) {
@@ -175,7 +116,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   result.mesh = mesh.mesh;
   result.twin = mesh.twin;
   const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
-  CollapseEngine engine(mesh, scale_map, options);
+  CollapseEngine engine(mesh, scale_map, options, context);
   result.scales.push_back(take_scale(engine, 0, ""));
   std::string floor;
   for (std::size_t i = 1; i < target.size(); ++i) {
@@ -190,7 +131,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   }
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
-  measure_errors(result.mesh, result.scales, context);
+  measure_scale_errors(mesh.component, result.mesh, result.scales, context);
   drop_far_scales(result, options.max_error * engine.mesh().diagonal());
   note_floor(result, target, floor.empty() ? "every coarser scale exceeds max_error" : floor);
   return result;

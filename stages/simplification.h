@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 1;
+inline constexpr int kSimplificationVersion = 2;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kQem, kThesis };
 template <>
@@ -23,10 +23,14 @@ struct EnumNames<CollapseOrder> {
 struct SimplificationOptions {
   CollapseOrder order = CollapseOrder::kTexmesh;
   double persistence_weight = 0.05;  // cost x (1 + weight * p)
-  double uv_weight = 0.1;            // of the UV quadric against the geometric one
-  double boundary_weight = 10;       // of the border quadrics
+  double uv_weight = 0.06;           // of the UV quadric against the geometric one
+  double normal_weight = 0.01;       // of the normals' quadric; one radian counts as a mean edge
+  double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
+  double boundary_weight = 10;  // of the border quadrics
+  double seam_weight = 1;       // of the same at seams of the texture
   double max_error =
       0.05;  // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
+  double max_shift = 0.05;  // of the diagonal: no collapse that shifts the texture by more
   int min_triangles = 100;  // no scale is asked to go below
   // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no
   // scale small enough for a first picture; targets are then scaled down geometrically so that the coarsest
@@ -40,9 +44,14 @@ struct SimplificationOptions {
     v("persistence_weight", s.persistence_weight, Range{0, 10},
       "cost of removing a vertex grows by this per scale it persists");
     v("uv_weight", s.uv_weight, Range{0, 10}, "weight of the texture's distortion against the shape's");
+    v("normal_weight", s.normal_weight, Range{0, 10}, "weight of the normals' distortion");
+    v("colour_weight", s.colour_weight, Range{0, 10}, "weight of the vertex colours' distortion");
+    v("seam_weight", s.seam_weight, Range{0, 1000}, "weight of seams of the texture");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
       "no scale deviates more than this fraction of the diagonal");
+    v("max_shift", s.max_shift, Range{0.0001, 1},
+      "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
       "share of the vertices that the coarsest scale is asked for at most");
     v("min_triangles", s.min_triangles, Range{1, 1000000}, "no scale is asked to have fewer triangles");
@@ -69,8 +78,10 @@ struct NestedScale {
   std::vector<std::uint32_t>
       triangle_source;               // per triangle: index of the S_0 triangle it comes from (material, part)
   std::uint32_t position_count = 0;  // positions in use
-  float error_max = 0, error_rms = 0;  // distance between S_0 and S_i, sampled both ways, object units
-  std::string floor_reason;            // why the scale has more vertices than asked for, "" when it has not
+  // Distance between S_0 and S_i, sampled both ways, object units. What has vanished with its whole component
+  // counts as no farther from S_i than the component's diagonal.
+  float error_max = 0, error_rms = 0;
+  std::string floor_reason;  // why the scale has more vertices than asked for, "" when it has not
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,

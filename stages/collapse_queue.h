@@ -1,0 +1,40 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace texmesh {
+
+/// 4-ary heap of items with changeable keys; equal keys come out by rising item number. The keys stand in the
+/// heap itself, so that a sift touches no other memory but the places it writes.
+class CollapseQueue {
+ public:
+  explicit CollapseQueue(std::size_t items) : at_(items, kOut) {}
+  bool empty() const { return heap_.empty(); }
+  std::uint32_t top() const { return heap_[0].item; }
+  bool contains(std::uint32_t item) const { return at_[item] != kOut; }
+  double key(std::uint32_t item) const { return heap_[at_[item]].key; }  // of one that it contains
+  /// For an empty queue: all items at once, in linear time; call order() behind the last.
+  void append(std::uint32_t item, double key);
+  void order();
+  void set(std::uint32_t item, double key);  // inserts or moves
+  void erase(std::uint32_t item);
+
+ private:
+  static constexpr std::uint32_t kOut = 0xffffffffu;
+  struct Entry {
+    double key;
+    std::uint32_t item;
+    bool operator<(const Entry& o) const { return key < o.key || (key == o.key && item < o.item); }
+  };
+  void place(std::size_t i, const Entry& entry) {
+    heap_[i] = entry;
+    at_[entry.item] = static_cast<std::uint32_t>(i);
+  }
+  void sift_up(std::size_t i);
+  void sift_down(std::size_t i);
+  std::vector<Entry> heap_;
+  std::vector<std::uint32_t> at_;
+};
+
+}  // namespace texmesh
