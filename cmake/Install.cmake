@@ -20,6 +20,7 @@ if(TEXMESH_COMPILER)
   texmesh_install_component(texmeshCompiler "stages;pipeline")
   install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)
   install(EXPORT texmeshTool NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE texmeshTool.cmake)
 endif()
 install(DIRECTORY schemas/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/schemas FILES_MATCHING PATTERN *.schema.json

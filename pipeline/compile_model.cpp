@@ -46,20 +46,21 @@ std::optional<std::vector<std::string>> uris_of(const std::string& note) {
 /// import need not run.
 class ModelSource {
  public:
-  ModelSource(const CompileRequest& request, Store& store, const RunContext& context)
-      : path_(request.input), options_(request.options.import) {
-    bytes_ = read_input_file(path_, static_cast<std::uint64_t>(options_.max_file_bytes));
-    main_digest_ = sha256(bytes_);
-    const Sha256 note_key = list_key(request.options);
+  explicit ModelSource(const CompileRequest& request)
+      : path_(request.input), options_(request.options.import), known_(request.known) {}
+
+  void open(const CompileOptions& options, Store& store, const RunContext& context, bool may_write_notes) {
+    look_at_model();
+    const Sha256 note_key = list_key(options);
     if (const auto note = store.find_note(note_key); note && unchanged_since(*note)) return;
     imported_ = std::make_shared<ImportedModel>(import(context, requests_));
-    store.put_note(note_key, to_json(requests_).dump());
+    if (may_write_notes) store.put_note(note_key, to_json(requests_).dump());
   }
 
   Sha256 digest() const {
     Key key("source", 1);
     key.add("extension", lower_extension(path_));
-    key.add_input("model", main_digest_, bytes_.size());
+    key.add_input("model", main_.digest, main_.bytes);
     key.add("files", to_json(requests_).dump());
     return key.digest();
   }
@@ -68,25 +69,56 @@ class ModelSource {
     return {[this](const RunContext& context) {
       if (imported_) return std::move(*std::exchange(imported_, nullptr));
       Requests again;
-      return import(context, again);
+      ImportedModel model = import(context, again);
+      if (to_json(again) != to_json(requests_))
+        throw InputError(path_.filename().string(), "", "files that stay as they are while they are compiled",
+                         "one that has changed meanwhile");
+      return model;
     }};
   }
 
   /// Input digests for provenance: the model's own references, never the paths of this machine.
   Json inputs() const {
-    Json list =
-        Json::array({{{"role", "model"}, {"sha256", to_hex(main_digest_)}, {"bytes", bytes_.size()}}});
+    Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_.digest)}, {"bytes", main_.bytes}}});
     for (const FileRequest& r : requests_)
       if (r.found)
         list.push_back({{"role", "file"}, {"uri", r.uri}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
     return list;
   }
 
+  std::vector<FileRequest> files() const {
+    std::vector<FileRequest> all;
+    if (main_.found) all.push_back(main_);
+    all.insert(all.end(), requests_.begin(), requests_.end());
+    return all;
+  }
+
  private:
+  void look_at_model() {
+    const auto stamp = stamp_of(path_.string());
+    for (const FileRequest& r : known_)
+      if (r.uri.empty() && r.found && stamp && *stamp == r.stamp) {
+        main_ = r;
+        return;
+      }
+    read_model();
+  }
+
+  void read_model() {
+    FileStamp stamp;
+    bytes_ = read_input_file(path_, static_cast<std::uint64_t>(options_.max_file_bytes), &stamp);
+    has_bytes_ = true;
+    const FileRequest found{"", true, sha256(bytes_), bytes_.size(), stamp};
+    if (main_.found && (found.digest != main_.digest || found.bytes != main_.bytes))
+      throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
+                       "one that has changed meanwhile");
+    main_ = found;
+  }
+
   Sha256 list_key(const CompileOptions& options) const {
     Key key("import-files", kImportVersion);
     key.add("extension", lower_extension(path_));
-    key.add_input("model", main_digest_, bytes_.size());
+    key.add_input("model", main_.digest, main_.bytes);
     CompileOptions copy = options;
     for (const OptionField& f : list_options(copy))
       if (f.stage == "import") key.add(f.path(), option_text(f));
@@ -97,9 +129,10 @@ class ModelSource {
     const auto uris = uris_of(note);
     if (!uris) return false;
     FileResolver resolver(path_.parent_path());
+    resolver.expect(known_);
     for (const std::string& uri : *uris) {
       try {
-        resolver.read(uri, static_cast<std::uint64_t>(options_.max_file_bytes));
+        resolver.look(uri, static_cast<std::uint64_t>(options_.max_file_bytes));
       } catch (const InputError&) {
         return false;  // the import itself must say what is wrong
       }
@@ -109,17 +142,25 @@ class ModelSource {
     return true;
   }
 
-  ImportedModel import(const RunContext& context, Requests& requests) const {
+  ImportedModel import(const RunContext& context, Requests& requests) {
+    if (!has_bytes_) read_model();
     FileResolver resolver(path_.parent_path());
-    ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options_, context);
-    requests = resolver.requests();
-    return m;
+    try {
+      ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options_, context);
+      requests = resolver.requests();
+      return m;
+    } catch (...) {
+      requests = resolver.requests();  // what a failure depends on, too
+      throw;
+    }
   }
 
   fs::path path_;
   ImportOptions options_;
+  std::vector<FileRequest> known_;
   std::vector<std::uint8_t> bytes_;
-  Sha256 main_digest_{};
+  bool has_bytes_ = false;
+  FileRequest main_;
   Requests requests_;
   std::shared_ptr<ImportedModel> imported_;
 };
@@ -147,36 +188,66 @@ void refuse_warnings(const Notes& notes, const std::string& input) {
                        n.code + ": " + n.text);
 }
 
-}  // namespace
-
-Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
-                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes) {
-  ModelSource source(request, store, context);
-  const std::string provenance_json = provenance(source, request.options);
-
-  GraphRun graph(stages, request.options, store, context, observer);
+void give_inputs(GraphRun& graph, ModelSource& source, const std::string& provenance_json) {
   graph.give("source", object(source.source()), source.digest(), 0);
-  const std::span provenance_bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
-                                   provenance_json.size());
-  graph.give("provenance", object(provenance_json), sha256(provenance_bytes), provenance_json.size());
-  Object result = graph.run(wanted);
-  notes = graph.notes();
-  return result;
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()), provenance_json.size());
+  graph.give("provenance", object(provenance_json), sha256(bytes), provenance_json.size());
 }
 
-CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
-                             const StageObserver& observer) {
-  CompileOutcome outcome;
-  const Object package =
-      run_stages(request, stage_table(), "package", store, context, observer, outcome.notes);
+CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Store& store, const RunContext& context,
+                         const StageObserver& observer) {
+  GraphRun graph(stage_table(), request.options, store, context, observer);
+  give_inputs(graph, source, provenance(source, request.options));
+  graph.explain(request.earlier_keys, request.explainer);
+  const Object package = graph.run("package");
   const auto& bytes = *static_cast<const std::vector<std::uint8_t>*>(package.get());
 
+  CompileOutcome outcome;
   outcome.package_bytes = bytes.size();
+  outcome.package_digest = sha256(bytes);
+  outcome.notes = graph.notes();
+  outcome.files = source.files();
+  outcome.keys = graph.keys();
   if (request.strict) refuse_warnings(outcome.notes, request.input);
   if (request.output.empty()) return outcome;
   outcome.unchanged = file_holds(request.output, bytes);
   if (!outcome.unchanged) write_file_atomically(request.output, bytes, request.temporary);
   return outcome;
+}
+
+}  // namespace
+
+CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
+                             const StageObserver& observer) {
+  ModelSource source(request);
+  try {
+    source.open(request.options, store, context, true);
+    return run_graph(request, source, store, context, observer);
+  } catch (...) {
+    if (request.files_of_failure) request.files_of_failure(source.files());
+    throw;
+  }
+}
+
+Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
+                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes) {
+  ModelSource source(request);
+  source.open(request.options, store, context, true);
+  GraphRun graph(stages, request.options, store, context, observer);
+  give_inputs(graph, source, provenance(source, request.options));
+  Object result = graph.run(wanted);
+  notes = graph.notes();
+  return result;
+}
+
+std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request, Store& store,
+                                                                      const RunContext& context) {
+  ModelSource source(request);
+  source.open(request.options, store, context, false);
+  GraphRun graph(stage_table(), request.options, store, context, {});
+  give_inputs(graph, source, provenance(source, request.options));
+  graph.explain(request.earlier_keys, {});
+  return graph.forecast();
 }
 
 }  // namespace texmesh

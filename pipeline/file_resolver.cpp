@@ -97,16 +97,22 @@ const char* kind_of(mode_t mode) {
   return "something else";
 }
 
-std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::string& name,
-                                   const std::string& expected) {
+/// The stamp is taken before the first byte is read: a change while reading gives another one later.
+FileStamp checked_stamp(int fd, const std::string& name, const std::string& expected) {
   struct stat s {};
   if (::fstat(fd, &s) != 0) throw InputError(name, "", "a readable file", message(errno));
   if (!S_ISREG(s.st_mode)) throw InputError(name, "", expected, kind_of(s.st_mode));
+  return stamp_of(s);
+}
+
+std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::string& name,
+                                   const std::string& expected, FileStamp& stamp) {
+  stamp = checked_stamp(fd, name, expected);
   const auto too_long = [&](std::uint64_t size) {
     return InputError(name, "", "a file of at most " + std::to_string(max_bytes) + " bytes",
                       std::to_string(size));
   };
-  const auto declared = static_cast<std::uint64_t>(s.st_size);
+  const std::uint64_t declared = stamp.bytes;
   if (declared > max_bytes) throw too_long(declared);
   // The file may grow or shrink meanwhile, and files of /proc declare 0 bytes: read until its end, not until
   // st_size.
@@ -137,7 +143,7 @@ FileResolver::~FileResolver() { ::close(folder_); }
 
 std::size_t FileResolver::record(const std::string& uri) {
   const auto [it, is_new] = index_of_.try_emplace(uri, requests_.size());
-  if (is_new) requests_.push_back({uri, false, {}, 0});
+  if (is_new) requests_.push_back({uri, false, {}, 0, {}});
   return it->second;
 }
 
@@ -150,36 +156,63 @@ int FileResolver::open_beneath(const std::string& uri) {
   return open_component_wise(folder_, uri);
 }
 
+/// Opens a uri that was recorded; -1 when there is no such file.
+int FileResolver::open_regular(const std::string& uri) {
+  check_relative_name(uri, "", "");
+  const int fd = open_beneath(uri);
+  if (fd >= 0) return fd;
+  switch (errno) {
+    case ENOENT:
+    case ENOTDIR:
+    case EACCES:
+    case ENAMETOOLONG:
+      return -1;
+    case ELOOP:
+    case EXDEV:
+      throw InputError(uri, "", kRegularFile, "a symbolic link");
+    case ENXIO:
+      throw InputError(uri, "", kRegularFile, "a socket");
+    default:
+      throw InputError(uri, "", "a readable file", message(errno));
+  }
+}
+
 std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
   const std::size_t index = record(uri);
-  check_relative_name(uri, "", "");
-  const Descriptor fd(open_beneath(uri));
-  if (fd.get() < 0) {
-    switch (errno) {
-      case ENOENT:
-      case ENOTDIR:
-      case EACCES:
-      case ENAMETOOLONG:
-        return std::nullopt;
-      case ELOOP:
-      case EXDEV:
-        throw InputError(uri, "", kRegularFile, "a symbolic link");
-      case ENXIO:
-        throw InputError(uri, "", kRegularFile, "a socket");
-      default:
-        throw InputError(uri, "", "a readable file", message(errno));
-    }
-  }
-  std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile);
-  requests_[index] = {uri, true, sha256(bytes), bytes.size()};
+  const Descriptor fd(open_regular(uri));
+  if (fd.get() < 0) return std::nullopt;
+  FileStamp stamp;
+  std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
+  requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp};
   return bytes;
 }
 
-std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
+void FileResolver::expect(std::vector<FileRequest> known) {
+  for (FileRequest& r : known)
+    if (r.found) expected_[r.uri] = std::move(r);
+}
+
+bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {
+  const auto known = expected_.find(uri);
+  if (known != expected_.end()) {
+    const std::size_t index = record(uri);
+    const Descriptor fd(open_regular(uri));
+    if (fd.get() < 0) return false;
+    if (checked_stamp(fd.get(), uri, kRegularFile) == known->second.stamp) {
+      requests_[index] = known->second;
+      return true;
+    }
+  }
+  return read(uri, max_bytes).has_value();
+}
+
+std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
+                                          FileStamp* stamp) {
   const std::string name = path.string();
   const Descriptor fd(retry_on_signal([&] { return ::open(name.c_str(), kReadFlags); }));
   if (fd.get() < 0) throw InputError(name, "", "a readable file", message(errno));
-  return read_all(fd.get(), max_bytes, name, "a regular file");
+  FileStamp own;
+  return read_all(fd.get(), max_bytes, name, "a regular file", stamp ? *stamp : own);
 }
 
 }  // namespace texmesh

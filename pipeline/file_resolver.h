@@ -7,17 +7,19 @@
 #include <vector>
 
 #include "format/sha256.h"
+#include "pipeline/file_stamp.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {
 
-/// A file that a model asked for. `digest` and `bytes` are zero unless found. Becomes part of the cache key:
-/// the same requests with the same answers give the same model.
+/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and bytes
+/// become part of the cache key: the same requests with the same answers give the same model.
 struct FileRequest {
-  std::string uri;
+  std::string uri;  // as the model names it; "" = the model itself
   bool found = false;
   Sha256 digest{};
   std::uint64_t bytes = 0;
+  FileStamp stamp;  // when it was read; no part of any key
   friend bool operator==(const FileRequest&, const FileRequest&) = default;
 };
 
@@ -37,21 +39,30 @@ class FileResolver : public Resolver {
 
   std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) override;
 
+  /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.
+  void expect(std::vector<FileRequest> known);
+  /// As read(), but for the digest only: reads the file only when its stamp is not an expected one. False when it is not
+  /// there.
+  bool look(const std::string& uri, std::uint64_t max_bytes);
+
   /// Every uri that was asked for, once, in the order of first use; refused ones as not found.
   const std::vector<FileRequest>& requests() const { return requests_; }
 
  private:
   int open_beneath(const std::string& uri);
+  int open_regular(const std::string& uri);
   std::size_t record(const std::string& uri);
 
   int folder_ = -1;
   bool walk_ = false;
   std::vector<FileRequest> requests_;
   std::map<std::string, std::size_t> index_of_;
+  std::map<std::string, FileRequest> expected_;
 };
 
 /// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
 /// missing, not a regular file, unreadable or longer than max_bytes.
-std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes);
+std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
+                                          FileStamp* stamp = nullptr);
 
 }  // namespace texmesh

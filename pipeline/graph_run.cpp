@@ -14,6 +14,22 @@ namespace {
 
 constexpr std::size_t kOutside = static_cast<std::size_t>(-1);
 
+std::vector<KeyChange> changes_between(const Key& before, const Key& after) {
+  const auto find = [](const Key& key, const std::string& label) -> const std::string* {
+    for (const auto& [l, value] : key.parts())
+      if (l == label) return &value;
+    return nullptr;
+  };
+  std::vector<KeyChange> changes;
+  for (const auto& [label, value] : before.parts()) {
+    const std::string* now = find(after, label);
+    if (!now || *now != value) changes.push_back({label, value, now ? *now : ""});
+  }
+  for (const auto& [label, value] : after.parts())
+    if (!find(before, label)) changes.push_back({label, "", value});
+  return changes;
+}
+
 /// Whether a field belongs to what a stage lists: a whole section or that very field.
 bool names_field(const std::vector<std::string>& listed, const OptionField& field) {
   return std::any_of(listed.begin(), listed.end(),
@@ -54,6 +70,35 @@ struct GraphRun::State {
     }
     for (const Stage& s : stages)
       for (const std::string& input : s.inputs) ++slots[input].uses_left;
+  }
+
+  /// What has changed since the earlier run that is known, if one is.
+  StageExplanation explanation_of(const Stage& stage, const Key& key, StageExplanation::Verdict verdict) {
+    StageExplanation e;
+    e.verdict = verdict;
+    const auto earlier = earlier_keys.find(stage.name);
+    if (earlier == earlier_keys.end()) return e;
+    if (earlier->second == key.digest()) {
+      e.has_history = true;
+      return e;
+    }
+    const auto preimage = store.preimage(earlier->second);
+    const auto before = preimage ? key_from_preimage(*preimage) : std::nullopt;
+    if (!before) return e;
+    e.has_history = true;
+    e.changes = changes_between(*before, key);
+    return e;
+  }
+
+  void tell_why(const Stage& stage, const Key& key, StageExplanation::Verdict verdict) {
+    {
+      const std::lock_guard lock(mutex);
+      keys[stage.name] = key.digest();
+    }
+    if (!explainer) return;
+    const StageExplanation e = explanation_of(stage, key, verdict);
+    const std::lock_guard lock(observer_mutex);
+    explainer(stage, e);
   }
 
   void notify(const Stage& stage, StageEvent event, double fraction = 0, double seconds = 0) {
@@ -142,16 +187,31 @@ struct GraphRun::State {
       for (const Artefact& a : stage.outputs) publish_digest(a.name, key.digest(), 0);
       return;
     }
-    if (auto blobs = store.find(key.digest()); blobs && blobs->size() == stage.outputs.size() + 1) {
-      if (Bytes notes = store.load(blobs->back())) {
-        node.notes = decode_artefact<Notes>(*notes, stage.name + ".notes");
-        node.blobs = std::move(*blobs);
-        for (std::size_t k = 0; k < stage.outputs.size(); ++k)
-          publish_digest(stage.outputs[k].name, node.blobs[k].digest, node.blobs[k].bytes);
-        notify(stage, StageEvent::kHit);
-        return;
-      }
-    }
+    if (take_from_store(node, key)) return;
+    // Whoever else computes this very key: wait for it, then look again.
+    std::unique_ptr<Claim> claim = store.claim(key.digest(), context);
+    if (claim && take_from_store(node, key)) return;
+    tell_why(stage, key, StageExplanation::Verdict::kRuns);
+    compute_and_store(node, key);
+  }
+
+  bool take_from_store(Node& node, const Key& key) {
+    const Stage& stage = *node.stage;
+    auto blobs = store.find(key.digest());
+    if (!blobs || blobs->size() != stage.outputs.size() + 1) return false;
+    const Bytes notes = store.load(blobs->back());
+    if (!notes) return false;
+    node.notes = decode_artefact<Notes>(*notes, stage.name + ".notes");
+    node.blobs = std::move(*blobs);
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+      publish_digest(stage.outputs[k].name, node.blobs[k].digest, node.blobs[k].bytes);
+    tell_why(stage, key, StageExplanation::Verdict::kHit);
+    notify(stage, StageEvent::kHit);
+    return true;
+  }
+
+  void compute_and_store(Node& node, const Key& key) {
+    const Stage& stage = *node.stage;
     StageOutputs outputs = execute(node);
     std::vector<std::pair<std::string, Bytes>> encoded;
     for (std::size_t k = 0; k < stage.outputs.size(); ++k)
@@ -222,6 +282,8 @@ struct GraphRun::State {
   Store& store;
   const RunContext& context;
   StageObserver observer;
+  StageExplainer explainer;
+  StageKeys earlier_keys, keys;
   std::vector<Node> nodes;
   std::map<std::string, Slot> slots;
   std::mutex mutex, observer_mutex, schedule;
@@ -242,6 +304,53 @@ void GraphRun::give(const std::string& artefact, Object object, const Sha256& di
   slot.digest = digest;
   slot.bytes = bytes;
   slot.known = true;
+}
+
+void GraphRun::explain(StageKeys earlier, StageExplainer explainer) {
+  state_->earlier_keys = std::move(earlier);
+  state_->explainer = std::move(explainer);
+}
+
+StageKeys GraphRun::keys() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->keys;
+}
+
+std::vector<std::pair<const Stage*, StageExplanation>> GraphRun::forecast() {
+  State& s = *state_;
+  std::vector<std::pair<const Stage*, StageExplanation>> all(s.nodes.size());
+  // The table is in the order of the graph only by custom: go round until nothing new becomes known.
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (std::size_t i = 0; i < s.nodes.size(); ++i) {
+      const Stage& stage = *s.nodes[i].stage;
+      if (all[i].first || !s.is_ready(stage)) continue;
+      progress = true;
+      const Key key = s.key_of(stage);
+      if (!stage.stored) {
+        for (const Artefact& a : stage.outputs) s.publish_digest(a.name, key.digest(), 0);
+        all[i] = {&stage, {}};
+        continue;
+      }
+      const auto blobs = s.store.find(key.digest());
+      const bool hit = blobs && blobs->size() == stage.outputs.size() + 1;
+      for (std::size_t k = 0; hit && k < stage.outputs.size(); ++k)
+        s.publish_digest(stage.outputs[k].name, (*blobs)[k].digest, (*blobs)[k].bytes);
+      all[i] = {&stage, s.explanation_of(stage, key, hit ? StageExplanation::Verdict::kHit
+                                                         : StageExplanation::Verdict::kRuns)};
+    }
+  }
+  for (std::size_t i = 0; i < s.nodes.size(); ++i) {
+    if (all[i].first) continue;
+    const Stage& stage = *s.nodes[i].stage;
+    StageExplanation e;
+    e.verdict = StageExplanation::Verdict::kUnknown;
+    for (const std::string& input : stage.inputs)
+      if (e.waits_for.empty() && !s.slots.at(input).known) e.waits_for = input;
+    all[i] = {&stage, e};
+  }
+  std::erase_if(all, [](const auto& a) { return !a.first->stored; });
+  return all;
 }
 
 Object GraphRun::run(const std::string& wanted) {

@@ -19,17 +19,30 @@ Key& Key::add_input(std::string_view role, const Sha256& digest, std::uint64_t b
   return add("input " + std::string(role), to_hex(digest) + " " + std::to_string(bytes));
 }
 
-Sha256 Key::digest() const {
+Sha256 Key::digest() const { return digest_of_parts(parts_); }
+
+Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts) {
   std::vector<std::uint8_t> record;
   auto put = [&record](const std::string& s) {
     for (int i = 0; i < 8; ++i) record.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
     record.insert(record.end(), s.begin(), s.end());
   };
-  for (const auto& [label, value] : parts_) {
+  for (const auto& [label, value] : parts) {
     put(label);
     put(value);
   }
   return sha256(record);
+}
+
+std::optional<Key> key_from_preimage(const std::string& preimage) {
+  const auto j = nlohmann::ordered_json::parse(preimage, nullptr, false);
+  if (!j.is_object()) return std::nullopt;
+  Key key;
+  for (const auto& [label, value] : j.items()) {
+    if (!value.is_string()) return std::nullopt;
+    key.add(label, value.get<std::string>());
+  }
+  return key;
 }
 
 std::string Key::preimage() const {

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,7 +28,15 @@ class Key {
   std::string preimage() const;
 
  private:
+  Key() = default;
+  friend std::optional<Key> key_from_preimage(const std::string& preimage);
   std::vector<std::pair<std::string, std::string>> parts_;
 };
+
+/// A key from its preimage, with the same parts in the same order; nothing when it is no preimage.
+std::optional<Key> key_from_preimage(const std::string& preimage);
+
+/// The digest of a key that has these parts.
+Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts);
 
 }  // namespace texmesh

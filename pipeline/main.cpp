@@ -1,39 +1,49 @@
+// texmesh: compile and cache without the stages' libraries, whose loading alone takes longer than seeing that a collection
+// of a thousand models is up to date; every other command is texmesh-core's.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
 #include <iostream>
 
 #include "format/errors.h"
-#include "format/manifest.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/library_versions.h"
-#include "pipeline/worker.h"
+#include "pipeline/core_path.h"
 
-int main(int argc, char** argv) {
-  using namespace texmesh;
-  if (argc == 2 && std::string(argv[1]) == "worker")
-    return worker_main();  // started by compile, see pipeline/worker.h
+namespace texmesh {
+namespace {
 
+int start_core(char** argv) {
+  const std::string core = core_executable();
+  ::execv(core.c_str(), argv);
+  throw InputError(core, "", "an executable that starts", std::strerror(errno));
+}
+
+int run_here(int argc, char** argv) {
   CLI::App app{"texmesh compiles textured 3D scans into packages that any static web server can stream."};
-  app.set_version_flag("--version", "texmesh " + tool_version() + ", package format " +
-                                        std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor));
   app.require_subcommand(1);
-  app.footer(
-      "Start here:\n"
-      "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
-      "  texmesh dump scan.texmesh                    see what is in the package\n"
-      "  texmesh verify scan.texmesh                  check every byte of it\n"
-      "Each command explains itself: texmesh compile --help");
   int exit_code = kExitOk;
   try {
-    add_compile_command(app, exit_code);
-    add_dump_command(app, exit_code);
-    add_verify_command(app, exit_code);
-    add_unpack_command(app, exit_code);
-    add_pack_command(app, exit_code);
-    add_debug_command(app, exit_code);
-    add_stages_command(app, exit_code);
+    if (std::string(argv[1]) == "compile")
+      add_compile_command(app, exit_code);
+    else
+      add_cache_command(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kExitOk : kExitUsage;
+  }
+  return exit_code;
+}
+
+}  // namespace
+}  // namespace texmesh
+
+int main(int argc, char** argv) {
+  using namespace texmesh;
+  try {
+    const std::string command = argc > 1 ? argv[1] : "";
+    return command == "compile" || command == "cache" ? run_here(argc, argv) : start_core(argv);
   } catch (const Error& e) {
     std::cerr << "texmesh: " << e.what() << '\n';
     return kExitModelFailed;
@@ -41,5 +51,4 @@ int main(int argc, char** argv) {
     std::cerr << "texmesh: internal error: " << e.what() << '\n';
     return kExitInternal;
   }
-  return exit_code;
 }

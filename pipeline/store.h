@@ -9,6 +9,7 @@
 
 #include "format/sha256.h"
 #include "pipeline/key.h"
+#include "stages/run_context.h"
 
 namespace texmesh {
 
@@ -20,9 +21,22 @@ struct StoredBlob {
 };
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
+/// Held while a key is computed, so that processes that share a store compute it once. Ends with the object, and with the
+/// process however that ends.
+class Claim {
+ public:
+  virtual ~Claim() = default;
+};
+
+/// Something about the store that a person should know; never a reason to fail.
+struct StoreEvent {
+  std::string code;  // "cache-entry-damaged", "cache-layer-unreachable", "cache-not-written"
+  std::string text;
+};
+
 /// Results of stage runs by key. A lookup never throws for what it finds: an absent, incomplete or damaged
 /// entry is a miss. put() may fail quietly too (a full disk costs only the next build's time); it then
-/// returns false.
+/// returns false. Safe from several threads.
 class Store {
  public:
   virtual ~Store() = default;
@@ -31,10 +45,17 @@ class Store {
   /// The bytes of a blob; null when it is gone or does not have this digest.
   virtual Bytes load(const StoredBlob& blob) = 0;
   virtual bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) = 0;
-  /// Small facts that are not results (which files an import asked for), by key; unverified beyond their own
-  /// digest.
+  /// The parts of a key that was put once (Key::preimage), whether its blobs are still there or not.
+  virtual std::optional<std::string> preimage(const Sha256& key) = 0;
+  /// Small facts that are not results (which files an import asked for), by key; verified by their own
+  /// digest. A later put_note replaces an earlier one.
   virtual std::optional<std::string> find_note(const Sha256& key) = 0;
   virtual bool put_note(const Sha256& key, const std::string& text) = 0;
+  /// Waits until nobody else holds the key; null where there is nothing to share or locks do not work. Throws Cancelled.
+  /// A thread that holds a claim must not wait for another one.
+  virtual std::unique_ptr<Claim> claim(const Sha256&, const RunContext&) { return nullptr; }
+  /// What has happened since the last call.
+  virtual std::vector<StoreEvent> take_events() { return {}; }
 };
 
 /// Keeps nothing: --no-cache.
@@ -43,6 +64,7 @@ class NullStore : public Store {
   std::optional<std::vector<StoredBlob>> find(const Sha256&) override { return std::nullopt; }
   Bytes load(const StoredBlob&) override { return nullptr; }
   bool put(const Key&, const std::vector<std::pair<std::string, Bytes>>&) override { return true; }
+  std::optional<std::string> preimage(const Sha256&) override { return std::nullopt; }
   std::optional<std::string> find_note(const Sha256&) override { return std::nullopt; }
   bool put_note(const Sha256&, const std::string&) override { return true; }
 };
@@ -53,6 +75,7 @@ class MemoryStore : public Store {
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override;
   Bytes load(const StoredBlob& blob) override;
   bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override;
+  std::optional<std::string> preimage(const Sha256& key) override;
   std::optional<std::string> find_note(const Sha256& key) override;
   bool put_note(const Sha256& key, const std::string& text) override;
 
@@ -60,17 +83,7 @@ class MemoryStore : public Store {
   std::mutex mutex_;
   std::map<Sha256, std::vector<StoredBlob>> runs_;
   std::map<Sha256, Bytes> blobs_;
-  std::map<Sha256, std::string> notes_;
+  std::map<Sha256, std::string> notes_, preimages_;
 };
-
-/// On disk: `ac/<k[0:2]>/<key>` (a JSON record: the key's parts, the outputs, and its own digest) and
-/// `cas/<d[0:2]>/<digest>` (the bytes). Published by temporary file, fdatasync, rename and folder fsync,
-/// blobs first; verified on every hit; damaged entries are moved to `quarantine/`. Safe between processes
-/// without locks: two that compute the same key write the same bytes.
-std::unique_ptr<Store> open_disk_store(const std::string& folder);  // InputError when it cannot be made
-
-/// --cache, else TEXMESH_CACHE, else $XDG_CACHE_HOME/texmesh, else ~/.cache/texmesh; "" when none of them is
-/// there.
-std::string default_cache_folder(const std::string& flag);
 
 }  // namespace texmesh

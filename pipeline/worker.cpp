@@ -15,9 +15,12 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
 
 #include "format/errors.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/core_path.h"
 
 extern char** environ;
 
@@ -52,6 +55,7 @@ class InterruptGuard {
 
 struct Child {
   std::size_t job = 0;
+  int lane = 0;
   pid_t pid = -1;
   int out = -1, err = -1;
   std::string line, last_words, temporary;
@@ -84,10 +88,32 @@ void write_all(int fd, const std::string& text) {
   }
 }
 
-Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits) {
+std::string job_text(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits, int threads) {
+  Json keys = Json::object();
+  for (const auto& [stage, key] : job.earlier_keys) keys[stage] = to_hex(key);
+  return Json{{"input", job.input},
+              {"output", job.output},
+              {"temporary", temporary},
+              {"profile", *job.profile},
+              {"cache", job.cache.folder},
+              {"layers", job.cache.layers},
+              {"upload", job.cache.upload},
+              {"strict", job.strict},
+              {"explain", job.explain},
+              {"forecast", job.forecast},
+              {"known", files_to_json(job.known)},
+              {"keys", keys},
+              {"threads", threads},
+              {"memory_bytes", limits.memory_bytes},
+              {"cpu_s", limits.cpu_s}}
+      .dump();
+}
+
+Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits, int threads) {
+  static const std::string executable = core_executable();
   Child child;
   child.job = index;
-  child.temporary = job.output.empty()
+  child.temporary = job.output.empty() || job.forecast
                         ? ""
                         : job.output + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(index);
   Pipe in, out, err;
@@ -98,22 +124,13 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
   posix_spawn_file_actions_adddup2(&actions, err.write, 2);
   std::string name = "texmesh", command = "worker";
   char* argv[] = {name.data(), command.data(), nullptr};
-  const int rc = ::posix_spawn(&child.pid, "/proc/self/exe", &actions, nullptr, argv, environ);
+  const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environ);
   posix_spawn_file_actions_destroy(&actions);
   ::close(in.read);
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, Json{{"input", job.input},
-                           {"output", job.output},
-                           {"temporary", child.temporary},
-                           {"profile", job.profile},
-                           {"cache", job.cache},
-                           {"strict", job.strict},
-                           {"threads", job.threads},
-                           {"memory_bytes", limits.memory_bytes},
-                           {"cpu_s", limits.cpu_s}}
-                          .dump());
+  write_all(in.write, job_text(job, child.temporary, limits, threads));
   ::close(in.write);
   child.out = out.read;
   child.err = err.read;
@@ -122,13 +139,40 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
   return child;
 }
 
-/// Takes what an event says about the model into its report.
-void take_event(const std::string& line, WorkerReport& report) {
+void take_stage(const Json& e, double now_s, WorkerReport& report) {
+  const std::string stage = e.value("stage", "");
+  if (e.value("event", "") == "stage-started") {
+    report.spans.push_back({stage, now_s, now_s, false});
+    return;
+  }
+  const bool hit = e.value("result", "") == "hit";
+  ++(hit ? report.stages_hit : report.stages_ran);
+  const auto open = std::find_if(report.spans.rbegin(), report.spans.rend(),
+                                 [&](const StageSpan& s) { return s.stage == stage; });
+  if (hit || open == report.spans.rend())
+    report.spans.push_back({stage, now_s, now_s, hit});
+  else
+    open->end_s = now_s;
+}
+
+void take_inputs(const Json& e, WorkerReport& report) {
+  report.files = files_from_json(e.value("files", ""));
+  from_hex(e.value("package", ""), report.package_digest);
+  for (const auto& [stage, key] : e.value("keys", Json::object()).items())
+    if (Sha256 digest; key.is_string() && from_hex(key.get<std::string>(), digest)) report.keys[stage] = digest;
+}
+
+/// Takes what an event says about the model into its report. False: it is for this process alone.
+bool take_event(const std::string& line, double now_s, WorkerReport& report) {
   const Json e = Json::parse(line, nullptr, false);
-  if (!e.is_object()) return;
+  if (!e.is_object()) return true;
   const std::string event = e.value("event", "");
-  if (event == "stage-finished") {
-    ++(e.value("result", "") == "hit" ? report.stages_hit : report.stages_ran);
+  if (event == "inputs") {
+    take_inputs(e, report);
+    return false;
+  }
+  if (event == "stage-started" || event == "stage-finished") {
+    take_stage(e, now_s, report);
   } else if (event == "result") {
     report.package_bytes = e.value("bytes", std::uint64_t{0});
     report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
@@ -140,6 +184,7 @@ void take_event(const std::string& line, WorkerReport& report) {
     report.error_found = e.value("found", "");
     report.error_message = e.value("message", "");
   }
+  return true;
 }
 
 /// Reads what is there; false at end of file.
@@ -156,13 +201,13 @@ bool drain(int fd, std::string& into) {
   }
 }
 
-void read_events(Child& child, WorkerReport& report, const EventSink& sink) {
+void read_events(Child& child, WorkerReport& report, double now_s, const EventSink& sink) {
   if (child.out >= 0 && !drain(child.out, child.line)) close_fd(child.out);
   for (std::size_t end; (end = child.line.find('\n')) != std::string::npos;) {
     const std::string line = child.line.substr(0, end);
     child.line.erase(0, end + 1);
-    take_event(line, report);
-    if (sink && line.find("\"event\":\"result\"") == std::string::npos) sink(child.job, line);
+    const bool is_public = take_event(line, now_s, report);
+    if (sink && is_public && line.find("\"event\":\"result\"") == std::string::npos) sink(child.job, line);
   }
 }
 
@@ -216,34 +261,77 @@ std::string error_line(const WorkerReport& r) {
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+/// The order in which jobs start: longest first, so that no long one is left for the end; unknown ones by their size.
+std::vector<std::size_t> start_order(const std::vector<WorkerJob>& jobs) {
+  std::vector<std::size_t> order(jobs.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return jobs[a].predicted_s > jobs[b].predicted_s; });
+  return order;
+}
+
 /// All children of one run.
 class Pool {
  public:
-  Pool(const std::vector<WorkerJob>& jobs, const WorkerLimits& limits, const EventSink& sink,
+  Pool(const std::vector<WorkerJob>& jobs, const PoolSettings& settings, const EventSink& sink,
        const FinishSink& finished)
-      : jobs_(jobs), limits_(limits), sink_(sink), finished_(finished), reports_(jobs.size()) {
+      : jobs_(jobs),
+        settings_(settings),
+        limits_(settings.limits),
+        sink_(sink),
+        finished_(finished),
+        reports_(jobs.size()),
+        waiting_(start_order(jobs)) {
     for (WorkerReport& r : reports_) r.result = ModelResult::kCancelled;
   }
 
-  std::vector<WorkerReport> run(int parallel, bool stop_on_failure) {
-    std::size_t next = 0;
+  std::vector<WorkerReport> run() {
     bool stop = false;
-    while (!children_.empty() || (next < jobs_.size() && !stop && !g_interrupted)) {
-      while (next < jobs_.size() && !stop && !g_interrupted &&
-             children_.size() < static_cast<std::size_t>(parallel)) {
-        reports_[next].result = ModelResult::kInternal;
-        children_.push_back(start_child(jobs_[next], next, limits_));
-        ++next;
-      }
+    while (!children_.empty() || (!waiting_.empty() && !stop && !g_interrupted)) {
+      while (!stop && !g_interrupted && start_one()) continue;
       if (g_interrupted) interrupt_children();
       wait_for_something();
       enforce_wall_limit();
-      if (reap() && stop_on_failure) stop = true;
+      if (reap() && settings_.stop_on_failure) stop = true;
     }
     return std::move(reports_);
   }
 
  private:
+  double now_s() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  /// Starts the first waiting job that fits; false when none does.
+  bool start_one() {
+    const int processors = std::max(settings_.processors, 1);
+    if (waiting_.empty() || children_.size() >= static_cast<std::size_t>(processors)) return false;
+    std::uint64_t in_use = 0;
+    for (const Child& c : children_) in_use += jobs_[c.job].predicted_memory_bytes;
+    const auto fits = [&](std::size_t job) {
+      return children_.empty() || settings_.memory_bytes == 0 ||
+             in_use + jobs_[job].predicted_memory_bytes <= settings_.memory_bytes;
+    };
+    const auto next = std::find_if(waiting_.begin(), waiting_.end(), fits);
+    if (next == waiting_.end()) return false;
+    const std::size_t job = *next;
+    waiting_.erase(next);
+    reports_[job].result = ModelResult::kInternal;
+    reports_[job].ran = true;
+    const std::size_t side_by_side =
+        std::min<std::size_t>(static_cast<std::size_t>(processors), children_.size() + 1 + waiting_.size());
+    Child child = start_child(jobs_[job], job, limits_, std::max(1, processors / static_cast<int>(side_by_side)));
+    child.lane = free_lane();
+    reports_[job].lane = child.lane;
+    reports_[job].start_s = now_s();
+    children_.push_back(std::move(child));
+    return true;
+  }
+
+  int free_lane() const {
+    for (int lane = 0;; ++lane)
+      if (std::none_of(children_.begin(), children_.end(), [&](const Child& c) { return c.lane == lane; }))
+        return lane;
+  }
+
   void wait_for_something() {
     std::vector<pollfd> fds;
     for (const Child& c : children_)
@@ -251,7 +339,7 @@ class Pool {
         if (fd >= 0) fds.push_back({fd, POLLIN, 0});
     ::poll(fds.data(), fds.size(), fds.empty() ? 5 : 100);
     for (Child& c : children_) {
-      read_events(c, reports_[c.job], sink_);
+      read_events(c, reports_[c.job], now_s(), sink_);
       if (c.err >= 0 && !drain(c.err, c.last_words)) close_fd(c.err);
       if (c.last_words.size() > 2000) c.last_words.erase(0, c.last_words.size() - 2000);
     }
@@ -288,12 +376,12 @@ class Pool {
         continue;
       }
       WorkerReport& report = reports_[c.job];
-      read_events(c, report, sink_);
+      read_events(c, report, now_s(), sink_);
       if (c.err >= 0) drain(c.err, c.last_words);
       const bool told = !report.error_kind.empty();
       conclude(c, status, usage, limits_, jobs_[c.job], g_interrupted != 0, report);
       if (!told && !report.error_kind.empty() && sink_) sink_(c.job, error_line(report));
-      failed = failed || (report.result != ModelResult::kOk && report.result != ModelResult::kUnchanged);
+      failed = failed || !report.ok();
       close_fd(c.out);
       close_fd(c.err);
       if (finished_) finished_(c.job, report);
@@ -303,21 +391,24 @@ class Pool {
   }
 
   const std::vector<WorkerJob>& jobs_;
+  const PoolSettings& settings_;
   const WorkerLimits& limits_;
   const EventSink& sink_;
   const FinishSink& finished_;
   std::vector<WorkerReport> reports_;
+  std::vector<std::size_t> waiting_;
   std::vector<Child> children_;
+  Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> interrupted_at_;
 };
 
 }  // namespace
 
-std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel,
-                                      const WorkerLimits& limits, bool stop_on_failure, const EventSink& sink,
-                                      const FinishSink& finished) {
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
+                                      const EventSink& sink, const FinishSink& finished) {
+  if (jobs.empty()) return {};
   const InterruptGuard guard;
-  return Pool(jobs, limits, sink, finished).run(std::max(parallel, 1), stop_on_failure);
+  return Pool(jobs, settings, sink, finished).run();
 }
 
 }  // namespace texmesh

@@ -1,10 +1,12 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "pipeline/compile_model.h"
+#include "pipeline/file_resolver.h"
+#include "pipeline/graph_run.h"
 
 namespace texmesh {
 
@@ -15,41 +17,80 @@ struct WorkerLimits {
   std::uint64_t wall_s = 3600;
 };
 
+/// Where results are kept.
+struct CacheSettings {
+  std::string folder;               // "" = keep nothing
+  std::vector<std::string> layers;  // asked behind it: folders and URLs
+  bool upload = false;              // put what was computed into the layers that are URLs
+};
+
 /// One model for a child process.
 struct WorkerJob {
   std::string input, output;
-  std::string profile;  // JSON of every option
-  std::string cache;    // folder, "" = none
+  std::shared_ptr<const std::string> profile;  // JSON of every option; jobs may share it
+  CacheSettings cache;
   bool strict = false;
-  int threads = 1;
+  bool explain = false;   // say of every stage why it runs or not
+  bool forecast = false;  // say it, and do nothing
+  std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
+  StageKeys earlier_keys;
+  std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
+  double predicted_s = 0;
 };
 
 enum class ModelResult : std::uint8_t { kOk, kUnchanged, kFailed, kInternal, kCancelled };
+const char* result_name(ModelResult result);  // "ok", "unchanged", "failed", "internal-error", "cancelled"
+
+/// One stage in the course of a model, in seconds since the pool began.
+struct StageSpan {
+  std::string stage;
+  double start_s = 0, end_s = 0;
+  bool hit = false;
+};
 
 /// What became of a model.
 struct WorkerReport {
   ModelResult result = ModelResult::kInternal;
+  bool ran = false;  // false: known from an earlier run (up to date, or a known failure), or never started
   std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
+  Sha256 package_digest{};
   double seconds = 0;
   std::string error_kind, error_file, error_place, error_expected, error_found, error_message;
   int stages_ran = 0, stages_hit = 0;
+  std::vector<FileRequest> files;  // as CompileOutcome; empty after a failure
+  StageKeys keys;
+  int lane = 0;  // which of the side-by-side places it ran in, from 0
+  double start_s = 0;
+  std::vector<StageSpan> spans;
+  bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
 };
 
 /// Told of every event line of a job's child (SPEC of the lines: schemas/event.v1.schema.json), in order.
 using EventSink = std::function<void(std::size_t job, const std::string& json_line)>;
 using FinishSink = std::function<void(std::size_t job, const WorkerReport& report)>;
 
-/// Compiles the jobs, each in a fresh child process of this executable (posix_spawn, never a fork of a
-/// threaded parent), at most `parallel` side by side, and returns a report per job in their order. A child
+struct PoolSettings {
+  int processors = 1;
+  std::uint64_t memory_bytes = 0;  // bound of the sum of the predicted peaks that run side by side; 0 = none
+  WorkerLimits limits;
+  bool stop_on_failure = false;  // no further child starts after a failure
+};
+
+/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a
+/// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest start first;
+/// at most `processors` run side by side, fewer when their predicted peaks do not fit the memory (one always runs), and
+/// the last ones get the processors that are free as threads. A child
 /// that dies, hangs or outgrows its limits costs its own model only. SIGINT and SIGTERM end all children
-/// within two seconds and leave no temporary file; what had not finished is kCancelled. stop_on_failure: no
-/// further child starts after a failure.
-std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, int parallel,
-                                      const WorkerLimits& limits, bool stop_on_failure, const EventSink& sink,
-                                      const FinishSink& finished);
+/// within two seconds and leave no temporary file; what had not finished is kCancelled.
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
+                                      const EventSink& sink, const FinishSink& finished);
 
 /// The child's side: reads a job from standard input, writes event lines to standard output, returns the exit
 /// code.
 int worker_main();
+
+/// How files and keys travel between the two.
+std::string files_to_json(const std::vector<FileRequest>& files);
+std::vector<FileRequest> files_from_json(const std::string& json);  // what is malformed is left out
 
 }  // namespace texmesh

@@ -12,7 +12,10 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/cache/cache_layer.h"
+#include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/compile_model.h"
 #include "pipeline/worker.h"
 
 namespace texmesh {
@@ -98,27 +101,90 @@ int report_error(EventWriter& events, const char* kind, const Error& e) {
   return kExitModelFailed;
 }
 
-int compile(const Json& job, EventWriter& events) {
+Json explanation_event(const Stage& stage, const StageExplanation& e) {
+  static constexpr const char* kVerdicts[] = {"hit", "runs", "unknown"};
+  Json changes = Json::array();
+  for (const KeyChange& c : e.changes) changes.push_back({{"part", c.label}, {"from", c.from}, {"to", c.to}});
+  Json event{{"event", "stage-explained"},
+             {"stage", stage.name},
+             {"verdict", kVerdicts[static_cast<int>(e.verdict)]},
+             {"history", e.has_history},
+             {"changes", std::move(changes)}};
+  if (!e.waits_for.empty()) event["waits_for"] = e.waits_for;
+  return event;
+}
+
+CompileRequest request_of(const Json& job) {
   CompileRequest request;
   request.input = job.at("input").get<std::string>();
   request.output = job.at("output").get<std::string>();
   request.temporary = job.at("temporary").get<std::string>();
   request.strict = job.at("strict").get<bool>();
+  request.known = files_from_json(job.at("known").get<std::string>());
+  for (const auto& [stage, key] : job.at("keys").items())
+    if (Sha256 digest; from_hex(key.get<std::string>(), digest)) request.earlier_keys[stage] = digest;
   read_profile(request.options, job.at("profile").get<std::string>(), "options");
-  RunContext context;
-  context.threads = job.at("threads").get<int>();
-  context.cancelled = &g_cancelled;
-  const std::string cache = job.at("cache").get<std::string>();
-  const std::unique_ptr<Store> store = cache.empty() ? std::make_unique<NullStore>() : open_disk_store(cache);
+  return request;
+}
 
-  const CompileOutcome outcome = compile_model(request, *store, context, stage_events(events));
+std::unique_ptr<Store> store_of(const Json& job) {
+  const std::string cache = job.at("cache").get<std::string>();
+  if (cache.empty()) return std::make_unique<NullStore>();
+  std::unique_ptr<Store> store = open_disk_store(cache);
+  std::vector<std::unique_ptr<CacheLayer>> layers;
+  for (const Json& place : job.at("layers")) layers.push_back(open_layer(place.get<std::string>()));
+  if (layers.empty()) return store;
+  return layered_store(std::move(store), std::move(layers), job.at("upload").get<bool>());
+}
+
+void report_store(EventWriter& events, Store& store) {
+  for (const StoreEvent& e : store.take_events())
+    events.write({{"event", "cache"}, {"code", e.code}, {"text", e.text}});
+}
+
+void report_outcome(EventWriter& events, const CompileOutcome& outcome) {
   for (const Note& n : outcome.notes)
     events.write({{"event", "note"},
                   {"severity", n.severity == Severity::kWarning ? "warning" : "info"},
                   {"code", n.code},
                   {"place", n.place},
                   {"text", n.text}});
+  Json keys = Json::object();
+  for (const auto& [stage, key] : outcome.keys) keys[stage] = to_hex(key);
+  events.write({{"event", "inputs"},
+                {"files", files_to_json(outcome.files)},
+                {"package", to_hex(outcome.package_digest)},
+                {"keys", keys}});
   events.write({{"event", "result"}, {"unchanged", outcome.unchanged}, {"bytes", outcome.package_bytes}});
+}
+
+int compile(const Json& job, EventWriter& events) {
+  CompileRequest request = request_of(job);
+  RunContext context;
+  context.threads = job.at("threads").get<int>();
+  context.cancelled = &g_cancelled;
+  const std::unique_ptr<Store> store = store_of(job);
+  if (job.at("forecast").get<bool>()) {
+    for (const auto& [stage, explanation] : forecast_model(request, *store, context))
+      events.write(explanation_event(*stage, explanation));
+    report_store(events, *store);
+    events.write({{"event", "result"}, {"unchanged", true}, {"bytes", 0}});
+    return kExitOk;
+  }
+  if (job.at("explain").get<bool>())
+    request.explainer = [&events](const Stage& stage, const StageExplanation& e) {
+      events.write(explanation_event(stage, e));
+    };
+  request.files_of_failure = [&events](const std::vector<FileRequest>& files) {
+    events.write({{"event", "inputs"}, {"files", files_to_json(files)}, {"package", ""}, {"keys", Json::object()}});
+  };
+  try {
+    report_outcome(events, compile_model(request, *store, context, stage_events(events)));
+  } catch (...) {
+    report_store(events, *store);
+    throw;
+  }
+  report_store(events, *store);
   return kExitOk;
 }
 

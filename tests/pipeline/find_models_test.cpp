@@ -1,4 +1,4 @@
-#include "pipeline/find_models.h"
+#include "pipeline/batch/find_models.h"
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@
 
 #include "format/manifest.h"
 #include "format/tables.h"
-#include "pipeline/collection.h"
+#include "pipeline/batch/collection.h"
 #include "pipeline/import/range_scan.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"
@@ -131,10 +131,10 @@ TEST(Collection, ModelOptionsStandOverThoseOfTheCollection) {
       "c.json", {});
   ASSERT_EQ(models.size(), 2u);
   EXPECT_EQ(models[0].output, "b.texmesh");
-  EXPECT_EQ(models[0].options.ssf.scales, 9);
-  EXPECT_EQ(models[0].options.lut.quality_fine, 90);
+  EXPECT_EQ(models[0].options->ssf.scales, 9);
+  EXPECT_EQ(models[0].options->lut.quality_fine, 90);
   EXPECT_EQ(models[1].output, "d/e.texmesh");
-  EXPECT_EQ(models[1].options.ssf.scales, 7);
+  EXPECT_EQ(models[1].options->ssf.scales, 7);
 }
 
 TEST(Collection, NamesThePlaceOfAFault) {

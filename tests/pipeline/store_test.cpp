@@ -1,4 +1,4 @@
-#include "pipeline/store.h"
+#include "pipeline/cache/disk_store.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

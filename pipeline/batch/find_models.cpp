@@ -1,4 +1,4 @@
-#include "pipeline/find_models.h"
+#include "pipeline/batch/find_models.h"
 
 #include <algorithm>
 #include <cctype>
@@ -12,20 +12,11 @@ namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
 
-/// A folder holds many JSON files; a range scan says what it is within its first bytes.
-bool is_range_scan(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string head(4096, '\0');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  return head.find("\"cylindrical-range-scan\"") != std::string::npos;
-}
-
 bool is_model(const fs::path& path) {
   std::string e = path.extension().string();
   std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
   return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" ||
-         (e == ".json" && is_range_scan(path));
+         (e == ".json" && is_range_scan(path.string()));
 }
 
 struct Found {
@@ -33,19 +24,36 @@ struct Found {
 };
 
 void add_folder(const fs::path& folder, std::vector<Found>& found) {
-  const std::size_t first = found.size();
-  for (const auto& entry :
-       fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied)) {
-    if (entry.path().filename().string().front() == '.') continue;
-    if (entry.is_regular_file() && is_model(entry.path()))
-      found.push_back({entry.path(), entry.path().lexically_relative(folder)});
-  }
-  if (found.size() == first) throw InputError(folder.string(), "", "a folder with models", "none");
-  std::sort(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(),
-            [](const Found& a, const Found& b) { return a.path < b.path; });
+  for (const std::string& relative : list_models(folder.string())) found.push_back({folder / relative, relative});
 }
 
 }  // namespace
+
+bool is_range_scan(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string head(4096, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  return head.find("\"cylindrical-range-scan\"") != std::string::npos;
+}
+
+std::vector<std::string> list_models(const std::string& folder) {
+  std::error_code ec;
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, ec), end;
+  if (ec) throw InputError(folder, "", "a folder with models", ec.message());
+  std::vector<std::string> models;
+  const std::size_t prefix = folder.ends_with('/') ? folder.size() : folder.size() + 1;
+  for (; it != end; it.increment(ec)) {
+    if (ec) throw InputError(folder, "", "a folder that can be listed", ec.message());
+    const std::string path = it->path().string();
+    if (it->path().filename().string().front() == '.') continue;
+    if (is_model(it->path()) && it->is_regular_file()) models.push_back(path.substr(prefix));
+  }
+  if (models.empty()) throw InputError(folder, "", "a folder with models", "none");
+  std::sort(models.begin(), models.end(),
+            [](const std::string& a, const std::string& b) { return fs::path(a) < fs::path(b); });
+  return models;
+}
 
 std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output) {
   std::vector<Found> found;

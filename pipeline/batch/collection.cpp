@@ -1,0 +1,199 @@
+#include "pipeline/batch/collection.h"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <initializer_list>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "format/errors.h"
+#include "pipeline/inspect/bounded_json.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxFileBytes = 256u << 20, kMaxModels = 1'000'000, kMaxPathBytes = 1000;
+
+class CollectionReader {
+ public:
+  CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder)
+      : file_(file), list_folder_(list_folder), options_(base) {}
+
+  std::vector<CollectionModel> read(const Json& root) {
+    check_members(root, "", {"$schema", "version", "options", "patterns", "models", "folders"});
+    if (!root.contains("version") || root["version"] != 1)
+      fail("/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
+    if (root.contains("options")) apply(options_, root["options"], "/options");
+    read_patterns(root);
+    const bool has_folders = root.contains("folders");
+    if (!root.contains("models") && !has_folders) fail("/models", "models or folders", "nothing");
+    std::vector<CollectionModel> models;
+    if (root.contains("models")) {
+      check_list(root["models"], "/models", "models");
+      for (std::size_t i = 0; i < root["models"].size(); ++i)
+        models.push_back(read_model(root["models"][i], "/models/" + std::to_string(i)));
+    }
+    if (has_folders) read_folders(root["folders"], models);
+    return models;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& place, const std::string& expected,
+                         const std::string& found) const {
+    throw InputError(file_, place, expected, found.substr(0, 120));
+  }
+
+  void check_members(const Json& object, const std::string& place,
+                     std::initializer_list<std::string_view> known) const {
+    if (!object.is_object()) fail(place, "an object", object.type_name());
+    for (const auto& [name, value] : object.items())
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        fail(place + "/" + name, "a known field", "\"" + name + "\"");
+  }
+
+  std::string path_at(const Json& object, const char* key, const std::string& place) const {
+    const Json& v = object[key];
+    if (!v.is_string() || v.get_ref<const std::string&>().empty() ||
+        v.get_ref<const std::string&>().size() > kMaxPathBytes)
+      fail(place + "/" + key, "a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes", v.dump());
+    return v.get<std::string>();
+  }
+
+  void apply(CompileOptions& options, const Json& body, const std::string& place) const {
+    if (!body.is_object()) fail(place, "an object", body.type_name());
+    if (body.contains("version"))
+      fail(place + "/version", "no version, the collection has one", body["version"].dump());
+    Json profile = body;
+    profile["version"] = 1;
+    try {
+      read_profile(options, profile.dump(), file_);
+    } catch (const InputError& e) {
+      throw InputError(file_, place + e.place(), e.expected(), e.found());
+    }
+  }
+
+  void check_list(const Json& list, const std::string& place, const std::string& what) const {
+    if (!list.is_array() || list.empty() || list.size() > kMaxModels)
+      fail(place, "a list of 1 to " + std::to_string(kMaxModels) + " " + what, list.type_name());
+  }
+
+  void read_patterns(const Json& root) {
+    if (!root.contains("patterns")) return;
+    const Json& list = root["patterns"];
+    check_list(list, "/patterns", "patterns");
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string place = "/patterns/" + std::to_string(i);
+      check_members(list[i], place, {"match", "options"});
+      if (!list[i].contains("match")) fail(place + "/match", "a pattern", "nothing");
+      if (!list[i].contains("options")) fail(place + "/options", "options", "nothing");
+      patterns_.push_back({path_at(list[i], "match", place), list[i]["options"], place + "/options"});
+      CompileOptions check = options_;  // wrong options are an error even where nothing matches
+      apply(check, list[i]["options"], place + "/options");
+    }
+  }
+
+  /// Options of the models that the same patterns match, made once.
+  std::shared_ptr<const CompileOptions> options_for(const std::string& input) {
+    std::vector<bool> matches;
+    for (const Pattern& p : patterns_) matches.push_back(::fnmatch(p.match.c_str(), input.c_str(), 0) == 0);
+    auto& shared = shared_[matches];
+    if (!shared) {
+      CompileOptions options = options_;
+      for (std::size_t i = 0; i < patterns_.size(); ++i)
+        if (matches[i]) apply(options, patterns_[i].options, patterns_[i].place);
+      shared = std::make_shared<const CompileOptions>(std::move(options));
+    }
+    return shared;
+  }
+
+  /// Folders give what the list does not name already; a model keeps its place in the folder.
+  void read_folders(const Json& folders, std::vector<CollectionModel>& models) {
+    namespace fs = std::filesystem;
+    check_list(folders, "/folders", "folders");
+    std::set<std::string> listed;
+    for (const CollectionModel& m : models) listed.insert(fs::path(m.input).lexically_normal().string());
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      const std::string place = "/folders/" + std::to_string(i);
+      if (!folders[i].is_string() || folders[i].get_ref<const std::string&>().empty())
+        fail(place, "a path", folders[i].dump());
+      const std::string folder = folders[i].get<std::string>();
+      if (!list_folder_) continue;
+      const std::vector<std::string> found = list_folder_(folder);
+      std::map<std::string, int> sharing;
+      const auto package_of = [](const std::string& relative) {
+        return fs::path(relative).replace_extension(".texmesh").string();
+      };
+      for (const std::string& relative : found) ++sharing[package_of(relative)];
+      for (const std::string& relative : found) {
+        const std::string input = (fs::path(folder) / relative).string();
+        if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
+        const std::string package = package_of(relative);
+        add(models, {input, sharing[package] > 1 ? relative + ".texmesh" : package, options_for(input)}, place);
+      }
+    }
+  }
+
+  void add(std::vector<CollectionModel>& models, CollectionModel model, const std::string& place) {
+    if (models.size() >= kMaxModels) fail(place, "at most " + std::to_string(kMaxModels) + " models", "more");
+    if (!outputs_.insert(std::filesystem::path(model.output).lexically_normal().string()).second)
+      fail(place, "an output of its own for " + model.input, model.output + ", as another model");
+    models.push_back(std::move(model));
+  }
+
+  CollectionModel read_model(const Json& json, const std::string& place) {
+    namespace fs = std::filesystem;
+    check_members(json, place, {"input", "output", "options"});
+    if (!json.contains("input")) fail(place + "/input", "a path", "nothing");
+    CollectionModel m;
+    m.input = path_at(json, "input", place);
+    m.output = json.contains("output") ? path_at(json, "output", place)
+                                       : fs::path(m.input).filename().replace_extension(".texmesh").string();
+    const fs::path output(m.output);
+    bool beneath = output.is_relative() && output.extension() == ".texmesh";
+    for (const fs::path& part : output) beneath = beneath && part != "..";
+    if (!beneath)
+      fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
+    if (!outputs_.insert(output.lexically_normal().string()).second)
+      fail(place + "/output", "an output of its own", m.output + ", as another model");
+    m.options = options_for(m.input);
+    if (json.contains("options")) {
+      CompileOptions own = *m.options;
+      apply(own, json["options"], place + "/options");
+      m.options = std::make_shared<const CompileOptions>(std::move(own));
+    }
+    return m;
+  }
+
+  struct Pattern {
+    std::string match;
+    Json options;
+    std::string place;
+  };
+  const std::string& file_;
+  const FolderLister& list_folder_;
+  CompileOptions options_;
+  std::vector<Pattern> patterns_;
+  std::map<std::vector<bool>, std::shared_ptr<const CompileOptions>> shared_;
+  std::set<std::string> outputs_;
+};
+
+}  // namespace
+
+std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
+                                             const CompileOptions& base, const FolderLister& list_folder) {
+  if (json.size() > kMaxFileBytes)
+    throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
+  try {
+    const std::span bytes(reinterpret_cast<const std::uint8_t*>(json.data()), json.size());
+    return CollectionReader(file_name, base, list_folder).read(parse_bounded_json(bytes, file_name, 16));
+  } catch (const FormatError& e) {
+    throw InputError(file_name, e.place(), e.expected(), e.found());
+  }
+}
+
+}  // namespace texmesh

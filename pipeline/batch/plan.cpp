@@ -1,0 +1,105 @@
+#include "pipeline/batch/plan.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "format/errors.h"
+#include "format/sha256.h"
+#include "pipeline/batch/collection.h"
+#include "pipeline/batch/find_models.h"
+#include "pipeline/file_resolver.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::uint64_t kMaxCollectionBytes = 256u << 20;
+
+bool is_collection(const std::string& input) {
+  return fs::path(input).extension() == ".json" && fs::is_regular_file(input) && !is_range_scan(input);
+}
+
+/// Options after the command line's flags, as text; one text for all models that share an object.
+class Profiles {
+ public:
+  explicit Profiles(const PlanRequest& request) : request_(request) {}
+  std::shared_ptr<const std::string> of(const std::shared_ptr<const CompileOptions>& options) {
+    auto& text = by_options_[options.get()];
+    if (!text) {
+      CompileOptions all = *options;
+      if (request_.apply_flags) request_.apply_flags(all);
+      std::string profile = write_profile(all);
+      text = by_text_.try_emplace(profile, std::make_shared<const std::string>(profile)).first->second;
+      kept_.push_back(options);  // so that no other object gets its address
+    }
+    return text;
+  }
+
+ private:
+  const PlanRequest& request_;
+  std::map<const CompileOptions*, std::shared_ptr<const std::string>> by_options_;
+  std::map<std::string, std::shared_ptr<const std::string>> by_text_;
+  std::vector<std::shared_ptr<const CompileOptions>> kept_;
+};
+
+void add_collection(const std::string& file, const PlanRequest& request, Profiles& profiles, BatchPlan& plan) {
+  const auto bytes = read_input_file(file, kMaxCollectionBytes);
+  const fs::path folder = fs::path(file).parent_path();
+  const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
+  for (const CollectionModel& m :
+       read_collection(std::string(bytes.begin(), bytes.end()), file, request.base, list)) {
+    const std::string input = (folder / m.input).string();
+    plan.models.push_back({input, (fs::path(request.output) / m.output).string(), input, profiles.of(m.options)});
+  }
+  plan.files.push_back(file);
+}
+
+void refuse_shared_outputs(const BatchPlan& plan) {
+  std::map<std::string_view, const PlannedModel*> taken;
+  for (const PlannedModel& m : plan.models) {
+    const auto [other, fresh] = taken.emplace(m.output, &m);
+    if (!fresh)
+      throw InputError(m.input, "", "a package of its own", m.output + ", which is that of " + other->second->input);
+  }
+}
+
+void keep_shard(BatchPlan& plan, const PlanRequest& request) {
+  if (request.shards <= 1) return;
+  std::erase_if(plan.models, [&](const PlannedModel& m) {
+    const std::string name = fs::path(m.output).lexically_relative(request.output).generic_string();
+    const Sha256 digest = sha256({reinterpret_cast<const std::uint8_t*>(name.data()), name.size()});
+    std::uint64_t number = 0;
+    for (int i = 0; i < 8; ++i) number = number << 8 | digest[static_cast<std::size_t>(i)];
+    return number % static_cast<std::uint64_t>(request.shards) != static_cast<std::uint64_t>(request.shard);
+  });
+}
+
+}  // namespace
+
+BatchPlan plan_batch(const PlanRequest& request) {
+  BatchPlan plan;
+  Profiles profiles(request);
+  std::vector<std::string> others;
+  for (const std::string& input : request.inputs)
+    if (is_collection(input))
+      add_collection(input, request, profiles, plan);
+    else
+      others.push_back(input);
+  const bool names_package = fs::path(request.output).extension() == ".texmesh" && !fs::is_directory(request.output);
+  if (!plan.files.empty() && names_package)
+    throw InputError(request.output, "", "a folder for the packages of a collection", "the name of one package");
+  if (!others.empty()) {
+    const auto shared = std::make_shared<const CompileOptions>(request.base);
+    for (ModelPath& m : find_models(others, request.output)) {
+      std::string name = request.inputs.size() == 1 && names_package ? fs::path(m.input).filename().string() : m.input;
+      plan.models.push_back({std::move(m.input), std::move(m.output), std::move(name), profiles.of(shared)});
+    }
+  }
+  refuse_shared_outputs(plan);
+  keep_shard(plan, request);
+  plan.outputs = fs::absolute(request.output).lexically_normal().string();
+  return plan;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,254 @@
+#include "pipeline/batch/progress.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <ostream>
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Shares of a model's time that the stages took on the sample scans; they only shape the progress bar.
+double share(const std::string& stage) {
+  static const std::map<std::string, double> shares{{"import", .03},         {"condition", .04},
+                                                    {"skeletonization", .2}, {"ssf", .2},
+                                                    {"simplification", .15}, {"perceptual_values", .05},
+                                                    {"fragmentation", .03},  {"zim", .02},
+                                                    {"ladder", .08},         {"lut", .08},
+                                                    {"scales", .05},         {"quality", .06},
+                                                    {"package", .01}};
+  const auto it = shares.find(stage);
+  return it == shares.end() ? 0 : it->second;
+}
+
+std::string sentence(const Json& note) {
+  const std::string place = note.value("place", "");
+  return note.value("code", "") + (place.empty() ? "" : " at " + place) + ": " + note.value("text", "");
+}
+
+}  // namespace
+
+std::string format_bytes(std::uint64_t bytes) {
+  if (bytes < 1000) return fmt::format("{} B", bytes);
+  if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
+  if (bytes < 1000000000) return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
+  return fmt::format("{:.2f} GB", static_cast<double>(bytes) / 1e9);
+}
+
+std::string format_seconds(double seconds) {
+  if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+  const int s = static_cast<int>(seconds + .5);
+  if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
+  return fmt::format("{} h {} min", s / 3600, s / 60 % 60);
+}
+
+std::string describe_change(const std::string& part, const std::string& from, const std::string& to) {
+  const auto shorten = [&](const std::string& value) -> std::string {
+    if (value.empty()) return "nothing";
+    if (part.starts_with("input ") && value.size() > 65 && value[64] == ' ')
+      return value.substr(0, 8) + " (" + value.substr(65) + " bytes)";
+    return value.size() > 60 ? value.substr(0, 57) + "..." : value;
+  };
+  const std::string name = part.starts_with("option ") ? part.substr(7) : part;
+  return name + " " + shorten(from) + " -> " + shorten(to);
+}
+
+namespace {
+
+/// "runs: ladder.rungs [5,8] -> [8]" and the like.
+std::string verdict(const Json& e) {
+  const std::string v = e.value("verdict", "");
+  if (v == "hit") return "from the cache";
+  if (v == "unknown") return "depends on what becomes of " + e.value("waits_for", "");
+  const Json changes = e.value("changes", Json::array());
+  if (!e.value("history", false)) return "runs: no earlier run of it is known";
+  if (changes.empty()) return "runs: nothing has changed, but its result is no longer in the cache";
+  std::string text = "runs: ";
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    text += (i ? "; " : "") + describe_change(changes[i].value("part", ""), changes[i].value("from", ""),
+                                              changes[i].value("to", ""));
+  return text;
+}
+
+}  // namespace
+
+Progress::Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain)
+    : out_(out), mode_(mode), verbose_(verbose), explain_(explain) {}
+
+void Progress::begin(std::vector<ProgressModel> models) {
+  models_ = std::move(models);
+  for (const ProgressModel& m : models_) total_weight_ += m.weight;
+}
+
+void Progress::recalled(std::size_t model, const WorkerReport& r, const std::string& output) {
+  if (!r.error_message.empty()) {
+    if (mode_ == OutputMode::kJson)
+      out_ << Json{{"event", "error"},          {"model", models_[model].name}, {"kind", r.error_kind},
+                   {"file", r.error_file},      {"place", r.error_place},       {"expected", r.error_expected},
+                   {"found", r.error_found},    {"message", r.error_message}}
+                  .dump(-1, ' ', false, Json::error_handler_t::replace)
+           << '\n';
+    else
+      line("error: " + r.error_message + " (nothing has changed since; --retry-failed tries again)");
+  }
+  const bool alone = models_.size() == 1;
+  ++finished_count_;
+  if (mode_ == OutputMode::kJson || (r.ok() && mode_ != OutputMode::kQuiet && (verbose_ || alone))) {
+    --finished_count_;
+    finished(model, r, output);
+  }
+}
+
+void Progress::started(std::size_t model, const std::string& output) {
+  running_[model].start = std::chrono::steady_clock::now();
+  if (mode_ == OutputMode::kJson)
+    out_ << Json{{"event", "model-started"}, {"model", models_[model].name}, {"output", output}}.dump(
+                -1, ' ', false, Json::error_handler_t::replace)
+         << '\n'
+         << std::flush;
+}
+
+void Progress::event(std::size_t model, const std::string& json_line) {
+  const Json e = Json::parse(json_line, nullptr, false);
+  if (!e.is_object()) return;
+  const std::string event = e.value("event", ""), &name = models_[model].name;
+  if (mode_ == OutputMode::kJson) {
+    Json tagged{{"event", event}, {"model", name}};
+    for (const auto& [k, v] : e.items())
+      if (k != "event") tagged[k] = v;
+    out_ << tagged.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n' << std::flush;
+    return;
+  }
+  const std::string stage = e.value("stage", "");
+  if (event == "stage-started") {
+    running_[model].stage = stage;
+  } else if (event == "stage-finished") {
+    const double part = share(stage) * models_[model].weight;
+    running_[model].fraction += part;
+    done_weight_ += part;
+    if (verbose_ && e.value("result", "") == "ran")
+      line(fmt::format("{}: {} took {}", name, stage, format_seconds(e.value("seconds", 0.0))));
+    else if (verbose_ && !explain_)
+      line(fmt::format("{}: {} from the cache", name, stage));
+  } else if (event == "stage-explained" && explain_) {
+    line(fmt::format("{}: {:<18} {}", name, stage, verdict(e)));
+  } else if (event == "note" && (e.value("severity", "") == "warning" || verbose_)) {
+    line(fmt::format("{}: {}: {}", name, e.value("severity", "") == "warning" ? "warning" : "note", sentence(e)));
+  } else if (event == "cache") {
+    if (++cache_events_[e.value("text", "")] == 1) line("cache: " + e.value("text", ""));
+  } else if (event == "error") {
+    line(fmt::format("error: {}", e.value("message", "")));
+  }
+  redraw(false);
+}
+
+void Progress::finished(std::size_t model, const WorkerReport& r, const std::string& output) {
+  ++finished_count_;
+  const std::string& name = models_[model].name;
+  const auto it = running_.find(model);
+  done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
+  running_.erase(model);
+  if (mode_ == OutputMode::kJson) {
+    out_ << Json{{"event", "model-finished"},
+                 {"model", name},
+                 {"result", result_name(r.result)},
+                 {"ran", r.ran},
+                 {"output", output},
+                 {"bytes", r.package_bytes},
+                 {"seconds", r.seconds},
+                 {"peak_memory_bytes", r.peak_memory_bytes},
+                 {"stages_ran", r.stages_ran},
+                 {"stages_from_cache", r.stages_hit}}
+                .dump(-1, ' ', false, Json::error_handler_t::replace)
+         << '\n';
+    if (r.ran) out_ << std::flush;
+    return;
+  }
+  if (r.result == ModelResult::kOk && mode_ != OutputMode::kQuiet)
+    line(fmt::format("{}: {}, {}, {}, peak memory {}{}", name, output, format_bytes(r.package_bytes),
+                     format_seconds(r.seconds), format_bytes(r.peak_memory_bytes),
+                     r.stages_hit ? fmt::format(" ({} of {} stages from the cache)", r.stages_hit,
+                                                r.stages_hit + r.stages_ran)
+                                  : ""));
+  else if (r.result == ModelResult::kUnchanged && mode_ != OutputMode::kQuiet)
+    line(fmt::format("{}: {} is up to date", name, output));
+  redraw(true);
+}
+
+void Progress::summary(const std::vector<WorkerReport>& reports, double seconds) {
+  auto count = [&](ModelResult r) {
+    return std::count_if(reports.begin(), reports.end(),
+                         [r](const WorkerReport& x) { return x.result == r; });
+  };
+  const auto ok = count(ModelResult::kOk), same = count(ModelResult::kUnchanged),
+             cancelled = count(ModelResult::kCancelled);
+  const auto models = static_cast<std::ptrdiff_t>(reports.size()), failed = models - ok - same - cancelled;
+  if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
+  if (mode_ == OutputMode::kJson) {
+    out_ << Json{{"event", "summary"}, {"models", reports.size()}, {"compiled", ok},    {"unchanged", same},
+                 {"failed", failed},   {"cancelled", cancelled},   {"seconds", seconds}}
+                .dump()
+         << '\n'
+         << std::flush;
+    return;
+  }
+  for (const auto& [text, times] : cache_events_)
+    if (times > 1) line(fmt::format("cache: {} more times: {}", times - 1, text));
+  const auto recalled = std::count_if(reports.begin(), reports.end(),
+                                      [](const WorkerReport& r) { return r.ok() && !r.ran; });
+  if (explain_ && recalled > 0 && mode_ != OutputMode::kQuiet)
+    out_ << fmt::format("{} of {} models are up to date: no input, option or tool has changed\n", recalled, models);
+  else if (models >= 2 || cancelled > 0)
+    if (mode_ != OutputMode::kQuiet || failed + cancelled > 0)
+      out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}\n", ok, same, failed,
+                          cancelled ? fmt::format(", {} cancelled", cancelled) : "", format_seconds(seconds));
+  out_ << std::flush;
+}
+
+void Progress::forecast_summary(std::size_t to_look_at, std::size_t models) {
+  if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
+  line(fmt::format("{} of {} models are up to date: no input, option or tool has changed. Nothing was written.",
+                   models - to_look_at, models));
+}
+
+void Progress::line(const std::string& text) {
+  out_ << (mode_ == OutputMode::kTerminal ? "\r\033[K" : "") << text << '\n' << std::flush;
+}
+
+double Progress::done_fraction() const { return total_weight_ > 0 ? std::clamp(done_weight_ / total_weight_, 0.0, 1.0) : 1; }
+
+std::string Progress::eta() const {
+  const double done = done_fraction();
+  const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  if (done < .02 || elapsed < 1) return "";
+  return ", " + format_seconds(elapsed * (1 - done) / done) + " left";
+}
+
+/// The model that has been at it for longest.
+std::string Progress::slowest() const {
+  const auto it = std::min_element(running_.begin(), running_.end(), [](const auto& a, const auto& b) {
+    return a.second.start < b.second.start;
+  });
+  return it == running_.end() ? "" : models_[it->first].name + " " + it->second.stage;
+}
+
+/// Ten times a second is enough for an eye; events come faster.
+void Progress::redraw(bool now) {
+  if (mode_ != OutputMode::kTerminal) return;
+  const auto time = std::chrono::steady_clock::now();
+  if (!now && time - drawn_ < std::chrono::milliseconds(100)) return;
+  drawn_ = time;
+  constexpr int kWidth = 24;
+  const int filled = static_cast<int>(done_fraction() * kWidth);
+  std::string now_at = slowest();
+  if (now_at.size() > 48) now_at = "..." + now_at.substr(now_at.size() - 45);
+  out_ << fmt::format("\r\033[K[{:=<{}}{:<{}}] {}/{} {}{}", "", filled, "", kWidth - filled, finished_count_,
+                      models_.size(), now_at, eta())
+       << std::flush;
+}
+
+}  // namespace texmesh

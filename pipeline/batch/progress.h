@@ -1,0 +1,64 @@
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <iosfwd>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pipeline/worker.h"
+
+namespace texmesh {
+
+enum class OutputMode : std::uint8_t { kTerminal, kPlain, kJson, kQuiet };
+
+struct ProgressModel {
+  std::string name;
+  double weight = 1;  // expected seconds; 0 for what need not run
+};
+
+/// What a user sees of a compile run: one bar for the whole run that redraws itself on a terminal, plain lines in a pipe,
+/// or one JSON event a line (schemas/event.v1.schema.json). Errors and warnings are shown in every mode.
+class Progress {
+ public:
+  /// `explain`: say of every stage why it runs.
+  Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain);
+
+  void begin(std::vector<ProgressModel> models);
+  void recalled(std::size_t model, const WorkerReport& report, const std::string& output);  // no need to run it
+  void started(std::size_t model, const std::string& output);
+  void event(std::size_t model, const std::string& json_line);
+  void finished(std::size_t model, const WorkerReport& report, const std::string& output);
+  void summary(const std::vector<WorkerReport>& reports, double seconds);
+  void forecast_summary(std::size_t to_look_at, std::size_t models);
+
+ private:
+  struct Running {
+    std::string stage;
+    std::chrono::steady_clock::time_point start;
+    double fraction = 0;  // of its weight
+  };
+  void line(const std::string& text);  // a lasting line
+  void redraw(bool now);
+  double done_fraction() const;
+  std::string eta() const;
+  std::string slowest() const;
+
+  std::ostream& out_;
+  OutputMode mode_;
+  bool verbose_, explain_;
+  std::vector<ProgressModel> models_;
+  std::map<std::size_t, Running> running_;
+  std::size_t finished_count_ = 0;
+  std::map<std::string, std::size_t> cache_events_;  // by text: the same one from many models is told once
+  double done_weight_ = 0, total_weight_ = 0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), drawn_;
+};
+
+std::string format_bytes(std::uint64_t bytes);  // "1.23 MB", decimal units
+std::string format_seconds(double seconds);     // "3.4 s", "2 min 10 s"
+
+/// "ladder.rungs: [5,8] -> [8]"; digests shortened.
+std::string describe_change(const std::string& part, const std::string& from, const std::string& to);
+
+}  // namespace texmesh

@@ -1,0 +1,204 @@
+#include "pipeline/cache/cache_files.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "format/errors.h"
+#include "pipeline/atomic_file.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kRecordVersion = 2;
+constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
+
+struct Descriptor {
+  int fd = -1;
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+};
+
+std::span<const std::uint8_t> as_bytes(const std::string& s) {
+  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+}
+
+bool write_all(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), 1 << 24));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+bool is_there(const std::string& path, std::size_t bytes) {
+  struct stat s {};
+  return ::stat(path.c_str(), &s) == 0 && S_ISREG(s.st_mode) && static_cast<std::size_t>(s.st_size) == bytes;
+}
+
+bool sync_folder(const std::string& folder) {
+  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  return d.fd >= 0 && (::fsync(d.fd) == 0 || errno == EINVAL || errno == ENOTSUP);
+}
+
+/// For file systems without O_TMPFILE (NFS): a named sibling. Pruning removes what a killed process leaves.
+bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> bytes) {
+  try {
+    write_file_atomically(path, bytes);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, const Sha256* key) {
+  const auto body = unseal(bytes);
+  if (!body) return std::nullopt;
+  const Json j = Json::parse(*body, nullptr, false);
+  if (!j.is_object() || j.value("version", 0) != kRecordVersion || !j.contains("key") || !j["key"].is_object() ||
+      !j.contains("outputs") || !j["outputs"].is_array())
+    return std::nullopt;
+  if (key) {
+    std::vector<std::pair<std::string, std::string>> parts;
+    for (const auto& [label, value] : j["key"].items()) {
+      if (!value.is_string()) return std::nullopt;
+      parts.emplace_back(label, value.get<std::string>());
+    }
+    if (digest_of_parts(parts) != *key) return std::nullopt;
+  }
+  CacheRecord record;
+  record.preimage = j["key"].dump(1);
+  for (const Json& o : j["outputs"]) {
+    StoredBlob b;
+    if (!o.is_object()) return std::nullopt;
+    b.name = o.value("name", "");
+    b.bytes = o.value("bytes", std::uint64_t{0});
+    if (!from_hex(o.value("sha256", ""), b.digest)) return std::nullopt;
+    record.outputs.push_back(b);
+  }
+  return record;
+}
+
+}  // namespace
+
+std::string object_path(const char* kind, const Sha256& digest) {
+  const std::string hex = to_hex(digest);
+  return std::string(kind) + "/" + hex.substr(0, 2) + "/" + hex;
+}
+
+std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes) {
+  const Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  struct stat s {};
+  if (d.fd < 0 || ::fstat(d.fd, &s) != 0 || !S_ISREG(s.st_mode) || static_cast<std::uint64_t>(s.st_size) > max_bytes)
+    return std::nullopt;
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(s.st_size));
+  for (std::size_t at = 0; at < bytes.size();) {
+    const ssize_t n = ::read(d.fd, bytes.data() + at, bytes.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return std::nullopt;  // EIO, or somebody shortens the file
+    at += static_cast<std::size_t>(n);
+  }
+  return bytes;
+}
+
+bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes) {
+  const std::string folder = fs::path(path).parent_path().string();
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  if (ec) return false;
+  const Descriptor d{::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666)};
+  if (d.fd < 0) {
+    if (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL && errno != ENOENT) return false;
+    return is_there(path, bytes.size()) || publish_by_rename(path, bytes);
+  }
+  if (!write_all(d.fd, bytes) || ::fdatasync(d.fd) != 0) return false;
+  const std::string self = "/proc/self/fd/" + std::to_string(d.fd);
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) != 0) {
+    if (errno == EEXIST) return is_there(path, bytes.size());
+    return errno == ENOENT && publish_by_rename(path, bytes);  // no /proc in this sandbox
+  }
+  return sync_folder(folder);
+}
+
+std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(as_bytes(body))) + "\n"; }
+
+std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < kSealBytes) return std::nullopt;
+  const std::string text(bytes.begin(), bytes.end());
+  std::string body = text.substr(0, text.size() - kSealBytes);
+  if (seal(body) != text) return std::nullopt;
+  return body;
+}
+
+std::string write_record(const CacheRecord& record) {
+  Json outputs = Json::array();
+  for (const StoredBlob& b : record.outputs)
+    outputs.push_back({{"name", b.name}, {"sha256", to_hex(b.digest)}, {"bytes", b.bytes}});
+  return seal(
+      Json{{"version", kRecordVersion}, {"key", Json::parse(record.preimage)}, {"outputs", std::move(outputs)}}.dump(1));
+}
+
+std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key) {
+  return parse_record(bytes, &key);
+}
+std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes) { return parse_record(bytes, nullptr); }
+
+FileLock::~FileLock() {
+  if (fd_ >= 0) ::close(fd_);
+}
+FileLock::FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)), busy_(other.busy_) {}
+FileLock& FileLock::operator=(FileLock&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  std::swap(busy_, other.busy_);
+  return *this;
+}
+
+namespace {
+
+int open_lock(const std::string& path) { return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666); }
+
+int operation(FileLock::Mode mode) { return mode == FileLock::Mode::kShared ? LOCK_SH : LOCK_EX; }
+
+}  // namespace
+
+FileLock FileLock::wait(const std::string& path, Mode mode) {
+  FileLock lock;
+  const int fd = open_lock(path);
+  if (fd < 0) return lock;
+  int rc;
+  do rc = ::flock(fd, operation(mode));
+  while (rc != 0 && errno == EINTR);
+  if (rc == 0)
+    lock.fd_ = fd;
+  else
+    ::close(fd);
+  return lock;
+}
+
+FileLock FileLock::attempt(const std::string& path, Mode mode) {
+  FileLock lock;
+  const int fd = open_lock(path);
+  if (fd < 0) return lock;
+  if (::flock(fd, operation(mode) | LOCK_NB) == 0) {
+    lock.fd_ = fd;
+  } else {
+    lock.busy_ = errno == EWOULDBLOCK || errno == EINTR;
+    ::close(fd);
+  }
+  return lock;
+}
+
+}  // namespace texmesh

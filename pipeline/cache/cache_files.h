@@ -1,0 +1,69 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/store.h"
+
+// The cache folder's own files: what stands where, how a file is published, what a record looks like.
+//
+//   ac/<k[0:2]>/<key>        a record: the key's parts in the clear, the outputs' digests, its own digest
+//   cas/<d[0:2]>/<digest>    the bytes of an output
+//   notes/<k[0:2]>/<key>     small facts that are not results
+//   memo/<name>              what the last run of a collection left (pipeline/build_memo.h)
+//   locks/<k[0:3]>           flock: held while a key that begins so is computed
+//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while pruning
+//   running/<name>           one per running build, locked while it lives; its time is the build's start
+//   quarantine/<name>        what was found damaged
+namespace texmesh {
+
+/// Path of an object within a cache folder; `kind` is ac, cas or notes.
+std::string object_path(const char* kind, const Sha256& digest);
+
+/// The whole of a regular file; nothing when it is not there, longer than max_bytes or cannot be read.
+std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
+
+/// Puts `bytes` under a name that nobody has: an unnamed temporary file, fdatasync, link, fsync of the folder. A file that
+/// is there already stays, whoever wrote it, and counts as success when it is as long. False when it cannot be done;
+/// nothing is left then, whatever kills the process.
+bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
+
+/// Text with its digest behind it, so that a cut or flipped one is noticed; and back.
+std::string seal(const std::string& body);
+std::optional<std::string> unseal(std::span<const std::uint8_t> bytes);
+
+/// A record of ac/: sealed JSON.
+struct CacheRecord {
+  std::string preimage;  // Key::preimage
+  std::vector<StoredBlob> outputs;
+};
+std::string write_record(const CacheRecord& record);
+/// Nothing when the record is damaged, of another version, or its parts do not give `key`.
+std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key);
+/// The same for a record whose key the caller knows by its name only (pruning).
+std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes);
+
+/// flock on a file that is made when it is not there; released with the object.
+class FileLock {
+ public:
+  enum class Mode : std::uint8_t { kShared, kExclusive };
+  FileLock() = default;
+  ~FileLock();
+  FileLock(FileLock&& other) noexcept;
+  FileLock& operator=(FileLock&& other) noexcept;
+  /// Waits. Not held when locks do not work there.
+  static FileLock wait(const std::string& path, Mode mode);
+  /// Does not wait.
+  static FileLock attempt(const std::string& path, Mode mode);
+  bool held() const { return fd_ >= 0; }
+  /// attempt() failed because somebody else holds it, not because locks do not work.
+  bool busy() const { return busy_; }
+
+ private:
+  int fd_ = -1;
+  bool busy_ = false;
+};
+
+}  // namespace texmesh

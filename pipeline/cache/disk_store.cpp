@@ -1,0 +1,237 @@
+#include "pipeline/cache/disk_store.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "format/errors.h"
+#include "pipeline/atomic_file.h"
+#include "pipeline/cache/cache_files.h"
+#include "pipeline/cache/prune.h"
+#include "pipeline/file_stamp.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+class LockClaim : public Claim {
+ public:
+  explicit LockClaim(FileLock lock) : lock_(std::move(lock)) {}
+
+ private:
+  FileLock lock_;
+};
+
+/// running/<name>: locked while this process lives.
+class RunningBuild {
+ public:
+  explicit RunningBuild(const std::string& folder) {
+    static std::atomic<unsigned> counter{0};
+    path_ = folder + "/running/" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+    ::unlink(path_.c_str());  // of an earlier process of this number
+    lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
+  }
+  ~RunningBuild() { ::unlink(path_.c_str()); }
+  RunningBuild(const RunningBuild&) = delete;
+  RunningBuild& operator=(const RunningBuild&) = delete;
+
+ private:
+  std::string path_;
+  FileLock lock_;
+};
+
+class DiskStore : public Store {
+ public:
+  explicit DiskStore(const std::string& folder)
+      : folder_(make_folders(folder)), running_(folder), start_ns_(wall_clock_ns()) {}
+
+  std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
+    const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared);
+    const std::string path = place("ac", key);
+    const auto bytes = read_whole(path);
+    if (!bytes) return std::nullopt;
+    auto record = read_record(*bytes, key);
+    if (!record) {
+      quarantine(path, "the record of a result");
+      return std::nullopt;
+    }
+    for (const StoredBlob& b : record->outputs)
+      if (!verify(b)) return std::nullopt;
+    touch(path);
+    return std::move(record->outputs);
+  }
+
+  Bytes load(const StoredBlob& blob) override {
+    const std::string path = place("cas", blob.digest);
+    const auto stamp = stamp_of(path);
+    auto bytes = read_whole(path);
+    if (!bytes) return nullptr;
+    if (!is_verified(blob.digest, stamp) && !check(path, blob, *bytes)) return nullptr;
+    return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+  }
+
+  bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+    const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared);
+    CacheRecord record{key.preimage(), {}};
+    for (const auto& [name, bytes] : outputs) {
+      const StoredBlob blob{name, sha256(*bytes), bytes->size()};
+      const std::string path = place("cas", blob.digest);
+      // A blob that is there already may be damaged: look, which moves it away.
+      const bool was_there = stamp_of(path) && verify(blob);
+      if (!was_there && !publish_object(path, *bytes)) return not_written();
+      record.outputs.push_back(blob);
+    }
+    const std::string text = write_record(record);
+    return publish_object(place("ac", key.digest()), bytes_of(text)) || not_written();
+  }
+
+  std::optional<std::string> preimage(const Sha256& key) override {
+    const auto bytes = read_whole(place("ac", key));
+    const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
+    return record ? std::optional(record->preimage) : std::nullopt;
+  }
+
+  std::optional<std::string> find_note(const Sha256& key) override {
+    const std::string path = place("notes", key);
+    const auto bytes = read_whole(path);
+    if (!bytes) return std::nullopt;
+    auto text = unseal(*bytes);
+    if (!text) quarantine(path, "a note");
+    return text;
+  }
+
+  bool put_note(const Sha256& key, const std::string& text) override {
+    const std::string path = place("notes", key), sealed = seal(text);
+    if (file_holds(path, bytes_of(sealed))) return true;
+    std::error_code ec;
+    fs::create_directories(fs::path(path).parent_path(), ec);
+    try {
+      write_file_atomically(path, bytes_of(sealed));
+      return true;
+    } catch (const InputError&) {
+      return not_written();
+    }
+  }
+
+  /// Polls, so that Ctrl-C ends the wait. A prefix of the key is enough: two keys that share a file wait for each other,
+  /// which costs time and never more, and the folder stays small.
+  std::unique_ptr<Claim> claim(const Sha256& key, const RunContext& context) override {
+    const std::string path = folder_ + "/locks/" + to_hex(key).substr(0, 3);
+    for (;;) {
+      FileLock lock = FileLock::attempt(path, FileLock::Mode::kExclusive);
+      if (lock.held()) return std::make_unique<LockClaim>(std::move(lock));
+      if (!lock.busy()) return nullptr;
+      context.check_cancelled();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+
+  std::vector<StoreEvent> take_events() override {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(events_, {});
+  }
+
+ private:
+  static std::string make_folders(const std::string& folder) {
+    std::error_code ec;
+    for (const char* part : {"ac", "cas", "notes", "memo", "locks", "running"}) {
+      fs::create_directories(fs::path(folder) / part, ec);
+      if (ec) throw InputError((fs::path(folder) / part).string(), "", "a cache folder", ec.message());
+    }
+    return folder;
+  }
+
+  static std::span<const std::uint8_t> bytes_of(const std::string& s) {
+    return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+  }
+
+  std::string place(const char* kind, const Sha256& digest) const {
+    return folder_ + "/" + object_path(kind, digest);
+  }
+
+  /// A use moves an entry to the young end of the queue, at most hourly (pruning knows of that hour).
+  void touch(const std::string& path) const {
+    struct stat s {};
+    if (::stat(path.c_str(), &s) == 0 && stamp_of(s).modified_ns < start_ns_ - kTouchInterval_s * 1'000'000'000)
+      ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
+  }
+
+  bool is_verified(const Sha256& digest, const std::optional<FileStamp>& stamp) {
+    const std::lock_guard lock(mutex_);
+    const auto it = verified_.find(digest);
+    return stamp && it != verified_.end() && it->second == *stamp;
+  }
+
+  bool verify(const StoredBlob& blob) {
+    const std::string path = place("cas", blob.digest);
+    const auto stamp = stamp_of(path);
+    if (is_verified(blob.digest, stamp)) return true;
+    const auto bytes = read_whole(path);
+    return bytes && check(path, blob, *bytes);
+  }
+
+  bool check(const std::string& path, const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
+    if (bytes.size() != blob.bytes || sha256(bytes) != blob.digest) {
+      quarantine(path, "the result " + blob.name);
+      return false;
+    }
+    touch(path);
+    if (const auto stamp = stamp_of(path)) {
+      const std::lock_guard lock(mutex_);
+      verified_[blob.digest] = *stamp;
+    }
+    return true;
+  }
+
+  void quarantine(const std::string& path, const std::string& what) {
+    std::error_code ec;
+    fs::create_directories(folder_ + "/quarantine", ec);
+    const std::string name = fs::path(path).filename().string();
+    fs::rename(path, folder_ + "/quarantine/" + name, ec);
+    const std::lock_guard lock(mutex_);
+    events_.push_back({"cache-entry-damaged",
+                       what + " does not have its digest; " +
+                           (ec ? "it could not be moved away (" + ec.message() + ")" : "moved to quarantine/" + name) +
+                           ", computed again"});
+  }
+
+  bool not_written() {
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(told_not_written_, true))
+      events_.push_back({"cache-not-written", "results cannot be kept in " + folder_ + " (is the disk full?)"});
+    return false;
+  }
+
+  std::string folder_;
+  RunningBuild running_;
+  std::int64_t start_ns_;
+  std::mutex mutex_;
+  std::map<Sha256, FileStamp> verified_;
+  std::vector<StoreEvent> events_;
+  bool told_not_written_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Store> open_disk_store(const std::string& folder) { return std::make_unique<DiskStore>(folder); }
+
+std::string default_cache_folder(const std::string& flag) {
+  if (!flag.empty()) return flag;
+  auto variable = [](const char* name) {
+    const char* v = std::getenv(name);
+    return std::string(v ? v : "");
+  };
+  if (const std::string v = variable("TEXMESH_CACHE"); !v.empty()) return v;
+  if (const std::string v = variable("XDG_CACHE_HOME"); !v.empty() && v.front() == '/') return v + "/texmesh";
+  if (const std::string v = variable("HOME"); !v.empty()) return v + "/.cache/texmesh";
+  return "";
+}
+
+}  // namespace texmesh

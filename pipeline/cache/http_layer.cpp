@@ -1,0 +1,121 @@
+#include <curl/curl.h>
+
+#include <algorithm>
+#include <cstring>
+#include <mutex>
+
+#include "pipeline/cache/cache_layer.h"
+
+namespace texmesh {
+namespace {
+
+struct Sink {
+  std::vector<std::uint8_t> bytes;
+  std::uint64_t max_bytes = 0;
+};
+struct Upload {
+  std::span<const std::uint8_t> rest;
+};
+
+std::size_t take(char* data, std::size_t size, std::size_t count, void* user) {
+  auto& sink = *static_cast<Sink*>(user);
+  if (sink.bytes.size() + size * count > sink.max_bytes) return 0;  // ends the transfer: longer than what was asked for
+  sink.bytes.insert(sink.bytes.end(), data, data + size * count);
+  return size * count;
+}
+std::size_t ignore(char*, std::size_t size, std::size_t count, void*) { return size * count; }
+std::size_t give(char* data, std::size_t size, std::size_t count, void* user) {
+  auto& upload = *static_cast<Upload*>(user);
+  const std::size_t n = std::min(size * count, upload.rest.size());
+  if (n > 0) std::memcpy(data, upload.rest.data(), n);
+  upload.rest = upload.rest.subspan(n);
+  return n;
+}
+
+struct Easy {
+  CURL* handle = ::curl_easy_init();
+  ~Easy() { ::curl_easy_cleanup(handle); }
+};
+
+/// scheme://host/path without user and password.
+std::string shown(const std::string& url) {
+  const std::size_t host = url.find("://") + 3, path = std::min(url.find('/', host), url.size());
+  const std::size_t at = url.rfind('@', path);
+  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
+}
+
+class HttpLayer : public CacheLayer {
+ public:
+  explicit HttpLayer(std::string url) : url_(std::move(url)) {
+    while (url_.ends_with('/')) url_.pop_back();
+    static std::once_flag once;
+    std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
+  }
+  std::string name() const override { return shown(url_); }
+
+  std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
+                                               std::uint64_t max_bytes) override {
+    const std::lock_guard lock(mutex_);
+    Sink sink{{}, max_bytes};
+    prepare(kind, digest);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_HTTPGET, 1L);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, take);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEDATA, &sink);
+    const CURLcode rc = ::curl_easy_perform(easy_.handle);
+    const long status = status_code();
+    if (status == 404 || status == 410) return std::nullopt;
+    if (rc == CURLE_WRITE_ERROR && status == 200) return std::nullopt;  // too long: not what was asked for
+    if (rc != CURLE_OK) throw LayerError(::curl_easy_strerror(rc));
+    if (status != 200) throw LayerError("status " + std::to_string(status));
+    return std::move(sink.bytes);
+  }
+
+  void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) override {
+    const std::lock_guard lock(mutex_);
+    Upload upload{bytes};
+    prepare(kind, digest);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_UPLOAD, 1L);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_READFUNCTION, give);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_READDATA, &upload);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes.size()));
+    ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, ignore);
+    const CURLcode rc = ::curl_easy_perform(easy_.handle);
+    if (rc != CURLE_OK) throw LayerError(::curl_easy_strerror(rc));
+    if (const long status = status_code(); status < 200 || status > 299)
+      throw LayerError("status " + std::to_string(status) + " for a PUT");
+  }
+
+ private:
+  void prepare(const char* kind, const Sha256& digest) {
+    const bool blob = std::string_view(kind) == "cas";
+    const std::string url = url_ + (blob ? "/cas/" : "/ac/") + to_hex(digest);
+    CURL* h = easy_.handle;
+    ::curl_easy_reset(h);  // keeps the connection
+    ::curl_easy_setopt(h, CURLOPT_URL, url.c_str());
+    ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
+    ::curl_easy_setopt(h, CURLOPT_FOLLOWLOCATION, 0L);
+    ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
+    ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT, 5L);
+    ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_LIMIT, 1000L);
+    ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_TIME, 10L);
+    ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
+  }
+  long status_code() const {
+    long status = 0;
+    ::curl_easy_getinfo(easy_.handle, CURLINFO_RESPONSE_CODE, &status);
+    return status;
+  }
+
+  std::string url_;
+  std::mutex mutex_;  // one connection
+  Easy easy_;
+};
+
+}  // namespace
+
+std::unique_ptr<CacheLayer> open_http_layer(const std::string& url) {
+  check_layer(url);
+  return std::make_unique<HttpLayer>(url);
+}
+
+}  // namespace texmesh

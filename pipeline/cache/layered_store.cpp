@@ -1,0 +1,195 @@
+#include <filesystem>
+#include <sstream>
+
+#include "format/errors.h"
+#include "pipeline/cache/cache_files.h"
+#include "pipeline/cache/cache_layer.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint64_t kMaxRecordBytes = 1 << 22, kMaxBlobBytes = 1ull << 34;
+
+class FolderLayer : public CacheLayer {
+ public:
+  explicit FolderLayer(std::string folder) : folder_(std::move(folder)) {}
+  std::string name() const override { return folder_; }
+  std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
+                                               std::uint64_t max_bytes) override {
+    if (!std::filesystem::is_directory(folder_)) throw LayerError("no such folder");
+    return read_whole(folder_ + "/" + object_path(kind, digest), max_bytes);
+  }
+  void put(const char*, const Sha256&, std::span<const std::uint8_t>) override {}
+
+ private:
+  std::string folder_;
+};
+
+std::span<const std::uint8_t> bytes_of(const std::string& s) {
+  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+}
+
+class LayeredStore : public Store {
+ public:
+  LayeredStore(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers, bool upload)
+      : local_(std::move(local)), upload_(upload) {
+    for (auto& l : layers) layers_.push_back({std::move(l), true});
+  }
+
+  std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
+    if (auto found = local_->find(key)) return found;
+    for (Layer& layer : layers_)
+      if (bring(layer, key))
+        if (auto found = local_->find(key)) return found;
+    return std::nullopt;
+  }
+
+  Bytes load(const StoredBlob& blob) override {
+    if (Bytes bytes = local_->load(blob)) return bytes;
+    for (Layer& layer : layers_)
+      if (auto bytes = get(layer, "cas", blob.digest, blob.bytes); bytes && is(blob, *bytes))
+        return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+    return nullptr;
+  }
+
+  bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+    const bool kept = local_->put(key, outputs);
+    if (!upload_) return kept;
+    CacheRecord record{key.preimage(), {}};
+    for (const auto& [name, bytes] : outputs) record.outputs.push_back({name, sha256(*bytes), bytes->size()});
+    const std::string text = write_record(record);
+    for (Layer& layer : layers_)
+      guarded(layer, [&] {  // blobs first: a record must never name what is not there
+        for (std::size_t i = 0; i < outputs.size(); ++i)
+          layer.layer->put("cas", record.outputs[i].digest, *outputs[i].second);
+        layer.layer->put("ac", key.digest(), bytes_of(text));
+      });
+    return kept;
+  }
+
+  std::optional<std::string> preimage(const Sha256& key) override { return local_->preimage(key); }
+
+  std::optional<std::string> find_note(const Sha256& key) override {
+    if (auto note = local_->find_note(key)) return note;
+    for (Layer& layer : layers_)
+      if (const auto bytes = get(layer, "notes", key, kMaxRecordBytes))
+        if (auto text = unseal(*bytes)) {
+          local_->put_note(key, *text);
+          return text;
+        }
+    return std::nullopt;
+  }
+
+  bool put_note(const Sha256& key, const std::string& text) override {
+    const bool kept = local_->put_note(key, text);
+    if (upload_) {
+      const std::string sealed = seal(text);
+      for (Layer& layer : layers_) guarded(layer, [&] { layer.layer->put("notes", key, bytes_of(sealed)); });
+    }
+    return kept;
+  }
+
+  std::unique_ptr<Claim> claim(const Sha256& key, const RunContext& context) override {
+    return local_->claim(key, context);
+  }
+
+  std::vector<StoreEvent> take_events() override {
+    auto events = local_->take_events();
+    const std::lock_guard lock(mutex_);
+    events.insert(events.end(), events_.begin(), events_.end());
+    events_.clear();
+    return events;
+  }
+
+ private:
+  struct Layer {
+    std::unique_ptr<CacheLayer> layer;
+    bool works = true;
+  };
+
+  static bool is(const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
+    return bytes.size() == blob.bytes && sha256(bytes) == blob.digest;
+  }
+
+  template <class F>
+  void guarded(Layer& layer, F&& f) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!layer.works) return;
+    }
+    try {
+      f();
+    } catch (const LayerError& e) {
+      const std::lock_guard lock(mutex_);
+      if (std::exchange(layer.works, false))
+        events_.push_back({"cache-layer-unreachable", layer.layer->name() + " is left out: " + e.what()});
+    }
+  }
+
+  std::optional<std::vector<std::uint8_t>> get(Layer& layer, const char* kind, const Sha256& digest,
+                                               std::uint64_t max_bytes) {
+    std::optional<std::vector<std::uint8_t>> bytes;
+    guarded(layer, [&] { bytes = layer.layer->get(kind, digest, max_bytes); });
+    return bytes;
+  }
+
+  void tell_damaged(const Layer& layer, const std::string& what) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back({"cache-entry-damaged", what + " from " + layer.layer->name() + " does not have its digest; not used"});
+  }
+
+  /// Copies a run of a stage from a layer into the local store, if all of it is there and sound.
+  bool bring(Layer& layer, const Sha256& key) {
+    const auto bytes = get(layer, "ac", key, kMaxRecordBytes);
+    if (!bytes) return false;
+    const auto record = read_record(*bytes, key);
+    if (!record) return tell_damaged(layer, "a record"), false;
+    std::vector<std::pair<std::string, Bytes>> outputs;
+    for (const StoredBlob& blob : record->outputs) {
+      if (blob.bytes > kMaxBlobBytes) return false;
+      auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
+      if (!blob_bytes) return false;
+      if (!is(blob, *blob_bytes)) return tell_damaged(layer, "the result " + blob.name), false;
+      outputs.emplace_back(blob.name, std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
+    }
+    const auto original = key_from_preimage(record->preimage);
+    return original && local_->put(*original, outputs);
+  }
+
+  std::unique_ptr<Store> local_;
+  std::vector<Layer> layers_;
+  bool upload_;
+  std::mutex mutex_;
+  std::vector<StoreEvent> events_;
+};
+
+}  // namespace
+
+std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder) {
+  return std::make_unique<FolderLayer>(folder);
+}
+
+void check_layer(const std::string& place) {
+  if (place.find("://") != std::string::npos && !place.starts_with("http://") && !place.starts_with("https://"))
+    throw InputError("cache layer", "", "a folder, or a URL that begins with http:// or https://",
+                     place.substr(0, place.find("://") + 3) + "...");
+}
+
+std::unique_ptr<CacheLayer> open_layer(const std::string& place) {
+  return place.find("://") != std::string::npos ? open_http_layer(place) : open_folder_layer(place);
+}
+
+std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers,
+                                     bool upload) {
+  return std::make_unique<LayeredStore>(std::move(local), std::move(layers), upload);
+}
+
+std::vector<std::string> layers_from_environment() {
+  const char* text = std::getenv("TEXMESH_CACHE_LAYERS");
+  std::istringstream in(text ? text : "");
+  std::vector<std::string> places;
+  for (std::string place; in >> place;) places.push_back(place);
+  return places;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,41 @@
+#include "pipeline/cli/units.h"
+
+#include <cmath>
+#include <map>
+
+#include "format/errors.h"
+
+namespace texmesh {
+namespace {
+
+double parse(const std::string& text, const std::string& flag, const std::map<std::string, double>& units,
+             const char* expected) {
+  std::size_t end = 0;
+  double v = 0;
+  try {
+    v = std::stod(text, &end);
+  } catch (const std::exception&) {
+    end = 0;
+  }
+  const auto unit = units.find(text.substr(end));
+  if (end == 0 || unit == units.end() || !(v >= 0 && v * unit->second < 1e18))
+    throw InputError(flag, "", expected, text);
+  return v * unit->second;
+}
+
+}  // namespace
+
+std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"", 1},      {"B", 1},      {"kB", 1e3},        {"MB", 1e6},         {"GB", 1e9},
+      {"TB", 1e12}, {"KiB", 1024}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}, {"TiB", 1099511627776.0}};
+  return static_cast<std::uint64_t>(parse(text, flag, kUnits, "a size such as 500MB or 8GiB"));
+}
+
+std::int64_t parse_seconds(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"", 1}, {"s", 1}, {"min", 60}, {"h", 3600}, {"d", 86400}};
+  return static_cast<std::int64_t>(parse(text, flag, kUnits, "a time such as 90d, 12h or 30min"));
+}
+
+}  // namespace texmesh

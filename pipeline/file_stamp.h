@@ -1,0 +1,32 @@
+#pragma once
+#include <sys/stat.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace texmesh {
+
+/// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the last change
+/// of content and of inode, in nanoseconds since 1970.
+struct FileStamp {
+  std::uint64_t device = 0, inode = 0, bytes = 0;
+  std::int64_t modified_ns = 0, changed_ns = 0;
+  friend bool operator==(const FileStamp&, const FileStamp&) = default;
+
+  /// A file that was changed this shortly before it was looked at may be changed again within the clock's tick: its
+  /// stamp is no proof.
+  bool is_settled(std::int64_t looked_at_ns) const {
+    return modified_ns < looked_at_ns - kSettleNs && changed_ns < looked_at_ns - kSettleNs;
+  }
+  static constexpr std::int64_t kSettleNs = 2'000'000'000;
+};
+
+FileStamp stamp_of(const struct stat& status);
+/// Nothing when `path` is not a regular file that can be looked at (symbolic links are followed).
+std::optional<FileStamp> stamp_of(const std::string& path);
+
+/// Wall clock in nanoseconds since 1970. For stamps and for the age of cache entries, never for results.
+std::int64_t wall_clock_ns();
+
+}  // namespace texmesh
