@@ -190,12 +190,13 @@ void refuse_warnings(const Notes& notes, const std::string& input) {
 
 void give_inputs(GraphRun& graph, ModelSource& source, const std::string& provenance_json) {
   graph.give("source", object(source.source()), source.digest(), 0);
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()), provenance_json.size());
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
+                        provenance_json.size());
   graph.give("provenance", object(provenance_json), sha256(bytes), provenance_json.size());
 }
 
-CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Store& store, const RunContext& context,
-                         const StageObserver& observer) {
+CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Store& store,
+                         const RunContext& context, const StageObserver& observer) {
   GraphRun graph(stage_table(), request.options, store, context, observer);
   give_inputs(graph, source, provenance(source, request.options));
   graph.explain(request.earlier_keys, request.explainer);
@@ -240,7 +241,8 @@ Object run_stages(const CompileRequest& request, const std::vector<Stage>& stage
   return result;
 }
 
-std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request, Store& store,
+std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request,
+                                                                      Store& store,
                                                                       const RunContext& context) {
   ModelSource source(request);
   source.open(request.options, store, context, false);

@@ -14,10 +14,11 @@ struct CompileRequest {
   std::string output;     // path of the package; "" = compile, check, write nothing
   std::string temporary;  // sibling of output that is renamed to it; "" = a name of its own
   CompileOptions options;
-  bool strict = false;              // warnings are errors
-  std::vector<FileRequest> known;   // digests of an earlier run, by stamp: such files are not read to learn them
-  StageKeys earlier_keys;           // of an earlier run, to explain against
-  StageExplainer explainer;         // may be empty
+  bool strict = false;  // warnings are errors
+  std::vector<FileRequest>
+      known;                 // digests of an earlier run, by stamp: such files are not read to learn them
+  StageKeys earlier_keys;    // of an earlier run, to explain against
+  StageExplainer explainer;  // may be empty
   // Told, when compiling fails, which files had been looked at: what would have to change for another result.
   std::function<void(const std::vector<FileRequest>&)> files_of_failure;
 };
@@ -27,7 +28,8 @@ struct CompileOutcome {
   Sha256 package_digest{};
   bool unchanged = false;  // the output already held these bytes and was left alone
   Notes notes;
-  std::vector<FileRequest> files;  // what the result depends on: the model (uri ""), then what it refers to, found or not
+  std::vector<FileRequest>
+      files;  // what the result depends on: the model (uri ""), then what it refers to, found or not
   StageKeys keys;
 };
 
@@ -43,9 +45,10 @@ CompileOutcome compile_model(const CompileRequest& request, Store& store, const 
 Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
                   Store& store, const RunContext& context, const StageObserver& observer, Notes& notes);
 
-/// What compile_model would do, by stage, without running a stage or writing anything. The input is read, and parsed where
-/// the store does not remember what it refers to.
-std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request, Store& store,
+/// What compile_model would do, by stage, without running a stage or writing anything. The input is read, and
+/// parsed where the store does not remember what it refers to.
+std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request,
+                                                                      Store& store,
                                                                       const RunContext& context);
 
 }  // namespace texmesh

@@ -3,9 +3,9 @@
 
 namespace texmesh {
 
-/// The executable that has every stage in it, texmesh-core: beside this one, or in ../libexec/texmesh, where installing puts
-/// it. The `texmesh` that people call loads none of the stages' libraries, so that a build with nothing to do ends at once;
-/// it starts this one for everything else. InputError when it is not there.
+/// The executable that has every stage in it, texmesh-core: beside this one, or in ../libexec/texmesh, where
+/// installing puts it. The `texmesh` that people call loads none of the stages' libraries, so that a build
+/// with nothing to do ends at once; it starts this one for everything else. InputError when it is not there.
 std::string core_executable();
 
 }  // namespace texmesh

@@ -12,8 +12,8 @@
 
 namespace texmesh {
 
-/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and bytes
-/// become part of the cache key: the same requests with the same answers give the same model.
+/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
+/// bytes become part of the cache key: the same requests with the same answers give the same model.
 struct FileRequest {
   std::string uri;  // as the model names it; "" = the model itself
   bool found = false;
@@ -41,8 +41,8 @@ class FileResolver : public Resolver {
 
   /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.
   void expect(std::vector<FileRequest> known);
-  /// As read(), but for the digest only: reads the file only when its stamp is not an expected one. False when it is not
-  /// there.
+  /// As read(), but for the digest only: reads the file only when its stamp is not an expected one. False
+  /// when it is not there.
   bool look(const std::string& uri, std::uint64_t max_bytes);
 
   /// Every uri that was asked for, once, in the order of first use; refused ones as not found.

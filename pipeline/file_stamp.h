@@ -7,15 +7,15 @@
 
 namespace texmesh {
 
-/// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the last change
-/// of content and of inode, in nanoseconds since 1970.
+/// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
+/// last change of content and of inode, in nanoseconds since 1970.
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t modified_ns = 0, changed_ns = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
 
-  /// A file that was changed this shortly before it was looked at may be changed again within the clock's tick: its
-  /// stamp is no proof.
+  /// A file that was changed this shortly before it was looked at may be changed again within the clock's
+  /// tick: its stamp is no proof.
   bool is_settled(std::int64_t looked_at_ns) const {
     return modified_ns < looked_at_ns - kSettleNs && changed_ns < looked_at_ns - kSettleNs;
   }

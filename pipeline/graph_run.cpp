@@ -336,8 +336,9 @@ std::vector<std::pair<const Stage*, StageExplanation>> GraphRun::forecast() {
       const bool hit = blobs && blobs->size() == stage.outputs.size() + 1;
       for (std::size_t k = 0; hit && k < stage.outputs.size(); ++k)
         s.publish_digest(stage.outputs[k].name, (*blobs)[k].digest, (*blobs)[k].bytes);
-      all[i] = {&stage, s.explanation_of(stage, key, hit ? StageExplanation::Verdict::kHit
-                                                         : StageExplanation::Verdict::kRuns)};
+      all[i] = {&stage,
+                s.explanation_of(stage, key,
+                                 hit ? StageExplanation::Verdict::kHit : StageExplanation::Verdict::kRuns)};
     }
   }
   for (std::size_t i = 0; i < s.nodes.size(); ++i) {

@@ -31,9 +31,10 @@ struct StageExplanation {
     kUnknown,  // forecasts only: depends on what an earlier stage will give
   };
   Verdict verdict = Verdict::kHit;
-  bool has_history = false;        // a key of an earlier run of this stage for this model is known
-  std::vector<KeyChange> changes;  // against that key, in the order of the key's parts; empty where nothing changed
-  std::string waits_for;           // kUnknown: the artefact
+  bool has_history = false;  // a key of an earlier run of this stage for this model is known
+  std::vector<KeyChange>
+      changes;            // against that key, in the order of the key's parts; empty where nothing changed
+  std::string waits_for;  // kUnknown: the artefact
 };
 using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
 
@@ -52,8 +53,8 @@ class GraphRun {
   /// An artefact from outside the graph, with the digest that stands for it in keys.
   void give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes);
 
-  /// What a stage's key is compared with, and who is told, for every stage, before it runs. Called from any thread, one call
-  /// at a time.
+  /// What a stage's key is compared with, and who is told, for every stage, before it runs. Called from any
+  /// thread, one call at a time.
   void explain(StageKeys earlier, StageExplainer explainer);
 
   /// What run() would do, in table order, without running anything or changing the store.

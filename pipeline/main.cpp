@@ -1,5 +1,5 @@
-// texmesh: compile and cache without the stages' libraries, whose loading alone takes longer than seeing that a collection
-// of a thousand models is up to date; every other command is texmesh-core's.
+// texmesh: compile and cache without the stages' libraries, whose loading alone takes longer than seeing that
+// a collection of a thousand models is up to date; every other command is texmesh-core's.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

@@ -21,8 +21,8 @@ struct StoredBlob {
 };
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-/// Held while a key is computed, so that processes that share a store compute it once. Ends with the object, and with the
-/// process however that ends.
+/// Held while a key is computed, so that processes that share a store compute it once. Ends with the object,
+/// and with the process however that ends.
 class Claim {
  public:
   virtual ~Claim() = default;
@@ -51,8 +51,8 @@ class Store {
   /// digest. A later put_note replaces an earlier one.
   virtual std::optional<std::string> find_note(const Sha256& key) = 0;
   virtual bool put_note(const Sha256& key, const std::string& text) = 0;
-  /// Waits until nobody else holds the key; null where there is nothing to share or locks do not work. Throws Cancelled.
-  /// A thread that holds a claim must not wait for another one.
+  /// Waits until nobody else holds the key; null where there is nothing to share or locks do not work. Throws
+  /// Cancelled. A thread that holds a claim must not wait for another one.
   virtual std::unique_ptr<Claim> claim(const Sha256&, const RunContext&) { return nullptr; }
   /// What has happened since the last call.
   virtual std::vector<StoreEvent> take_events() { return {}; }

@@ -88,7 +88,8 @@ void write_all(int fd, const std::string& text) {
   }
 }
 
-std::string job_text(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits, int threads) {
+std::string job_text(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits,
+                     int threads) {
   Json keys = Json::object();
   for (const auto& [stage, key] : job.earlier_keys) keys[stage] = to_hex(key);
   return Json{{"input", job.input},
@@ -158,8 +159,10 @@ void take_stage(const Json& e, double now_s, WorkerReport& report) {
 void take_inputs(const Json& e, WorkerReport& report) {
   report.files = files_from_json(e.value("files", ""));
   from_hex(e.value("package", ""), report.package_digest);
-  for (const auto& [stage, key] : e.value("keys", Json::object()).items())
-    if (Sha256 digest; key.is_string() && from_hex(key.get<std::string>(), digest)) report.keys[stage] = digest;
+  const Json keys = e.value("keys", Json::object());
+  for (const auto& [stage, key] : keys.items())
+    if (Sha256 digest; key.is_string() && from_hex(key.get<std::string>(), digest))
+      report.keys[stage] = digest;
 }
 
 /// Takes what an event says about the model into its report. False: it is for this process alone.
@@ -261,7 +264,8 @@ std::string error_line(const WorkerReport& r) {
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// The order in which jobs start: longest first, so that no long one is left for the end; unknown ones by their size.
+/// The order in which jobs start: longest first, so that no long one is left for the end; unknown ones by
+/// their size.
 std::vector<std::size_t> start_order(const std::vector<WorkerJob>& jobs) {
   std::vector<std::size_t> order(jobs.size());
   std::iota(order.begin(), order.end(), 0);
@@ -318,7 +322,8 @@ class Pool {
     reports_[job].ran = true;
     const std::size_t side_by_side =
         std::min<std::size_t>(static_cast<std::size_t>(processors), children_.size() + 1 + waiting_.size());
-    Child child = start_child(jobs_[job], job, limits_, std::max(1, processors / static_cast<int>(side_by_side)));
+    Child child =
+        start_child(jobs_[job], job, limits_, std::max(1, processors / static_cast<int>(side_by_side)));
     child.lane = free_lane();
     reports_[job].lane = child.lane;
     reports_[job].start_s = now_s();

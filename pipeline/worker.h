@@ -30,8 +30,8 @@ struct WorkerJob {
   std::shared_ptr<const std::string> profile;  // JSON of every option; jobs may share it
   CacheSettings cache;
   bool strict = false;
-  bool explain = false;   // say of every stage why it runs or not
-  bool forecast = false;  // say it, and do nothing
+  bool explain = false;            // say of every stage why it runs or not
+  bool forecast = false;           // say it, and do nothing
   std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
   StageKeys earlier_keys;
   std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
@@ -77,11 +77,11 @@ struct PoolSettings {
 };
 
 /// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a
-/// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest start first;
-/// at most `processors` run side by side, fewer when their predicted peaks do not fit the memory (one always runs), and
-/// the last ones get the processors that are free as threads. A child
-/// that dies, hangs or outgrows its limits costs its own model only. SIGINT and SIGTERM end all children
-/// within two seconds and leave no temporary file; what had not finished is kCancelled.
+/// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest
+/// start first; at most `processors` run side by side, fewer when their predicted peaks do not fit the memory
+/// (one always runs), and the last ones get the processors that are free as threads. A child that dies, hangs
+/// or outgrows its limits costs its own model only. SIGINT and SIGTERM end all children within two seconds
+/// and leave no temporary file; what had not finished is kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished);
 

@@ -176,7 +176,8 @@ int compile(const Json& job, EventWriter& events) {
       events.write(explanation_event(stage, e));
     };
   request.files_of_failure = [&events](const std::vector<FileRequest>& files) {
-    events.write({{"event", "inputs"}, {"files", files_to_json(files)}, {"package", ""}, {"keys", Json::object()}});
+    events.write(
+        {{"event", "inputs"}, {"files", files_to_json(files)}, {"package", ""}, {"keys", Json::object()}});
   };
   try {
     report_outcome(events, compile_model(request, *store, context, stage_events(events)));

@@ -49,8 +49,8 @@ struct PackedRecord {
   std::vector<std::string> error;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.keys, s.package_identity, s.package_times,
-      s.package_bytes, s.peak_memory_bytes, s.seconds, s.error);
+    a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.keys, s.package_identity,
+      s.package_times, s.package_bytes, s.peak_memory_bytes, s.seconds, s.error);
   }
 };
 
@@ -61,12 +61,21 @@ FileStamp stamp(const std::array<std::uint64_t, 3>& id, const std::array<std::in
 }
 
 std::vector<std::uint8_t> pack(const MemoRecord& r) {
-  PackedRecord p{r.request,       r.package_digest, static_cast<std::uint8_t>(r.failed),
-                 r.looked_at_ns,  {},               {},
-                 identity(r.package_stamp), times(r.package_stamp), r.package_bytes,
-                 r.peak_memory_bytes, r.seconds,    r.error};
+  PackedRecord p{r.request,
+                 r.package_digest,
+                 static_cast<std::uint8_t>(r.failed),
+                 r.looked_at_ns,
+                 {},
+                 {},
+                 identity(r.package_stamp),
+                 times(r.package_stamp),
+                 r.package_bytes,
+                 r.peak_memory_bytes,
+                 r.seconds,
+                 r.error};
   for (const FileRequest& f : r.files)
-    p.files.push_back({f.uri, static_cast<std::uint8_t>(f.found), f.digest, f.bytes, identity(f.stamp), times(f.stamp)});
+    p.files.push_back(
+        {f.uri, static_cast<std::uint8_t>(f.found), f.digest, f.bytes, identity(f.stamp), times(f.stamp)});
   for (const auto& [stage, key] : r.keys) p.keys.push_back({stage, key});
   return encode_artefact(p);
 }
@@ -101,7 +110,8 @@ std::uint64_t get_u64(const std::vector<std::uint8_t>& in, std::size_t at) {
 /// Not through symbolic links: import does not follow them either.
 std::optional<FileStamp> look(const std::string& path, bool follow) {
   struct stat s {};
-  if ((follow ? ::stat(path.c_str(), &s) : ::lstat(path.c_str(), &s)) != 0 || !S_ISREG(s.st_mode)) return std::nullopt;
+  if ((follow ? ::stat(path.c_str(), &s) : ::lstat(path.c_str(), &s)) != 0 || !S_ISREG(s.st_mode))
+    return std::nullopt;
   return stamp_of(s);
 }
 
@@ -164,7 +174,9 @@ bool BuildMemo::find(const std::string& package, MemoRecord& record) const {
   }
 }
 
-void BuildMemo::set(const std::string& package, const MemoRecord& record) { changed_[package] = pack(record); }
+void BuildMemo::set(const std::string& package, const MemoRecord& record) {
+  changed_[package] = pack(record);
+}
 
 bool BuildMemo::save() {
   if (path_.empty() || changed_.empty()) return true;
@@ -206,8 +218,8 @@ bool still_holds(MemoRecord& record, const std::string& input, const std::string
     }
     if (!same_file(path, is_model, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
   }
-  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest, record.package_bytes,
-                                   record.package_stamp, refreshed))
+  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest,
+                                   record.package_bytes, record.package_stamp, refreshed))
     return false;
   // What was settled before is so now; what was read just now was true at this moment.
   if (refreshed) record.looked_at_ns = now_ns;

@@ -133,7 +133,8 @@ class CollectionReader {
         const std::string input = (fs::path(folder) / relative).string();
         if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
         const std::string package = package_of(relative);
-        add(models, {input, sharing[package] > 1 ? relative + ".texmesh" : package, options_for(input)}, place);
+        add(models, {input, sharing[package] > 1 ? relative + ".texmesh" : package, options_for(input)},
+            place);
       }
     }
   }

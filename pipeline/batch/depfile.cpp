@@ -11,9 +11,11 @@ std::string escaped(const std::string& path) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     const char c = path[i];
     if (c == '\n' || c == '\r')
-      throw InputError(path, "", "a path without line breaks (dependency files cannot hold them)", "one with them");
+      throw InputError(path, "", "a path without line breaks (dependency files cannot hold them)",
+                       "one with them");
     if ((c == ' ' || c == '#') && i > 0 && path[i - 1] == '\\')
-      throw InputError(path, "", "a path without a backslash before a blank or # (dependency files cannot hold it)",
+      throw InputError(path, "",
+                       "a path without a backslash before a blank or # (dependency files cannot hold it)",
                        "one with it");
     if (c == ' ' || c == '#') out += '\\';
     if (c == '$') out += '$';

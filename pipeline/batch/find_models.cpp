@@ -24,7 +24,8 @@ struct Found {
 };
 
 void add_folder(const fs::path& folder, std::vector<Found>& found) {
-  for (const std::string& relative : list_models(folder.string())) found.push_back({folder / relative, relative});
+  for (const std::string& relative : list_models(folder.string()))
+    found.push_back({folder / relative, relative});
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ struct ModelPath {
 /// (a.glb.texmesh). InputError for what is not there.
 std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output);
 
-/// Every model beneath a folder as find_models finds them: paths relative to it, sorted. InputError when the folder is not
-/// there or holds none.
+/// Every model beneath a folder as find_models finds them: paths relative to it, sorted. InputError when the
+/// folder is not there or holds none.
 std::vector<std::string> list_models(const std::string& folder);
 
 /// A JSON file that says within its first bytes that it is a range scan; other JSON files are collections.

@@ -43,14 +43,16 @@ class Profiles {
   std::vector<std::shared_ptr<const CompileOptions>> kept_;
 };
 
-void add_collection(const std::string& file, const PlanRequest& request, Profiles& profiles, BatchPlan& plan) {
+void add_collection(const std::string& file, const PlanRequest& request, Profiles& profiles,
+                    BatchPlan& plan) {
   const auto bytes = read_input_file(file, kMaxCollectionBytes);
   const fs::path folder = fs::path(file).parent_path();
   const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
   for (const CollectionModel& m :
        read_collection(std::string(bytes.begin(), bytes.end()), file, request.base, list)) {
     const std::string input = (folder / m.input).string();
-    plan.models.push_back({input, (fs::path(request.output) / m.output).string(), input, profiles.of(m.options)});
+    plan.models.push_back(
+        {input, (fs::path(request.output) / m.output).string(), input, profiles.of(m.options)});
   }
   plan.files.push_back(file);
 }
@@ -60,7 +62,8 @@ void refuse_shared_outputs(const BatchPlan& plan) {
   for (const PlannedModel& m : plan.models) {
     const auto [other, fresh] = taken.emplace(m.output, &m);
     if (!fresh)
-      throw InputError(m.input, "", "a package of its own", m.output + ", which is that of " + other->second->input);
+      throw InputError(m.input, "", "a package of its own",
+                       m.output + ", which is that of " + other->second->input);
   }
 }
 
@@ -86,13 +89,16 @@ BatchPlan plan_batch(const PlanRequest& request) {
       add_collection(input, request, profiles, plan);
     else
       others.push_back(input);
-  const bool names_package = fs::path(request.output).extension() == ".texmesh" && !fs::is_directory(request.output);
+  const bool names_package =
+      fs::path(request.output).extension() == ".texmesh" && !fs::is_directory(request.output);
   if (!plan.files.empty() && names_package)
-    throw InputError(request.output, "", "a folder for the packages of a collection", "the name of one package");
+    throw InputError(request.output, "", "a folder for the packages of a collection",
+                     "the name of one package");
   if (!others.empty()) {
     const auto shared = std::make_shared<const CompileOptions>(request.base);
     for (ModelPath& m : find_models(others, request.output)) {
-      std::string name = request.inputs.size() == 1 && names_package ? fs::path(m.input).filename().string() : m.input;
+      std::string name =
+          request.inputs.size() == 1 && names_package ? fs::path(m.input).filename().string() : m.input;
       plan.models.push_back({std::move(m.input), std::move(m.output), std::move(name), profiles.of(shared)});
     }
   }

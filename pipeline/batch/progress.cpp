@@ -87,9 +87,9 @@ void Progress::begin(std::vector<ProgressModel> models) {
 void Progress::recalled(std::size_t model, const WorkerReport& r, const std::string& output) {
   if (!r.error_message.empty()) {
     if (mode_ == OutputMode::kJson)
-      out_ << Json{{"event", "error"},          {"model", models_[model].name}, {"kind", r.error_kind},
-                   {"file", r.error_file},      {"place", r.error_place},       {"expected", r.error_expected},
-                   {"found", r.error_found},    {"message", r.error_message}}
+      out_ << Json{{"event", "error"},       {"model", models_[model].name}, {"kind", r.error_kind},
+                   {"file", r.error_file},   {"place", r.error_place},       {"expected", r.error_expected},
+                   {"found", r.error_found}, {"message", r.error_message}}
                   .dump(-1, ' ', false, Json::error_handler_t::replace)
            << '\n';
     else
@@ -137,7 +137,8 @@ void Progress::event(std::size_t model, const std::string& json_line) {
   } else if (event == "stage-explained" && explain_) {
     line(fmt::format("{}: {:<18} {}", name, stage, verdict(e)));
   } else if (event == "note" && (e.value("severity", "") == "warning" || verbose_)) {
-    line(fmt::format("{}: {}: {}", name, e.value("severity", "") == "warning" ? "warning" : "note", sentence(e)));
+    line(fmt::format("{}: {}: {}", name, e.value("severity", "") == "warning" ? "warning" : "note",
+                     sentence(e)));
   } else if (event == "cache") {
     if (++cache_events_[e.value("text", "")] == 1) line("cache: " + e.value("text", ""));
   } else if (event == "error") {
@@ -198,10 +199,11 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
   }
   for (const auto& [text, times] : cache_events_)
     if (times > 1) line(fmt::format("cache: {} more times: {}", times - 1, text));
-  const auto recalled = std::count_if(reports.begin(), reports.end(),
-                                      [](const WorkerReport& r) { return r.ok() && !r.ran; });
+  const auto recalled =
+      std::count_if(reports.begin(), reports.end(), [](const WorkerReport& r) { return r.ok() && !r.ran; });
   if (explain_ && recalled > 0 && mode_ != OutputMode::kQuiet)
-    out_ << fmt::format("{} of {} models are up to date: no input, option or tool has changed\n", recalled, models);
+    out_ << fmt::format("{} of {} models are up to date: no input, option or tool has changed\n", recalled,
+                        models);
   else if (models >= 2 || cancelled > 0)
     if (mode_ != OutputMode::kQuiet || failed + cancelled > 0)
       out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}\n", ok, same, failed,
@@ -211,15 +213,18 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
 
 void Progress::forecast_summary(std::size_t to_look_at, std::size_t models) {
   if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
-  line(fmt::format("{} of {} models are up to date: no input, option or tool has changed. Nothing was written.",
-                   models - to_look_at, models));
+  line(fmt::format(
+      "{} of {} models are up to date: no input, option or tool has changed. Nothing was written.",
+      models - to_look_at, models));
 }
 
 void Progress::line(const std::string& text) {
   out_ << (mode_ == OutputMode::kTerminal ? "\r\033[K" : "") << text << '\n' << std::flush;
 }
 
-double Progress::done_fraction() const { return total_weight_ > 0 ? std::clamp(done_weight_ / total_weight_, 0.0, 1.0) : 1; }
+double Progress::done_fraction() const {
+  return total_weight_ > 0 ? std::clamp(done_weight_ / total_weight_, 0.0, 1.0) : 1;
+}
 
 std::string Progress::eta() const {
   const double done = done_fraction();

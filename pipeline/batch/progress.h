@@ -17,15 +17,17 @@ struct ProgressModel {
   double weight = 1;  // expected seconds; 0 for what need not run
 };
 
-/// What a user sees of a compile run: one bar for the whole run that redraws itself on a terminal, plain lines in a pipe,
-/// or one JSON event a line (schemas/event.v1.schema.json). Errors and warnings are shown in every mode.
+/// What a user sees of a compile run: one bar for the whole run that redraws itself on a terminal, plain
+/// lines in a pipe, or one JSON event a line (schemas/event.v1.schema.json). Errors and warnings are shown in
+/// every mode.
 class Progress {
  public:
   /// `explain`: say of every stage why it runs.
   Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain);
 
   void begin(std::vector<ProgressModel> models);
-  void recalled(std::size_t model, const WorkerReport& report, const std::string& output);  // no need to run it
+  void recalled(std::size_t model, const WorkerReport& report,
+                const std::string& output);  // no need to run it
   void started(std::size_t model, const std::string& output);
   void event(std::size_t model, const std::string& json_line);
   void finished(std::size_t model, const WorkerReport& report, const std::string& output);

@@ -18,13 +18,26 @@ std::string dump(const Json& j) { return j.dump(1, ' ', false, Json::error_handl
 std::string xml(const std::string& text) {
   std::string out;
   for (const char c : text) switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\n': out += "&#10;"; break;
-      case '\t': out += "&#9;"; break;
-      default: out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\n':
+        out += "&#10;";
+        break;
+      case '\t':
+        out += "&#9;";
+        break;
+      default:
+        out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
     }
   return out;
 }
@@ -52,9 +65,15 @@ Json model_json(const PlannedModel& m, const WorkerReport& r) {
 
 double microseconds(double s) { return std::round(s * 1e6); }
 
-Json span(const std::string& name, const char* category, double start_s, double end_s, int process, int thread) {
-  return {{"name", name}, {"cat", category},  {"ph", "X"},     {"ts", microseconds(start_s)},
-          {"dur", std::max(1.0, microseconds(end_s - start_s))}, {"pid", process}, {"tid", thread}};
+Json span(const std::string& name, const char* category, double start_s, double end_s, int process,
+          int thread) {
+  return {{"name", name},
+          {"cat", category},
+          {"ph", "X"},
+          {"ts", microseconds(start_s)},
+          {"dur", std::max(1.0, microseconds(end_s - start_s))},
+          {"pid", process},
+          {"tid", thread}};
 }
 
 Json named(const char* what, int process, int thread, const std::string& name) {
@@ -80,10 +99,17 @@ std::vector<int> threads_of(const std::vector<StageSpan>& spans) {
 ResultCounts count_results(const std::vector<WorkerReport>& reports) {
   ResultCounts c;
   for (const WorkerReport& r : reports) switch (r.result) {
-      case ModelResult::kOk: ++c.compiled; break;
-      case ModelResult::kUnchanged: ++c.unchanged; break;
-      case ModelResult::kCancelled: ++c.cancelled; break;
-      default: ++c.failed;
+      case ModelResult::kOk:
+        ++c.compiled;
+        break;
+      case ModelResult::kUnchanged:
+        ++c.unchanged;
+        break;
+      case ModelResult::kCancelled:
+        ++c.cancelled;
+        break;
+      default:
+        ++c.failed;
     }
   return c;
 }
@@ -91,8 +117,9 @@ ResultCounts count_results(const std::vector<WorkerReport>& reports) {
 std::string write_summary(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports,
                           double seconds) {
   const ResultCounts c = count_results(reports);
-  Json j{{"version", 1},           {"models", Json::array()}, {"compiled", c.compiled}, {"unchanged", c.unchanged},
-         {"failed", c.failed},     {"cancelled", c.cancelled}, {"seconds", seconds}};
+  Json j{
+      {"version", 1},       {"models", Json::array()},  {"compiled", c.compiled}, {"unchanged", c.unchanged},
+      {"failed", c.failed}, {"cancelled", c.cancelled}, {"seconds", seconds}};
   for (std::size_t i = 0; i < models.size(); ++i) j["models"].push_back(model_json(models[i], reports[i]));
   return dump(j);
 }
@@ -102,12 +129,13 @@ std::string write_junit(const std::vector<PlannedModel>& models, const std::vect
   const ResultCounts c = count_results(reports);
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
-      "<testsuite name=\"texmesh compile\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" time=\"{:.3f}\">\n",
+      "<testsuite name=\"texmesh compile\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" "
+      "time=\"{:.3f}\">\n",
       models.size(), c.failed, c.cancelled, seconds);
   for (std::size_t i = 0; i < models.size(); ++i) {
     const WorkerReport& r = reports[i];
-    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"", xml(utf8(models[i].name)),
-                       r.seconds);
+    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"",
+                       xml(utf8(models[i].name)), r.seconds);
     if (r.ok())
       out += "/>\n";
     else if (r.result == ModelResult::kCancelled)
@@ -136,7 +164,8 @@ std::string write_trace(const std::vector<PlannedModel>& models, const std::vect
   for (const auto& [lane, threads] : lanes) {
     events.push_back(named("process_name", lane, 0, "worker " + std::to_string(lane)));
     events.push_back(named("thread_name", lane, 0, "models"));
-    for (int t = 1; t <= threads; ++t) events.push_back(named("thread_name", lane, t, "stages " + std::to_string(t)));
+    for (int t = 1; t <= threads; ++t)
+      events.push_back(named("thread_name", lane, t, "stages " + std::to_string(t)));
   }
   return dump(Json{{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}});
 }
@@ -159,10 +188,12 @@ std::string write_statistics(const std::vector<WorkerReport>& reports) {
     }
   std::string out = fmt::format("{:<20} {:>7} {:>11} {:>10}\n", "stage", "ran", "from cache", "seconds");
   for (const std::string& stage : order)
-    out += fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n", stage, rows[stage].ran, rows[stage].hits, rows[stage].seconds);
-  const auto not_run = std::count_if(reports.begin(), reports.end(), [](const WorkerReport& r) { return !r.ran; });
-  return out + fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n{} of {} models needed no look at their stages\n", "all",
-                           all.ran, all.hits, all.seconds, not_run, reports.size());
+    out += fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n", stage, rows[stage].ran, rows[stage].hits,
+                       rows[stage].seconds);
+  const auto not_run =
+      std::count_if(reports.begin(), reports.end(), [](const WorkerReport& r) { return !r.ran; });
+  return out + fmt::format("{:<20} {:>7} {:>11} {:>10.2f}\n{} of {} models needed no look at their stages\n",
+                           "all", all.ran, all.hits, all.seconds, not_run, reports.size());
 }
 
 }  // namespace texmesh

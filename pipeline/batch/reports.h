@@ -17,13 +17,13 @@ ResultCounts count_results(const std::vector<WorkerReport>& reports);
 std::string write_summary(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports,
                           double seconds);
 
-/// The same for CI systems that read JUnit's XML: a test case per model; a model that could not be compiled is a failure, one
-/// that was not reached is skipped.
+/// The same for CI systems that read JUnit's XML: a test case per model; a model that could not be compiled
+/// is a failure, one that was not reached is skipped.
 std::string write_junit(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports,
                         double seconds);
 
-/// Chrome's trace format (chrome://tracing, Perfetto): one process per lane of the pool, in it a thread with the models and
-/// threads with their stages.
+/// Chrome's trace format (chrome://tracing, Perfetto): one process per lane of the pool, in it a thread with
+/// the models and threads with their stages.
 std::string write_trace(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports);
 
 /// Runs, cache hits and seconds per stage, as a table for people.

@@ -21,7 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
@@ -49,7 +51,8 @@ class Batch {
     compile();
     memo_.save();
     write_reports();
-    if (wrote_ && !settings_.cache.folder.empty()) prune_now_and_then(settings_.cache.folder, settings_.cache_limits);
+    if (wrote_ && !settings_.cache.folder.empty())
+      prune_now_and_then(settings_.cache.folder, settings_.cache_limits);
     return exit_code();
   }
 
@@ -79,8 +82,8 @@ class Batch {
       MemoRecord& record = records_[i];
       const bool remembered = memo_.find(m.output, record);
       bool refreshed = false;
-      if (remembered && record.request == request_of(m.profile) && !(record.failed && settings_.retry_failed) &&
-          still_holds(record, m.input, m.output, refreshed)) {
+      if (remembered && record.request == request_of(m.profile) &&
+          !(record.failed && settings_.retry_failed) && still_holds(record, m.input, m.output, refreshed)) {
         if (refreshed) memo_.set(m.output, record);
         recall(i, record);
         record = {};
@@ -225,7 +228,9 @@ class Batch {
 
   int forecast() {
     begin_progress();
-    const auto on_event = [&](std::size_t job, const std::string& line) { progress_.event(model_of_job_[job], line); };
+    const auto on_event = [&](std::size_t job, const std::string& line) {
+      progress_.event(model_of_job_[job], line);
+    };
     const auto reports = run_workers(jobs_, settings_.pool, on_event, {});
     for (std::size_t job = 0; job < reports.size(); ++job) reports_[model_of_job_[job]] = reports[job];
     progress_.forecast_summary(jobs_.size(), plan_.models.size());
@@ -237,7 +242,8 @@ class Batch {
   }
 
   void write_reports() const {
-    write_text(settings_.summary, settings_.summary.empty() ? "" : write_summary(plan_.models, reports_, seconds_));
+    write_text(settings_.summary,
+               settings_.summary.empty() ? "" : write_summary(plan_.models, reports_, seconds_));
     write_text(settings_.junit, settings_.junit.empty() ? "" : write_junit(plan_.models, reports_, seconds_));
     write_text(settings_.trace, settings_.trace.empty() ? "" : write_trace(plan_.models, reports_));
     if (settings_.statistics && settings_.mode != OutputMode::kJson) std::cout << write_statistics(reports_);

@@ -68,8 +68,8 @@ std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, con
   const auto body = unseal(bytes);
   if (!body) return std::nullopt;
   const Json j = Json::parse(*body, nullptr, false);
-  if (!j.is_object() || j.value("version", 0) != kRecordVersion || !j.contains("key") || !j["key"].is_object() ||
-      !j.contains("outputs") || !j["outputs"].is_array())
+  if (!j.is_object() || j.value("version", 0) != kRecordVersion || !j.contains("key") ||
+      !j["key"].is_object() || !j.contains("outputs") || !j["outputs"].is_array())
     return std::nullopt;
   if (key) {
     std::vector<std::pair<std::string, std::string>> parts;
@@ -102,7 +102,8 @@ std::string object_path(const char* kind, const Sha256& digest) {
 std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat s {};
-  if (d.fd < 0 || ::fstat(d.fd, &s) != 0 || !S_ISREG(s.st_mode) || static_cast<std::uint64_t>(s.st_size) > max_bytes)
+  if (d.fd < 0 || ::fstat(d.fd, &s) != 0 || !S_ISREG(s.st_mode) ||
+      static_cast<std::uint64_t>(s.st_size) > max_bytes)
     return std::nullopt;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(s.st_size));
   for (std::size_t at = 0; at < bytes.size();) {
@@ -147,14 +148,17 @@ std::string write_record(const CacheRecord& record) {
   Json outputs = Json::array();
   for (const StoredBlob& b : record.outputs)
     outputs.push_back({{"name", b.name}, {"sha256", to_hex(b.digest)}, {"bytes", b.bytes}});
-  return seal(
-      Json{{"version", kRecordVersion}, {"key", Json::parse(record.preimage)}, {"outputs", std::move(outputs)}}.dump(1));
+  return seal(Json{
+      {"version", kRecordVersion}, {"key", Json::parse(record.preimage)}, {"outputs", std::move(outputs)}}
+                  .dump(1));
 }
 
 std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key) {
   return parse_record(bytes, &key);
 }
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes) { return parse_record(bytes, nullptr); }
+std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes) {
+  return parse_record(bytes, nullptr);
+}
 
 FileLock::~FileLock() {
   if (fd_ >= 0) ::close(fd_);
@@ -168,7 +172,9 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
 
 namespace {
 
-int open_lock(const std::string& path) { return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666); }
+int open_lock(const std::string& path) {
+  return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+}
 
 int operation(FileLock::Mode mode) { return mode == FileLock::Mode::kShared ? LOCK_SH : LOCK_EX; }
 

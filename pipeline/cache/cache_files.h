@@ -14,9 +14,9 @@
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>              what the last run of a collection left (pipeline/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins so is computed
-//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while pruning
-//   running/<name>           one per running build, locked while it lives; its time is the build's start
-//   quarantine/<name>        what was found damaged
+//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while
+//   pruning running/<name>           one per running build, locked while it lives; its time is the build's
+//   start quarantine/<name>        what was found damaged
 namespace texmesh {
 
 /// Path of an object within a cache folder; `kind` is ac, cas or notes.
@@ -25,9 +25,9 @@ std::string object_path(const char* kind, const Sha256& digest);
 /// The whole of a regular file; nothing when it is not there, longer than max_bytes or cannot be read.
 std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
 
-/// Puts `bytes` under a name that nobody has: an unnamed temporary file, fdatasync, link, fsync of the folder. A file that
-/// is there already stays, whoever wrote it, and counts as success when it is as long. False when it cannot be done;
-/// nothing is left then, whatever kills the process.
+/// Puts `bytes` under a name that nobody has: an unnamed temporary file, fdatasync, link, fsync of the
+/// folder. A file that is there already stays, whoever wrote it, and counts as success when it is as long.
+/// False when it cannot be done; nothing is left then, whatever kills the process.
 bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
 
 /// Text with its digest behind it, so that a cut or flipped one is noticed; and back.

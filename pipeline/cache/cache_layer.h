@@ -7,13 +7,14 @@
 
 namespace texmesh {
 
-/// A place behind the local cache: a shared folder or a plain HTTP server. Nothing that it gives is believed before it
-/// is verified; that it cannot be reached is no error.
+/// A place behind the local cache: a shared folder or a plain HTTP server. Nothing that it gives is believed
+/// before it is verified; that it cannot be reached is no error.
 class CacheLayer {
  public:
   virtual ~CacheLayer() = default;
   virtual std::string name() const = 0;
-  /// An object (`kind`: ac, cas or notes); nothing when it is not there. Throws LayerError when the layer does not work.
+  /// An object (`kind`: ac, cas or notes); nothing when it is not there. Throws LayerError when the layer
+  /// does not work.
   virtual std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
                                                        std::uint64_t max_bytes) = 0;
   /// Only for layers that take results. Throws LayerError.
@@ -27,10 +28,10 @@ class LayerError : public std::runtime_error {
 /// A folder laid out as a cache folder; nothing is ever written to it.
 std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
 
-/// GET and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote must be told not to
-/// validate action results; any WebDAV-like server does); notes stand under ac/ too. http and https only, no redirects,
-/// 5 s to connect, given up when less than 1 kB/s arrive for 10 s. A credential in the URL (user:password@) never shows up in
-/// name() or messages. InputError for what is no such URL.
+/// GET and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote must be
+/// told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http and
+/// https only, no redirects, 5 s to connect, given up when less than 1 kB/s arrive for 10 s. A credential in
+/// the URL (user:password@) never shows up in name() or messages. InputError for what is no such URL.
 std::unique_ptr<CacheLayer> open_http_layer(const std::string& url);
 
 /// InputError for what names no layer, without touching it.
@@ -39,11 +40,11 @@ void check_layer(const std::string& place);
 /// http(s)://... or a folder.
 std::unique_ptr<CacheLayer> open_layer(const std::string& place);
 
-/// The local store with layers behind it, asked in order when the local one misses. What a layer gives is verified, kept
-/// locally, and found there from then on. With `upload`, results that were computed are put into every HTTP layer. A layer
-/// that fails is left out for the rest of the process, with one event.
-std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers,
-                                     bool upload);
+/// The local store with layers behind it, asked in order when the local one misses. What a layer gives is
+/// verified, kept locally, and found there from then on. With `upload`, results that were computed are put
+/// into every HTTP layer. A layer that fails is left out for the rest of the process, with one event.
+std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, bool upload);
 
 /// The layers that TEXMESH_CACHE_LAYERS names, separated by blanks.
 std::vector<std::string> layers_from_environment();

@@ -120,8 +120,8 @@ class DiskStore : public Store {
     }
   }
 
-  /// Polls, so that Ctrl-C ends the wait. A prefix of the key is enough: two keys that share a file wait for each other,
-  /// which costs time and never more, and the folder stays small.
+  /// Polls, so that Ctrl-C ends the wait. A prefix of the key is enough: two keys that share a file wait for
+  /// each other, which costs time and never more, and the folder stays small.
   std::unique_ptr<Claim> claim(const Sha256& key, const RunContext& context) override {
     const std::string path = folder_ + "/locks/" + to_hex(key).substr(0, 3);
     for (;;) {
@@ -159,7 +159,8 @@ class DiskStore : public Store {
   /// A use moves an entry to the young end of the queue, at most hourly (pruning knows of that hour).
   void touch(const std::string& path) const {
     struct stat s {};
-    if (::stat(path.c_str(), &s) == 0 && stamp_of(s).modified_ns < start_ns_ - kTouchInterval_s * 1'000'000'000)
+    if (::stat(path.c_str(), &s) == 0 &&
+        stamp_of(s).modified_ns < start_ns_ - kTouchInterval_s * 1'000'000'000)
       ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
   }
 
@@ -183,7 +184,7 @@ class DiskStore : public Store {
       return false;
     }
     touch(path);
-    if (const auto stamp = stamp_of(path)) {
+    if (const auto stamp = stamp_of(path); stamp && stamp->is_settled(wall_clock_ns())) {
       const std::lock_guard lock(mutex_);
       verified_[blob.digest] = *stamp;
     }
@@ -196,16 +197,17 @@ class DiskStore : public Store {
     const std::string name = fs::path(path).filename().string();
     fs::rename(path, folder_ + "/quarantine/" + name, ec);
     const std::lock_guard lock(mutex_);
-    events_.push_back({"cache-entry-damaged",
-                       what + " does not have its digest; " +
-                           (ec ? "it could not be moved away (" + ec.message() + ")" : "moved to quarantine/" + name) +
-                           ", computed again"});
+    events_.push_back({"cache-entry-damaged", what + " does not have its digest; " +
+                                                  (ec ? "it could not be moved away (" + ec.message() + ")"
+                                                      : "moved to quarantine/" + name) +
+                                                  ", computed again"});
   }
 
   bool not_written() {
     const std::lock_guard lock(mutex_);
     if (!std::exchange(told_not_written_, true))
-      events_.push_back({"cache-not-written", "results cannot be kept in " + folder_ + " (is the disk full?)"});
+      events_.push_back(
+          {"cache-not-written", "results cannot be kept in " + folder_ + " (is the disk full?)"});
     return false;
   }
 
@@ -213,14 +215,16 @@ class DiskStore : public Store {
   RunningBuild running_;
   std::int64_t start_ns_;
   std::mutex mutex_;
-  std::map<Sha256, FileStamp> verified_;
+  std::map<Sha256, FileStamp> verified_;  // only stamps that prove something
   std::vector<StoreEvent> events_;
   bool told_not_written_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Store> open_disk_store(const std::string& folder) { return std::make_unique<DiskStore>(folder); }
+std::unique_ptr<Store> open_disk_store(const std::string& folder) {
+  return std::make_unique<DiskStore>(folder);
+}
 
 std::string default_cache_folder(const std::string& flag) {
   if (!flag.empty()) return flag;

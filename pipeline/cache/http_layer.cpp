@@ -19,7 +19,8 @@ struct Upload {
 
 std::size_t take(char* data, std::size_t size, std::size_t count, void* user) {
   auto& sink = *static_cast<Sink*>(user);
-  if (sink.bytes.size() + size * count > sink.max_bytes) return 0;  // ends the transfer: longer than what was asked for
+  if (sink.bytes.size() + size * count > sink.max_bytes)
+    return 0;  // ends the transfer: longer than what was asked for
   sink.bytes.insert(sink.bytes.end(), data, data + size * count);
   return size * count;
 }

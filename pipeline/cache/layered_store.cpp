@@ -1,7 +1,5 @@
 #include <filesystem>
-#include <sstream>
 
-#include "format/errors.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/cache_layer.h"
 
@@ -135,7 +133,8 @@ class LayeredStore : public Store {
 
   void tell_damaged(const Layer& layer, const std::string& what) {
     const std::lock_guard lock(mutex_);
-    events_.push_back({"cache-entry-damaged", what + " from " + layer.layer->name() + " does not have its digest; not used"});
+    events_.push_back({"cache-entry-damaged",
+                       what + " from " + layer.layer->name() + " does not have its digest; not used"});
   }
 
   /// Copies a run of a stage from a layer into the local store, if all of it is there and sound.
@@ -150,7 +149,8 @@ class LayeredStore : public Store {
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
       if (!blob_bytes) return false;
       if (!is(blob, *blob_bytes)) return tell_damaged(layer, "the result " + blob.name), false;
-      outputs.emplace_back(blob.name, std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
+      outputs.emplace_back(blob.name,
+                           std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
     }
     const auto original = key_from_preimage(record->preimage);
     return original && local_->put(*original, outputs);
@@ -169,27 +169,13 @@ std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder) {
   return std::make_unique<FolderLayer>(folder);
 }
 
-void check_layer(const std::string& place) {
-  if (place.find("://") != std::string::npos && !place.starts_with("http://") && !place.starts_with("https://"))
-    throw InputError("cache layer", "", "a folder, or a URL that begins with http:// or https://",
-                     place.substr(0, place.find("://") + 3) + "...");
-}
-
 std::unique_ptr<CacheLayer> open_layer(const std::string& place) {
   return place.find("://") != std::string::npos ? open_http_layer(place) : open_folder_layer(place);
 }
 
-std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers,
-                                     bool upload) {
+std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, bool upload) {
   return std::make_unique<LayeredStore>(std::move(local), std::move(layers), upload);
-}
-
-std::vector<std::string> layers_from_environment() {
-  const char* text = std::getenv("TEXMESH_CACHE_LAYERS");
-  std::istringstream in(text ? text : "");
-  std::vector<std::string> places;
-  for (std::string place; in >> place;) places.push_back(place);
-  return places;
 }
 
 }  // namespace texmesh

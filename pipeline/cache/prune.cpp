@@ -41,7 +41,8 @@ bool is_object_name(const std::string& name) {
   return from_hex(name, digest);
 }
 
-/// Start of the oldest build that still runs; the largest time when none does. Forgets builds that were killed.
+/// Start of the oldest build that still runs; the largest time when none does. Forgets builds that were
+/// killed.
 std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count = nullptr) {
   std::int64_t oldest = std::numeric_limits<std::int64_t>::max();
   for (const Entry& e : list(folder, "running")) {
@@ -146,7 +147,8 @@ class Pruning {
       for (const std::string& b : std::set<std::string>(r.blobs.begin(), r.blobs.end())) {
         const auto it = blobs_.find(b);
         if (it == blobs_.end() || --it->second.users > 0) continue;
-        if (it->second.entry.stamp.modified_ns < in_use_since_ns_ && remove(it->second.entry)) ++result_.blobs;
+        if (it->second.entry.stamp.modified_ns < in_use_since_ns_ && remove(it->second.entry))
+          ++result_.blobs;
         blobs_.erase(it);
       }
     }
@@ -207,7 +209,9 @@ CacheStatistics cache_statistics(const std::string& folder) {
   return s;
 }
 
-PruneResult prune_cache(const std::string& folder, const CacheLimits& limits) { return Pruning(folder, limits).run(); }
+PruneResult prune_cache(const std::string& folder, const CacheLimits& limits) {
+  return Pruning(folder, limits).run();
+}
 
 void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
   const std::string stamp_path = folder + "/pruned";
@@ -259,7 +263,8 @@ std::vector<CacheDamage> verify_cache(const std::string& folder) {
     const auto bytes = read_whole(e.path);
     if (!bytes || !unseal(*bytes)) condemn(e, "the note is damaged");
   }
-  std::sort(damage.begin(), damage.end(), [](const CacheDamage& a, const CacheDamage& b) { return a.path < b.path; });
+  std::sort(damage.begin(), damage.end(),
+            [](const CacheDamage& a, const CacheDamage& b) { return a.path < b.path; });
   return damage;
 }
 

@@ -19,8 +19,8 @@ struct CacheStatistics {
   std::uint64_t blobs = 0, blob_bytes = 0;      // their results
   std::uint64_t notes = 0, note_bytes = 0;
   std::uint64_t quarantined = 0, quarantined_bytes = 0;
-  std::uint64_t running = 0;                    // builds that use it now
-  std::int64_t oldest_use_s = 0;                // seconds since the last use of the oldest record
+  std::uint64_t running = 0;      // builds that use it now
+  std::int64_t oldest_use_s = 0;  // seconds since the last use of the oldest record
   std::uint64_t bytes() const { return record_bytes + blob_bytes + note_bytes + quarantined_bytes; }
 };
 CacheStatistics cache_statistics(const std::string& folder);
@@ -31,14 +31,15 @@ struct PruneResult {
   std::uint64_t kept_in_use = 0;  // records that had to go by size or age but belong to a running build
 };
 
-/// Removes what has not been used for longest until the folder keeps the limits; records before the blobs that no other
-/// record needs; then blobs without a record, notes that are too old, what was quarantined a week ago, and temporary files
-/// of killed processes. Never what a running build has used: those are entries used later than kTouchInterval_s before
-/// the start of the oldest running build. Safe beside builds and other pruning.
+/// Removes what has not been used for longest until the folder keeps the limits; records before the blobs
+/// that no other record needs; then blobs without a record, notes that are too old, what was quarantined a
+/// week ago, and temporary files of killed processes. Never what a running build has used: those are entries
+/// used later than kTouchInterval_s before the start of the oldest running build. Safe beside builds and
+/// other pruning.
 PruneResult prune_cache(const std::string& folder, const CacheLimits& limits);
 
-/// prune_cache when the last one is long enough ago (a tenth of an hour) for the folder to have grown; what builds call
-/// when they are done.
+/// prune_cache when the last one is long enough ago (a tenth of an hour) for the folder to have grown; what
+/// builds call when they are done.
 void prune_now_and_then(const std::string& folder, const CacheLimits& limits);
 
 struct CacheDamage {

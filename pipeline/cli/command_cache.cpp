@@ -25,7 +25,8 @@ struct CacheArguments {
 std::string folder_of(const CacheArguments& args) {
   std::string folder = default_cache_folder(args.cache);
   if (folder.empty())
-    throw InputError("--cache", "", "a cache folder (--cache, TEXMESH_CACHE, XDG_CACHE_HOME or HOME)", "none of them");
+    throw InputError("--cache", "", "a cache folder (--cache, TEXMESH_CACHE, XDG_CACHE_HOME or HOME)",
+                     "none of them");
   return folder;
 }
 
@@ -38,22 +39,18 @@ std::string existing_folder_of(const CacheArguments& args) {
 void statistics(const CacheArguments& args) {
   const CacheStatistics s = cache_statistics(existing_folder_of(args));
   if (args.json) {
-    std::cout << Json{{"folder", folder_of(args)},
-                      {"bytes", s.bytes()},
-                      {"records", s.records},
-                      {"blobs", s.blobs},
-                      {"blob_bytes", s.blob_bytes},
-                      {"notes", s.notes},
-                      {"quarantined", s.quarantined},
-                      {"quarantined_bytes", s.quarantined_bytes},
-                      {"running_builds", s.running},
-                      {"oldest_use_s", s.oldest_use_s}}
+    std::cout << Json{{"folder", folder_of(args)},    {"bytes", s.bytes()},
+                      {"records", s.records},         {"blobs", s.blobs},
+                      {"blob_bytes", s.blob_bytes},   {"notes", s.notes},
+                      {"quarantined", s.quarantined}, {"quarantined_bytes", s.quarantined_bytes},
+                      {"running_builds", s.running},  {"oldest_use_s", s.oldest_use_s}}
                      .dump(1)
               << '\n';
     return;
   }
   std::cout << fmt::format(
-      "folder         {}\nsize           {}\nresults        {} runs of stages, {} outputs of {}\nquarantined    {} of {}\n"
+      "folder         {}\nsize           {}\nresults        {} runs of stages, {} outputs of {}\nquarantined "
+      "   {} of {}\n"
       "oldest use     {:.1f} days ago\nrunning builds {}\n",
       folder_of(args), format_bytes(s.bytes()), s.records, s.blobs, format_bytes(s.blob_bytes), s.quarantined,
       format_bytes(s.quarantined_bytes), static_cast<double>(s.oldest_use_s) / 86400, s.running);
@@ -65,17 +62,17 @@ void prune(const CacheArguments& args) {
   if (!args.age.empty()) limits.max_age_s = parse_seconds(args.age, "--age");
   const PruneResult r = prune_cache(existing_folder_of(args), limits);
   if (args.json) {
-    std::cout << Json{{"removed_records", r.records},       {"removed_blobs", r.blobs},
-                      {"removed_others", r.others},         {"removed_bytes", r.bytes},
-                      {"kept_bytes", r.kept_bytes},         {"kept_in_use", r.kept_in_use}}
+    std::cout << Json{{"removed_records", r.records}, {"removed_blobs", r.blobs},
+                      {"removed_others", r.others},   {"removed_bytes", r.bytes},
+                      {"kept_bytes", r.kept_bytes},   {"kept_in_use", r.kept_in_use}}
                      .dump(1)
               << '\n';
     return;
   }
-  std::cout << fmt::format("removed {} results with {} outputs, {}; {} are left{}\n", r.records, r.blobs,
-                           format_bytes(r.bytes), format_bytes(r.kept_bytes),
-                           r.kept_in_use ? fmt::format(" ({} results are in use by running builds)", r.kept_in_use)
-                                         : "");
+  std::cout << fmt::format(
+      "removed {} results with {} outputs, {}; {} are left{}\n", r.records, r.blobs, format_bytes(r.bytes),
+      format_bytes(r.kept_bytes),
+      r.kept_in_use ? fmt::format(" ({} results are in use by running builds)", r.kept_in_use) : "");
 }
 
 int verify(const CacheArguments& args) {
@@ -100,7 +97,8 @@ void add_cache_command(CLI::App& app, int& exit_code) {
   c->require_subcommand(1);
   const auto add = [&](const char* name, const char* help, std::function<int(const CacheArguments&)> run) {
     CLI::App* sub = c->add_subcommand(name, help);
-    sub->add_option("--cache", args->cache, "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)");
+    sub->add_option("--cache", args->cache,
+                    "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)");
     if (std::string(name) != "path") sub->add_flag("--json", args->json, "As JSON");
     sub->callback([args, &exit_code, run] {
       try {
@@ -113,18 +111,19 @@ void add_cache_command(CLI::App& app, int& exit_code) {
     return sub;
   };
   add("stat", "How much it holds", [](const CacheArguments& a) { return statistics(a), kExitOk; });
-  CLI::App* p = add("prune", "Remove what has not been used for longest", [](const CacheArguments& a) {
-    return prune(a), kExitOk;
-  });
+  CLI::App* p = add("prune", "Remove what has not been used for longest",
+                    [](const CacheArguments& a) { return prune(a), kExitOk; });
   p->add_option("--size", args->size, "Until it holds no more than this (default 20GB, 0 = no limit)");
   p->add_option("--age", args->age, "And what was not used for this long (default 90d, 0 = no limit)");
-  add("verify", "Read every object; move damaged ones to quarantine (exit code 1 when there are any)", verify);
+  add("verify", "Read every object; move damaged ones to quarantine (exit code 1 when there are any)",
+      verify);
   add("path", "Where it is", [](const CacheArguments& a) {
     std::cout << folder_of(a) << '\n';
     return kExitOk;
   });
   c->footer(
-      "Builds prune by themselves (compile --cache-size, --cache-age) and never touch what a running build uses.\n"
+      "Builds prune by themselves (compile --cache-size, --cache-age) and never touch what a running build "
+      "uses.\n"
       "Deleting the folder is safe: everything in it can be computed again.");
 }
 

@@ -91,8 +91,9 @@ OutputMode output_mode(const CompileArguments& args) {
 void read_shard(const std::string& text, PlanRequest& request) {
   if (text.empty()) return;
   int shard = -1, shards = 0, read = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &read) != 2 || read != static_cast<int>(text.size()) ||
-      shards < 1 || shards > 1'000'000 || shard < 0 || shard >= shards)
+  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &read) != 2 ||
+      read != static_cast<int>(text.size()) || shards < 1 || shards > 1'000'000 || shard < 0 ||
+      shard >= shards)
     throw InputError("--shard", "", "I/N with I in 0 .. N - 1", text);
   request.shard = shard;
   request.shards = shards;
@@ -102,8 +103,9 @@ void read_shard(const std::string& text, PlanRequest& request) {
 std::uint64_t memory_to_use(const std::string& text) {
   if (!text.empty()) return parse_bytes(text, "--memory");
   const long pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGE_SIZE);
-  return pages > 0 && page_bytes > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes) / 5 * 4
-                                     : 0;
+  return pages > 0 && page_bytes > 0
+             ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes) / 5 * 4
+             : 0;
 }
 
 PlanRequest plan_request(const CompileArguments& args) {
@@ -130,7 +132,8 @@ RunSettings run_settings(const CompileArguments& args) {
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
   for (const std::string& layer : run.cache.layers) check_layer(layer);
-  run.cache_limits = {parse_bytes(args.cache_size, "--cache-size"), parse_seconds(args.cache_age, "--cache-age")};
+  run.cache_limits = {parse_bytes(args.cache_size, "--cache-size"),
+                      parse_seconds(args.cache_age, "--cache-age")};
   run.mode = output_mode(args);
   for (const std::string& file : {args.profile, args.jnd_profile})
     if (!file.empty()) run.more_inputs.push_back(file);
@@ -141,16 +144,21 @@ void add_run_options(CLI::App& c, CompileArguments& args) {
   RunSettings& run = args.run;
   c.add_option("-j,--jobs", args.jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
   c.add_option("--memory", args.memory,
-               "Most memory of all models that run side by side, by what they took before (default: 4/5 of the machine's)");
+               "Most memory of all models that run side by side, by what they took before (default: 4/5 of "
+               "the machine's)");
   c.add_option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
       ->capture_default_str();
-  c.add_option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit")->capture_default_str();
+  c.add_option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit")
+      ->capture_default_str();
   c.add_option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
       ->capture_default_str();
-  c.add_option("--shard", args.shard, "I/N: compile only part I of 0 .. N-1; which models that are does not change when "
-                                      "others come and go");
-  auto* keep_going = c.add_flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)");
-  c.add_flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")->excludes(keep_going);
+  c.add_option("--shard", args.shard,
+               "I/N: compile only part I of 0 .. N-1; which models that are does not change when "
+               "others come and go");
+  auto* keep_going =
+      c.add_flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)");
+  c.add_flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")
+      ->excludes(keep_going);
   c.add_flag("--retry-failed", run.retry_failed,
              "Try models again that failed before, though nothing has changed since");
   c.add_flag("--strict", run.strict, "Warnings are errors");
@@ -193,7 +201,8 @@ constexpr const char* kFooter =
     "  texmesh compile bust.obj -o bust.texmesh --profile museum.json --rungs 8,18,53,86\n\n"
     "Every stage option can stand in a profile under the same name: "
     "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
-    "A package is made again only when its model, a file that the model refers to, an option or texmesh has changed.\n"
+    "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
+    "changed.\n"
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error. A model that fails leaves no "
     "package.";
 
@@ -202,8 +211,9 @@ constexpr const char* kFooter =
 void add_compile_command(CLI::App& app, int& exit_code) {
   auto args = std::make_shared<CompileArguments>();
   CLI::App* c = app.add_subcommand("compile", "Compile textured scans into packages");
-  c->add_option("INPUT", args->inputs,
-                "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of them, or collections (.json)")
+  c->add_option(
+       "INPUT", args->inputs,
+       "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of them, or collections (.json)")
       ->required();
   c->add_option("-o,--output", args->output, "NAME.texmesh for one model, a folder for several")->required();
   c->add_option("--profile", args->profile,

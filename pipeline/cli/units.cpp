@@ -27,7 +27,7 @@ double parse(const std::string& text, const std::string& flag, const std::map<st
 
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
   static const std::map<std::string, double> kUnits{
-      {"", 1},      {"B", 1},      {"kB", 1e3},        {"MB", 1e6},         {"GB", 1e9},
+      {"", 1},      {"B", 1},      {"kB", 1e3},        {"MB", 1e6},           {"GB", 1e9},
       {"TB", 1e12}, {"KiB", 1024}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}, {"TiB", 1099511627776.0}};
   return static_cast<std::uint64_t>(parse(text, flag, kUnits, "a size such as 500MB or 8GiB"));
 }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <mutex>
 #include <set>
+#include <utility>
 
 namespace texmesh {
 namespace {
@@ -92,6 +93,20 @@ struct Fake {
 
 using Ran = std::multiset<std::string>;
 
+/// A store without claims over another one.
+struct Unclaimed : Store {
+  explicit Unclaimed(MemoryStore& s) : store(s) {}
+  std::optional<std::vector<StoredBlob>> find(const Sha256& k) override { return store.MemoryStore::find(k); }
+  Bytes load(const StoredBlob& b) override { return store.MemoryStore::load(b); }
+  bool put(const Key& k, const std::vector<std::pair<std::string, Bytes>>& o) override {
+    return store.MemoryStore::put(k, o);
+  }
+  std::optional<std::string> preimage(const Sha256& k) override { return store.MemoryStore::preimage(k); }
+  std::optional<std::string> find_note(const Sha256& k) override { return store.MemoryStore::find_note(k); }
+  bool put_note(const Sha256& k, const std::string& t) override { return store.MemoryStore::put_note(k, t); }
+  MemoryStore& store;
+};
+
 TEST(GraphRun, RunsEverythingOnceThenNothing) {
   Fake fake;
   MemoryStore store;
@@ -172,6 +187,89 @@ TEST(GraphRun, CancelledBeforeAnyWork) {
   graph.give("source", object(Text("abc")), sha256({}), 0);
   EXPECT_THROW(graph.run("join"), Cancelled);
   EXPECT_EQ(fake.ran, Ran{});
+}
+
+TEST(GraphRun, ExplainsWhatHasChangedSinceTheEarlierRun) {
+  Fake fake;
+  MemoryStore store;
+  const std::vector<Stage> stages = fake.table();
+  const auto run = [&](const CompileOptions& options, const StageKeys& earlier, StageKeys* keys) {
+    std::map<std::string, StageExplanation> told;
+    const RunContext context;
+    GraphRun graph(stages, options, store, context);
+    graph.give("source", object(Text("abc")), sha256({}), 3);
+    graph.explain(earlier, [&](const Stage& s, const StageExplanation& e) { told[s.name] = e; });
+    graph.run("join");
+    if (keys) *keys = graph.keys();
+    return told;
+  };
+  using Verdict = StageExplanation::Verdict;
+  StageKeys keys;
+  auto told = run({}, {}, &keys);
+  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
+  EXPECT_FALSE(told.at("left").has_history);
+  EXPECT_EQ(keys.size(), 3u);  // the derived stage has no entry of its own
+  told = run({}, keys, nullptr);
+  EXPECT_EQ(told.at("left").verdict, Verdict::kHit);
+  CompileOptions options;
+  options.ssf.scales = 7;
+  told = run(options, keys, nullptr);
+  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
+  EXPECT_TRUE(told.at("left").has_history);
+  ASSERT_EQ(told.at("left").changes.size(), 1u);
+  EXPECT_EQ(told.at("left").changes[0].label, "option ssf.scales");
+  EXPECT_EQ(told.at("left").changes[0].from, "20");
+  EXPECT_EQ(told.at("left").changes[0].to, "7");
+  EXPECT_EQ(told.at("join").verdict, Verdict::kHit);  // left gave the same
+}
+
+TEST(GraphRun, AForecastRunsNothing) {
+  Fake fake;
+  MemoryStore store;
+  const std::vector<Stage> stages = fake.table();
+  const auto forecast = [&](const CompileOptions& options) {
+    const RunContext context;
+    GraphRun graph(stages, options, store, context);
+    graph.give("source", object(Text("abc")), sha256({}), 3);
+    std::map<std::string, StageExplanation> told;
+    for (const auto& [stage, e] : graph.forecast()) told[stage->name] = e;
+    return told;
+  };
+  using Verdict = StageExplanation::Verdict;
+  auto told = forecast({});
+  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
+  EXPECT_EQ(told.at("join").verdict, Verdict::kUnknown);
+  EXPECT_FALSE(told.at("join").waits_for.empty());
+  EXPECT_FALSE(told.contains("middle"));
+  EXPECT_EQ(fake.ran, Ran{});
+  {
+    const RunContext context;
+    const CompileOptions options;
+    GraphRun graph(stages, options, store, context);
+    graph.give("source", object(Text("abc")), sha256({}), 3);
+    graph.run("join");
+  }
+  for (const auto& [name, e] : forecast({})) EXPECT_EQ(e.verdict, Verdict::kHit) << name;
+}
+
+TEST(GraphRun, WaitsForWhoeverComputesTheSameAndTakesTheResult) {
+  // The claim is given only after somebody else has put the result of "left".
+  struct Contended : MemoryStore {
+    Fake* fake = nullptr;
+    bool waited = false;
+    std::unique_ptr<Claim> claim(const Sha256&, const RunContext&) override {
+      if (!std::exchange(waited, true)) {
+        Unclaimed mine(*this);
+        fake->run(mine, "abc");
+      }
+      return std::make_unique<Claim>();
+    }
+  } store;
+  Fake first, other;
+  store.fake = &other;
+  EXPECT_EQ(first.run(store, "abc", {}, 1), "aabcR+a");
+  EXPECT_EQ(first.ran, Ran{});  // everything came from the other one
+  EXPECT_TRUE(other.ran.contains("left"));
 }
 
 }  // namespace

@@ -3,11 +3,17 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "format/errors.h"
 #include "pipeline/atomic_file.h"
+#include "pipeline/cache/cache_files.h"
+#include "pipeline/cache/cache_layer.h"
+#include "pipeline/cache/prune.h"
 
 namespace texmesh {
 namespace {
@@ -96,6 +102,192 @@ TEST(DiskStore, LeavesNoTemporaryFiles) {
 
 TEST(DiskStore, AFolderThatCannotBeMadeIsAnInputError) {
   EXPECT_THROW(open_disk_store("/proc/texmesh-cache"), InputError);
+}
+
+void set_age(const fs::path& path, std::int64_t seconds) {
+  fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::seconds(seconds));
+}
+
+TEST(DiskStore, TellsOfDamageOnceAndMovesItAway) {
+  const Folder folder;
+  auto store = open_disk_store(folder.path.string());
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));
+  const fs::path blob = folder.path / object_path("cas", sha256(*bytes_of("rungs")));
+  std::ofstream(blob, std::ios::binary | std::ios::trunc) << "runGs";
+  EXPECT_FALSE(store->find(key_of("[8]").digest()));
+  const auto events = store->take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].code, "cache-entry-damaged");
+  EXPECT_TRUE(store->take_events().empty());
+  EXPECT_FALSE(fs::exists(blob));
+  EXPECT_TRUE(fs::exists(folder.path / "quarantine" / blob.filename()));
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));  // computed again
+  EXPECT_TRUE(store->find(key_of("[8]").digest()));
+}
+
+TEST(DiskStore, ARecordUnderAnotherKeyIsNotBelieved) {
+  const Folder folder;
+  auto store = open_disk_store(folder.path.string());
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));
+  const fs::path other = folder.path / object_path("ac", key_of("[9]").digest());
+  fs::create_directories(other.parent_path());
+  fs::copy_file(folder.path / object_path("ac", key_of("[8]").digest()), other);
+  EXPECT_FALSE(store->find(key_of("[9]").digest()));
+  EXPECT_TRUE(store->find(key_of("[8]").digest()));
+}
+
+TEST(DiskStore, KeepsThePreimageToExplainWith) {
+  const Folder folder;
+  auto store = open_disk_store(folder.path.string());
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));
+  const auto preimage = store->preimage(key_of("[8]").digest());
+  ASSERT_TRUE(preimage);
+  const auto key = key_from_preimage(*preimage);
+  ASSERT_TRUE(key);
+  EXPECT_EQ(key->digest(), key_of("[8]").digest());
+  EXPECT_FALSE(store->preimage(key_of("[9]").digest()));
+}
+
+TEST(DiskStore, AClaimIsForOneAtATimeAndEndsWithItsHolder) {
+  const Folder folder;
+  auto a = open_disk_store(folder.path.string()), b = open_disk_store(folder.path.string());
+  const Sha256 key = key_of("[8]").digest();
+  std::atomic<bool> cancelled{false};
+  RunContext context;
+  context.cancelled = &cancelled;
+  auto claim = a->claim(key, context);
+  ASSERT_TRUE(claim);
+  std::atomic<bool> got{false};
+  std::thread waiter([&] {
+    const auto second = b->claim(key, context);
+    got = true;
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_FALSE(got);
+  claim.reset();
+  waiter.join();
+  EXPECT_TRUE(got);
+  claim = a->claim(key, context);
+  cancelled = true;
+  EXPECT_THROW(b->claim(key, context), Cancelled);
+}
+
+TEST(Prune, TheLeastRecentlyUsedGoesFirstRecordsBeforeBlobs) {
+  const Folder folder;
+  {
+    auto store = open_disk_store(folder.path.string());
+    for (int i = 0; i < 4; ++i)
+      ASSERT_TRUE(store->put(key_of(std::to_string(i)),
+                             {{"own", bytes_of(std::string(1000, static_cast<char>('a' + i)))},
+                              {"shared", bytes_of("the same for all")}}));
+  }
+  for (int i = 0; i < 4; ++i)
+    set_age(folder.path / object_path("ac", key_of(std::to_string(i)).digest()), 100000 * (i + 1));
+  const PruneResult r = prune_cache(folder.path.string(), {4000, 0});
+  EXPECT_GE(r.records, 1u);
+  EXPECT_LE(r.kept_bytes, 4000u);
+  auto store = open_disk_store(folder.path.string());
+  EXPECT_TRUE(store->find(key_of("0").digest()));   // the youngest
+  EXPECT_FALSE(store->find(key_of("3").digest()));  // the oldest
+  EXPECT_TRUE(store->take_events().empty());        // nothing half there
+}
+
+TEST(Prune, ByAgeSinceTheLastUse) {
+  const Folder folder;
+  {
+    auto store = open_disk_store(folder.path.string());
+    ASSERT_TRUE(store->put(key_of("old"), {{"x", bytes_of("old")}}));
+    ASSERT_TRUE(store->put(key_of("used"), {{"x", bytes_of("used")}}));
+  }
+  for (const char* name : {"old", "used"})
+    set_age(folder.path / object_path("ac", key_of(name).digest()), 86400 * 40);
+  ASSERT_TRUE(open_disk_store(folder.path.string())->find(key_of("used").digest()));  // a use makes it young
+  EXPECT_EQ(prune_cache(folder.path.string(), {0, 86400 * 30}).records, 1u);
+  auto store = open_disk_store(folder.path.string());
+  EXPECT_TRUE(store->find(key_of("used").digest()));
+  EXPECT_FALSE(store->find(key_of("old").digest()));
+}
+
+TEST(Prune, NeverWhatARunningBuildHasUsed) {
+  const Folder folder;
+  auto running = open_disk_store(folder.path.string());
+  ASSERT_TRUE(running->put(key_of("mine"), {{"x", bytes_of("mine")}}));
+  PruneResult r = prune_cache(folder.path.string(), {1, 0});
+  EXPECT_EQ(r.records, 0u);
+  EXPECT_GE(r.kept_in_use, 1u);
+  EXPECT_TRUE(running->find(key_of("mine").digest()));
+  running.reset();
+  r = prune_cache(folder.path.string(), {1, 0});
+  EXPECT_EQ(r.records, 1u);
+  EXPECT_FALSE(open_disk_store(folder.path.string())->find(key_of("mine").digest()));
+}
+
+TEST(Prune, ForgetsBuildsThatWereKilled) {
+  const Folder folder;
+  open_disk_store(folder.path.string());
+  std::ofstream(folder.path / "running/12345-0") << "";  // nobody holds it
+  EXPECT_EQ(cache_statistics(folder.path.string()).running, 0u);
+  EXPECT_FALSE(fs::exists(folder.path / "running/12345-0"));
+}
+
+TEST(VerifyCache, FindsEveryFlippedBit) {
+  const Folder folder;
+  constexpr int kObjects = 40;
+  {
+    auto store = open_disk_store(folder.path.string());
+    for (int i = 0; i < kObjects; ++i)
+      ASSERT_TRUE(store->put(key_of(std::to_string(i)), {{"x", bytes_of("blob " + std::to_string(i))}}));
+  }
+  EXPECT_TRUE(verify_cache(folder.path.string()).empty());
+  for (int i = 0; i < kObjects; i += 2) {
+    const fs::path file =
+        folder.path / (i % 4 ? object_path("ac", key_of(std::to_string(i)).digest())
+                             : object_path("cas", sha256(*bytes_of("blob " + std::to_string(i)))));
+    std::fstream f(file, std::ios::binary | std::ios::in | std::ios::out);
+    char c = 0;
+    f.seekg(i % 5).get(c);
+    f.seekp(i % 5).put(static_cast<char>(c ^ (1 << i % 8)));
+  }
+  // A damaged blob takes its record with it.
+  EXPECT_EQ(verify_cache(folder.path.string()).size(), kObjects / 2u + kObjects / 4u);
+  EXPECT_TRUE(verify_cache(folder.path.string()).empty());
+  auto store = open_disk_store(folder.path.string());
+  for (int i = 0; i < kObjects; ++i)
+    EXPECT_EQ(store->find(key_of(std::to_string(i)).digest()).has_value(), i % 2 == 1);
+}
+
+TEST(LayeredStore, BringsWhatAFolderHoldsAndNothingDamaged) {
+  const Folder folder;
+  const std::string shared = (folder.path / "shared").string(), local = (folder.path / "local").string();
+  {
+    auto store = open_disk_store(shared);
+    ASSERT_TRUE(store->put(key_of("a"), {{"x", bytes_of("first")}}));
+    ASSERT_TRUE(store->put(key_of("b"), {{"x", bytes_of("second")}}));
+    ASSERT_TRUE(store->put_note(key_of("n").digest(), "note"));
+  }
+  std::ofstream(fs::path(shared) / object_path("cas", sha256(*bytes_of("second")))) << "secOnd";
+  const auto open = [&] {
+    std::vector<std::unique_ptr<CacheLayer>> layers;
+    layers.push_back(open_layer(shared));
+    return layered_store(open_disk_store(local), std::move(layers), false);
+  };
+  auto store = open();
+  const auto found = store->find(key_of("a").digest());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(*store->load(found->front()), *bytes_of("first"));
+  EXPECT_EQ(store->find_note(key_of("n").digest()), "note");
+  EXPECT_FALSE(store->find(key_of("b").digest()));
+  const auto events = store->take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].code, "cache-entry-damaged");
+  store.reset();
+  fs::remove_all(shared);
+  EXPECT_TRUE(open_disk_store(local)->find(key_of("a").digest()));  // it is here now
+  store = open();
+  EXPECT_FALSE(store->find(key_of("c").digest()));
+  ASSERT_EQ(store->take_events().size(), 1u);  // unreachable, said once
+  EXPECT_FALSE(store->find(key_of("d").digest()));
+  EXPECT_TRUE(store->take_events().empty());
 }
 
 TEST(AtomicFile, ReplacesOrLeavesAlone) {

@@ -1,0 +1,25 @@
+// What the command line needs to know of layers; apart from them, so that it does not load libcurl.
+#include <cstdlib>
+#include <sstream>
+
+#include "format/errors.h"
+#include "pipeline/cache/cache_layer.h"
+
+namespace texmesh {
+
+void check_layer(const std::string& place) {
+  if (place.find("://") != std::string::npos && !place.starts_with("http://") &&
+      !place.starts_with("https://"))
+    throw InputError("cache layer", "", "a folder, or a URL that begins with http:// or https://",
+                     place.substr(0, place.find("://") + 3) + "...");
+}
+
+std::vector<std::string> layers_from_environment() {
+  const char* text = std::getenv("TEXMESH_CACHE_LAYERS");
+  std::istringstream in(text ? text : "");
+  std::vector<std::string> places;
+  for (std::string place; in >> place;) places.push_back(place);
+  return places;
+}
+
+}  // namespace texmesh
