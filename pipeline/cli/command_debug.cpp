@@ -9,6 +9,7 @@
 
 #include "format/errors.h"
 #include "pipeline/atomic_file.h"
+#include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/file_resolver.h"
 #include "pipeline/inspect/debug_input.h"
