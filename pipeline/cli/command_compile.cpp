@@ -227,18 +227,21 @@ void add_compile_command(CLI::App& app, int& exit_code) {
   add_stage_options(*c, *args);
   c->footer(kFooter);
   c->callback([args, &exit_code] {
+    RunSettings run;
+    BatchPlan plan;
     try {
       const PlanRequest request = plan_request(*args);
-      RunSettings run = run_settings(*args);
-      const BatchPlan plan = plan_batch(request);
+      run = run_settings(*args);
+      plan = plan_batch(request);
       if (!run.depfile.empty() && plan.models.size() != 1)
         throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
-      run.more_inputs.insert(run.more_inputs.end(), plan.files.begin(), plan.files.end());
-      exit_code = run_batch(plan, run, std::cout);
     } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
       std::cerr << "texmesh compile: " << e.what() << '\n';
       exit_code = kExitUsage;
+      return;
     }
+    run.more_inputs.insert(run.more_inputs.end(), plan.files.begin(), plan.files.end());
+    exit_code = run_batch(plan, run, std::cout);
   });
 }
 
