@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
     add_compile_command(app, exit_code);
     add_cache_command(app, exit_code);
     add_dump_command(app, exit_code);
+    add_diff_command(app, exit_code);
     add_verify_command(app, exit_code);
     add_unpack_command(app, exit_code);
     add_pack_command(app, exit_code);

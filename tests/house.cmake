@@ -13,3 +13,5 @@ if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its us
 endif()
 add_test(NAME house_make_scan COMMAND ${house}/check_make_scan $<TARGET_FILE:make_scan> $<TARGET_FILE:texmesh>
   ${CMAKE_CURRENT_BINARY_DIR}/make_scan)
+add_test(NAME house_examples COMMAND ${house}/check_examples $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>
+  ${PROJECT_SOURCE_DIR}/examples ${CMAKE_CURRENT_BINARY_DIR}/examples)

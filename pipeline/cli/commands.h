@@ -9,12 +9,19 @@ class App;
 namespace texmesh {
 
 /// Stable exit codes.
-enum ExitCode : int { kExitOk = 0, kExitModelFailed = 1, kExitUsage = 2, kExitInternal = 3 };
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitModelFailed = 1,
+  kExitUsage = 2,
+  kExitInternal = 3,
+  kExitDifferent = 4
+};
 
 // Each adds one subcommand to `app`; when the user chose it, its callback runs and stores the exit code.
 void add_compile_command(CLI::App& app, int& exit_code);
 void add_cache_command(CLI::App& app, int& exit_code);   // command_cache.cpp
 void add_dump_command(CLI::App& app, int& exit_code);    // command_dump.cpp
+void add_diff_command(CLI::App& app, int& exit_code);    // command_diff.cpp
 void add_verify_command(CLI::App& app, int& exit_code);  // command_verify.cpp
 void add_unpack_command(CLI::App& app, int& exit_code);  // command_pack.cpp
 void add_pack_command(CLI::App& app, int& exit_code);    // command_pack.cpp

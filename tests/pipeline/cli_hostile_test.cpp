@@ -150,15 +150,25 @@ TEST_F(Hostile, TheFixturesThemselvesAreFine) {
 
 TEST_F(Hostile, MissingFile) { expect_refused("nothing.glb"); }
 TEST_F(Hostile, EmptyFiles) {
-  for (const char* name : {"e.glb", "e.gltf", "e.obj", "e.ply", "e.stl", "e.json", "e.xyz"}) {
+  for (const char* name : {"e.glb", "e.gltf", "e.obj", "e.ply", "e.stl", "e.xyz"}) {
     write_text(in(name), "");
     expect_refused(name);
   }
 }
 TEST_F(Hostile, WrongMagic) {
-  for (const char* name : {"w.glb", "w.gltf", "w.ply", "w.stl", "w.json", "w.fbx"}) {
+  for (const char* name : {"w.glb", "w.gltf", "w.ply", "w.stl", "w.fbx"}) {
     write_text(in(name), "this is no model at all, whatever its name says\n");
     expect_refused(name);
+  }
+}
+TEST_F(Hostile, AJsonThatIsNoRangeScanIsReadAsCollection) {
+  for (const char* text : {"", "this is no collection", "{", "[]", "{\"models\":7}"}) {
+    write_text(in("c.json"), text);
+    const CommandResult r = compile("c.json");
+    EXPECT_EQ(r.exit_code, 2) << text << r.output << r.errors;
+    EXPECT_NE(r.errors.find("c.json"), std::string::npos) << r.errors;
+    EXPECT_NE(r.errors.find("found "), std::string::npos) << r.errors;
+    EXPECT_TRUE(files_beneath(folder_ / "out").empty());
   }
 }
 TEST_F(Hostile, AFolderAsModelFile) {

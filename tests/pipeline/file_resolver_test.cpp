@@ -67,7 +67,8 @@ TEST_P(FileResolverTest, RecordsEveryRequestOnceInOrder) {
   const std::vector<std::uint8_t> alpha{'a', 'l', 'p', 'h', 'a'};
   std::vector<FileRequest> requests = resolver.requests();
   for (FileRequest& request : requests) request.stamp = {};  // inode and times differ from run to run
-  EXPECT_EQ(requests, (std::vector<FileRequest>{{"tex/none", false, {}, 0, {}}, {"a.bin", true, sha256(alpha), 5, {}}}));
+  EXPECT_EQ(requests, (std::vector<FileRequest>{{"tex/none", false, {}, 0, {}},
+                                                {"a.bin", true, sha256(alpha), 5, {}}}));
 }
 
 TEST_P(FileResolverTest, MissingFilesAreNoError) {
