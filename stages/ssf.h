@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSsfVersion = 1;
+inline constexpr int kSsfVersion = 2;
 
 struct SsfOptions {
   int scales = 20;          // smoothed copies beside the original
@@ -21,7 +21,9 @@ struct SsfOptions {
   double component_cap =
       0.25;              // persistence ends where sigma exceeds this fraction of the component's diagonal
   double rate_cap = 10;  // w_ij <= cap * min(M_i, M_j) / h^2
-  int max_terms = 6000;  // work cap: Chebyshev terms; the largest sigmas are lowered to fit
+  double error_ratio = 4;  // sigma / vertex spacing below which no level of the pyramid goes: more = nearer
+                           // to the full resolution, and slower
+  int max_terms = 3000;  // work cap: Chebyshev terms of a level; heat flows slower where more would be needed
   double window = 1.4;   // range scans: half-width of the Gaussian's window, in sigma
   template <class S, class V>
   static void fields(S& s, V&& v) {
@@ -34,7 +36,10 @@ struct SsfOptions {
     v("component_cap", s.component_cap, Range{0.05, 1},
       "persistence ends where sigma exceeds this fraction of the component");
     v("rate_cap", s.rate_cap, Range{3, 1000}, "cap of the Laplacian's rates, in 1 / (mean edge)^2");
-    v("max_terms", s.max_terms, Range{100, 100000}, "most Chebyshev terms; larger sigmas are lowered to fit");
+    v("error_ratio", s.error_ratio, Range{2, 1000},
+      "least ratio of sigma and vertex spacing on the coarser levels of the solver; 1000 = one level");
+    v("max_terms", s.max_terms, Range{100, 100000},
+      "most Chebyshev terms of a level; its fastest rates are slowed down to fit");
     v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
   }
 };
@@ -56,14 +61,14 @@ struct ScaleMap {
   }
 };
 
-/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (of the positions
-/// that the heat flow smooths),
-/// all scales in one Chebyshev recurrence over the position graph (twins joined). Independent of
-/// skeletonization. Every component has a sigma ladder of its own, from its mean edge to sigma_max of its
-/// diagonal or the first sigma at which the smoothed component has shrunk to `convergence` of its extent. A
-/// scale counts for a component only while its sigma, there and on the largest component (most positions), is
-/// within component_cap of the component's diagonal: small parts are detail of the whole. Deterministic for
-/// any thread count.
+/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (of the positions that
+/// the heat flow smooths), over the position graph (twins joined). Independent of skeletonization. Every
+/// component has a sigma ladder of its own, from its mean edge to sigma_max of its diagonal or the first
+/// sigma at which the smoothed component has shrunk to `convergence` of its extent. A scale counts for a
+/// component only while its sigma, there and on the largest component (most positions), is within
+/// component_cap of the component's diagonal: small parts are detail of the whole. Large sigmas are solved on
+/// coarser levels, whose vertices are positions of the mesh: feature points of a scale are no denser than
+/// sigma / error_ratio asks for. O(n log n); deterministic for any thread count.
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context);
 

@@ -96,7 +96,7 @@ Surface surface_of(const Mesh& m) {
 
 TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
   const Surface s = surface_of(testing::bumpy_sphere(22, 40, 0.08f));
-  const HeatOperator l = make_heat_operator(s.points, s.corners, s.mean_edge, 10);
+  const HeatOperator l = make_heat_operator({s.points, s.corners, {}}, {}, s.mean_edge, 10);
   const auto n = static_cast<Eigen::Index>(s.points.size());
   // L is similar to a symmetric matrix by the roots of the masses; those follow from w_ij = w_ji row by row.
   Eigen::VectorXd root = Eigen::VectorXd::Zero(n);
@@ -107,11 +107,11 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
     for (std::uint32_t k = l.first[queue[q]]; k < l.first[queue[q] + 1]; ++k) {
       const std::uint32_t i = queue[q], j = l.column[k];
       double back = 0;
-      for (std::uint32_t e = l.first[j]; e < l.first[j + 1]; ++e) back = l.column[e] == i ? l.rate[e] : back;
-      symmetric(i, j) = -std::sqrt(l.rate[k] * back);
-      symmetric(i, i) += l.rate[k];
+      for (std::uint32_t e = l.first[j]; e < l.first[j + 1]; ++e) back = l.column[e] == i ? double{l.rate[e]} : back;
+      symmetric(i, j) = -std::sqrt(double{l.rate[k]} * back);
+      symmetric(i, i) += double{l.rate[k]};
       if (root[j] == 0) {
-        root[j] = root[i] * std::sqrt(l.rate[k] / back);
+        root[j] = root[i] * std::sqrt(double{l.rate[k]} / back);
         queue.push_back(j);
       }
     }
@@ -126,7 +126,7 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
   std::vector<double> times;
   for (double sigma = s.mean_edge; sigma < 1.3; sigma *= 1.4) times.push_back(0.5 * sigma * sigma);
   ASSERT_GT(times.size(), 5u);
-  const HeatFlow flow = diffuse(l, s.points, times, RunContext{});
+  const std::vector<HeatFlow> flows = diffuse(l, s.points, 0, times, RunContext{});
   for (std::size_t t = 0; t < times.size(); ++t) {
     const auto apply = [&](auto&& f) -> Eigen::MatrixXd {
       Eigen::VectorXd d(n);
@@ -140,20 +140,17 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
     int flips = 0;
     for (Eigen::Index i = 0; i < n; ++i)
       for (int k = 0; k < 3; ++k) {
-        const auto& at = flow.at(static_cast<std::size_t>(i), t);
-        error += std::pow(at.response[k] - response(i, k), 2);
+        const double at = flows[t].response[static_cast<std::size_t>(i)][k],
+                     moved = flows[t].moved[static_cast<std::size_t>(i)][k];
+        error += std::pow(at - response(i, k), 2);
         size += std::pow(response(i, k), 2);
-        smooth_error = std::max(smooth_error, std::fabs(at.smooth[k] - smooth(i, k)));
-        flips += (at.response[k] < 0) != (response(i, k) < 0);
+        smooth_error = std::max(smooth_error, std::fabs(x(i, k) + moved - smooth(i, k)));
+        flips += (at < 0) != (response(i, k) < 0);
       }
     EXPECT_LE(std::sqrt(error / size), 0.002) << "time " << t;
     EXPECT_LE(flips, std::max(1.0, 0.001 * 3 * static_cast<double>(n))) << "time " << t;
     EXPECT_LE(smooth_error, 2e-5) << "time " << t;
   }
-}
-
-TEST(HeatKernel, TermEstimateIsInvertible) {
-  for (double time : {0.5, 10.0, 5000.0}) EXPECT_NEAR(heat_time(heat_terms(time, 100), 100) / time, 1, 0.1);
 }
 
 /// An octahedron split `levels` times and blown up to a sphere, with or without bumps: nearly even triangles
@@ -276,14 +273,14 @@ TEST(Ssf, SmallPartsAreDetailOfTheWhole) {
   EXPECT_GT(at_least(map, 14), 0u);
 }
 
-TEST(Ssf, WorkCapLowersTheLargestSigma) {
+TEST(Ssf, WorkCapSlowsTheFastestRates) {
   const Mesh m = testing::bumpy_sphere(60, 90);
   const ScaleMap free = run(m), capped = run(m, {.max_terms = 100});
   EXPECT_TRUE(free.notes.empty());
   ASSERT_EQ(capped.notes.size(), 1u);
   EXPECT_EQ(capped.notes[0].code, "scale-space-work-cap");
-  EXPECT_LT(capped.sigma[20], free.sigma[20]);
-  EXPECT_EQ(capped.sigma[1], free.sigma[1]);
+  EXPECT_EQ(capped.sigma, free.sigma);
+  EXPECT_NE(capped.persistence, free.persistence);
 }
 
 TEST(Ssf, TwinsShareTheirScale) {
