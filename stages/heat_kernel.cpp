@@ -51,16 +51,14 @@ std::vector<HeatChord> weigh_edges(const HeatSurface& s) {
     const auto [lo, hi] = std::minmax(s.corners[halves[0]], s.corners[next_corner(halves[0])]);
     double weight = 0;
     for (std::uint32_t h : halves)
-      weight +=
-          0.5 * clamped_cotangent(s.points[s.corners[previous_corner(h)]], s.points[lo], s.points[hi]);
+      weight += 0.5 * clamped_cotangent(s.points[s.corners[previous_corner(h)]], s.points[lo], s.points[hi]);
     edges.push_back({lo, hi, weight});
   }
   const auto middle = static_cast<std::ptrdiff_t>(edges.size());
   edges.insert(edges.end(), s.chords.begin(), s.chords.end());
-  std::inplace_merge(edges.begin(), edges.begin() + middle, edges.end(),
-                     [](const HeatChord& a, const HeatChord& b) {
-                       return a.lo != b.lo ? a.lo < b.lo : a.hi < b.hi;
-                     });
+  std::inplace_merge(
+      edges.begin(), edges.begin() + middle, edges.end(),
+      [](const HeatChord& a, const HeatChord& b) { return a.lo != b.lo ? a.lo < b.lo : a.hi < b.hi; });
   return edges;
 }
 
@@ -199,8 +197,7 @@ class Chebyshev {
         for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
           sum = sum + (points[i] - points[l.column[e]]) * double{l.rate[e]};
         sum = sum * factor;
-        source_[i] =
-            Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
+        source_[i] = Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
       }
     });
   }

@@ -13,6 +13,7 @@ namespace {
 /// A level carries sigmas up to kReach error_ratio spacings; the next one's seeds are kSeed sigma /
 /// error_ratio apart.
 constexpr double kReach = 1.4, kSeed = 0.8;
+constexpr double kLeastWeight = 1e-3;
 /// Levels of no more vertices carry all the rest: nothing to gain.
 constexpr std::size_t kSmallLevel = 2048;
 
@@ -25,9 +26,7 @@ struct Cells {
 class CellGrower {
  public:
   CellGrower(const HeatLevel& fine, double radius)
-      : fine_(fine),
-        radius_(radius),
-        distance_(fine.points.size(), std::numeric_limits<double>::infinity()) {
+      : fine_(fine), radius_(radius), distance_(fine.points.size(), std::numeric_limits<double>::infinity()) {
     cells_.of.resize(fine.points.size());
   }
 
@@ -88,44 +87,17 @@ std::vector<std::uint32_t> dual_triangles(const HeatLevel& fine, const Cells& ce
   return corners;
 }
 
-/// Pairs of cells that are edges of triangles, as sorted rows of the lower one's partners.
-class CellPairs {
- public:
-  CellPairs(const std::vector<std::uint32_t>& corners, std::size_t cells) : first_(cells + 1, 0) {
-    const auto each = [&](auto&& visit) {
-      for (std::size_t c = 0; c < corners.size(); c += 3)
-        for (std::size_t k = 0; k < 3; ++k) {
-          const auto [lo, hi] = std::minmax(corners[c + k], corners[c + (k + 1) % 3]);
-          visit(lo, hi);
-        }
-    };
-    each([&](std::uint32_t lo, std::uint32_t) { ++first_[lo + 1]; });
-    for (std::size_t i = 0; i < cells; ++i) first_[i + 1] += first_[i];
-    partner_.resize(first_.back());
-    std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-    each([&](std::uint32_t lo, std::uint32_t hi) { partner_[at[lo]++] = hi; });
-    for (std::size_t i = 0; i < cells; ++i)
-      std::sort(partner_.begin() + first_[i], partner_.begin() + first_[i + 1]);
-  }
-  bool contains(std::uint32_t lo, std::uint32_t hi) const {
-    return std::binary_search(partner_.begin() + first_[lo], partner_.begin() + first_[lo + 1], hi);
-  }
-
- private:
-  std::vector<std::uint32_t> first_, partner_;
-};
-
-/// Cells that touch but share no triangle. The heat that a gradient g drives through the fine edges is sum
-/// w_ij g x_ij; the chord X lets the same pass when its weight is sum w_ij (x_ij X) / |X|^2.
-std::vector<HeatChord> find_chords(const HeatLevel& fine, const Cells& cells,
-                                   const std::vector<std::uint32_t>& corners) {
-  const CellPairs joined(corners, cells.seed.size());
+/// Weights between cells that touch. The heat that a gradient g drives through the fine edges between two
+/// cells is sum w_ij g x_ij; the chord X of their seeds lets the same pass when its weight is sum w_ij (x_ij
+/// X) / |X|^2. Cotangents of the dual triangles were the alternative: no better on plain surfaces, and off by
+/// a third on rods and sheets thinner than a cell, whose dual triangles cut through the inside.
+std::vector<HeatChord> find_chords(const HeatLevel& fine, const Cells& cells) {
   const HeatOperator& l = fine.laplacian;
   std::vector<HeatChord> crossing;
   for (std::uint32_t i = 0; i < fine.points.size(); ++i)
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) {
       const std::uint32_t j = l.column[k], lo = cells.of[i], hi = cells.of[j];
-      if (lo >= hi || joined.contains(lo, hi)) continue;
+      if (lo >= hi) continue;
       const Vec3d chord = fine.points[cells.seed[hi]] - fine.points[cells.seed[lo]],
                   edge = fine.points[j] - fine.points[i];
       const double square = dot(chord, chord), weight = double{l.rate[k]} * l.mass[i];
@@ -141,17 +113,14 @@ std::vector<HeatChord> find_chords(const HeatLevel& fine, const Cells& cells,
     else
       chords.push_back(c);
   // Folded cells may cancel out; the surface must hang together all the same.
-  for (HeatChord& c : chords) c.weight = std::max(c.weight, 1e-3);
+  for (HeatChord& c : chords) c.weight = std::max(c.weight, kLeastWeight);
   return chords;
 }
 
-double mean_length(const std::vector<Vec3d>& points, const std::vector<std::uint32_t>& corners,
-                   const std::vector<HeatChord>& chords) {
+double mean_length(const std::vector<Vec3d>& points, const std::vector<HeatChord>& chords) {
   double sum = 0;
-  for (std::size_t c = 0; c < corners.size(); c += 3)
-    for (std::size_t k = 0; k < 3; ++k) sum += length(points[corners[c + k]] - points[corners[c + (k + 1) % 3]]);
-  for (const HeatChord& c : chords) sum += 2 * length(points[c.hi] - points[c.lo]);
-  return sum / std::max(1.0, static_cast<double>(corners.size() + 2 * chords.size()));
+  for (const HeatChord& c : chords) sum += length(points[c.hi] - points[c.lo]);
+  return sum / std::max(1.0, static_cast<double>(chords.size()));
 }
 
 }  // namespace
@@ -174,13 +143,12 @@ HeatLevel coarsen(const HeatLevel& fine, double radius, double rate_cap) {
   level.vertex = cells.seed;
   for (std::uint32_t v : cells.seed) level.points.push_back(fine.points[v]);
   level.corners = dual_triangles(fine, cells);
-  const std::vector<HeatChord> chords = find_chords(fine, cells, level.corners);
+  const std::vector<HeatChord> chords = find_chords(fine, cells);
   std::vector<double> mass(level.vertex.size(), 0);
   for (std::size_t v = 0; v < cells.of.size(); ++v) mass[cells.of[v]] += fine.laplacian.mass[v];
   // Of a crumpled surface chords stay short while its cells grow.
-  level.spacing = std::max(radius, mean_length(level.points, level.corners, chords));
-  level.laplacian =
-      make_heat_operator({level.points, level.corners, chords}, std::move(mass), level.spacing, rate_cap);
+  level.spacing = std::max(radius, mean_length(level.points, chords));
+  level.laplacian = make_heat_operator({level.points, {}, chords}, std::move(mass), level.spacing, rate_cap);
   return level;
 }
 

@@ -21,15 +21,14 @@ HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> cor
                        double rate_cap);
 
 /// The next coarser level. Vertices become seeds in order, each unless one is within `radius` along the
-/// edges; every vertex joins its nearest seed (Voronoi cells by Dijkstra). Seeds are the new vertices, fine
-/// triangles of three cells the new triangles (one per three cells and direction), areas of the cells the
-/// masses. Cells that touch without a triangle (thin tubes, strips) keep together by a chord that lets the
-/// same heat pass as the fine edges between them for a constant gradient. Deterministic: ties go to the
-/// earlier seed. O(n log n).
+/// edges; every vertex joins its nearest seed (Voronoi cells by Dijkstra). Seeds are the new vertices, areas
+/// of the cells the masses; between cells that touch the same heat passes as through the fine edges between
+/// them under a constant gradient. Fine triangles of three cells become the new triangles, one per three
+/// cells and direction; only normals need them. Deterministic: ties go to the earlier seed. O(n log n).
 HeatLevel coarsen(const HeatLevel& fine, double radius, double rate_cap);
 
-/// Whether heat that has flowed as far as sigma is smooth enough for a level: up to 1.4 error_ratio spacings of
-/// it the level below is nearer to the truth. Levels of few vertices carry everything.
+/// Whether heat that has flowed as far as sigma is smooth enough for a level: up to 1.4 error_ratio spacings
+/// of it the level below is nearer to the truth. Levels of few vertices carry everything.
 bool carries(const HeatLevel& level, double sigma, double error_ratio);
 /// Radius to coarsen by for a level whose first sigma this is.
 double seed_radius(double sigma, double error_ratio);

@@ -19,7 +19,7 @@ constexpr std::size_t kSmallComponent = 8192;
 struct Layout {
   std::vector<std::uint32_t> position, first_position;  // within a component in Morton order
   std::vector<std::uint32_t> triangle, first_triangle;
-  std::vector<std::uint32_t> vertex;  // per lowest twin: its index within the component
+  std::vector<std::uint32_t> vertex;        // per lowest twin: its index within the component
   std::vector<double> diagonal, mean_edge;  // per component, object units
   std::size_t component_count() const { return diagonal.size(); }
   std::size_t size(std::size_t c) const { return first_position[c + 1] - first_position[c]; }
@@ -108,8 +108,7 @@ void measure(const Mesh& m, Layout& layout) {
         sum += length(to_double(m.positions[m.position_of(layout.triangle[i], k)]) -
                       to_double(m.positions[m.position_of(layout.triangle[i], (k + 1) % 3)]));
     layout.diagonal.push_back(length(hi - lo));
-    layout.mean_edge.push_back(sum /
-                               (3.0 * (layout.first_triangle[c + 1] - layout.first_triangle[c])));
+    layout.mean_edge.push_back(sum / (3.0 * (layout.first_triangle[c + 1] - layout.first_triangle[c])));
   }
 }
 
@@ -222,7 +221,8 @@ class MeshFilter {
         small.push_back(c);
         continue;
       }
-      const ComponentScales s = filter_component(cut_out(mesh_, layout_, c), whole_sigma_, options_, context_);
+      const ComponentScales s =
+          filter_component(cut_out(mesh_, layout_, c), whole_sigma_, options_, context_);
       totals_.add(s);
       place(c, s);
       count(s);
@@ -240,7 +240,8 @@ class MeshFilter {
       std::vector<ComponentScales> done(std::min(kBatch, small.size() - batch));
       parallel_for(context_, done.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-          done[i] = filter_component(cut_out(mesh_, layout_, small[batch + i]), whole_sigma_, options_, alone);
+          done[i] =
+              filter_component(cut_out(mesh_, layout_, small[batch + i]), whole_sigma_, options_, alone);
           place(small[batch + i], done[i]);
           done[i].persistence = done[i].crossing = {};
         }

@@ -19,9 +19,9 @@ struct SsfOptions {
   double band = 2.75;     // C_i = t_i (H(sigma_i) - H(band * sigma_i))
   double contrast = 0.3;  // tau: of the response's rms
   double component_cap =
-      0.25;              // persistence ends where sigma exceeds this fraction of the component's diagonal
-  double rate_cap = 10;  // w_ij <= cap * min(M_i, M_j) / h^2
-  double error_ratio = 4;  // sigma / vertex spacing below which no level of the pyramid goes: more = nearer
+      0.25;                // persistence ends where sigma exceeds this fraction of the component's diagonal
+  double rate_cap = 10;    // w_ij <= cap * min(M_i, M_j) / h^2
+  double error_ratio = 5;  // sigma / vertex spacing below which no level of the pyramid goes: more = nearer
                            // to the full resolution, and slower
   int max_terms = 3000;  // work cap: Chebyshev terms of a level; heat flows slower where more would be needed
   double window = 1.4;   // range scans: half-width of the Gaussian's window, in sigma

@@ -21,7 +21,8 @@ constexpr double kManyCapped = 0.1;
 /// What is closer than this, in mean edges, is one vertex then.
 constexpr double kCluster = 0.5;
 
-/// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more terms.
+/// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more
+/// terms.
 constexpr std::size_t kTimesAtOnce = 8;
 
 constexpr std::size_t kGrain = 4096;
@@ -155,7 +156,8 @@ class ComponentFilter {
       const std::size_t end = reach(state.level, begin);
       const std::size_t converged = carry(state, begin, end);
       if (may_stop && converged + 1 < scales_) return converged;
-      if (end < last_) state = next_state(std::move(state), seed_radius(ladder_.sigma[end], options_.error_ratio));
+      if (end < last_)
+        state = next_state(std::move(state), seed_radius(ladder_.sigma[end], options_.error_ratio));
       context_.report(static_cast<double>(end) / static_cast<double>(scales_));
       begin = end;
     }
@@ -201,9 +203,11 @@ class ComponentFilter {
     std::size_t converged = scales_;
     std::vector<std::vector<float>> curvature;
     LevelState walker{{}, {}, state.points, state.time, state.normals};
+    // The next level starts from the last scale but one: what its operator makes of points that another one
+    // smoothed is roughest at first.
+    const std::size_t handover = std::max(begin + 1, end - 1);
     for (std::size_t i = begin; i < end + ladder_.band;) {
-      // A part ends with the last scale, whose points the next level starts from.
-      const std::size_t stop = std::min(i + kTimesAtOnce, i < end ? end : end + ladder_.band);
+      const std::size_t stop = std::min(i + kTimesAtOnce, i < handover ? handover : end + ladder_.band);
       const std::span<const double> times(ladder_.time.data() + i, stop - i);
       const std::vector<HeatFlow> flows =
           diffuse(state.level.laplacian, walker.points, walker.time, times, context_);
@@ -217,7 +221,7 @@ class ComponentFilter {
       walker.time = times.back();
       for (std::size_t v = 0; v < walker.points.size(); ++v)
         walker.points[v] = moved(walker.points[v], flows.back().moved[v]);
-      if (stop == end) {
+      if (stop == handover) {
         state.normals = normals_of(state, walker.points);
         state.time = walker.time;
         state.points = walker.points;
@@ -261,8 +265,7 @@ class ComponentFilter {
     const std::vector<Vec3f>& before = state.normals;
     std::vector<Vec3d> sum(points.size());
     for (std::size_t h = 0; h < corners.size(); h += 3) {
-      const Vec3d a = points[corners[h]],
-                  n = cross(points[corners[h + 1]] - a, points[corners[h + 2]] - a);
+      const Vec3d a = points[corners[h]], n = cross(points[corners[h + 1]] - a, points[corners[h + 2]] - a);
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t v = corners[h + k];
         if (before.empty() ? component_.fan_of_position[h + k] : dot(n, to_double(before[v])) >= 0)

@@ -1,8 +1,10 @@
 // Scale-space filtering of meshes: speed, growth, memory and accuracy, all in one run.
-//   ssf_bench                      made scans of 125k .. 2M triangles: seconds and peak bytes of the stage, and
-//                                  the exponent of the log-log fit; the machine's STREAM triad against what the
-//                                  Chebyshev recurrence moves at 1M vertices
-//   ssf_bench --accuracy [MODEL..] the response on the pyramid against one level in double precision, scale by
+//   ssf_bench                      made scans of 125k .. 2M triangles: seconds and peak bytes of the stage,
+//   and
+//                                  the exponent of the log-log fit; the machine's STREAM triad against what
+//                                  the Chebyshev recurrence moves at 1M vertices
+//   ssf_bench --accuracy [MODEL..] the response on the pyramid against one level in double precision, scale
+//   by
 //                                  scale; without models a made scan of --triangles
 #include <malloc.h>
 #include <sys/resource.h>
@@ -124,7 +126,8 @@ double recurrence(const HeatLevel& level, const RunContext& context) {
 }
 
 void print_growth(const std::vector<int>& sizes, const RunContext& context) {
-  std::printf("%10s %10s %9s %9s %9s  %s\n", "triangles", "positions", "wall s", "cpu s", "peak MB", "S1..S20 features");
+  std::printf("%10s %10s %9s %9s %9s  %s\n", "triangles", "positions", "wall s", "cpu s", "peak MB",
+              "S1..S20 features");
   std::vector<double> x, wall, cpu;
   for (int triangles : sizes) {
     const ConditionedMesh mesh = made_scan(triangles, context);
@@ -136,8 +139,7 @@ void print_growth(const std::vector<int>& sizes, const RunContext& context) {
     cpu.push_back(std::log(processor_seconds() - start_cpu));
     x.push_back(std::log(static_cast<double>(mesh.mesh.triangles.size())));
     std::printf("%10zu %10zu %9.2f %9.2f %9.0f ", mesh.mesh.triangles.size(), mesh.mesh.positions.size(),
-                std::exp(wall.back()), std::exp(cpu.back()),
-                1e-6 * static_cast<double>(peak_bytes - before));
+                std::exp(wall.back()), std::exp(cpu.back()), 1e-6 * static_cast<double>(peak_bytes - before));
     for (int i : {1, 5, 10, 15, 20})
       std::printf(" %td", std::count_if(map.persistence.begin(), map.persistence.end(),
                                         [&](int p) { return p >= i; }));
@@ -164,9 +166,11 @@ void print_bandwidth(int triangles, const RunContext& context) {
   SurfaceComponent c = largest_surface(mesh);
   const HeatLevel level = finest_level(std::move(c.points), std::move(c.corners), 1, SsfOptions{}.rate_cap);
   const double triad = stream_triad(context), moved = recurrence(level, context);
-  std::printf("%zu vertices, %d threads: triad %.1f GB/s, recurrence %.1f GB/s, share %.2f (capped %.2f %%, bound %.0f)\n",
-              level.points.size(), context.threads, triad, moved, moved / triad, 100 * level.laplacian.capped,
-              level.laplacian.bound);
+  std::printf(
+      "%zu vertices, %d threads: triad %.1f GB/s, recurrence %.1f GB/s, share %.2f (capped %.2f %%, bound "
+      "%.0f)\n",
+      level.points.size(), context.threads, triad, moved, moved / triad, 100 * level.laplacian.capped,
+      level.laplacian.bound);
 }
 
 struct Difference {
@@ -175,6 +179,40 @@ struct Difference {
 
 /// Of `flow` at some vertices against the truth there: relative error, and the share of components of the
 /// response that have the wrong sign, all of them and those above a tenth of the rms.
+std::vector<Vec3d> normals(const SurfaceComponent& c, const HeatFlow& truth) {
+  std::vector<Vec3d> n(c.points.size());
+  const auto at = [&](std::uint32_t v) { return c.points[v] + to_double(truth.moved[v]); };
+  for (std::size_t h = 0; h < c.corners.size(); h += 3) {
+    const Vec3d a = at(c.corners[h]), m = cross(at(c.corners[h + 1]) - a, at(c.corners[h + 2]) - a);
+    for (std::size_t k = 0; k < 3; ++k) n[c.corners[h + k]] = n[c.corners[h + k]] + m;
+  }
+  for (Vec3d& v : n) v = normalized(v);
+  return n;
+}
+
+Difference compare_n(const std::vector<Vec3d>& n, const HeatFlow& flow, const HeatFlow& truth,
+                     const std::vector<std::uint32_t>& vertex) {
+  double difference = 0, size = 0, tangential = 0;
+  for (std::size_t v = 0; v < vertex.size(); ++v) {
+    const Vec3d t = to_double(truth.response[vertex[v]]);
+    const double a = dot(to_double(flow.response[v]), n[vertex[v]]), b = dot(t, n[vertex[v]]);
+    difference += (a - b) * (a - b);
+    size += b * b;
+    tangential += dot(t, t) - b * b;
+  }
+  Difference out;
+  const double count = static_cast<double>(vertex.size()), limit = 0.1 * std::sqrt(size / count);
+  for (std::size_t v = 0; v < vertex.size(); ++v) {
+    const double a = dot(to_double(flow.response[v]), n[vertex[v]]),
+                 b = dot(to_double(truth.response[vertex[v]]), n[vertex[v]]);
+    const bool flip = (a < 0) != (b < 0);
+    out.significant += (flip && std::fabs(b) > limit) / count;
+  }
+  out.error = std::sqrt(difference / size);
+  out.flips = std::sqrt(tangential / size);
+  return out;
+}
+
 Difference compare(const HeatFlow& flow, const HeatFlow& truth, const std::vector<std::uint32_t>& vertex) {
   double difference = 0, size = 0;
   for (std::size_t v = 0; v < vertex.size(); ++v)
@@ -227,11 +265,16 @@ void print_accuracy(const std::string& name, const ConditionedMesh& mesh, const 
     }
     const std::vector<HeatFlow> flow = diffuse(level.laplacian, points, time, times.subspan(i, 1), context);
     const Difference one = compare(single[i], truth[i], all), pyramid = compare(flow[0], truth[i], vertex);
-    std::printf("  S%-2zu sigma %6.2f  single: error %.4f %% flips %.4f %%   pyramid: %8zu vertices, bound %5.0f, error %6.3f %% "
-                "flips %.3f %% significant %.3f %%\n",
-                i + 1, ladder.sigma[i], 100 * one.error, 100 * one.flips, vertex.size(),
-                level.laplacian.bound * level.spacing * level.spacing, 100 * pyramid.error, 100 * pyramid.flips,
-                100 * pyramid.significant);
+    std::printf(
+        "  S%-2zu sigma %6.2f  single: error %.4f %% flips %.4f %%   pyramid: %8zu vertices, bound %5.0f, "
+        "error %6.3f %% "
+        "flips %.3f %% significant %.3f %%\n",
+        i + 1, ladder.sigma[i], 100 * one.error, 100 * one.flips, vertex.size(),
+        level.laplacian.bound * level.spacing * level.spacing, 100 * pyramid.error, 100 * pyramid.flips,
+        100 * pyramid.significant);
+    const Difference nn = compare_n(normals(c, truth[i]), flow[0], truth[i], vertex);
+    std::printf("     normal part: error %6.3f %%  significant flips %.3f %%   tangential/normal %.3f\n",
+                100 * nn.error, 100 * nn.significant, nn.flips);
     for (std::size_t v = 0; v < points.size(); ++v) points[v] = points[v] + to_double(flow[0].moved[v]);
     time = times[i];
   }

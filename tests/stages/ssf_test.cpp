@@ -107,7 +107,8 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
     for (std::uint32_t k = l.first[queue[q]]; k < l.first[queue[q] + 1]; ++k) {
       const std::uint32_t i = queue[q], j = l.column[k];
       double back = 0;
-      for (std::uint32_t e = l.first[j]; e < l.first[j + 1]; ++e) back = l.column[e] == i ? double{l.rate[e]} : back;
+      for (std::uint32_t e = l.first[j]; e < l.first[j + 1]; ++e)
+        back = l.column[e] == i ? double{l.rate[e]} : back;
       symmetric(i, j) = -std::sqrt(double{l.rate[k]} * back);
       symmetric(i, i) += double{l.rate[k]};
       if (root[j] == 0) {
