@@ -7,10 +7,9 @@
 namespace texmesh {
 namespace {
 
-// A coded symbol of the sample weighs this much against one unit of the typical tables (annex K.3), which
-// stand for what the sample does not show: every symbol that baseline coding can produce needs a code,
-// because libjpeg-turbo writes a damaged stream for one that has none.
-constexpr std::uint64_t kSampleWeight = 64;
+// A coded symbol of the sample weighs this much against one that the sample lacks but an image may have:
+// every such symbol needs a code, because libjpeg-turbo writes a damaged stream for one that has none.
+constexpr std::uint64_t kSampleWeight = 16;
 
 JpegKind kind_of(const PlaneCoding& plane, int quality) {
   JpegKind kind;
@@ -21,15 +20,11 @@ JpegKind kind_of(const PlaneCoding& plane, int quality) {
   return kind;
 }
 
-/// A table for the symbols counted, with a code for every symbol of `typical`, where a code of length l
-/// stands for a frequency of 2^-l.
-HuffmanTable table_for(const std::array<std::uint64_t, 256>& count, const HuffmanTable& typical) {
+HuffmanTable table_for(const std::array<std::uint64_t, 256>& count,
+                       const std::vector<std::uint8_t>& symbols) {
   std::vector<std::uint64_t> weights;
-  std::size_t at = 0;
-  for (std::size_t l = 1; l <= 16; ++l)
-    for (int k = 0; k < typical.bits[l]; ++k)
-      weights.push_back(kSampleWeight * count[typical.symbols[at++]] + (std::uint64_t{1} << (16 - l) / 2));
-  return make_huffman_table(typical.symbols, weights);
+  for (const std::uint8_t symbol : symbols) weights.push_back(kSampleWeight * count[symbol] + 1);
+  return make_huffman_table(symbols, weights);
 }
 
 class JpegCodec : public TextureCodec {
@@ -59,8 +54,9 @@ class JpegCodec : public TextureCodec {
     HuffmanTables tables = coder.tables();
     SymbolCounts counts(tables.size());
     for (const PixelWindow& window : sample) coder.count_symbols(window, counts);
+    const auto possible = coder.possible_symbols();
     for (std::size_t k = 0; k < tables.size() && !sample.empty(); ++k)
-      tables[k] = table_for(counts[k], tables[k]);
+      tables[k] = table_for(counts[k], possible[k]);
     return tables;
   }
 

@@ -88,6 +88,40 @@ constexpr std::array<std::uint8_t, 16> kAdobeMarker{0xff, 0xee, 0,   14, 'A', 'd
                                                     'e',  0,    100, 0,  0,   0,   0,   0};
 constexpr std::size_t kMarkerBytes = 2;
 
+constexpr std::size_t kBlockCoefficients = 64;
+
+/// No coefficient of 8-bit samples is larger than 1024 (DC; AC stay under 930) before it is quantised.
+unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
+  static constexpr std::array<std::uint8_t, kBlockCoefficients> kNatural{
+      0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,  12, 19, 26, 33, 40, 48,
+      41, 34, 27, 20, 13, 6,  7,  14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23,
+      30, 37, 44, 51, 58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
+  const unsigned q = quantisers.quantval[kNatural[zigzag]];
+  return (1024 + q / 2) / q;
+}
+
+unsigned bits_of(unsigned value) {
+  unsigned bits = 0;
+  for (; value > 0; value >>= 1) ++bits;
+  return bits;
+}
+
+std::vector<std::uint8_t> dc_symbols(unsigned most_bits) {
+  std::vector<std::uint8_t> symbols;
+  for (unsigned bits = 0; bits <= std::min(most_bits, 11u); ++bits)
+    symbols.push_back(static_cast<std::uint8_t>(bits));
+  return symbols;
+}
+
+/// After a run of r zeros the coefficient is the (r + 1)th or a later one.
+std::vector<std::uint8_t> ac_symbols(std::span<const unsigned> most_bits) {
+  std::vector<std::uint8_t> symbols{0x00, 0xf0};  // end of block, sixteen zeros
+  for (unsigned run = 0; run < 16; ++run)
+    for (unsigned bits = 1; bits <= std::min(most_bits[run + 1], 10u); ++bits)
+      symbols.push_back(static_cast<std::uint8_t>(run << 4 | bits));
+  return symbols;
+}
+
 }  // namespace
 
 struct JpegCoder::State {
@@ -216,6 +250,28 @@ void JpegCoder::use_tables(const HuffmanTables& tables) {
     std::memset(to.huffval, 0, sizeof to.huffval);
     std::copy(tables[k].symbols.begin(), tables[k].symbols.end(), to.huffval);
   }
+}
+
+std::vector<std::vector<std::uint8_t>> JpegCoder::possible_symbols() const {
+  const jpeg_compress_struct& info = state_->info;
+  std::vector<std::vector<std::uint8_t>> out;
+  for (int pair = 0; pair < static_cast<int>(state_->table_pairs()); ++pair) {
+    unsigned dc = 0;
+    std::array<unsigned, kBlockCoefficients + 1> ac{};  // [k]: of coefficient k or a later one
+    for (int c = 0; c < info.num_components; ++c) {
+      if (info.comp_info[c].dc_tbl_no != pair) continue;
+      const JQUANT_TBL& quantisers = *info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no];
+      dc = std::max(dc, bits_of(2 * largest_coefficient(quantisers, 0)));
+      unsigned later = 0;
+      for (std::size_t k = kBlockCoefficients - 1; k > 0; --k) {
+        later = std::max(later, bits_of(largest_coefficient(quantisers, k)));
+        ac[k] = std::max(ac[k], later);
+      }
+    }
+    out.push_back(dc_symbols(dc));
+    out.push_back(ac_symbols(ac));
+  }
+  return out;
 }
 
 std::vector<std::uint8_t> JpegCoder::head_stream(std::uint32_t width_px, std::uint32_t height_px) {

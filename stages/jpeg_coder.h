@@ -35,6 +35,9 @@ class JpegCoder {
   /// Those in use; a new coder has the typical ones of ISO 10918-1 annex K.3, which have a code for every
   /// symbol.
   HuffmanTables tables() const;
+  /// For each of those tables, the symbols that coding any image can take: quantisers bound the coefficients,
+  /// so coarse ones leave few.
+  std::vector<std::vector<std::uint8_t>> possible_symbols() const;
   /// All that images of one size and kind have in common: SOI [APP14] DQT [DHT] SOF [SOS] EOI. A progressive
   /// coder's has neither DHT nor SOS: every scan has its own.
   std::vector<std::uint8_t> head_stream(std::uint32_t width_px, std::uint32_t height_px);

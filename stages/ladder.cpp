@@ -101,7 +101,7 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
 }
 
 /// What the tables are trained on: the middles of covered fragments, evenly spread in index order, together
-/// about 1/16 of the plane but at least 256 x 256 where there is so much. More of them and smaller ones show
+/// about 1/16 of the plane but at least 2^17 pixels where there are so many. More of them and smaller ones show
 /// more of the plane for the same work.
 std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels& pixels, int wanted) {
   std::vector<std::size_t> covered;
@@ -109,7 +109,7 @@ std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels
     if (plane.covered_texels[f] > 0) covered.push_back(f);
   const std::size_t count = std::min(covered.size(), static_cast<std::size_t>(std::max(wanted, 1)));
   const std::uint64_t budget =
-      std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 65536);
+      std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 131072);
   std::uint32_t side = 16;
   while (std::uint64_t{side + 16} * (side + 16) * count <= budget && side < 4096) side += 16;
   std::vector<PixelWindow> sample;
