@@ -100,9 +100,11 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   return coding;
 }
 
-/// What the tables are trained on: the middles of covered fragments, evenly spread in index order, together
-/// about 1/16 of the plane but at least 2^17 pixels where there are so many. More of them and smaller ones show
-/// more of the plane for the same work.
+/// What the tables are trained on: the middle rows of covered fragments, evenly spread in index order,
+/// together about 1/16 of the plane but at least 2^17 pixels where there are so many. More of them and
+/// smaller ones show more of the plane for the same work. Whole rows, because the DC step from a row's end to
+/// the next row's begin is large: narrower windows would show it too often, and the DC tables would be made
+/// for it.
 std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels& pixels, int wanted) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
@@ -110,16 +112,16 @@ std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels
   const std::size_t count = std::min(covered.size(), static_cast<std::size_t>(std::max(wanted, 1)));
   const std::uint64_t budget =
       std::max<std::uint64_t>(std::uint64_t{pixels.width_px} * pixels.height_px / 16, 131072);
-  std::uint32_t side = 16;
-  while (std::uint64_t{side + 16} * (side + 16) * count <= budget && side < 4096) side += 16;
+  constexpr std::uint32_t kRows = 16;
+  std::uint32_t height = kRows;
+  while (height < plane.fragment_height_px &&
+         std::uint64_t{height + kRows} * plane.fragment_width_px * count <= budget)
+    height += kRows;
   std::vector<PixelWindow> sample;
   for (std::size_t k = 0; k < count; ++k) {
     PixelWindow window = window_of(plane, pixels, covered[(2 * k + 1) * covered.size() / (2 * count)]);
-    const std::uint32_t w = std::min(side, window.width_px), h = std::min(side, window.height_px);
-    window.data += (window.height_px - h) / 2 * window.stride_bytes +
-                   std::size_t{(window.width_px - w) / 2} * plane.channels;
-    window.width_px = w;
-    window.height_px = h;
+    window.data += (window.height_px - height) / (2 * kRows) * kRows * window.stride_bytes;
+    window.height_px = height;
     sample.push_back(window);
   }
   return sample;
