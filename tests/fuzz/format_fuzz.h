@@ -9,6 +9,7 @@
 #include "delivery/cpp/package_reader.h"
 #include "tests/format/manifest_fixture.h"
 #include "tests/format/package_fixture.h"
+#include "tests/format/split_fixture.h"
 
 namespace texmesh::fuzz {
 namespace detail {
@@ -114,6 +115,29 @@ inline Bytes with_digests(Input input, std::size_t fixed, std::size_t record, st
 inline void fuzz_index_with_digests(Input input) { fuzz_index(with_digests(input, 16, 44, 8)); }
 inline void fuzz_tables_with_digests(Input input) { fuzz_tables(with_digests(input, 16, 36, 0)); }
 
+/// Blocks go in part by part, so that their digests do not stand in the way.
+inline void fuzz_split_stream(Input input) {
+  constexpr SplitLimits kLimits{20000, 40000};
+  const SplitStreamHead head = read_split_head(input);
+  SplitStreamReader reader(head, kLimits);
+  for (const SplitBlock& b : head.blocks) {
+    if (b.offset + b.bytes() > input.size()) break;
+    std::vector<Input> parts;
+    std::uint64_t at = b.offset;
+    for (const std::uint32_t size : b.parts) {
+      parts.push_back(input.subspan(static_cast<std::size_t>(at), size));
+      at += size;
+    }
+    reader.add_parts(parts);
+  }
+  const SplitMesh& mesh = reader.mesh();
+  require(mesh.points().size() <= kLimits.points && mesh.faces().size() <= kLimits.faces, "a mesh too large");
+  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+    for (std::uint32_t k = 0; k < 3; ++k)
+      require(mesh.point_at(f, k) < mesh.points().size() && mesh.point_at(f, k) != mesh.point_at(f, k + 1),
+              "a face without three points");
+}
+
 inline Bytes tagged(std::uint8_t kind, Input bytes) {
   Bytes out{kind};
   out.insert(out.end(), bytes.begin(), bytes.end());
@@ -124,13 +148,20 @@ inline Bytes tagged(std::uint8_t kind, Input bytes) {
 
 /// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
 /// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader. Anything but an answer or a FormatError is a fault: it aborts. What is read must also be
-/// written again, unchanged where the format has one form only.
+/// PackageReader, 9 a vertex-split stream. Anything but an answer or a FormatError is a fault: it aborts.
+/// What is read must also be written again, unchanged where the format has one form only.
 inline void read_format(std::span<const std::uint8_t> input) {
   using namespace detail;
-  constexpr void (*kReaders[])(Input) = {
-      fuzz_container, fuzz_manifest,           fuzz_textures,           fuzz_index, fuzz_tables, fuzz_quality,
-      fuzz_package,   fuzz_index_with_digests, fuzz_tables_with_digests};
+  constexpr void (*kReaders[])(Input) = {fuzz_container,
+                                         fuzz_manifest,
+                                         fuzz_textures,
+                                         fuzz_index,
+                                         fuzz_tables,
+                                         fuzz_quality,
+                                         fuzz_package,
+                                         fuzz_index_with_digests,
+                                         fuzz_tables_with_digests,
+                                         fuzz_split_stream};
   if (input.empty()) return;
   try {
     kReaders[input[0] % std::size(kReaders)](input.subspan(1));
@@ -156,6 +187,8 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
     corpus.push_back(tagged(5, reader.entry(kQualityPath)));
   }
   corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  for (const std::uint32_t n : {3u, 9u})
+    corpus.push_back(tagged(9, write_split_stream(texmesh::testing::split_fixture(n).source)));
   return corpus;
 }
 
