@@ -1,6 +1,7 @@
 #include "pipeline/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,7 +13,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "format/errors.h"
+#include "pipeline/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -25,7 +26,7 @@ struct Descriptor {
 };
 
 [[noreturn]] void fail(const std::string& path, const char* step) {
-  throw InputError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
+  throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
 }
 
 void write_all(int fd, std::span<const std::uint8_t> bytes, const std::string& path) {
@@ -47,31 +48,95 @@ void sync_folder(const std::string& path) {
 }
 
 std::string own_temporary(const std::string& path) {
-  static std::atomic<unsigned> counter{0};
-  return path + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+  static std::atomic<std::size_t> counter{0};
+  return temporary_name(path, counter++);
+}
+
+/// The descriptor's file still stands under this name.
+bool stands_at(int fd, const std::string& path) {
+  struct stat own {
+  }, there{};
+  return ::fstat(fd, &own) == 0 && ::lstat(path.c_str(), &there) == 0 && own.st_dev == there.st_dev &&
+         own.st_ino == there.st_ino;
+}
+
+/// An empty file under `temp`, locked, which is what tells it from one that a killed process left. -1 with
+/// errno; EEXIST when somebody else has it.
+int open_temporary(const std::string& temp) {
+  constexpr int kAttempts = 100;  // each is lost only to a cleaner that has just removed the file
+  for (int i = 0; i < kAttempts; ++i) {
+    const int fd = ::open(temp.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (fd < 0) return -1;
+    const bool taken = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    if (!taken && stands_at(fd, temp) && ::ftruncate(fd, 0) == 0) return fd;
+    const int error = taken ? EEXIST : errno;
+    const bool lost = !taken && !stands_at(fd, temp);
+    ::close(fd);
+    errno = error;
+    if (!lost) return -1;
+  }
+  errno = EEXIST;
+  return -1;
+}
+
+/// What stands before ".tmp<digits>-<digits>"; "" when the name does not end so.
+std::string_view without_temporary_ending(std::string_view name) {
+  const std::size_t at = name.rfind(".tmp");
+  if (at == std::string_view::npos) return {};
+  std::string_view rest = name.substr(at + 4);
+  const std::size_t dash = rest.find('-');
+  const auto is_number = [](std::string_view s) {
+    return !s.empty() && s.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  if (dash == std::string_view::npos || !is_number(rest.substr(0, dash)) || !is_number(rest.substr(dash + 1)))
+    return {};
+  return name.substr(0, at);
 }
 
 }  // namespace
 
+std::string temporary_name(const std::string& path, std::size_t number) {
+  return path + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(number);
+}
+
 void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
                            const std::string& temporary) {
-  const std::string temp = temporary.empty() ? own_temporary(path) : temporary;
+  std::string temp = temporary.empty() ? own_temporary(path) : temporary;
+  Descriptor d{open_temporary(temp)};
+  for (int i = 0; d.fd < 0 && errno == EEXIST && i < 100; ++i) {
+    temp = own_temporary(path);
+    d.fd = open_temporary(temp);
+  }
+  if (d.fd < 0) fail(path, "open");
   try {
-    {
-      Descriptor d{::open(temp.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666)};
-      if (d.fd < 0) fail(path, "open");
-      write_all(d.fd, bytes, path);
-      if (::fdatasync(d.fd) != 0) fail(path, "fdatasync");
-      const int fd = d.fd;
-      d.fd = -1;
-      if (::close(fd) != 0) fail(path, "close");
-    }
+    write_all(d.fd, bytes, path);
+    if (::fdatasync(d.fd) != 0) fail(path, "fdatasync");
+    // Under the lock: a cleaner must not take the finished file for one that was left.
     if (::rename(temp.c_str(), path.c_str()) != 0) fail(path, "rename");
   } catch (...) {
     ::unlink(temp.c_str());
     throw;
   }
   sync_folder(path);
+}
+
+bool remove_stale_temporary(const std::string& path) {
+  if (without_temporary_ending(std::filesystem::path(path).filename().string()).empty()) return false;
+  const Descriptor d{::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)};
+  return d.fd >= 0 && ::flock(d.fd, LOCK_EX | LOCK_NB) == 0 && stands_at(d.fd, path) &&
+         ::unlink(path.c_str()) == 0;
+}
+
+std::size_t remove_stale_temporaries(const std::string& folder, const std::string& ending) {
+  std::vector<std::string> found;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, ec), end; !ec && it != end;
+       it.increment(ec)) {
+    const std::string name = it->path().filename().string();
+    const std::string_view stem = without_temporary_ending(name);
+    if (!stem.empty() && stem.ends_with(ending)) found.push_back(it->path().string());
+  }
+  return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), remove_stale_temporary));
 }
 
 bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -7,10 +8,23 @@ namespace texmesh {
 
 /// Writes `bytes` under `path` so that the path holds either what it held before or all of the new bytes,
 /// whatever happens: temporary sibling, write, fdatasync, rename, fsync of the folder. On any failure the
-/// temporary is removed and InputError{path, "", "a writable file", reason} is thrown. `temporary` may name
-/// the sibling (a parent process that wants to remove it if this one is killed); "" makes a name of its own.
+/// temporary is removed and ResourceError{path, "", "a writable file", reason} is thrown. `temporary` may
+/// name the sibling (a parent process that wants to remove it if this one is killed; should somebody else be
+/// writing a file of that name, another one is taken); "" makes a name of its own. The temporary is locked
+/// (flock) while it is written.
 void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
                            const std::string& temporary = "");
+
+/// The name of a temporary sibling of `path`; `number` tells those of one process apart.
+std::string temporary_name(const std::string& path, std::size_t number);
+
+/// Removes what a killed process has left of write_file_atomically: `path` must have a temporary's name and
+/// be locked by nobody. False when it was not removed.
+bool remove_stale_temporary(const std::string& path);
+
+/// The same for every file of a folder whose name without the temporary's ending ends with `ending`. Returns
+/// how many were removed; a folder that cannot be listed holds none.
+std::size_t remove_stale_temporaries(const std::string& folder, const std::string& ending);
 
 /// True when `path` is a regular file that holds exactly these bytes.
 bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes);

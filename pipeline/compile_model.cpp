@@ -9,6 +9,7 @@
 #include "pipeline/atomic_file.h"
 #include "pipeline/file_resolver.h"
 #include "pipeline/library_versions.h"
+#include "pipeline/resource_error.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -149,6 +150,10 @@ class ModelSource {
       ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options_, context);
       requests = resolver.requests();
       return m;
+    } catch (const InputError& e) {
+      requests = resolver.requests();
+      if (resolver.failed_for_resources()) throw ResourceError(e.file(), e.place(), e.expected(), e.found());
+      throw;
     } catch (...) {
       requests = resolver.requests();  // what a failure depends on, too
       throw;

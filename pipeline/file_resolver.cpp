@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "pipeline/import/uri.h"
+#include "pipeline/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -38,6 +39,23 @@ class Descriptor {
 };
 
 std::string message(int error) { return std::generic_category().message(error); }
+
+/// What says nothing about the file is an error of the machine.
+[[noreturn]] void fail_to_read(const std::string& name, const std::string& place, const char* expected,
+                               int error) {
+  switch (error) {
+    case EIO:
+    case EMFILE:
+    case ENFILE:
+    case ENOMEM:
+    case ESTALE:
+    case ETIMEDOUT:
+    case EAGAIN:
+      throw ResourceError(name, place, expected, message(error));
+    default:
+      throw InputError(name, place, expected, message(error));
+  }
+}
 
 template <class F>
 auto retry_on_signal(F&& call) {
@@ -100,7 +118,7 @@ const char* kind_of(mode_t mode) {
 /// The stamp is taken before the first byte is read: a change while reading gives another one later.
 FileStamp checked_stamp(int fd, const std::string& name, const std::string& expected) {
   struct stat s {};
-  if (::fstat(fd, &s) != 0) throw InputError(name, "", "a readable file", message(errno));
+  if (::fstat(fd, &s) != 0) fail_to_read(name, "", "a readable file", errno);
   if (!S_ISREG(s.st_mode)) throw InputError(name, "", expected, kind_of(s.st_mode));
   return stamp_of(s);
 }
@@ -121,7 +139,7 @@ std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::s
     if (size > max_bytes) throw too_long(size);
     if (size == bytes.size()) bytes.resize(size + (std::size_t{1} << 16));
     const ssize_t got = retry_on_signal([&] { return ::read(fd, bytes.data() + size, bytes.size() - size); });
-    if (got < 0) throw InputError(name, "byte " + std::to_string(size), "readable bytes", message(errno));
+    if (got < 0) fail_to_read(name, "byte " + std::to_string(size), "readable bytes", errno);
     size += static_cast<std::size_t>(got);
     if (got == 0) {
       bytes.resize(size);
@@ -173,18 +191,23 @@ int FileResolver::open_regular(const std::string& uri) {
     case ENXIO:
       throw InputError(uri, "", kRegularFile, "a socket");
     default:
-      throw InputError(uri, "", "a readable file", message(errno));
+      fail_to_read(uri, "", "a readable file", errno);
   }
 }
 
 std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
   const std::size_t index = record(uri);
-  const Descriptor fd(open_regular(uri));
-  if (fd.get() < 0) return std::nullopt;
-  FileStamp stamp;
-  std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
-  requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp};
-  return bytes;
+  try {
+    const Descriptor fd(open_regular(uri));
+    if (fd.get() < 0) return std::nullopt;
+    FileStamp stamp;
+    std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
+    requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp};
+    return bytes;
+  } catch (const ResourceError&) {
+    failed_for_resources_ = true;
+    throw;
+  }
 }
 
 void FileResolver::expect(std::vector<FileRequest> known) {
@@ -210,7 +233,7 @@ std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std
                                           FileStamp* stamp) {
   const std::string name = path.string();
   const Descriptor fd(retry_on_signal([&] { return ::open(name.c_str(), kReadFlags); }));
-  if (fd.get() < 0) throw InputError(name, "", "a readable file", message(errno));
+  if (fd.get() < 0) fail_to_read(name, "", "a readable file", errno);
   FileStamp own;
   return read_all(fd.get(), max_bytes, name, "a regular file", stamp ? *stamp : own);
 }

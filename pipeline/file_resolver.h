@@ -45,6 +45,9 @@ class FileResolver : public Resolver {
   /// when it is not there.
   bool look(const std::string& uri, std::uint64_t max_bytes);
 
+  /// A read has failed for reasons of the machine (ResourceError), whatever the reader made of that.
+  bool failed_for_resources() const { return failed_for_resources_; }
+
   /// Every uri that was asked for, once, in the order of first use; refused ones as not found.
   const std::vector<FileRequest>& requests() const { return requests_; }
 
@@ -54,14 +57,15 @@ class FileResolver : public Resolver {
   std::size_t record(const std::string& uri);
 
   int folder_ = -1;
-  bool walk_ = false;
+  bool walk_ = false, failed_for_resources_ = false;
   std::vector<FileRequest> requests_;
   std::map<std::string, std::size_t> index_of_;
   std::map<std::string, FileRequest> expected_;
 };
 
 /// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
-/// missing, not a regular file, unreadable or longer than max_bytes.
+/// missing, not a regular file, unreadable or longer than max_bytes; ResourceError where the machine is to
+/// blame.
 std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
                                           FileStamp* stamp = nullptr);
 

@@ -19,6 +19,7 @@
 #include <optional>
 
 #include "format/errors.h"
+#include "pipeline/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/core_path.h"
 
@@ -100,6 +101,7 @@ std::string job_text(const WorkerJob& job, const std::string& temporary, const W
               {"layers", job.cache.layers},
               {"upload", job.cache.upload},
               {"strict", job.strict},
+              {"parent", ::getpid()},
               {"explain", job.explain},
               {"forecast", job.forecast},
               {"known", files_to_json(job.known)},
@@ -114,9 +116,7 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
   static const std::string executable = core_executable();
   Child child;
   child.job = index;
-  child.temporary = job.output.empty() || job.forecast
-                        ? ""
-                        : job.output + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(index);
+  child.temporary = job.output.empty() || job.forecast ? "" : temporary_name(job.output, index);
   Pipe in, out, err;
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);

@@ -16,6 +16,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/compile_model.h"
+#include "pipeline/resource_error.h"
 #include "pipeline/worker.h"
 
 namespace texmesh {
@@ -52,6 +53,7 @@ void limit(int resource, std::uint64_t value) {
 
 void apply_limits(const Json& job) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != job.value("parent", pid_t{0})) ::_exit(kExitInternal);  // it died before the line above
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers map terabytes of shadow
@@ -199,6 +201,8 @@ int worker_main() {
   apply_limits(job);
   try {
     return compile(job, events);
+  } catch (const ResourceError& e) {
+    return report_error(events, "resource", e);
   } catch (const InputError& e) {
     return report_error(events, "input", e);
   } catch (const FormatError& e) {

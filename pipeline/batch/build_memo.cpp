@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "format/archive.h"
@@ -142,10 +143,12 @@ BuildMemo::BuildMemo(const std::string& cache_folder, const std::string& outputs
 void BuildMemo::load() {
   index_.clear();
   auto bytes = read_whole(path_);
-  if (!bytes || bytes->size() < 8 + kDigestBytes) return;
-  const std::size_t end = bytes->size() - kDigestBytes;
+  if (!bytes) return;
+  const std::size_t end = bytes->size() - std::min(bytes->size(), kDigestBytes);
   const Sha256 digest = sha256(std::span(*bytes).first(end));
-  if (!std::equal(digest.begin(), digest.end(), bytes->begin() + static_cast<std::ptrdiff_t>(end))) return;
+  was_damaged_ = bytes->size() < 8 + kDigestBytes ||
+                 !std::equal(digest.begin(), digest.end(), bytes->begin() + static_cast<std::ptrdiff_t>(end));
+  if (was_damaged_) return;
   bytes_ = std::move(*bytes);
   if (get_u64(bytes_, 0) != kMemoVersion) return;
   for (std::size_t at = 8; at + 16 <= end;) {

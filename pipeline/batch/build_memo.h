@@ -32,6 +32,8 @@ class BuildMemo {
   /// `outputs`: absolute path of the output folder, or of the package where a run makes one only. Without a
   /// cache folder nothing is remembered.
   BuildMemo(const std::string& cache_folder, const std::string& outputs);
+  /// There was a memo, but not with its digest: nothing is remembered.
+  bool was_damaged() const { return was_damaged_; }
   /// `package`: path of the package as the run names it.
   bool find(const std::string& package, MemoRecord& record) const;
   void set(const std::string& package, const MemoRecord& record);
@@ -41,6 +43,7 @@ class BuildMemo {
  private:
   void load();
   std::string path_;
+  bool was_damaged_ = false;
   std::vector<std::uint8_t> bytes_;
   std::map<std::string_view, std::pair<std::size_t, std::size_t>> index_;  // into bytes_: offset and length
   std::map<std::string, std::vector<std::uint8_t>> changed_;

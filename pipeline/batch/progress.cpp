@@ -147,6 +147,16 @@ void Progress::event(std::size_t model, const std::string& json_line) {
   redraw(false);
 }
 
+void Progress::cache_event(const std::string& code, const std::string& text) {
+  if (mode_ == OutputMode::kJson)
+    out_ << Json{{"event", "cache"}, {"model", ""}, {"code", code}, {"text", text}}.dump(
+                -1, ' ', false, Json::error_handler_t::replace)
+         << '\n'
+         << std::flush;
+  else
+    line("cache: " + text);
+}
+
 void Progress::finished(std::size_t model, const WorkerReport& r, const std::string& output) {
   ++finished_count_;
   const std::string& name = models_[model].name;

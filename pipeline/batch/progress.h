@@ -30,6 +30,8 @@ class Progress {
                 const std::string& output);  // no need to run it
   void started(std::size_t model, const std::string& output);
   void event(std::size_t model, const std::string& json_line);
+  /// Something about the cache that no single model has met.
+  void cache_event(const std::string& code, const std::string& text);
   void finished(std::size_t model, const WorkerReport& report, const std::string& output);
   void summary(const std::vector<WorkerReport>& reports, double seconds);
   void forecast_summary(std::size_t to_look_at, std::size_t models);

@@ -48,8 +48,8 @@ class Batch {
     select();
     if (settings_.dry_run) return forecast();
     make_folders();
+    remove_leftovers();
     compile();
-    memo_.save();
     write_reports();
     if (wrote_ && !settings_.cache.folder.empty())
       prune_now_and_then(settings_.cache.folder, settings_.cache_limits);
@@ -149,11 +149,21 @@ class Batch {
     }
   }
 
+  /// What killed runs have left beside the packages.
+  void remove_leftovers() const {
+    std::set<std::string> folders;
+    for (const PlannedModel& m : plan_.models) folders.insert(fs::path(m.output).parent_path().string());
+    for (const std::string& folder : folders) remove_stale_temporaries(folder, ".texmesh");
+  }
+
   void begin_progress() {
     std::vector<ProgressModel> models;
     for (std::size_t i = 0; i < plan_.models.size(); ++i) models.push_back({plan_.models[i].name, 0});
     for (std::size_t j = 0; j < jobs_.size(); ++j) models[model_of_job_[j]].weight = jobs_[j].predicted_s;
     progress_.begin(std::move(models));
+    if (memo_.was_damaged())
+      progress_.cache_event("cache-entry-damaged",
+                            "what earlier runs found out does not have its digest; every model is looked at");
     std::size_t next = 0;
     for (std::size_t i = 0; i < plan_.models.size(); ++i) {
       if (next < model_of_job_.size() && model_of_job_[next] == i)
@@ -187,6 +197,9 @@ class Batch {
       reports_[model_of_job_[job]] = reports[job];
       wrote_ = wrote_ || reports[job].stages_ran > 0;
     }
+    if (!memo_.save())
+      progress_.cache_event("cache-not-written", "what this run found out cannot be kept in " +
+                                                     settings_.cache.folder + ": the next one looks again");
     seconds_ = seconds_since(start_);
     progress_.summary(reports_, seconds_);
   }
@@ -238,7 +251,9 @@ class Batch {
   }
 
   void write_text(const std::string& path, const std::string& text) const {
-    if (!path.empty() && !file_holds(path, bytes_of(text))) write_file_atomically(path, bytes_of(text));
+    if (path.empty()) return;
+    remove_stale_temporaries(fs::path(path).parent_path().string(), fs::path(path).filename().string());
+    if (!file_holds(path, bytes_of(text))) write_file_atomically(path, bytes_of(text));
   }
 
   void write_reports() const {

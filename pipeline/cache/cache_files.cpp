@@ -170,6 +170,13 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
   return *this;
 }
 
+bool FileLock::is_of(const std::string& path) const {
+  struct stat own {
+  }, there{};
+  return fd_ >= 0 && ::fstat(fd_, &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
+         own.st_dev == there.st_dev && own.st_ino == there.st_ino;
+}
+
 namespace {
 
 int open_lock(const std::string& path) {

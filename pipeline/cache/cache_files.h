@@ -60,6 +60,8 @@ class FileLock {
   bool held() const { return fd_ >= 0; }
   /// attempt() failed because somebody else holds it, not because locks do not work.
   bool busy() const { return busy_; }
+  /// The file that is locked is the one that stands under this path now, not one that was removed meanwhile.
+  bool is_of(const std::string& path) const;
 
  private:
   int fd_ = -1;

@@ -29,16 +29,26 @@ class LockClaim : public Claim {
   FileLock lock_;
 };
 
-/// running/<name>: locked while this process lives.
+/// running/<name>: locked while this process lives. The name may be taken by a process of the same number in
+/// another container, or by one that was killed; and pruning, which removes what nobody holds, may come
+/// between making the file and locking it.
 class RunningBuild {
  public:
   explicit RunningBuild(const std::string& folder) {
     static std::atomic<unsigned> counter{0};
-    path_ = folder + "/running/" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-    ::unlink(path_.c_str());  // of an earlier process of this number
-    lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
+    constexpr int kAttempts = 1000;
+    for (int i = 0; i < kAttempts; ++i) {
+      path_ = folder + "/running/" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+      lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
+      if (!lock_.held() && !lock_.busy()) return;  // locks do not work here
+      if (!lock_.is_of(path_)) continue;
+      ::utimensat(AT_FDCWD, path_.c_str(), nullptr, 0);  // this build's start
+      return;
+    }
   }
-  ~RunningBuild() { ::unlink(path_.c_str()); }
+  ~RunningBuild() {
+    if (lock_.is_of(path_)) ::unlink(path_.c_str());
+  }
   RunningBuild(const RunningBuild&) = delete;
   RunningBuild& operator=(const RunningBuild&) = delete;
 
@@ -85,7 +95,10 @@ class DiskStore : public Store {
       const std::string path = place("cas", blob.digest);
       // A blob that is there already may be damaged: look, which moves it away.
       const bool was_there = stamp_of(path) && verify(blob);
-      if (!was_there && !publish_object(path, *bytes)) return not_written();
+      if (was_there)  // pruning that has listed it without this new user must see that it is used
+        ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
+      else if (!publish_object(path, *bytes))
+        return not_written();
       record.outputs.push_back(blob);
     }
     const std::string text = write_record(record);
@@ -103,7 +116,10 @@ class DiskStore : public Store {
     const auto bytes = read_whole(path);
     if (!bytes) return std::nullopt;
     auto text = unseal(*bytes);
-    if (!text) quarantine(path, "a note");
+    if (text)
+      touch(path);
+    else
+      quarantine(path, "a note");
     return text;
   }
 

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <map>
 #include <set>
 
+#include "pipeline/atomic_file.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/file_stamp.h"
 
@@ -48,7 +50,7 @@ std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count =
   for (const Entry& e : list(folder, "running")) {
     const FileLock lock = FileLock::attempt(e.path, FileLock::Mode::kExclusive);
     if (lock.held()) {
-      ::unlink(e.path.c_str());
+      if (lock.is_of(e.path)) ::unlink(e.path.c_str());
       continue;
     }
     if (count) ++*count;
@@ -60,12 +62,7 @@ std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count =
 class Pruning {
  public:
   Pruning(const std::string& folder, const CacheLimits& limits)
-      : folder_(folder), limits_(limits), now_ns_(wall_clock_ns()) {
-    const std::int64_t oldest = oldest_running_ns(folder);
-    in_use_since_ns_ = oldest == std::numeric_limits<std::int64_t>::max()
-                           ? oldest
-                           : oldest - 2 * kTouchInterval_s * kSecond_ns;
-  }
+      : folder_(folder), limits_(limits), now_ns_(wall_clock_ns()), in_use_since_ns_(in_use_since_ns()) {}
 
   PruneResult run() {
     read_records();
@@ -125,9 +122,21 @@ class Pruning {
   }
   bool too_much() const { return limits_.max_bytes > 0 && total_bytes_ > limits_.max_bytes; }
 
+  /// Entries used later than this may be in use by a build that runs now.
+  std::int64_t in_use_since_ns() const {
+    const std::int64_t oldest = oldest_running_ns(folder_);
+    return oldest == std::numeric_limits<std::int64_t>::max() ? oldest
+                                                              : oldest - 2 * kTouchInterval_s * kSecond_ns;
+  }
+
+  /// A record or a blob that no running build has used. Builds start at any time: under the gate it is asked
+  /// again. (What was in use when pruning began is left alone without asking, which is never too little.)
+  bool remove_unused(const Entry& e) { return e.stamp.modified_ns < in_use_since_ns_ && remove(e, true); }
+
   /// Removes a file unless it has been used since it was listed: under the gate nobody looks at it meanwhile.
-  bool remove(const Entry& e) {
+  bool remove(const Entry& e, bool only_unused = false) {
     const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kExclusive);
+    if (only_unused && e.stamp.modified_ns >= in_use_since_ns()) return false;
     const auto stamp = stamp_of(e.path);
     if (!stamp || stamp->modified_ns != e.stamp.modified_ns || ::unlink(e.path.c_str()) != 0) return false;
     result_.bytes += e.stamp.bytes;
@@ -138,17 +147,15 @@ class Pruning {
   void drop_records() {
     for (const Record& r : records_) {
       if (!too_much() && !too_old(r.entry)) break;
-      if (r.entry.stamp.modified_ns >= in_use_since_ns_) {
+      if (!remove_unused(r.entry)) {
         ++result_.kept_in_use;
         continue;
       }
-      if (!remove(r.entry)) continue;
       ++result_.records;
       for (const std::string& b : std::set<std::string>(r.blobs.begin(), r.blobs.end())) {
         const auto it = blobs_.find(b);
         if (it == blobs_.end() || --it->second.users > 0) continue;
-        if (it->second.entry.stamp.modified_ns < in_use_since_ns_ && remove(it->second.entry))
-          ++result_.blobs;
+        if (remove_unused(it->second.entry)) ++result_.blobs;
         blobs_.erase(it);
       }
     }
@@ -157,14 +164,18 @@ class Pruning {
   /// Blobs whose record was never written (a killed build) or is damaged.
   void drop_orphans() {
     for (const auto& [name, blob] : blobs_)
-      if (blob.users == 0 && blob.entry.stamp.modified_ns < in_use_since_ns_ &&
-          blob.entry.stamp.modified_ns < now_ns_ - kTouchInterval_s * kSecond_ns && remove(blob.entry))
+      if (blob.users == 0 && blob.entry.stamp.modified_ns < now_ns_ - kTouchInterval_s * kSecond_ns &&
+          remove_unused(blob.entry))
         ++result_.blobs;
   }
 
   void drop_others() {
     for (const char* part : {"notes", "memo"})
       for (const Entry& e : list(folder_, part)) {
+        if (remove_stale_temporary(e.path)) {
+          ++result_.others;
+          continue;
+        }
         total_bytes_ += e.stamp.bytes;
         if (!is_object_name(name_of(e)) && std::string(part) == "notes")
           strays_.push_back(e);
@@ -176,12 +187,13 @@ class Pruning {
       if (e.stamp.changed_ns < now_ns_ - 7 * kDay_ns && remove(e)) ++result_.others;
     }
     for (const Entry& e : strays_)
-      if (e.stamp.modified_ns < now_ns_ - kDay_ns && remove(e)) ++result_.others;
+      if (remove_stale_temporary(e.path) || (e.stamp.modified_ns < now_ns_ - kDay_ns && remove(e)))
+        ++result_.others;
   }
 
   const std::string& folder_;
   const CacheLimits& limits_;
-  std::int64_t now_ns_, in_use_since_ns_ = 0;
+  std::int64_t now_ns_, in_use_since_ns_;
   std::uint64_t total_bytes_ = 0;
   std::vector<Record> records_;
   std::map<std::string, Blob> blobs_;
@@ -224,48 +236,73 @@ void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
   prune_cache(folder, limits);
 }
 
-std::vector<CacheDamage> verify_cache(const std::string& folder) {
-  std::vector<CacheDamage> damage;
-  std::error_code ec;
-  const auto condemn = [&](const Entry& e, const std::string& reason) {
-    fs::create_directories(folder + "/quarantine", ec);
-    fs::rename(e.path, folder + "/quarantine/" + name_of(e), ec);
-    damage.push_back({fs::path(e.path).lexically_relative(folder).string(), reason});
-  };
-  std::map<std::string, std::uint64_t> sound;
-  for (const Entry& e : list(folder, "cas")) {
+namespace {
+
+/// Reads every object beneath a cache folder, beside builds and pruning: what disappears meanwhile is no
+/// damage, and a record is listed before the blobs that were put before it.
+class Verification {
+ public:
+  explicit Verification(const std::string& folder) : folder_(folder) {}
+
+  std::vector<CacheDamage> run() {
+    const std::vector<Entry> records = list(folder_, "ac");
+    for (const Entry& e : list(folder_, "cas")) check_blob(e);
+    for (const Entry& e : records) check_record(e);
+    for (const Entry& e : list(folder_, "notes")) check_note(e);
+    std::sort(damage_.begin(), damage_.end(),
+              [](const CacheDamage& a, const CacheDamage& b) { return a.path < b.path; });
+    return damage_;
+  }
+
+ private:
+  void condemn(const Entry& e, const std::string& reason) {
+    std::error_code ec;
+    if (!stamp_of(e.path)) return;
+    fs::create_directories(folder_ + "/quarantine", ec);
+    fs::rename(e.path, folder_ + "/quarantine/" + name_of(e), ec);
+    damage_.push_back({fs::path(e.path).lexically_relative(folder_).string(), reason});
+  }
+
+  void check_blob(const Entry& e) {
     Sha256 digest;
-    if (!from_hex(name_of(e), digest)) continue;
+    if (!from_hex(name_of(e), digest)) return;
     const auto bytes = read_whole(e.path);
     if (!bytes || sha256(*bytes) != digest)
       condemn(e, "the bytes do not have the digest that is their name");
     else
-      sound[name_of(e)] = bytes->size();
+      sound_[name_of(e)] = bytes->size();
   }
-  for (const Entry& e : list(folder, "ac")) {
+
+  bool is_sound(const StoredBlob& blob) {
+    if (const auto it = sound_.find(to_hex(blob.digest)); it != sound_.end()) return it->second == blob.bytes;
+    const auto bytes = read_whole(folder_ + "/" + object_path("cas", blob.digest));  // put since
+    return bytes && bytes->size() == blob.bytes && sha256(*bytes) == blob.digest;
+  }
+
+  void check_record(const Entry& e) {
     Sha256 key;
-    if (!from_hex(name_of(e), key)) continue;
+    if (!from_hex(name_of(e), key)) return;
+    const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared);
     const auto bytes = read_whole(e.path);
     const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
-    if (!record) {
-      condemn(e, "the record is damaged or not that of its key");
-      continue;
-    }
-    for (const StoredBlob& b : record->outputs) {
-      const auto it = sound.find(to_hex(b.digest));
-      if (it != sound.end() && it->second == b.bytes) continue;
-      condemn(e, "the result " + b.name + " is missing or damaged");
-      break;
-    }
+    if (!record) return condemn(e, "the record is damaged or not that of its key");
+    for (const StoredBlob& b : record->outputs)
+      if (!is_sound(b)) return condemn(e, "the result " + b.name + " is missing or damaged");
   }
-  for (const Entry& e : list(folder, "notes")) {
-    if (!is_object_name(name_of(e))) continue;
+
+  void check_note(const Entry& e) {
+    if (!is_object_name(name_of(e))) return;
     const auto bytes = read_whole(e.path);
     if (!bytes || !unseal(*bytes)) condemn(e, "the note is damaged");
   }
-  std::sort(damage.begin(), damage.end(),
-            [](const CacheDamage& a, const CacheDamage& b) { return a.path < b.path; });
-  return damage;
-}
+
+  const std::string& folder_;
+  std::map<std::string, std::uint64_t> sound_;  // blobs, with their sizes
+  std::vector<CacheDamage> damage_;
+};
+
+}  // namespace
+
+std::vector<CacheDamage> verify_cache(const std::string& folder) { return Verification(folder).run(); }
 
 }  // namespace texmesh

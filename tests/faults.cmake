@@ -1,0 +1,10 @@
+# The library that lets file system calls of a build go wrong, and the tests that preload it.
+add_library(texmesh_fault_shim MODULE faults/fault_shim.cpp)
+target_link_libraries(texmesh_fault_shim PRIVATE ${CMAKE_DL_LIBS})
+target_include_directories(texmesh_fault_shim PRIVATE ${PROJECT_SOURCE_DIR})
+set_target_properties(texmesh_fault_shim PROPERTIES PREFIX "")
+foreach(test pipeline_cli_faults_test)
+  target_compile_definitions(${test} PRIVATE TEXMESH_FAULT_SHIM="$<TARGET_FILE:texmesh_fault_shim>")
+  add_dependencies(${test} texmesh_fault_shim)
+  set_tests_properties(${test} PROPERTIES TIMEOUT 7200)
+endforeach()

@@ -1,0 +1,236 @@
+// Builds that are killed, or whose file system fails, at every call that changes a file: what they leave is
+// either absent or whole, and the next build gives the same bytes as an undisturbed one. (Power loss is not
+// covered: what the kernel was given counts as written.)
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "tests/faults/fault_plan.h"
+#include "tests/support/small_builds.h"
+
+namespace texmesh::testing {
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// The file that the processes under the shim share with this one.
+class SharedCounts {
+ public:
+  explicit SharedCounts(const std::string& file) : file_(file) {
+    const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    if (fd < 0 || ::ftruncate(fd, sizeof(FaultCounts)) != 0) throw std::runtime_error(file);
+    void* place = ::mmap(nullptr, sizeof(FaultCounts), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+    ::close(fd);
+    if (place == MAP_FAILED) throw std::runtime_error(file);
+    counts_ = static_cast<FaultCounts*>(place);
+  }
+  ~SharedCounts() { ::munmap(counts_, sizeof(FaultCounts)); }
+  SharedCounts(const SharedCounts&) = delete;
+  SharedCounts& operator=(const SharedCounts&) = delete;
+  const FaultCounts& operator*() const { return *counts_; }
+  const std::string& file() const { return file_; }
+
+ private:
+  std::string file_;
+  FaultCounts* counts_;
+};
+
+CommandResult texmesh(std::vector<std::string> arguments, const std::vector<std::string>& environment = {}) {
+  arguments.insert(arguments.begin(), TEXMESH_BINARY);
+  return run_command(arguments, environment);
+}
+
+/// One build's place: packages and cache.
+class Site {
+ public:
+  Site(const std::string& models, const std::string& profile, const std::string& jobs)
+      : models_(models), profile_(profile), jobs_(jobs) {
+    fs::create_directories(out());
+  }
+  std::string out() const { return folder_ / "out"; }
+  std::string cache() const { return folder_ / "cache"; }
+
+  CommandResult build(const std::vector<std::string>& environment = {}) const {
+    return texmesh(
+        {"compile", models_, "-o", out(), "--cache", cache(), "--profile", profile_, "--jobs", jobs_},
+        environment);
+  }
+
+  /// A build in which call number `at` goes wrong.
+  CommandResult build_with_fault(const std::string& action, std::uint64_t at, SharedCounts& counts) const {
+    return build({"LD_PRELOAD=" TEXMESH_FAULT_SHIM, "TEXMESH_FAULT_FILE=" + counts.file(),
+                  "TEXMESH_FAULT_UNDER=" + folder_.path().string(), "TEXMESH_FAULT_ACTION=" + action,
+                  "TEXMESH_FAULT_AT=" + std::to_string(at)});
+  }
+  SharedCounts counts() const { return SharedCounts(folder_ / "counts"); }
+
+  Packages packages() const { return packages_in(out()); }
+
+  /// Temporary files anywhere, beneath the site.
+  std::vector<std::string> temporaries() const {
+    std::vector<std::string> found;
+    for (const std::string& f : files_beneath(folder_.path().string()))
+      if (f.find(".tmp") != std::string::npos) found.push_back(f);
+    return found;
+  }
+
+  /// Processes of a killed build die one after the other.
+  void wait_for_the_dead() const {
+    for (int i = 0; i < 500 && fs::exists(cache()); ++i) {
+      const CommandResult r = texmesh({"cache", "stat", "--json", "--cache", cache()});
+      if (Json::parse(r.output, nullptr, false).value("running_builds", 0) == 0) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+
+  void expect_sound_cache(const std::string& what) const {
+    if (!fs::exists(cache())) return;
+    const CommandResult r = texmesh({"cache", "verify", "--cache", cache()});
+    EXPECT_EQ(r.exit_code, 0) << what << ": " << r.output << r.errors;
+  }
+
+ private:
+  std::string models_, profile_, jobs_;
+  TemporaryFolder folder_;
+};
+
+class Faults : public ::testing::Test {
+ protected:
+  void SetUp() override {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "a preloaded library would come before the sanitizer's";
+#endif
+  }
+
+  /// Makes `models` tiny models and compiles them undisturbed.
+  void prepare(int models, const std::string& jobs) {
+    models_ = folder_ / "models";
+    profile_ = folder_ / "profile.json";
+    jobs_ = jobs;
+    write_text(profile_, kCheapProfile);
+    ASSERT_NO_FATAL_FAILURE(make_tiny_models(TEXMESH_MAKE_SCAN, models, models_));
+    const Site site(models_, profile_, jobs_);
+    SharedCounts counts = site.counts();
+    const CommandResult r = site.build_with_fault("none", 0, counts);
+    ASSERT_EQ(r.exit_code, 0) << r.output << r.errors;
+    reference_ = site.packages();
+    ASSERT_EQ(reference_.size(), static_cast<std::size_t>(models));
+    calls_ = (*counts).calls;
+    ASSERT_GT(calls_, 100u * static_cast<std::uint64_t>(models)) << "the shim is not at work";
+    EXPECT_TRUE(site.temporaries().empty());
+  }
+
+  /// All points, or a sample: spread over them, and more of the last ones, which write the package and the
+  /// memo.
+  std::set<std::uint64_t> points(std::uint64_t sample) const {
+    std::set<std::uint64_t> all;
+    const std::uint64_t n = full_sweeps() ? calls_ : std::min(sample, calls_);
+    for (std::uint64_t i = 0; i < n; ++i)
+      all.insert(1 + i * (calls_ - 1) / std::max<std::uint64_t>(n - 1, 1));
+    for (std::uint64_t back = 2; back <= 14; back += 3) all.insert(calls_ - back);
+    return all;
+  }
+
+  void expect_nothing_torn(const Site& site, const std::string& what) const {
+    site.expect_sound_cache(what);
+    for (const auto& [name, bytes] : site.packages()) {
+      if (name.find(".texmesh.tmp") != std::string::npos) continue;  // the next build removes it
+      ASSERT_TRUE(reference_.contains(name)) << what << " left " << name;
+      EXPECT_TRUE(bytes == reference_.at(name)) << what << " left a torn " << name;
+    }
+  }
+
+  void expect_next_build_to_be_whole(const Site& site, const std::string& what) const {
+    const CommandResult r = site.build();
+    EXPECT_EQ(r.exit_code, 0) << what << ": " << r.output << r.errors;
+    EXPECT_TRUE(site.packages() == reference_) << what << ": other packages, or something beside them";
+    site.expect_sound_cache(what + ", next build");
+    texmesh({"cache", "prune", "--size", "0", "--age", "0", "--cache", site.cache()});
+    for (const std::string& f : site.temporaries()) ADD_FAILURE() << what << " leaves " << f << " for ever";
+  }
+
+  /// Errors of the file system at the points of a sweep. Returns how many builds failed, and how.
+  void sweep_errors(const std::string& action, const std::string& reason, std::uint64_t sample) {
+    prepare(1, "1");
+    std::size_t failed = 0, succeeded = 0, silent = 0;
+    std::map<int, int> by_call;
+    for (const std::uint64_t at : points(sample)) {
+      const Site site(models_, profile_, jobs_);
+      SharedCounts counts = site.counts();
+      const CommandResult r = site.build_with_fault(action, at, counts);
+      const std::string what =
+          action + " at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
+      if ((*counts).fired == 0) continue;
+      const std::string text = r.output + r.errors;
+      if (r.exit_code == 0) {
+        ++succeeded;
+        EXPECT_TRUE(site.packages() == reference_) << what << ": success without the package";
+        if (text.find("cache:") == std::string::npos)
+          ++silent, ++by_call[static_cast<int>((*counts).fired_call)];
+      } else {
+        ++failed;
+        EXPECT_EQ(r.exit_code, 1) << what << ": " << text;
+        EXPECT_NE(text.find(reason), std::string::npos) << what << ": " << text;
+        EXPECT_TRUE(text.find(site.out()) != std::string::npos ||
+                    text.find(site.cache()) != std::string::npos)
+            << what << " does not name the file: " << text;
+      }
+      expect_nothing_torn(site, what);
+      expect_next_build_to_be_whole(site, what);
+    }
+    std::string calls;
+    for (const auto& [call, n] : by_call) calls += " kind " + std::to_string(call) + ": " + std::to_string(n);
+    std::printf("%s: %zu builds failed with its name, %zu succeeded (%zu without a word:%s), of %llu calls\n",
+                action.c_str(), failed, succeeded, silent, calls.c_str(),
+                static_cast<unsigned long long>(calls_));
+    EXPECT_GT(failed + succeeded, 0u);
+  }
+
+  TemporaryFolder folder_;
+  std::string models_, profile_, jobs_;
+  Packages reference_;
+  std::uint64_t calls_ = 0;
+};
+
+TEST_F(Faults, KilledAtEveryCall) {
+  ASSERT_NO_FATAL_FAILURE(prepare(full_sweeps() ? 3 : 1, full_sweeps() ? "2" : "1"));
+  std::map<std::uint32_t, int> killed;
+  int points_done = 0;
+  for (const std::uint64_t at : points(6)) {
+    const Site site(models_, profile_, jobs_);
+    SharedCounts counts = site.counts();
+    const CommandResult r = site.build_with_fault("kill", at, counts);
+    if ((*counts).fired == 0) continue;  // threads: this run has made fewer calls
+    ++points_done;
+    ++killed[(*counts).fired_call];
+    const std::string what =
+        "kill at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
+    EXPECT_EQ(r.exit_code, 128 + 9) << what;
+    site.wait_for_the_dead();
+    expect_nothing_torn(site, what);
+    expect_next_build_to_be_whole(site, what);
+    if (HasFatalFailure()) return;
+  }
+  std::printf(
+      "killed at %d of %llu calls: open %d, write %d, sync %d, link %d, rename %d, unlink %d, mkdir %d\n",
+      points_done, static_cast<unsigned long long>(calls_), killed[0], killed[1], killed[2], killed[3],
+      killed[4], killed[5], killed[6]);
+  EXPECT_GE(points_done, full_sweeps() ? 500 : 5);
+}
+
+TEST_F(Faults, TheDiskIsFullFromEveryCallOn) {
+  ASSERT_NO_FATAL_FAILURE(sweep_errors("full", "No space left on device", 4));
+}
+
+TEST_F(Faults, AnInputOutputErrorAtEveryCall) {
+  ASSERT_NO_FATAL_FAILURE(sweep_errors("eio", "Input/output error", 4));
+}
+
+}  // namespace
+}  // namespace texmesh::testing
