@@ -75,6 +75,8 @@ Json scales_json(const std::vector<ManifestScale>& scales) {
     j["displayPxError"].push_back(six_digits(s.display_px_error));
     j["displayPxEdge"].push_back(six_digits(s.display_px_edge));
   }
+  if (std::ranges::any_of(scales, [](const ManifestScale& s) { return !s.floor.empty(); }))
+    for (const ManifestScale& s : scales) j["floor"].push_back(s.floor);
   return j;
 }
 
@@ -171,11 +173,12 @@ void read_shape(const JsonAt& at, Manifest& m) {
   m.jnd = at["jnd"].number(0, 1);
 }
 
-void read_scales(const JsonAt& at, Manifest& m) {
+void read_scales(const JsonAt& at, bool floors, Manifest& m) {
   const std::size_t n = at["scale"].array(1, kMaxScales);
   for (const char* column : {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
                              "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge"})
     at[column].array(n, n);
+  if (floors) at["floor"].array(n, n);
   for (std::size_t i = 0; i < n; ++i) {
     ManifestScale s;
     s.scale = static_cast<int>(at["scale"][i].integer(0, kMaxScales - 1));
@@ -194,6 +197,7 @@ void read_scales(const JsonAt& at, Manifest& m) {
     s.display_px_jnd = at["displayPxJnd"][i].number(0, kAnyDisplayPx);
     s.display_px_error = at["displayPxError"][i].number(0, kAnyDisplayPx);
     s.display_px_edge = at["displayPxEdge"][i].number(0, kAnyDisplayPx);
+    if (floors) s.floor = at["floor"][i].text(kMaxFloorBytes);
     m.scales.push_back(std::move(s));
   }
 }
@@ -255,7 +259,8 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   Manifest m;
   read_version(at, m);
   read_shape(at, m);
-  read_scales(at["scales"], m);
+  const JsonAt scales = at["scales"];
+  read_scales(scales, document["scales"].is_object() && document["scales"].contains("floor"), m);
   read_steps(at["steps"], m);
   read_first_picture(at, m);
   read_paged_ref(at["index"], kIndexPath, m.index);

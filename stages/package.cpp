@@ -98,6 +98,7 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
     s.major = perceptual.major[k] != 0;
     s.error_max = static_cast<double>(nested.error_max);
     s.error_rms = static_cast<double>(nested.error_rms);
+    s.floor = nested.floor_reason;
     s.p95 = k == 0 ? 0 : static_cast<double>(perceptual.p95[k]);  // row 0: from S_0
     s.p99 = k == 0 ? 0 : static_cast<double>(perceptual.p99[k]);
     s.display_px_jnd = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_jnd[k]);

@@ -84,6 +84,7 @@ Json scales_json(PackageReader& p) {
                     {"display_px_jnd", s.display_px_jnd},
                     {"display_px_error", s.display_px_error},
                     {"display_px_edge", s.display_px_edge},
+                    {"floor", s.floor},
                     {"path", s.glb.path}});
   return {{"scales", list}};
 }

@@ -37,6 +37,11 @@ std::string scales_text(PackageReader& p) {
   for (const char* header : {"scale", "triangles", "vertices", "kB", "major", "max error", "rms error",
                              "p95 [%]", "p99 [%]", "jnd [px]", "error [px]", "edge [px]"})
     table.column(header);
+  std::string floors;
+  for (const ManifestScale& s : p.manifest().scales)
+    if (!s.floor.empty())
+      floors +=
+          fmt::format("S_{} has more vertices than its scale asks for: {}\n", s.scale, printable(s.floor));
   for (const ManifestScale& s : p.manifest().scales)
     table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
                kilobytes(s.glb.bytes), s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
@@ -45,7 +50,7 @@ std::string scales_text(PackageReader& p) {
   return "scales (errors in object units; px = displayed height up to which the scale is enough, by the "
          "just-noticeable\n"
          "difference, by an error of one pixel, by its edges)\n" +
-         table.text();
+         table.text() + floors;
 }
 
 std::string stream_text(PackageReader& p) {

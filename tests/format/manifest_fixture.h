@@ -41,6 +41,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
     s.display_px_edge = k == 0 ? kAnyDisplayPx : 1234.56;
     m.scales.push_back(s);
   }
+  if (scales > 1) m.scales.back().floor = std::string(long_numbers ? kMaxFloorBytes : 20, 'f');
   for (int k = scales - 1; k >= 0; --k)
     m.steps.push_back({k == 0 ? kAnyDisplayPx : 12345.6 + 10 * (scales - k), k});
   m.plane_count = planes;
