@@ -13,7 +13,7 @@ constexpr double kFadeBelow = 0.02;  // of the vertices: there the attributes' w
 constexpr double kDistanceWeight = 1e-6;
 // The hub of a fan of more corners is left alone until the fan has shrunk: every look at it, or at what would
 // collapse into it, takes as many steps.
-constexpr std::uint32_t kMostCorners = 1024;
+constexpr std::uint32_t kMostCorners = 256;
 
 }  // namespace
 

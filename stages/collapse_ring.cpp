@@ -127,6 +127,7 @@ bool CollapseRing::keeps_topology(std::uint32_t slot) {
     const std::uint32_t both = n.valence + n.far_valence, left = both - 2 * n.faces;
     if (left < 1 || left > std::max(n.valence, n.far_valence)) return false;
   }
+  if (!keeps_positions(slot)) return false;
   if (!closes) return true;
   for (const Corner& c : corners_) {  // a face of u that would repeat a face of v
     if (c.a == slot || c.b == slot || neighbours_[c.a].faces == 0 || neighbours_[c.b].faces == 0) continue;
@@ -137,6 +138,35 @@ bool CollapseRing::keeps_topology(std::uint32_t slot) {
       const std::uint32_t x = face.point[(entry % 4 + 1) % 3], y = face.point[(entry % 4 + 2) % 3];
       if ((x == a && y == b) || (x == b && y == a)) return false;
     }
+  }
+  return true;
+}
+
+/// Twins: no position of the group that stays may lose its last face, or it would be gone without a record.
+bool CollapseRing::keeps_positions(std::uint32_t slot) const {
+  const Neighbour& n = neighbours_[slot];
+  auto vanishes = [&](const CollapseMesh::Face& face) {
+    return (face.point[0] == centre_ || face.point[1] == centre_ || face.point[2] == centre_) &&
+           (face.point[0] == n.point || face.point[1] == n.point || face.point[2] == n.point);
+  };
+  auto stays = [&](std::uint32_t point, std::uint32_t position) {
+    for (std::uint32_t entry : mesh_.corners(point)) {
+      const CollapseMesh::Face& face = mesh_.faces()[entry / 4];
+      if (face.alive() && mesh_.wedge_position(face.wedge[entry % 4]) == position && !vanishes(face))
+        return true;
+    }
+    if (point != n.point) return false;
+    return std::any_of(corners_.begin(), corners_.end(), [&](const Corner& c) {
+      return c.a != slot && c.b != slot && destination(n, mesh_.wedge_position(wedges_[c.wedge])) == position;
+    });
+  };
+  for (const Corner& c : corners_) {
+    if (c.a != slot && c.b != slot) continue;
+    const CollapseMesh::Face& face = mesh_.faces()[c.face];
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (face.point[k] != centre_ && mesh_.is_multiple(face.point[k]) &&
+          !stays(face.point[k], mesh_.wedge_position(face.wedge[k])))
+        return false;
   }
   return true;
 }

@@ -69,6 +69,7 @@ class CollapseRing {
   };
   std::uint32_t slot_of(std::uint32_t point);
   bool positions_agree(const Neighbour& n) const;
+  bool keeps_positions(std::uint32_t slot) const;
 
   const CollapseMesh& mesh_;
   const std::vector<Vec2f>& uv0_;
