@@ -104,6 +104,8 @@ void JsonAt::fail(const std::string& expected, const std::string& found) const {
 }
 void JsonAt::fail_type(const char* expected) const { fail(expected, excerpt(value_)); }
 
+bool JsonAt::has(std::string_view name) const { return value_.is_object() && value_.contains(name); }
+
 JsonAt JsonAt::operator[](std::string_view name) const {
   if (!value_.is_object()) fail_type("an object");
   const auto it = value_.find(name);

@@ -39,6 +39,7 @@ class JsonAt {
       : value_(value), file_(file), pointer_(std::move(pointer)) {}
   JsonAt operator[](std::string_view name) const;  // must be there
   JsonAt operator[](std::size_t index) const;      // of an array, index < size()
+  bool has(std::string_view name) const;           // for fields that may be absent
   std::size_t array(std::size_t min_size, std::size_t max_size) const;
   std::uint64_t integer(std::uint64_t lo, std::uint64_t hi = kMaxJsonInteger) const;
   double number(double lo, double hi) const;

@@ -19,9 +19,10 @@ constexpr std::size_t kMaxScales = 100;  // two digits in the path
 constexpr std::uint64_t kMaxPlanes = 10000;
 
 /// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
-constexpr std::array<std::string_view, 2> kKnownFeatures{
+constexpr std::array<std::string_view, 3> kKnownFeatures{
     "codec-jpeg-progressive",
     "codec-webp",
+    kMipsFeature,
 };
 bool is_known_feature(const std::string& name) {
   return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
@@ -230,8 +231,10 @@ void read_first_picture(const JsonAt& at, Manifest& m) {
   m.first_picture_digest = first["sha256"].digest();
   const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
   const JsonAt previews = at["previews"];
-  const std::size_t n = std::min<std::size_t>(m.plane_count, kMaxManifestPreviews);
-  previews.array(n, n);
+  const std::size_t most = std::min<std::size_t>(m.plane_count, kMaxManifestPreviews);
+  // Only textures.json tells how many of the planes are mips, which have none.
+  const bool mips = std::ranges::find(m.required_features, kMipsFeature) != m.required_features.end();
+  const std::size_t n = previews.array(mips ? std::min<std::size_t>(most, 1) : most, most);
   for (std::size_t i = 0; i < n; ++i) {
     previews[i].array(2, 2);
     const ByteRange r{read_offset(previews[i][0]), previews[i][1].integer(1)};

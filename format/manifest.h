@@ -87,12 +87,13 @@ struct Manifest {
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // default rule: finer of JND and <= 1 px error
-  std::uint32_t plane_count = 0;      // texture planes, see textures.json
+  std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
   // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between them; its
   // SHA-256.
   std::uint64_t first_picture_offset = 0, first_picture_bytes = 0;
   Sha256 first_picture_digest{};
-  std::vector<ByteRange> previews;  // of planes 0.., at most kMaxManifestPreviews; inside the first picture
+  // Of the full-size planes 0.., at most kMaxManifestPreviews; inside the first picture.
+  std::vector<ByteRange> previews;
   PagedRef index, tables;
   EntryRef textures, quality, provenance;
   std::optional<StreamRef> stream;  // vertex splits (since 1.1)
@@ -112,6 +113,8 @@ Manifest read_manifest(std::span<const std::uint8_t> json);
 /// digest of the refs out, reading fills in the paths, and resolve_textures() the rest.
 struct TextureInfo {
   std::uint32_t image = 0;  // GLB image "texture/<image>"
+  std::uint32_t mip = 0;    // sides are 1 / 2^mip of the full-size plane's, rounded up; 0 = full size
+  std::uint32_t base = 0;   // of a mip: the full-size plane
   std::string role;  // base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data
   std::string name;  // as the source names the image
   std::string colour_space;  // srgb | linear
@@ -120,12 +123,16 @@ struct TextureInfo {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;
   std::string grid_reason;
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
-  EntryRef preview,
-      tables;  // preview/NNN.jpg; texture/<plane>/tables.pack, all rungs' table streams in rung order
+  EntryRef preview,             // preview/NNN.jpg; that of the full-size plane for a mip
+      tables;                   // texture/<plane>/tables.pack, all rungs' table streams in rung order
   std::vector<EntryRef> rungs;  // texture/<plane>/rNN.pack, rising quality: fragments in PlaneTables::order
   std::vector<int> rung_quality;
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;
 };
+/// The feature that packages with mips require.
+inline constexpr const char* kMipsFeature = "mips";
+/// How many of the planes have full size; they stand first.
+std::size_t full_size_planes(const std::vector<TextureInfo>& textures);
 std::string write_textures(const std::vector<TextureInfo>& textures);
 std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json);
 /// Fills offset, bytes and digest of every ref from the index; FormatError when an entry is not there.

@@ -33,8 +33,9 @@ void place_entries(std::vector<EntryRef>& refs, std::uint64_t manifest_bytes) {
 /// Everything of the manifest that is known once the entries have places.
 class ManifestFiller {
  public:
-  ManifestFiller(Manifest& manifest, const std::map<std::string, const Bytes*>& data)
-      : manifest_(manifest), data_(data) {}
+  ManifestFiller(Manifest& manifest, std::size_t full_size_planes,
+                 const std::map<std::string, const Bytes*>& data)
+      : manifest_(manifest), full_size_planes_(full_size_planes), data_(data) {}
 
   void fill(const std::vector<EntryRef>& refs) {
     by_path_.clear();
@@ -70,17 +71,21 @@ class ManifestFiller {
     const EntryRef& coarsest = manifest_.scales.back().glb;
     std::uint64_t end = coarsest.offset + coarsest.bytes;
     manifest_.previews.clear();
-    for (std::uint32_t p = 0; p < manifest_.plane_count; ++p) {
+    for (std::uint32_t p = 0; p < full_size_planes_; ++p) {
       const EntryRef& preview = *by_path_.at(preview_path(p));
-      const EntryRef& tables = *by_path_.at(table_streams_path(p));
       if (p < kMaxManifestPreviews) manifest_.previews.push_back({preview.offset, preview.bytes});
-      end = std::max({end, preview.offset + preview.bytes, tables.offset + tables.bytes});
+      end = std::max(end, preview.offset + preview.bytes);
+    }
+    for (std::uint32_t p = 0; p < manifest_.plane_count; ++p) {
+      const EntryRef& tables = *by_path_.at(table_streams_path(p));
+      end = std::max(end, tables.offset + tables.bytes);
     }
     manifest_.first_picture_offset = coarsest.offset;
     manifest_.first_picture_bytes = end - coarsest.offset;
   }
 
   Manifest& manifest_;
+  std::size_t full_size_planes_;
   const std::map<std::string, const Bytes*>& data_;
   std::map<std::string, const EntryRef*> by_path_;
 };
@@ -115,7 +120,8 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
   std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
   for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
   for (std::uint32_t p = 0; p < textures.size(); ++p) {
-    needed.insert(needed.end(), {preview_path(p), table_streams_path(p)});
+    if (textures[p].mip == 0) needed.push_back(preview_path(p));
+    needed.push_back(table_streams_path(p));
     for (std::uint32_t r = 0; r < textures[p].rung_quality.size(); ++r) needed.push_back(rung_path(p, r));
   }
   for (const std::string& path : needed)
@@ -129,6 +135,10 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
 std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
                                         const std::vector<PackageEntry>& entries) {
   check_entries(manifest, textures, entries);
+  const std::size_t full = full_size_planes(textures);
+  if (full < textures.size() &&
+      std::ranges::find(manifest.required_features, kMipsFeature) == manifest.required_features.end())
+    manifest.required_features.emplace_back(kMipsFeature);
   const Bytes textures_json = to_bytes(write_textures(textures));
   Bytes index;
   std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};
@@ -163,7 +173,7 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
     }
     index = write_index(without_index());
     index_ref->digest = sha256(index);
-    ManifestFiller(manifest, data).fill(refs);
+    ManifestFiller(manifest, full, data).fill(refs);
     text = write_manifest(manifest);
     if (text.size() <= slot) break;
     slot = text.size();

@@ -13,11 +13,15 @@ using Json = nlohmann::ordered_json;
 const std::string kFile = kTexturesPath;
 constexpr std::uint64_t kMaxFileBytes = 32u << 20;
 constexpr std::size_t kMaxPlanes = 10000, kMaxRungs = 100, kMaxTextBytes = 1000;
-constexpr std::uint64_t kMaxSide = 1u << 20;
+constexpr std::uint64_t kMaxSide = 1u << 20, kMaxMip = 20;
 
 Json texture_json(const TextureInfo& t) {
   Json j;
   j["image"] = t.image;
+  if (t.mip > 0) {
+    j["mip"] = t.mip;
+    j["base"] = t.base;
+  }
   j["role"] = t.role;
   j["name"] = t.name;
   j["colourSpace"] = t.colour_space;
@@ -62,6 +66,33 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
   t.grid_reason = at["gridReason"].text(kMaxTextBytes);
 }
 
+void read_mip(const JsonAt& at, TextureInfo& t) {
+  if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
+  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPlanes);
+}
+
+/// Full-size planes first, then mips by (base, mip), each of its base's image and size.
+void check_mips(const JsonAt& list, const std::vector<TextureInfo>& textures) {
+  const std::size_t full = full_size_planes(textures);
+  for (std::size_t p = full; p < textures.size(); ++p) {
+    const TextureInfo& t = textures[p];
+    if (t.mip == 0) list[p].fail("a mip, as the plane before is one", "a full-size plane");
+    if (t.base >= full) list[p]["base"].fail("a full-size plane", std::to_string(t.base));
+    const TextureInfo& base = textures[t.base];
+    const std::uint32_t before = p > full && textures[p - 1].base == t.base ? textures[p - 1].mip : 0;
+    if (t.mip <= before || (p > full && textures[p - 1].base > t.base))
+      list[p]["mip"].fail("mips by base and mip", std::to_string(t.mip));
+    const auto side = [&](std::uint64_t px) { return (px + (std::uint64_t{1} << t.mip) - 1) >> t.mip; };
+    if (t.width_px != side(base.width_px) || t.height_px != side(base.height_px))
+      list[p]["widthPx"].fail("sides of 1 / 2^mip of the full size, rounded up", std::to_string(t.width_px));
+    if (t.image != base.image || t.role != base.role || t.channels != base.channels ||
+        t.colour_space != base.colour_space || t.preview_width_px != base.preview_width_px ||
+        t.preview_height_px != base.preview_height_px)
+      list[p].fail("image, role, channels, colour space and preview of plane " + std::to_string(t.base),
+                   "others");
+  }
+}
+
 TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   TextureInfo t;
   t.image = u32(at["image"], 0, 0xffffffffu);
@@ -84,12 +115,18 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
     t.rung_quality.push_back(quality);
     t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(i));
   }
-  t.preview.path = preview_path(plane);
+  read_mip(at, t);
+  t.preview.path = preview_path(t.mip > 0 ? t.base : plane);
   t.tables.path = table_streams_path(plane);
   return t;
 }
 
 }  // namespace
+
+std::size_t full_size_planes(const std::vector<TextureInfo>& textures) {
+  return static_cast<std::size_t>(
+      std::ranges::find_if(textures, [](const TextureInfo& t) { return t.mip > 0; }) - textures.begin());
+}
 
 std::string write_textures(const std::vector<TextureInfo>& textures) {
   Json j;
@@ -106,6 +143,7 @@ std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
   std::vector<TextureInfo> textures;
   for (std::size_t i = 0, n = list.array(0, kMaxPlanes); i < n; ++i)
     textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
+  check_mips(list, textures);
   return textures;
 }
 

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <string>
 
 #include "stages/fragmentation.h"
+#include "stages/halve_pixels.h"
 #include "stages/parallel.h"
 
 namespace texmesh {
@@ -227,6 +229,58 @@ Pixels decode_for(const Image& image, const TexturePlane& plane) {
   return out;
 }
 
+Halving halving_of(const TexturePlane& plane) {
+  if (is_colour(plane.role)) return Halving::kLight;
+  return plane.role == TextureRole::kNormal && plane.channels == 3 ? Halving::kNormals : Halving::kNumbers;
+}
+
+/// The number of full-size planes; they stand first, and every mip follows its next finer plane's size.
+std::size_t check_planes(const std::vector<TexturePlane>& planes, std::size_t images) {
+  const auto fail = [](std::size_t p, const char* expected, std::uint64_t found) {
+    throw StageError("fragmentation", "plane " + std::to_string(p), expected, std::to_string(found));
+  };
+  std::size_t full = 0;
+  while (full < planes.size() && planes[full].mip == 0) ++full;
+  for (std::size_t p = 0; p < planes.size(); ++p) {
+    const TexturePlane& plane = planes[p];
+    if (plane.image >= images) fail(p, "an image of the model", plane.image);
+    if (p < full) continue;
+    if (plane.mip == 0 || plane.base >= full || (plane.mip > 1 && planes[p - 1].mip + 1 != plane.mip) ||
+        (plane.mip > 1 && planes[p - 1].base != plane.base))
+      fail(p, "mips behind all full-size planes, by their base and size", plane.mip);
+    const TexturePlane& finer = plane.mip == 1 ? planes[plane.base] : planes[p - 1];
+    if (plane.width_px != (finer.width_px + 1) / 2 || plane.height_px != (finer.height_px + 1) / 2 ||
+        plane.channels != finer.channels || plane.role != finer.role)
+      fail(p, "half of the finer plane", plane.width_px);
+  }
+  return full;
+}
+
+void decode_and_fill(std::span<const TexturePlane> planes, const std::vector<Image>& images, Fill fill,
+                     const RunContext& context, std::vector<Pixels>& out) {
+  std::vector<std::size_t> starts;  // planes of one image stand together; each image is decoded once
+  for (std::size_t p = 0; p < planes.size(); ++p)
+    if (p == 0 || planes[p].image != planes[p - 1].image) starts.push_back(p);
+  RunContext inner = context;
+  inner.progress = nullptr;
+  inner.threads = std::max(1, context.threads / static_cast<int>(std::max<std::size_t>(starts.size(), 1)));
+  parallel_for(context, starts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const Image& image = images[planes[starts[s]].image];
+      Pixels decoded = decode_for(image, planes[starts[s]]);
+      for (std::size_t p = starts[s]; p < planes.size() && planes[p].image == planes[starts[s]].image; ++p) {
+        if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
+          throw StageError("fragmentation", image.name, "an alpha channel", "none");
+        const bool last = p + 1 == planes.size() || planes[p + 1].image != planes[p].image;
+        Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
+                                                                      : channels_of(decoded, planes[p]);
+        if (fill == Fill::kPushPull) fill_uncovered(plane, planes[p].coverage, inner);
+        out[p] = padded(std::move(plane), planes[p]);
+      }
+    }
+  });
+}
+
 }  // namespace
 
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
@@ -245,30 +299,19 @@ void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, c
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context) {
   const std::vector<TexturePlane>& planes = fragments.planes;
-  std::vector<std::size_t> starts;  // planes of one image stand together; each image is decoded once
-  for (std::size_t p = 0; p < planes.size(); ++p) {
-    if (planes[p].image >= images.size())
-      throw StageError("fragmentation", "plane " + std::to_string(p) + ": image",
-                       "fewer than " + std::to_string(images.size()), std::to_string(planes[p].image));
-    if (p == 0 || planes[p].image != planes[p - 1].image) starts.push_back(p);
-  }
-  RunContext inner = context;
-  inner.progress = nullptr;
-  inner.threads = std::max(1, context.threads / static_cast<int>(std::max<std::size_t>(starts.size(), 1)));
+  const std::size_t full = check_planes(planes, images.size());
   std::vector<Pixels> out(planes.size());
-  parallel_for(context, starts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      const Image& image = images[planes[starts[s]].image];
-      Pixels decoded = decode_for(image, planes[starts[s]]);
-      for (std::size_t p = starts[s]; p < planes.size() && planes[p].image == planes[starts[s]].image; ++p) {
-        if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
-          throw StageError("fragmentation", image.name, "an alpha channel", "none");
-        const bool last = p + 1 == planes.size() || planes[p + 1].image != planes[p].image;
-        Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
-                                                                      : channels_of(decoded, planes[p]);
-        if (fill == Fill::kPushPull) fill_uncovered(plane, planes[p].coverage, inner);
-        out[p] = padded(std::move(plane), planes[p]);
-      }
+  decode_and_fill(std::span(planes).first(full), images, fill, context, out);
+  std::vector<std::size_t> chains;  // the first mip of each
+  for (std::size_t p = full; p < planes.size(); ++p)
+    if (planes[p].mip == 1) chains.push_back(p);
+  parallel_for(context, chains.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) {
+      std::size_t finer = planes[chains[c]].base;
+      for (std::size_t p = chains[c]; p < planes.size() && (p == chains[c] || planes[p].mip > 1); finer = p++)
+        out[p] =
+            padded(halved(out[finer], planes[finer].width_px, planes[finer].height_px, halving_of(planes[p])),
+                   planes[p]);
     }
   });
   return out;

@@ -133,6 +133,29 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
   }
 }
 
+std::uint32_t mip_side(std::uint32_t side_px, std::uint32_t mip) {
+  return static_cast<std::uint32_t>((std::uint64_t{side_px} + (1u << mip) - 1) >> mip);
+}
+
+/// Appends the mips of all planes there are, and their uses.
+void list_mips(const std::vector<Image>& images, Fragments& out, std::vector<std::vector<Use>>& uses) {
+  constexpr std::uint32_t kMaxMip = 3, kLeastSidePx = 256;
+  constexpr std::uint64_t kPreviewTexels = 65536;  // of 1/8: about what 16 KB hold at quality 60
+  const std::size_t full = out.planes.size();
+  for (std::size_t base = 0; base < full; ++base) {
+    const Image& image = images[out.planes[base].image];
+    for (std::uint32_t mip = 1; mip <= kMaxMip; ++mip) {
+      const std::uint32_t w = mip_side(image.width_px, mip), h = mip_side(image.height_px, mip);
+      if (std::max(w, h) < kLeastSidePx || (mip == kMaxMip && std::uint64_t{w} * h <= kPreviewTexels)) break;
+      TexturePlane plane = out.planes[base];
+      plane.mip = mip;
+      plane.base = static_cast<std::uint32_t>(base);
+      out.planes.push_back(std::move(plane));
+      uses.push_back(uses[base]);
+    }
+  }
+}
+
 double area_in_space(const Mesh& mesh, std::size_t triangle) {
   Vec3d p[3];
   for (int c = 0; c < 3; ++c)
@@ -264,7 +287,7 @@ void complete_plane(const FragmentGrid& grid, const Measure& measured, double wh
 }
 
 void note_faults(const TexturePlane& plane, const Measure& measured, const std::string& image, Notes& notes) {
-  if (plane.role == TextureRole::kAlpha) return;  // said of the colours already
+  if (plane.role == TextureRole::kAlpha || plane.mip > 0) return;  // said of the colours already
   if (measured.missing_uvs)
     add_warning(notes, "missing-texture-coordinates", image,
                 "a material uses the image without texture coordinates");
@@ -286,21 +309,22 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
   out.scales = scale_map.scales;
   std::vector<std::vector<Use>> uses;
   list_planes(materials, images, out, uses);
+  if (options.mips) list_mips(images, out, uses);
 
   std::vector<Job> jobs;
   std::vector<std::size_t> job_of(out.planes.size());
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
     const Image& image = images[out.planes[p].image];
+    const std::uint32_t width_px = mip_side(image.width_px, out.planes[p].mip);
+    const std::uint32_t height_px = mip_side(image.height_px, out.planes[p].mip);
     const auto same = std::find_if(jobs.begin(), jobs.end(), [&](const Job& job) {
-      return job.uses == uses[p] && job.grid.width_px == image.width_px &&
-             job.grid.height_px == image.height_px;
+      return job.uses == uses[p] && job.grid.width_px == width_px && job.grid.height_px == height_px;
     });
     job_of[p] = static_cast<std::size_t>(same - jobs.begin());
     if (same != jobs.end()) continue;
-    jobs.push_back(
-        {choose_grid(image.width_px, image.height_px, static_cast<std::uint32_t>(options.max_fragments),
-                     static_cast<std::uint32_t>(options.min_fragment_px)),
-         uses[p]});
+    jobs.push_back({choose_grid(width_px, height_px, static_cast<std::uint32_t>(options.max_fragments),
+                                static_cast<std::uint32_t>(options.min_fragment_px)),
+                    uses[p]});
   }
   std::vector<Measure> measured(jobs.size());
   parallel_for(context, jobs.size(), 1, [&](std::size_t begin, std::size_t end) {

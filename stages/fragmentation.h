@@ -25,6 +25,7 @@ struct FragmentationOptions {
   int max_fragments = 256;    // per texture plane
   int min_fragment_px = 128;  // side, where the image allows
   Fill fill = Fill::kPushPull;
+  bool mips = true;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("max_fragments", s.max_fragments, Range{1, 256}, "most fragments of one texture");
@@ -32,6 +33,7 @@ struct FragmentationOptions {
       "least side of a fragment, where the image allows");
     v("fill", s.fill,
       "push-pull = smooth colours where no chart covers the texture; none = the source's texels");
+    v("mips", s.mips, "smaller copies of every texture, half by half, for small displays");
   }
 };
 
@@ -55,11 +57,14 @@ constexpr bool is_colour(TextureRole role) {
   return role == TextureRole::kBaseColour || role == TextureRole::kEmissive || role == TextureRole::kColour;
 }
 
-/// One coded image of the package: the colour or data channels of a source image, or its alpha channel. A
-/// source image with an alpha channel that some material uses (mask, blend, or a number that an extension
-/// keeps there) gives two planes, colour first.
+/// One coded image of the package: the colour or data channels of a source image, or its alpha channel, at
+/// full size or, as a mip, at a half, a quarter, ... of it. A source image with an alpha channel that some
+/// material uses (mask, blend, or a number that an extension keeps there) gives two full-size planes, colour
+/// first. A mip is a plane like any other, with a grid, coverage and features of its own.
 struct TexturePlane {
   std::uint32_t image = 0;  // index into Model::images
+  std::uint32_t mip = 0;    // sides are 1 / 2^mip of the image's, rounded up; 0 = full size
+  std::uint32_t base = 0;   // of a mip: index of its full-size plane
   TextureRole role = TextureRole::kBaseColour;
   std::uint32_t width_px = 0, height_px = 0, channels = 3;                             // 1 or 3
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;  // multiples of 16
@@ -73,14 +78,17 @@ struct TexturePlane {
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.image, s.role, s.width_px, s.height_px, s.channels, s.fragment_width_px, s.fragment_height_px,
-      s.columns, s.rows, s.grid_reason, s.coverage, s.covered_texels, s.surface_fraction, s.features, s.eta);
+    a(s.image, s.mip, s.base, s.role, s.width_px, s.height_px, s.channels, s.fragment_width_px,
+      s.fragment_height_px, s.columns, s.rows, s.grid_reason, s.coverage, s.covered_texels,
+      s.surface_fraction, s.features, s.eta);
   }
 };
 
 struct Fragments {
-  int scales = 0;                    // as ScaleMap::scales
-  std::vector<TexturePlane> planes;  // by image index, colour before alpha; empty for untextured models
+  int scales = 0;  // as ScaleMap::scales
+  // Full-size planes by image index, colour before alpha; then mips by (base, mip), without gaps in a chain.
+  // Empty for untextured models.
+  std::vector<TexturePlane> planes;
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
@@ -91,6 +99,10 @@ struct Fragments {
 /// Cuts the images that materials use into planes and fragments (thesis 3.2):
 /// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a
 /// note.
+/// - Mips: halves down to, and without, the size of the preview: 1/2 and 1/4, and 1/8 where the image has
+/// more
+///   than 2048 x 2048 texels (its preview is 1/16), each while its longer side has at least 256 texels. Below
+///   that a mip's tables cost more than it saves.
 /// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the
 /// image allows.
 /// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the
@@ -109,8 +121,9 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
 
 /// The pixels of every plane: decoded, uncovered texels filled, and extended to columns x fragment_width by
 /// rows x fragment_height: edges repeated to the end of their 16 x 16 block, flat blocks beyond (never seen,
-/// nearly free). Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for an
-/// image that does not decode.
+/// nearly free). A mip is the next finer plane, filled, halved (stages/halve_pixels.h). Derived data, never
+/// stored: zim, ladder and lut share one copy. Throws InputError for an image that does not decode,
+/// StageError for planes that do not fit the images or each other.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context);
 

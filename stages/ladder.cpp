@@ -188,6 +188,7 @@ Pixels means_of(const BoxSums& boxes) {
 
 void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
                     PlaneLadder& out) {
+  if (plane.mip > 0) return;  // its full-size plane's preview serves
   const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
   const auto encode = [&](const BoxSums& boxes) {
     out.preview = encode_jpeg(means_of(boxes), options.preview_quality, subsampling);

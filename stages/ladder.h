@@ -64,7 +64,7 @@ struct PlaneLadder {
   Codec codec = Codec::kJpeg;
   std::vector<LadderRung> rungs;  // rising quality
   std::vector<std::uint8_t>
-      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB
+      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB; mips have none
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {

@@ -67,6 +67,11 @@ void check_inputs(const NestedScales& scales, const PerceptualValues& perceptual
   if (files.files.empty()) fail("scale files", "at least one", "none");
   for (std::size_t p = 0; p < planes; ++p) {
     if (fragments.planes[p].image >= images.size()) fail(plane_place(p), "an image of the model", "none");
+    if (fragments.planes[p].mip > 0 && fragments.planes[p].base >= p)
+      fail(plane_place(p), "a mip of a plane before it", std::to_string(fragments.planes[p].base));
+    if ((fragments.planes[p].mip > 0) != ladder.planes[p].preview.empty())
+      fail(plane_place(p), "a preview for full-size planes, none for mips",
+           std::to_string(ladder.planes[p].preview.size()) + " bytes");
     const PlaneTables& t = tables.planes[p];
     require(plane_place(p) + ": rungs of the ladder", t.rung_count(), ladder.planes[p].rungs.size());
     require(plane_place(p) + ": fragments", fragments.planes[p].fragment_count(), t.fragment_count());
@@ -133,10 +138,13 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   return m;
 }
 
-TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladder,
+/// `base` is the ladder of the full-size plane.
+TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladder, const PlaneLadder& base,
                              const std::vector<Image>& images) {
   TextureInfo t;
   t.image = plane.image;
+  t.mip = plane.mip;
+  t.base = plane.base;
   t.role = enum_name(plane.role);
   t.name = clean_text(images[plane.image].name, 200);
   t.colour_space = is_colour(plane.role) ? "srgb" : "linear";
@@ -149,8 +157,8 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.columns = plane.columns;
   t.rows = plane.rows;
   t.grid_reason = clean_text(plane.grid_reason, 1000);
-  t.preview_width_px = ladder.preview_width_px;
-  t.preview_height_px = ladder.preview_height_px;
+  t.preview_width_px = base.preview_width_px;
+  t.preview_height_px = base.preview_height_px;
   for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
   return t;
 }
@@ -184,7 +192,7 @@ Bytes pack_rung(const LadderRung& rung, const PlaneTables& tables, std::size_t r
 void add_texture_entries(const PlaneLadder& ladder, const PlaneTables& tables, std::size_t plane,
                          std::vector<PackageEntry>& entries) {
   const auto p = static_cast<std::uint32_t>(plane);
-  entries.push_back({preview_path(p), ladder.preview});
+  if (!ladder.preview.empty()) entries.push_back({preview_path(p), ladder.preview});
   Bytes streams;
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const LadderRung& rung = ladder.rungs[r];
@@ -217,7 +225,9 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   if (!files.stream.empty()) entries.push_back({kSplitStreamPath, files.stream});
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     context.check_cancelled();
-    textures.push_back(describe_texture(fragments.planes[p], ladder.planes[p], images));
+    const TexturePlane& plane = fragments.planes[p];
+    const std::size_t base = plane.mip > 0 ? plane.base : p;
+    textures.push_back(describe_texture(plane, ladder.planes[p], ladder.planes[base], images));
     add_texture_entries(ladder.planes[p], tables.planes[p], p, entries);
   }
   context.check_cancelled();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 
 #include "format/portable_math.h"
 #include "stages/image_compare.h"
@@ -45,7 +44,9 @@ ShownPlanes find_shown(const std::vector<Material>& materials, const Fragments& 
   auto plane_of = [&](const TextureRef& ref) -> std::int32_t {
     for (std::uint32_t p = 0; ref.used() && p < fragments.planes.size(); ++p) {
       const TexturePlane& plane = fragments.planes[p];
-      if (plane.image != static_cast<std::uint32_t>(ref.image) || plane.role == TextureRole::kAlpha) continue;
+      if (plane.image != static_cast<std::uint32_t>(ref.image) || plane.role == TextureRole::kAlpha ||
+          plane.mip > 0)
+        continue;
       const auto at = std::find(shown.planes.begin(), shown.planes.end(), p);
       const auto index = static_cast<std::int32_t>(at - shown.planes.begin());
       if (at == shown.planes.end()) shown.planes.push_back(p);

@@ -159,10 +159,11 @@ std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladde
   std::vector<PreviewImage> out;
   for (std::size_t i = 0; i < fragments.planes.size(); ++i) {
     const TexturePlane& plane = fragments.planes[i];
-    if (plane.role == TextureRole::kAlpha) continue;
+    if (plane.role == TextureRole::kAlpha || plane.mip > 0) continue;
     PreviewImage image{plane.image, "image/jpeg", ladder.planes[i].preview};
     for (std::size_t j = 0; j < fragments.planes.size(); ++j) {
-      if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha)
+      if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha ||
+          fragments.planes[j].mip > 0)
         continue;
       image.mime_type = "image/png";
       image.bytes = combine(decode_jpeg(ladder.planes[i].preview, kMaxPreviewPixels),

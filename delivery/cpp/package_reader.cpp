@@ -78,6 +78,15 @@ const std::vector<TextureInfo>& PackageReader::textures() {
         !feature.empty() &&
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
       throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
+  const std::size_t full = full_size_planes(textures);
+  const bool mips =
+      std::ranges::find(manifest_.required_features, kMipsFeature) != manifest_.required_features.end();
+  if (mips != (full < textures.size()))
+    throw FormatError(store_->name(), kTexturesPath, mips ? "mips, as the manifest requires" : "no mips",
+                      std::to_string(textures.size() - full));
+  if (manifest_.previews.size() != std::min(full, kMaxManifestPreviews))
+    throw FormatError(store_->name(), kManifestPath, "previews of the full-size planes",
+                      std::to_string(manifest_.previews.size()));
   resolve_textures(textures, index());
   for (std::size_t p = 0; p < manifest_.previews.size(); ++p)
     if (manifest_.previews[p] != ByteRange{textures[p].preview.offset, textures[p].preview.bytes})

@@ -28,6 +28,8 @@ Json summary_json(PackageReader& p) {
     const TextureInfo& t = p.textures()[k];
     textures.push_back({{"plane", k},
                         {"image", t.image},
+                        {"mip", t.mip},
+                        {"base", t.mip > 0 ? t.base : k},
                         {"name", t.name},
                         {"role", t.role},
                         {"width_px", t.width_px},

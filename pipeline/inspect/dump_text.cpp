@@ -28,8 +28,9 @@ std::string pixels(double px) {
 
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
   const std::string name = t.name.empty() ? "" : " \"" + printable(t.name) + "\"";
-  return fmt::format("texture plane {}{}, {}: {} x {} px, {} channel{}\n", plane, name, t.role, t.width_px,
-                     t.height_px, t.channels, t.channels == 1 ? "" : "s");
+  const std::string mip = t.mip == 0 ? "" : fmt::format(", mip {} of plane {}", t.mip, t.base);
+  return fmt::format("texture plane {}{}, {}{}: {} x {} px, {} channel{}\n", plane, name, t.role, mip,
+                     t.width_px, t.height_px, t.channels, t.channels == 1 ? "" : "s");
 }
 
 std::string scales_text(PackageReader& p) {
@@ -80,21 +81,27 @@ std::string steps_text(const Manifest& m) {
 std::string textures_text(PackageReader& p) {
   if (p.textures().empty()) return "textures: none\n";
   TextTable table;
-  for (const char* header : {"plane", "image"}) table.column(header);
+  for (const char* header : {"plane", "image", "mip"}) table.column(header);
   table.column("role", Align::kLeft);
   table.column("name", Align::kLeft);
-  for (const char* header : {"width px", "height px", "grid", "stored", "rungs", "lowest kB", "highest kB"})
+  for (const char* header :
+       {"width px", "height px", "grid", "stored", "rungs", "lowest kB", "highest kB", "all kB"})
     table.column(header);
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& t = p.textures()[k];
-    table.row({std::to_string(k), std::to_string(t.image), t.role, printable(t.name),
+    std::uint64_t all = t.tables.bytes;
+    for (const EntryRef& rung : t.rungs) all += rung.bytes;
+    table.row({std::to_string(k), std::to_string(t.image), std::to_string(t.mip), t.role, printable(t.name),
                std::to_string(t.width_px), std::to_string(t.height_px),
                fmt::format("{}x{}", t.columns, t.rows),
                std::to_string(stored_fragments(p.tables().planes[k])), std::to_string(t.rungs.size()),
                t.rungs.empty() ? "" : kilobytes(t.rungs.front().bytes),
-               t.rungs.empty() ? "" : kilobytes(t.rungs.back().bytes)});
+               t.rungs.empty() ? "" : kilobytes(t.rungs.back().bytes), kilobytes(all)});
   }
-  return "textures (grid and stored count fragments; kB of the lowest and the highest rung)\n" + table.text();
+  return "textures (mip m has 1 / 2^m of the sides; grid and stored count fragments; kB of the lowest and "
+         "the\n"
+         "highest rung, and of all)\n" +
+         table.text();
 }
 
 std::string kinds_text(const std::vector<KindBytes>& kinds) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 #include "format/layout.h"
 #include "format/sha256.h"
@@ -96,13 +97,21 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
                     Findings& findings) {
   findings.require_equal<std::uint64_t>(m.plane_count, textures.size(), "textures", kTexturesPath, "");
   findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), "tables", kTablesPath, "planes");
-  std::set<std::pair<std::uint32_t, bool>> seen;
+  const std::size_t full = full_size_planes(textures);
+  const bool mips = std::count(m.required_features.begin(), m.required_features.end(), kMipsFeature) > 0;
+  findings.require_equal<std::uint64_t>(std::min(full, kMaxManifestPreviews), m.previews.size(), "reference",
+                                        kManifestPath, "/previews");
+  findings.require(mips == (full < textures.size()), "textures", kManifestPath, "/requiredFeatures",
+                   mips ? "mips in textures.json" : "mips, as textures.json has some", "none");
+  std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
   for (std::size_t k = 0; k < std::min(textures.size(), tables.planes.size()); ++k) {
     const TextureInfo& info = textures[k];
     const PlaneTables& t = tables.planes[k];
     const std::string place = "/" + std::to_string(k);
-    findings.require(seen.insert({info.image, info.role == "alpha"}).second, "textures", kTexturesPath, place,
-                     "one plane for the colours and one for the alpha of image " + std::to_string(info.image),
+    findings.require(seen.insert({info.image, info.role == "alpha", info.mip}).second, "textures",
+                     kTexturesPath, place,
+                     "one plane for the colours and one for the alpha of image " +
+                         std::to_string(info.image) + " at every size",
                      "another");
     findings.require(info.columns == t.columns && info.rows == t.rows, "tables-grid", kTablesPath,
                      plane_field(static_cast<std::uint32_t>(k), "grid"),

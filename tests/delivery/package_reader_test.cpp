@@ -190,6 +190,35 @@ TEST(PackageReader, EveryFlippedByteIsNoticed) {
   }
 }
 
+/// A package whose second plane is a mip of the first.
+Bytes package_with_mip(bool say_so = true) {
+  const Bytes package = make_package(2);
+  PackageReader reader = open_memory(package);
+  std::vector<TextureInfo> textures = reader.textures();
+  TextureInfo& mip = textures[1];
+  mip.image = 0, mip.mip = 1, mip.base = 0;
+  mip.width_px = 250, mip.height_px = 128, mip.fragment_width_px = mip.fragment_height_px = 128;
+  std::vector<PackageEntry> entries;
+  for (const EntryRef& e : reader.index())
+    if (e.path != kTexturesPath && e.path != preview_path(1)) entries.push_back({e.path, reader.entry(e)});
+  Manifest m = reader.manifest();
+  if (!say_so) {  // the writer names the feature itself: say it of a package without mips
+    m.required_features = {kMipsFeature};
+    entries.push_back({preview_path(1), reader.preview(1)});
+    return write_package(m, reader.textures(), entries);
+  }
+  return write_package(m, textures, entries);
+}
+
+TEST(PackageReader, MipsArePlanesWithTheirBasesPreview) {
+  PackageReader reader = open_memory(package_with_mip());
+  EXPECT_EQ(reader.manifest().required_features, std::vector<std::string>{kMipsFeature});
+  EXPECT_EQ(reader.preview(1), reader.preview(0));
+  read_everything(reader);
+  PackageReader liar = open_memory(package_with_mip(false));
+  EXPECT_THROW(liar.textures(), FormatError);
+}
+
 TEST(PackageReader, DocumentsMustAgree) {
   const Bytes package = make_package(1);
   const auto source = memory_source(package);

@@ -224,6 +224,61 @@ TEST(Textures, RoundTripTruncationAndFlips) {
     }
 }
 
+/// Two full-size planes and the mips of both.
+std::vector<TextureInfo> with_mips() {
+  std::vector<TextureInfo> textures{texture(0, 3), texture(1, 10)};
+  for (const auto& [base, mip] : {std::pair{0u, 1u}, {0u, 3u}, {1u, 1u}}) {
+    const auto plane = static_cast<std::uint32_t>(textures.size());
+    TextureInfo t = texture(plane, 2);
+    const TextureInfo& full = textures[base];
+    t.image = full.image, t.role = full.role, t.channels = full.channels, t.colour_space = full.colour_space;
+    t.mip = mip, t.base = base;
+    t.width_px = mip == 1 ? 500 : 125;
+    t.height_px = mip == 1 ? 250 : 63;
+    t.columns = mip == 1 ? 2 : 1, t.rows = 1;
+    t.preview.path = full.preview.path;
+    textures.push_back(t);
+  }
+  return textures;
+}
+
+TEST(Textures, MipsRoundTripAndTheirRulesAreChecked) {
+  const std::vector<TextureInfo> textures = with_mips();
+  EXPECT_EQ(read_textures(as_bytes(write_textures(textures))), textures);
+  EXPECT_EQ(full_size_planes(textures), 2u);
+  const auto refused = [&](const char* place, auto change) {
+    Json j = Json::parse(write_textures(textures));
+    change(j["textures"]);
+    try {
+      read_textures(as_bytes(j.dump()));
+      ADD_FAILURE() << place;
+    } catch (const FormatError& e) {
+      EXPECT_EQ(e.place(), std::string("/textures/") + place);
+    }
+  };
+  refused("2/base", [](Json& j) { j[2].erase("base"); });
+  refused("2/base", [](Json& j) { j[2]["base"] = 2; });
+  refused("2/base", [](Json& j) { j[2]["base"] = -1; });
+  refused("2/mip", [](Json& j) { j[2]["mip"] = 21; });
+  refused("3", [](Json& j) { j[3].erase("mip"); });
+  refused("3/mip", [](Json& j) { j[3]["mip"] = 1; });
+  refused("3/widthPx", [](Json& j) { j[3]["mip"] = 2; });
+  refused("4/mip", [](Json& j) { std::swap(j[3], j[4]); });
+  refused("2", [](Json& j) { j[2]["image"] = 5; });
+  refused("2", [](Json& j) { j[2]["channels"] = 1; });
+  refused("4", [](Json& j) { j[4]["previewWidthPx"] = 7; });
+}
+
+TEST(Manifest, OnlyMipsMayLackPreviews) {
+  Manifest m = make_manifest(3, 4);
+  m.previews.resize(2);
+  EXPECT_THROW(write_manifest(m), FormatError);
+  m.required_features = {kMipsFeature};
+  EXPECT_EQ(read_manifest(as_bytes(write_manifest(m))), m);
+  m.previews.clear();
+  EXPECT_THROW(write_manifest(m), FormatError);
+}
+
 TEST(Textures, RulesAreChecked) {
   const auto refused = [](const char* place, auto change) {
     Json j = Json::parse(write_textures({texture(0, 3)}));

@@ -4,7 +4,9 @@
 #include <cstdlib>
 
 #include "stages/fragmentation.h"
+#include "stages/halve_pixels.h"
 #include "stages/jpeg.h"
+#include "stages/png_writer.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -209,6 +211,63 @@ TEST(FillPlanes, RefusesPlanesThatDoNotFitTheImage) {
   fragments = planes_of(image, {TextureRole::kAlpha});
   EXPECT_THROW(fill_planes(fragments, {image}, Fill::kNone, {}), StageError);
   EXPECT_TRUE(fill_planes({}, {}, Fill::kPushPull, {}).empty());
+}
+
+/// A model of one image with two mips; `seed` makes the picture.
+Fragments with_mips(std::uint32_t w, std::uint32_t h, TextureRole role) {
+  Fragments out;
+  for (std::uint32_t mip = 0; mip < 3; ++mip) {
+    TexturePlane p;
+    p.role = role;
+    p.mip = mip;
+    p.width_px = (w + (1u << mip) - 1) >> mip;
+    p.height_px = (h + (1u << mip) - 1) >> mip;
+    p.fragment_width_px = (p.width_px + 15) / 16 * 16;
+    p.fragment_height_px = (p.height_px + 15) / 16 * 16;
+    p.columns = p.rows = 1;
+    p.coverage.assign((std::size_t{p.width_px} + 7) / 8 * p.height_px, 0xf0);
+    out.planes.push_back(p);
+  }
+  return out;
+}
+
+TEST(Fill, MipsAreHalvesOfTheFilledFinerPlane) {
+  const Pixels source = noise(75, 50, 3);
+  Image image;
+  image.name = "a.png";
+  image.bytes = write_png(source);
+  image = probe_image("a.png", image.bytes, {});
+  for (const auto& [role, kind] : {std::pair{TextureRole::kBaseColour, Halving::kLight},
+                                   {TextureRole::kNormal, Halving::kNormals},
+                                   {TextureRole::kData, Halving::kNumbers}})
+    for (const int threads : {1, 8}) {
+      RunContext context;
+      context.threads = threads;
+      const Fragments fragments = with_mips(75, 50, role);
+      const std::vector<Pixels> planes = fill_planes(fragments, {image}, Fill::kPushPull, context);
+      ASSERT_EQ(planes.size(), 3u);
+      for (std::size_t p = 1; p < 3; ++p) {
+        const TexturePlane& finer = fragments.planes[p - 1];
+        const Pixels want = halved(planes[p - 1], finer.width_px, finer.height_px, kind);
+        EXPECT_EQ(planes[p].width_px, fragments.planes[p].fragment_width_px);
+        for (std::uint32_t y = 0; y < want.height_px; ++y)
+          for (std::uint32_t x = 0; x < want.width_px; ++x)
+            for (std::uint32_t c = 0; c < 3; ++c) ASSERT_EQ(planes[p].at(x, y)[c], want.at(x, y)[c]);
+      }
+    }
+  const auto refused = [&](auto change) {
+    Fragments fragments = with_mips(75, 50, TextureRole::kData);
+    change(fragments.planes);
+    EXPECT_THROW(fill_planes(fragments, {image}, Fill::kNone, {}), StageError);
+  };
+  using P = std::vector<TexturePlane>&;
+  refused([](P p) { p[1].base = 7; });
+  refused([](P p) { p[2].mip = 3; });
+  refused([](P p) { p[2].mip = 0; });
+  refused([](P p) { p[1].width_px = 39; });
+  refused([](P p) { p[1].role = TextureRole::kNormal; });
+  refused([](P p) { p.erase(p.begin()); });
+  refused([](P p) { p[2].image = 1; });
 }
 
 }  // namespace

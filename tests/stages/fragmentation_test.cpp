@@ -309,7 +309,7 @@ TEST(Fragmentation, SurfaceFractionIsThatOfTheTexturedPart) {
   for (std::size_t t = 12; t < mesh.triangles.size(); ++t) mesh.triangle_material[t] = 1;
   const Fragments out =
       run(conditioned(mesh), {with_base(0), with_base(1)}, {image_of(256, 256), image_of(512, 512)});
-  ASSERT_EQ(out.planes.size(), 2u);
+  ASSERT_EQ(out.planes.size(), 3u);  // the second image has a mip
   EXPECT_NEAR(total(out.planes[0].surface_fraction), 24.0 / 25, 1e-5);
   EXPECT_NEAR(total(out.planes[1].surface_fraction), 1.0 / 25, 1e-5);
   // The cube's atlas leaves gaps.
@@ -383,6 +383,101 @@ TEST(Fragmentation, RolesChannelsAndSharing) {
             4u);
 }
 
+std::vector<std::array<std::uint32_t, 4>> mips_of(const Fragments& f) {
+  std::vector<std::array<std::uint32_t, 4>> out;
+  for (const TexturePlane& p : f.planes) out.push_back({p.mip, p.base, p.width_px, p.height_px});
+  return out;
+}
+
+TEST(Fragmentation, MipsGoDownToThePreview) {
+  const ConditionedMesh mesh = conditioned(testing::sheet(4));
+  Material m = with_base(0);
+  m.normal_texture.image = 1;
+  m.alpha_mode = AlphaMode::kBlend;
+  const std::vector<Image> images{image_of(1001, 600, 4), image_of(4096, 2048)};
+  const Fragments out = run(mesh, {m}, images);
+  using Row = std::array<std::uint32_t, 4>;
+  EXPECT_EQ(mips_of(out), (std::vector<Row>{{0, 0, 1001, 600},
+                                            {0, 0, 1001, 600},
+                                            {0, 0, 4096, 2048},
+                                            {1, 0, 501, 300},
+                                            {1, 1, 501, 300},
+                                            {1, 2, 2048, 1024},
+                                            {2, 2, 1024, 512},
+                                            {3, 2, 512, 256}}));
+  EXPECT_EQ(out.planes[4].role, TextureRole::kAlpha);
+  EXPECT_EQ(out.planes[4].channels, 1u);
+  EXPECT_EQ(out.planes[7].role, TextureRole::kNormal);
+  for (const TexturePlane& p : out.planes) {
+    EXPECT_NEAR(total(p.surface_fraction), 1, 1e-5);
+    EXPECT_EQ(p.covered_texels.size(), p.fragment_count());
+  }
+  FragmentationOptions without;
+  without.mips = false;
+  EXPECT_EQ(run(mesh, {m}, images, 1, without).planes.size(), 3u);
+  // 1/8 is the preview of 2048 x 2048; small images have none worth its tables.
+  EXPECT_EQ(mips_of(run(mesh, {with_base(0)}, {image_of(2048, 2048)})).size(), 3u);
+  EXPECT_EQ(mips_of(run(mesh, {with_base(0)}, {image_of(510, 510)})).size(), 1u);
+  EXPECT_EQ(mips_of(run(mesh, {with_base(0)}, {image_of(511, 16)})).size(), 2u);
+}
+
+TEST(Fragmentation, MipsCoverWhatSamplingThemTouches) {
+  Mesh mesh = testing::sheet(1, 0);
+  mesh.uv0 = {{0.3f, 0.32f}, {0.71f, 0.3f}, {0.33f, 0.6f}, {0.7f, 0.64f}};
+  const Fragments out = run(conditioned(mesh), {with_base(0)}, {image_of(1030, 777)});
+  ASSERT_EQ(out.planes.size(), 3u);
+  for (std::size_t k = 1; k < 3; ++k) {
+    const TexturePlane& p = out.planes[k];
+    const TexturePlane& finer = out.planes[k - 1];
+    std::vector<std::uint8_t> want((std::size_t{p.width_px} + 7) / 8 * p.height_px);
+    TexelCoverage alone(p.width_px, p.height_px, Wrap::kRepeat, Wrap::kRepeat);
+    for (const Triangle& t : mesh.triangles) {
+      Corners c;
+      for (std::size_t i = 0; i < 3; ++i)
+        c[i] = {static_cast<double>(mesh.uv0[t[i]].x) * p.width_px,
+                static_cast<double>(mesh.uv0[t[i]].y) * p.height_px};
+      alone.add(c);
+    }
+    EXPECT_EQ(p.coverage, alone.bits());
+    // A texel is covered wherever a finer one within it is.
+    for (std::uint32_t y = 0; y < finer.height_px; ++y)
+      for (std::uint32_t x = 0; x < finer.width_px; ++x)
+        if (bit(finer.coverage, finer.width_px, x, y))
+          EXPECT_TRUE(bit(p.coverage, p.width_px, x * p.width_px / finer.width_px,
+                          y * p.height_px / finer.height_px));
+  }
+}
+
+/// A wall of n x n tiles of one image beside a square that shows another image once.
+TEST(Fragmentation, EveryRepeatOfATilingTextureCounts) {
+  for (const int n : {1, 4, 7}) {
+    Mesh mesh = testing::sheet(n * 4, 0);  // corners at quarters of the tiles
+    for (Vec2f& uv : mesh.uv0) uv = uv * static_cast<float>(n);
+    ConditionedMesh wall = conditioned(mesh);
+    const TexturePlane p = run(wall, {with_base(0)}, {image_of(512, 512)}).planes[0];
+    EXPECT_NEAR(total(p.surface_fraction), 1, 1e-5);
+    // Each fragment gets its share of every repeat, and the features of all of them.
+    const auto [lo, hi] = std::minmax_element(p.surface_fraction.begin(), p.surface_fraction.end());
+    EXPECT_NEAR(*lo, *hi, 1e-5);
+    const auto features = std::accumulate(
+        p.features.begin(), p.features.begin() + static_cast<std::ptrdiff_t>(p.fragment_count()), 0u);
+    EXPECT_GE(features, mesh.positions.size());
+  }
+}
+
+TEST(Fragmentation, FarCoordinatesAreBoundedWork) {
+  for (const Wrap wrap : kWraps) {
+    Mesh mesh = testing::sheet(60);
+    for (Vec2f& uv : mesh.uv0) uv = {uv.x * 2e6f - 1e6f, uv.y * 2e6f - 1e6f};
+    Material m = with_base(0);
+    m.base_colour_texture.wrap_s = m.base_colour_texture.wrap_t = wrap;
+    const auto begin = std::chrono::steady_clock::now();
+    const Fragments out = run(conditioned(mesh), {m}, {image_of(15, 4097), image_of(1, 1)});
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20)) << "7,200 triangles";
+    EXPECT_NEAR(total(out.planes[0].surface_fraction), 1, 1e-4);
+  }
+}
+
 TEST(Fragmentation, SecondTexcoordAndTransform) {
   Mesh mesh = testing::sheet(4, 0);
   mesh.uv1 = mesh.uv0;
@@ -450,8 +545,8 @@ TEST(Fragmentation, SameResultForAnyNumberOfThreads) {
   m.emissive_texture.image = 2;
   const std::vector<Image> images{image_of(700, 900), image_of(1024, 512), image_of(333, 100)};
   const Fragments a = run(mesh, {m}, images, 1), b = run(mesh, {m}, images, 8);
-  ASSERT_EQ(a.planes.size(), 3u);
-  for (std::size_t p = 0; p < 3; ++p) {
+  ASSERT_EQ(a.planes.size(), 6u);
+  for (std::size_t p = 0; p < 6; ++p) {
     EXPECT_EQ(a.planes[p].coverage, b.planes[p].coverage);
     EXPECT_EQ(a.planes[p].features, b.planes[p].features);
     EXPECT_EQ(a.planes[p].surface_fraction, b.planes[p].surface_fraction);

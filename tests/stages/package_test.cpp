@@ -230,6 +230,54 @@ TEST(Package, HundredsOfPlanesStillBootstrapInOneRead) {
   EXPECT_EQ(read_index_head(part(package, m.index)).pages.size(), 221u);
 }
 
+/// Turns the last planes into mips 1 and 2 of plane 0.
+Inputs inputs_with_mips(std::size_t full) {
+  Inputs inputs(full + 2);
+  for (std::uint32_t mip : {1u, 2u}) {
+    const std::size_t p = full + mip - 1;
+    TexturePlane& plane = inputs.fragments.planes[p];
+    plane.image = 0;
+    plane.mip = mip;
+    plane.base = 0;
+    plane.width_px = 760 >> mip;
+    plane.height_px = 500 >> mip;
+    plane.fragment_width_px = plane.fragment_height_px = mip == 1 ? 128 : 64;
+    plane.fragment_height_px = mip == 1 ? 128 : 64;
+    inputs.ladder.planes[p].preview.clear();
+  }
+  return inputs;
+}
+
+TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
+  const Bytes package = inputs_with_mips(2).assemble();
+  const Manifest m = manifest_of(package);
+  EXPECT_EQ(m.required_features, std::vector<std::string>{"mips"});
+  EXPECT_EQ(m.plane_count, 4u);
+  EXPECT_EQ(m.previews.size(), 2u);
+  std::vector<TextureInfo> textures = read_textures(part(package, m.textures));
+  const auto index = read_index(part(package, m.index));
+  resolve_textures(textures, index);
+  EXPECT_EQ(textures[3].preview, textures[0].preview);
+  EXPECT_EQ(textures[3].mip, 2u);
+  EXPECT_TRUE(std::ranges::none_of(index, [](const EntryRef& e) { return e.path == preview_path(2); }));
+  EXPECT_LE(textures[3].tables.offset + textures[3].tables.bytes,
+            m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_TRUE(manifest_of(Inputs(2).assemble()).required_features.empty());
+
+  Inputs wrong = inputs_with_mips(1);
+  wrong.fragments.planes[1].base = 1;
+  EXPECT_THROW(wrong.assemble(), StageError);
+  wrong = inputs_with_mips(1);
+  wrong.ladder.planes[1].preview = fake_jpeg(30, 'p');
+  EXPECT_THROW(wrong.assemble(), StageError);
+}
+
+TEST(Package, HundredsOfPlanesWithMipsStillBootstrapInOneRead) {
+  const Manifest m = manifest_of(inputs_with_mips(300).assemble());
+  EXPECT_EQ(m.plane_count, 302u);
+  EXPECT_EQ(m.previews.size(), kMaxManifestPreviews);
+}
+
 TEST(Package, NamesFromTheSourceAreMadeSafe) {
   Inputs inputs(1);
   inputs.images[0].name = "a\xff\x1b[2J\xc3\xa4\xed\xa0\x80" + std::string(300, 'x');

@@ -1,0 +1,131 @@
+#include "stages/halve_pixels.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "format/errors.h"
+#include "format/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kFull = 65535;  // linear light in 16 bits
+
+struct LightTables {
+  std::array<std::uint16_t, 256> linear{};
+  std::vector<std::uint8_t> encoded;  // [kFull + 1]
+};
+
+double light_of(double encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : portable::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+const LightTables& light_tables() {
+  static const LightTables tables = [] {
+    LightTables t;
+    t.encoded.resize(kFull + 1);
+    for (std::size_t v = 0; v < 256; ++v)
+      t.linear[v] =
+          static_cast<std::uint16_t>(std::floor(light_of(static_cast<double>(v) / 255) * kFull + 0.5));
+    std::size_t at = 0;
+    for (std::size_t v = 0; v < 256; ++v) {  // v up to where v + 1 is nearer in encoded values
+      const double end = v == 255 ? kFull + 1.0 : light_of((static_cast<double>(v) + 0.5) / 255) * kFull;
+      for (; at <= kFull && static_cast<double>(at) < end; ++at) t.encoded[at] = static_cast<std::uint8_t>(v);
+    }
+    return t;
+  }();
+  return tables;
+}
+
+/// What an output texel takes along one axis: `count` texels from `first` on.
+struct Taps {
+  std::uint32_t first = 0, count = 0;
+  std::array<std::uint64_t, 3> weight{};
+};
+
+/// Weights of one axis; each output's sum to `whole`.
+std::vector<Taps> taps_of(std::uint32_t size, std::uint64_t& whole) {
+  const std::uint32_t half = (size + 1) / 2, common = std::gcd(size, half);
+  const std::uint64_t w = size / common, o = half / common;
+  whole = w;
+  std::vector<Taps> out(half);
+  for (std::uint32_t i = 0; i < half; ++i) {
+    const std::uint64_t lo = i * w, hi = (i + std::uint64_t{1}) * w;  // in units of 1 / o texels
+    out[i].first = static_cast<std::uint32_t>(lo / o);
+    for (std::uint64_t j = lo / o; j * o < hi; ++j)
+      out[i].weight[out[i].count++] = std::min(hi, (j + 1) * o) - std::max(lo, j * o);
+  }
+  return out;
+}
+
+void put_normal(const std::array<std::uint64_t, 3>& sum, std::uint64_t whole, std::uint8_t* to) {
+  double n[3], squared = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    n[c] = static_cast<double>(sum[c]) / (127.5 * static_cast<double>(whole)) - 1;
+    squared += n[c] * n[c];
+  }
+  const double length = squared > 1e-4 ? std::sqrt(squared) : 1;
+  for (std::size_t c = 0; c < 3; ++c)
+    to[c] = static_cast<std::uint8_t>(std::clamp(std::floor((n[c] / length + 1) * 127.5 + 0.5), 0.0, 255.0));
+}
+
+template <Halving kKind, std::uint32_t C>
+void reduce(const Pixels& from, const std::vector<Taps>& columns, const std::vector<Taps>& rows,
+            std::uint64_t whole, Pixels& to) {
+  const LightTables& light = light_tables();
+  std::uint8_t* out = to.data.data();
+  for (const Taps& row : rows)
+    for (const Taps& column : columns) {
+      std::array<std::uint64_t, 3> sum{};
+      for (std::uint32_t v = 0; v < row.count; ++v) {
+        const std::uint8_t* p = from.at(column.first, row.first + v);
+        for (std::uint32_t u = 0; u < column.count; ++u, p += C) {
+          const std::uint64_t weight = row.weight[v] * column.weight[u];
+          for (std::uint32_t c = 0; c < C; ++c)
+            sum[c] += weight * (kKind == Halving::kLight ? light.linear[p[c]] : p[c]);
+        }
+      }
+      if constexpr (kKind == Halving::kNormals) {
+        put_normal(sum, whole, out);
+      } else {
+        for (std::uint32_t c = 0; c < C; ++c) {
+          const std::uint64_t mean = (sum[c] + whole / 2) / whole;
+          out[c] = kKind == Halving::kLight ? light.encoded[mean] : static_cast<std::uint8_t>(mean);
+        }
+      }
+      out += C;
+    }
+}
+
+}  // namespace
+
+Pixels halved(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind) {
+  const bool grey = from.channels == 1;
+  if (width_px == 0 || height_px == 0 || width_px > from.width_px || height_px > from.height_px ||
+      from.data.size() != std::size_t{from.width_px} * from.height_px * from.channels ||
+      (!grey && from.channels != 3) || (grey && kind == Halving::kNormals))
+    throw StageError("fragmentation", "pixels to halve", "1 or 3 channels of the size that is asked for",
+                     std::to_string(from.width_px) + " x " + std::to_string(from.height_px) + " x " +
+                         std::to_string(from.channels));
+  std::uint64_t across = 0, down = 0;
+  const std::vector<Taps> columns = taps_of(width_px, across), rows = taps_of(height_px, down);
+  Pixels to{
+      static_cast<std::uint32_t>(columns.size()), static_cast<std::uint32_t>(rows.size()), from.channels, {}};
+  to.data.resize(std::size_t{to.width_px} * to.height_px * to.channels);
+  const std::uint64_t whole = across * down;
+  if (kind == Halving::kNormals)
+    reduce<Halving::kNormals, 3>(from, columns, rows, whole, to);
+  else if (kind == Halving::kLight)
+    grey ? reduce<Halving::kLight, 1>(from, columns, rows, whole, to)
+         : reduce<Halving::kLight, 3>(from, columns, rows, whole, to);
+  else
+    grey ? reduce<Halving::kNumbers, 1>(from, columns, rows, whole, to)
+         : reduce<Halving::kNumbers, 3>(from, columns, rows, whole, to);
+  return to;
+}
+
+}  // namespace texmesh
