@@ -1,6 +1,7 @@
 #include "stages/fragment_grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "stages/texel_coverage.h"
@@ -9,7 +10,8 @@ namespace texmesh {
 namespace {
 
 constexpr std::uint32_t kPreferredPx = 256, kMaxSidePx = 65488;
-constexpr std::uint64_t kPreferredCount = 64;
+constexpr std::uint32_t kPreferredCount = 64;
+constexpr std::uint64_t kFragmentOverhead = 6400, kFilledTexelOverhead = 1;  // hundredths of a byte
 constexpr std::size_t kMaxCells = 4096;
 constexpr double kMaxTiles = 64;
 constexpr double kFarTexels = 1099511627776.0;  // 2^40; no fraction is left in a float UV there
@@ -28,27 +30,70 @@ Axis cut_axis(std::uint32_t size_px, std::uint32_t side, std::uint32_t min_px) {
   return {(size_px + side_px - 1) / side_px, side_px};
 }
 
-std::string reason_of(const FragmentGrid& g, std::uint32_t max_fragments, std::uint32_t min_px) {
-  const auto text = [](std::uint64_t v) { return std::to_string(v); };
-  const std::uint64_t count = std::uint64_t{g.columns} * g.rows;
-  const std::uint64_t padded = std::uint64_t{g.columns} * g.fragment_width_px * g.rows * g.fragment_height_px;
-  const std::uint64_t permille = (padded - std::uint64_t{g.width_px} * g.height_px) * 1000 / padded;
+/// Covered texels of every 16 x 16 block of an image.
+class Blocks {
+ public:
+  Blocks(std::uint32_t width_px, std::uint32_t height_px, const std::vector<std::uint8_t>& coverage)
+      : columns_((width_px + 15) / 16),
+        rows_((height_px + 15) / 16),
+        covered_(std::size_t{columns_} * rows_) {
+    const std::size_t stride = (std::size_t{width_px} + 7) / 8;
+    for (std::uint32_t y = 0; y < height_px; ++y)
+      for (std::size_t byte = 0; byte < stride; ++byte) {
+        const auto width = std::min<std::size_t>(8, width_px - byte * 8);
+        covered_[std::size_t{y / 16} * columns_ + byte / 2] += static_cast<std::uint16_t>(
+            coverage.empty() ? width : static_cast<std::size_t>(std::popcount(coverage[y * stride + byte])));
+      }
+    for (const std::uint16_t n : covered_) texels_ += n;
+  }
+  std::uint64_t texels() const { return texels_; }
+  /// Fragments with a covered texel.
+  std::uint32_t stored(const Axis& x, const Axis& y) const {
+    std::vector<std::uint8_t> any(std::size_t{x.count} * y.count);
+    for (std::uint32_t r = 0; r < rows_; ++r)
+      for (std::uint32_t c = 0; c < columns_; ++c)
+        if (covered_[std::size_t{r} * columns_ + c] > 0)
+          any[std::size_t{r * 16 / y.side_px} * x.count + c * 16 / x.side_px] = 1;
+    return static_cast<std::uint32_t>(std::count(any.begin(), any.end(), 1));
+  }
+
+ private:
+  std::uint32_t columns_, rows_;
+  std::vector<std::uint16_t> covered_;
+  std::uint64_t texels_ = 0;
+};
+
+struct Candidate {
+  Axis x, y;
+  std::uint32_t stored = 0;
+  std::uint64_t filled = 0;  // texels of stored fragments that are not covered
+  std::uint64_t overhead() const { return stored * kFragmentOverhead + filled * kFilledTexelOverhead; }
+};
+
+std::string text(std::uint64_t v) { return std::to_string(v); }
+
+std::string tenths(std::uint64_t part, std::uint64_t whole) {
+  const std::uint64_t v = part * 10 / whole;
+  return text(v / 10) + "." + text(v % 10);
+}
+
+std::string reason_of(const FragmentGrid& g, const Candidate& chosen, std::size_t candidates,
+                      std::uint32_t max_fragments, std::uint32_t min_px) {
   std::string why;
-  const std::uint32_t side = std::max(g.fragment_width_px, g.fragment_height_px);
   if (g.columns == 1 && g.rows == 1)
     why = max_fragments == 1 ? "one fragment asked for"
                              : "too small for two fragments of " + text(min_px) + " px";
-  else if (side > std::max(kPreferredPx, min_px + 15) && count > max_fragments / 2)
+  else if (std::max(g.fragment_width_px, g.fragment_height_px) > std::max(kPreferredPx, min_px + 15))
     why = "larger than " + text(kPreferredPx) + " px to stay within " + text(max_fragments) + " fragments";
-  else if (count >= kPreferredCount)
-    why = side == kPreferredPx ? "the preferred side, at least " + text(kPreferredCount) + " fragments"
-                               : "the largest side up to " + text(kPreferredPx) + " px with at least " +
-                                     text(kPreferredCount) + " fragments";
+  else if (candidates == 1)
+    why = "the only grid that keeps the limits";
   else
-    why = "sides near the least of " + text(min_px) + " px";
+    why = "least overhead of " + text(candidates) + " grids";
   return text(g.width_px) + " x " + text(g.height_px) + " px in " + text(g.columns) + " x " + text(g.rows) +
-         " fragments of " + text(g.fragment_width_px) + " x " + text(g.fragment_height_px) + " px (" + why +
-         "; " + text(permille / 10) + "." + text(permille % 10) + " % padding)";
+         " fragments of " + text(g.fragment_width_px) + " x " + text(g.fragment_height_px) + " px, " +
+         text(chosen.stored) + " stored (" + why + "; overhead " + tenths(chosen.overhead(), 100000) +
+         " kB a rung: " + text(chosen.stored) + " fragments of " + text(kFragmentOverhead / 100) + " B, " +
+         tenths(chosen.filled, 1000) + "k uncovered texels)";
 }
 
 /// The part of a convex polygon with lo <= axis <= hi.
@@ -77,20 +122,33 @@ double area_of(const std::vector<Vec2d>& polygon) {
 
 }  // namespace
 
-FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t max_fragments,
+FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px,
+                         const std::vector<std::uint8_t>& coverage, std::uint32_t max_fragments,
                          std::uint32_t min_px) {
   min_px = (std::max(min_px, 16u) + 15) / 16 * 16;
   const std::uint64_t most = std::max<std::uint64_t>(max_fragments, 1);
-  const std::uint64_t wanted = std::min(kPreferredCount, most);
-  const auto count = [&](std::uint32_t side) {
-    return std::uint64_t{cut_axis(width_px, side, min_px).count} * cut_axis(height_px, side, min_px).count;
+  const Blocks blocks(width_px, height_px, coverage);
+  std::vector<Candidate> candidates;
+  const auto consider = [&](std::uint32_t side, bool at_any_rate) {
+    Candidate c{cut_axis(width_px, side, min_px), cut_axis(height_px, side, min_px)};
+    if (std::uint64_t{c.x.count} * c.y.count > most && !at_any_rate) return;
+    for (const Candidate& other : candidates)
+      if (other.x.side_px == c.x.side_px && other.y.side_px == c.y.side_px) return;
+    c.stored = blocks.stored(c.x, c.y);
+    c.filled = std::uint64_t{c.stored} * c.x.side_px * c.y.side_px - blocks.texels();
+    candidates.push_back(c);
   };
   std::uint32_t side = std::max(kPreferredPx, min_px);
-  while (side > min_px && count(side) < wanted) side -= 16;
-  while (count(side) > most && side < kMaxSidePx) side += 16;
-  const Axis x = cut_axis(width_px, side, min_px), y = cut_axis(height_px, side, min_px);
-  FragmentGrid grid{width_px, height_px, x.side_px, y.side_px, x.count, y.count, {}};
-  grid.reason = reason_of(grid, max_fragments, min_px);
+  for (std::uint32_t s = side; s >= min_px; s -= 16) consider(s, false);
+  for (; candidates.empty(); side = std::min(side + 16, kMaxSidePx)) consider(side, side == kMaxSidePx);
+
+  std::uint32_t wanted = 0;
+  for (const Candidate& c : candidates) wanted = std::max(wanted, std::min(c.stored, kPreferredCount));
+  const Candidate* best = nullptr;
+  for (const Candidate& c : candidates)
+    if (c.stored >= wanted && (best == nullptr || c.overhead() < best->overhead())) best = &c;
+  FragmentGrid grid{width_px, height_px, best->x.side_px, best->y.side_px, best->x.count, best->y.count, {}};
+  grid.reason = reason_of(grid, *best, candidates.size(), max_fragments, min_px);
   return grid;
 }
 

@@ -16,12 +16,17 @@ struct FragmentGrid {
   std::string reason;
 };
 
-/// At most max_fragments, sides multiples of 16 and at least min_px where the image allows. The side is 256
-/// px where that gives at least 64 fragments (or all that are allowed), because a 256 px fragment costs 0.5 %
-/// more than a whole image and one of 128 px 2 %; below that it is as large as 64 fragments allow, because
-/// harmonic time compensation with 16 misses its deadline by 0.8 %, with 64 by 0.1 %. Sides above 65488 px
-/// are never chosen (JPEG), so a larger image has more than max_fragments when that is 1.
-FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t max_fragments,
+/// The grid with the least overhead for what is covered (`coverage` as TexturePlane::coverage; empty = all of
+/// it), of those with at most max_fragments, sides multiples of 16 up to 256 px, and at least min_px where
+/// the image allows. The overhead of a grid is 64 bytes for every stored fragment (at every rung: 37 of
+/// headers, 15 in the tables, 12 for starting prediction and bytes anew) and 0.01 bytes for every texel of a
+/// stored fragment that is not covered (what filled texels cost at middling quality: 650 bytes for 256 x
+/// 256); so small sides win where they skip more than they cost. Grids with fewer than 64 stored fragments
+/// are taken only when there are none with more, because harmonic time compensation with 16 misses its
+/// deadline by 0.8 %, with 64 by 0.1 %. Sides grow beyond 256 px where max_fragments asks for it, never above
+/// 65488 px (JPEG), so a larger image has more than max_fragments when that is 1.
+FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px,
+                         const std::vector<std::uint8_t>& coverage, std::uint32_t max_fragments,
                          std::uint32_t min_px);
 
 /// Adds `amount` to the fragments in proportion to the area of the triangle in them (texel coordinates,

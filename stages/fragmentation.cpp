@@ -24,11 +24,12 @@ struct Use {
 
 /// What has to be measured: planes with the same size and uses share it.
 struct Job {
-  FragmentGrid grid;
+  std::uint32_t width_px, height_px;
   std::vector<Use> uses;
 };
 
 struct Measure {
+  FragmentGrid grid;
   std::vector<std::uint8_t> coverage;
   std::vector<double> surface;          // absolute, per fragment
   std::vector<std::uint32_t> features;  // [scale * fragments + fragment]
@@ -172,7 +173,7 @@ void for_each_triangle(const Mesh& mesh, const Job& job, Measure& out, const Bod
     const std::vector<Vec2f>& uvs = use.ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
     const bool first = std::none_of(job.uses.begin(), job.uses.begin() + static_cast<std::ptrdiff_t>(u),
                                     [&](const Use& earlier) { return earlier.material == use.material; });
-    const TexelMap map(use.ref.transform, job.grid.width_px, job.grid.height_px);
+    const TexelMap map(use.ref.transform, job.width_px, job.height_px);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       if (mesh.triangle_material[t] != use.material) continue;
       if (uvs.empty()) {
@@ -208,19 +209,28 @@ std::vector<std::uint32_t> count_features(std::vector<std::uint64_t>& corners, c
   return features;
 }
 
-Measure measure(const ConditionedMesh& conditioned, const ScaleMap& scale_map, const Job& job) {
+void measure_coverage(const Mesh& mesh, const Job& job, Measure& out) {
+  TexelCoverage coverage(job.width_px, job.height_px, Wrap::kRepeat, Wrap::kRepeat);
+  for_each_triangle(mesh, job, out,
+                    [&](std::size_t, const Use& use, bool, const std::array<Vec2d, 3>& texels) {
+                      coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
+                      coverage.add(texels);
+                    });
+  out.coverage = coverage.take();
+}
+
+/// Surface and features of the grid's fragments.
+void measure_fragments(const ConditionedMesh& conditioned, const ScaleMap& scale_map, const Job& job,
+                       Measure& out) {
   const Mesh& mesh = conditioned.mesh;
-  const std::size_t fragments = std::size_t{job.grid.columns} * job.grid.rows;
-  Measure out;
+  const std::size_t fragments = std::size_t{out.grid.columns} * out.grid.rows;
   out.surface.resize(fragments);
-  TexelCoverage coverage(job.grid.width_px, job.grid.height_px, Wrap::kRepeat, Wrap::kRepeat);
-  AreaSpreader spreader(job.grid);
+  AreaSpreader spreader(out.grid);
   std::vector<std::uint64_t> corners;
   std::vector<std::uint32_t> last_fragment(mesh.positions.size(), 0xffffffff);  // spares most of the sorting
+  Measure again;                                                                // faults are counted already
   for_each_triangle(
-      mesh, job, out, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
-        coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
-        coverage.add(texels);
+      mesh, job, again, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
         if (first) spreader.add(texels, use.ref.wrap_s, use.ref.wrap_t, area_in_space(mesh, t), out.surface);
         const Vec2d centre = (texels[0] + texels[1] + texels[2]) * (1.0 / 3);
         for (int c = 0; c < 3; ++c) {
@@ -229,14 +239,23 @@ Measure measure(const ConditionedMesh& conditioned, const ScaleMap& scale_map, c
           const Vec2d corner = texels[static_cast<std::size_t>(c)];
           const Vec2d inside =
               corner + (centre - corner) * 1e-6;  // decides on which side of a border it lies
-          const std::uint32_t fragment = fragment_at(job.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
+          const std::uint32_t fragment = fragment_at(out.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
           if (last_fragment[position] == fragment) continue;
           last_fragment[position] = fragment;
           corners.push_back(std::uint64_t{position} << 16 | fragment);
         }
       });
-  out.coverage = coverage.take();
   out.features = count_features(corners, scale_map, fragments);
+}
+
+Measure measure(const ConditionedMesh& conditioned, const ScaleMap& scale_map, const Job& job,
+                const FragmentationOptions& options) {
+  Measure out;
+  measure_coverage(conditioned.mesh, job, out);
+  out.grid = choose_grid(job.width_px, job.height_px, out.coverage,
+                         static_cast<std::uint32_t>(options.max_fragments),
+                         static_cast<std::uint32_t>(options.min_fragment_px));
+  measure_fragments(conditioned, scale_map, job, out);
   return out;
 }
 
@@ -269,8 +288,8 @@ std::vector<float> eta_of_features(const TexturePlane& plane) {
   return eta;
 }
 
-void complete_plane(const FragmentGrid& grid, const Measure& measured, double whole_surface,
-                    TexturePlane& plane) {
+void complete_plane(const Measure& measured, double whole_surface, TexturePlane& plane) {
+  const FragmentGrid& grid = measured.grid;
   plane.width_px = grid.width_px;
   plane.height_px = grid.height_px;
   plane.fragment_width_px = grid.fragment_width_px;
@@ -318,24 +337,22 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
     const std::uint32_t width_px = mip_side(image.width_px, out.planes[p].mip);
     const std::uint32_t height_px = mip_side(image.height_px, out.planes[p].mip);
     const auto same = std::find_if(jobs.begin(), jobs.end(), [&](const Job& job) {
-      return job.uses == uses[p] && job.grid.width_px == width_px && job.grid.height_px == height_px;
+      return job.width_px == width_px && job.height_px == height_px && job.uses == uses[p];
     });
     job_of[p] = static_cast<std::size_t>(same - jobs.begin());
     if (same != jobs.end()) continue;
-    jobs.push_back({choose_grid(width_px, height_px, static_cast<std::uint32_t>(options.max_fragments),
-                                static_cast<std::uint32_t>(options.min_fragment_px)),
-                    uses[p]});
+    jobs.push_back({width_px, height_px, uses[p]});
   }
   std::vector<Measure> measured(jobs.size());
   parallel_for(context, jobs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) measured[j] = measure(mesh, scale_map, jobs[j]);
+    for (std::size_t j = begin; j < end; ++j) measured[j] = measure(mesh, scale_map, jobs[j], options);
   });
   context.report(0.9);
 
   double whole_surface = 0;
   for (std::size_t t = 0; t < mesh.mesh.triangles.size(); ++t) whole_surface += area_in_space(mesh.mesh, t);
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
-    complete_plane(jobs[job_of[p]].grid, measured[job_of[p]], whole_surface, out.planes[p]);
+    complete_plane(measured[job_of[p]], whole_surface, out.planes[p]);
     note_faults(out.planes[p], measured[job_of[p]], images[out.planes[p].image].name, out.notes);
   }
   return out;

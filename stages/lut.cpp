@@ -251,8 +251,10 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   check(fragments, pixels, predictors, ladder, options);
   PackageTables out;
   std::vector<PreviewLuma> previews;
-  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
-    previews.emplace_back(fragments.planes[p], ladder.planes[p].preview);
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];  // a mip is skipped for its full-size plane's preview
+    previews.emplace_back(plane, ladder.planes[plane.mip > 0 ? plane.base : p].preview);
+  }
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     out.planes.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],

@@ -130,7 +130,7 @@ TEST(FragmentGrid, FollowsItsRules) {
   for (const auto& [w, h] : sizes)
     for (const std::uint32_t most : {256u, 64u, 5u, 1u})
       for (const std::uint32_t least : {128u, 16u, 500u}) {
-        const FragmentGrid g = choose_grid(w, h, most, least);
+        const FragmentGrid g = choose_grid(w, h, {}, most, least);
         const auto axis = [&](std::uint32_t size, std::uint32_t side, std::uint32_t count) {
           EXPECT_EQ(side % 16, 0u);
           EXPECT_LE(side, 65488u);
@@ -144,7 +144,7 @@ TEST(FragmentGrid, FollowsItsRules) {
         EXPECT_FALSE(g.reason.empty());
       }
   const auto grid = [](std::uint32_t w, std::uint32_t h) {
-    const FragmentGrid g = choose_grid(w, h, 256, 128);
+    const FragmentGrid g = choose_grid(w, h, {}, 256, 128);
     return std::array{g.columns, g.rows, g.fragment_width_px, g.fragment_height_px};
   };
   EXPECT_EQ(grid(1, 1), (std::array{1u, 1u, 16u, 16u}));
@@ -154,6 +154,66 @@ TEST(FragmentGrid, FollowsItsRules) {
   EXPECT_EQ(grid(4096, 4096), (std::array{16u, 16u, 256u, 256u}));
   EXPECT_EQ(grid(8192, 8192), (std::array{16u, 16u, 512u, 512u}));
   EXPECT_EQ(grid(678, 2199), (std::array{5u, 14u, 144u, 160u}));
+}
+
+/// Coverage of w x h texels where covered(x, y).
+std::vector<std::uint8_t> bits_where(std::uint32_t w, std::uint32_t h, auto&& covered) {
+  std::vector<std::uint8_t> bits((std::size_t{w} + 7) / 8 * h);
+  for (std::uint32_t y = 0; y < h; ++y)
+    for (std::uint32_t x = 0; x < w; ++x)
+      if (covered(x, y))
+        bits[(std::size_t{w} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
+  return bits;
+}
+
+TEST(Grid, LeastOverheadOfWhatIsCovered) {
+  // Everything covered: the largest fragments. Islands far apart: small ones skip what lies between.
+  const auto whole = bits_where(2048, 2048, [](auto, auto) { return true; });
+  EXPECT_EQ(choose_grid(2048, 2048, whole, 256, 128).fragment_width_px, 256u);
+  EXPECT_EQ(choose_grid(2048, 2048, whole, 256, 128).reason, choose_grid(2048, 2048, {}, 256, 128).reason);
+  const auto islands = bits_where(4096, 4096, [](std::uint32_t x, std::uint32_t y) {
+    return x % 512 < 100 && y % 512 < 100 && x < 4000;
+  });
+  // 64 islands: 256 px fragments, 128 would be more than 256 in all but cost less; the limit holds.
+  EXPECT_EQ(choose_grid(4096, 4096, islands, 256, 128).fragment_width_px, 256u);
+  const FragmentGrid fine = choose_grid(
+      2048, 2048,
+      bits_where(2048, 2048, [](std::uint32_t x, std::uint32_t y) { return x % 256 < 100 && y % 256 < 100; }),
+      256, 128);
+  EXPECT_EQ(fine.fragment_width_px, 128u) << fine.reason;
+  EXPECT_NE(fine.reason.find("64 stored"), std::string::npos) << fine.reason;
+  EXPECT_NE(fine.reason.find("least overhead of"), std::string::npos) << fine.reason;
+}
+
+TEST(Grid, NoOtherGridOfTheCandidatesCostsLess) {
+  Random random{21};
+  for (int round = 0; round < 12; ++round) {
+    const std::uint32_t w = 700 + random.next() % 1500, h = 700 + random.next() % 1500;
+    const auto bits = bits_where(w, h, [&, seed = round](std::uint32_t x, std::uint32_t y) {
+      return ((x / 97) * 7 + (y / 61) * 13 + static_cast<std::uint32_t>(seed)) % 5 < 2;
+    });
+    // Cost by brute force over texels.
+    const auto cost = [&](std::uint32_t fw, std::uint32_t fh) {
+      const std::uint32_t columns = (w + fw - 1) / fw, rows = (h + fh - 1) / fh;
+      std::vector<std::uint32_t> covered(columns * rows);
+      std::uint64_t texels = 0, stored = 0;
+      for (std::uint32_t y = 0; y < h; ++y)
+        for (std::uint32_t x = 0; x < w; ++x)
+          if (bit(bits, w, x, y)) ++covered[y / fh * columns + x / fw], ++texels;
+      for (const auto n : covered) stored += n > 0;
+      return std::pair{6400 * stored + (stored * fw * fh - texels), stored};
+    };
+    const FragmentGrid g = choose_grid(w, h, bits, 256, 128);
+    const auto [least, stored] = cost(g.fragment_width_px, g.fragment_height_px);
+    for (std::uint32_t side = 128; side <= 256; side += 16) {
+      const FragmentGrid other = choose_grid(w, h, {}, 256, side);  // a grid near that side
+      if (other.columns * other.rows > 256 || other.fragment_width_px > 256 || other.fragment_height_px > 256)
+        continue;
+      const auto [others, others_stored] = cost(other.fragment_width_px, other.fragment_height_px);
+      if (others_stored >= 64 && stored >= 64)
+        EXPECT_LE(least, others + 6400) << g.reason << " / " << other.reason;
+    }
+  }
 }
 
 TEST(AreaSpreader, SpreadsAsManySamplesDo) {
