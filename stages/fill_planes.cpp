@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 
+#include "stages/fill_blocks.h"
 #include "stages/fragmentation.h"
 #include "stages/halve_pixels.h"
 #include "stages/parallel.h"
@@ -294,6 +295,8 @@ void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, c
     PushPull<3>(pixels, coverage, context).run();
   else
     throw StageError("fragmentation", "channels", "1 or 3", std::to_string(pixels.channels));
+  if (std::ranges::any_of(coverage, [](std::uint8_t bits) { return bits != 0; }))
+    flatten_unseen(pixels, coverage, context);
 }
 
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFragmentationVersion = 2;
+inline constexpr int kFragmentationVersion = 3;
 
 enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>
@@ -128,7 +128,8 @@ std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Im
                                 const RunContext& context);
 
 /// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of
-/// the covered ones; those keep their value. Without any covered texel nothing changes.
+/// the covered ones, and fill_blocks.h makes that cheap for JPEG; covered ones keep their value. Without any
+/// covered texel nothing changes.
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context);
 
 }  // namespace texmesh

@@ -76,6 +76,41 @@ TEST(Fill, IsSmoothAndConstantForAConstant) {
     EXPECT_LT(std::abs(ramp.at(x, 4)[0] - ramp.at(x - 1, 4)[0]), 80) << x;
 }
 
+TEST(Fill, BlocksThatNobodySeesAreFlatAndBorderBlocksHaveFewCoefficients) {
+  // A photograph-like chart covers the left 40 of 96 columns, all rows of 48.
+  testing::Random random{31};
+  for (const std::uint32_t channels : {1u, 3u}) {
+    Pixels pixels{96, 48, channels, {}};
+    std::vector<std::uint8_t> coverage(12 * 48);
+    for (std::uint32_t y = 0; y < 48; ++y) {
+      for (std::uint32_t x = 0; x < 96; ++x)
+        for (std::uint32_t c = 0; c < channels; ++c)
+          pixels.data.push_back(
+              x < 40 ? static_cast<std::uint8_t>(90 + (x * 7 + y * 5 + c * 30) % 60 + random.next() % 6)
+                     : static_cast<std::uint8_t>(random.next()));
+      for (std::uint32_t x = 0; x < 5; ++x) coverage[y * 12 + x] = 0xff;
+    }
+    const Pixels before = pixels;
+    fill_uncovered(pixels, coverage, {});
+    const auto bytes = [](const Pixels& p) { return encode_jpeg(p, 75, Subsampling::k420).size(); };
+    EXPECT_LT(bytes(pixels), bytes(before) / 2);
+    for (std::uint32_t y = 0; y < 48; ++y)
+      for (std::uint32_t x = 0; x < 96; ++x)
+        for (std::uint32_t c = 0; c < channels; ++c) {
+          if (x < 40) ASSERT_EQ(pixels.at(x, y)[c], before.at(x, y)[c]);
+          if (x >= 48) ASSERT_EQ(pixels.at(x, y)[c], pixels.at(x / 16 * 16, y / 16 * 16)[c]) << x << " " << y;
+        }
+    // The block at columns 32..47 is half covered: no dearer than one that is wholly covered.
+    const auto block = [&](std::uint32_t left) {
+      Pixels out{16, 48, channels, {}};
+      for (std::uint32_t y = 0; y < 48; ++y)
+        out.data.insert(out.data.end(), pixels.at(left, y), pixels.at(left, y) + 16 * channels);
+      return out;
+    };
+    EXPECT_LT(bytes(block(32)), bytes(block(16)));
+  }
+}
+
 TEST(Fill, NothingCoveredChangesNothingAndBadCoverageIsRefused) {
   Pixels pixels = noise(20, 10, 3);
   const Pixels before = pixels;
