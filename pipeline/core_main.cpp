@@ -33,6 +33,7 @@ int main(int argc, char** argv) {
     add_unpack_command(app, exit_code);
     add_pack_command(app, exit_code);
     add_debug_command(app, exit_code);
+    add_study_command(app, exit_code);
     add_stages_command(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

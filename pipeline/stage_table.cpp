@@ -1,5 +1,7 @@
 #include "pipeline/stage_table.h"
 
+#include <algorithm>
+
 namespace texmesh {
 namespace {
 
@@ -248,11 +250,32 @@ std::vector<Stage> make_table() {
   };
 }
 
+bool makes(const Stage& stage, const std::string& artefact) {
+  return std::any_of(stage.outputs.begin(), stage.outputs.end(),
+                     [&](const Artefact& a) { return a.name == artefact; });
+}
+
 }  // namespace
 
 const std::vector<Stage>& stage_table() {
   static const std::vector<Stage> table = make_table();
   return table;
+}
+
+std::vector<Stage> graph_towards(Stage last) {
+  const std::vector<Stage>& table = stage_table();
+  std::vector<std::string> needed = last.inputs;
+  std::vector<bool> taken(table.size(), false);
+  for (std::size_t i = table.size(); i-- > 0;) {  // an input stands before its use
+    taken[i] = std::any_of(needed.begin(), needed.end(),
+                           [&](const std::string& artefact) { return makes(table[i], artefact); });
+    if (taken[i]) needed.insert(needed.end(), table[i].inputs.begin(), table[i].inputs.end());
+  }
+  std::vector<Stage> graph;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    if (taken[i]) graph.push_back(table[i]);
+  graph.push_back(std::move(last));
+  return graph;
 }
 
 }  // namespace texmesh

@@ -93,4 +93,8 @@ struct Source {
 /// can be read.
 const std::vector<Stage>& stage_table();
 
+/// The stages of the table that `last` needs, directly or not, in the table's order, and `last` itself: for
+/// commands that want to see what is in the middle of the graph.
+std::vector<Stage> graph_towards(Stage last);
+
 }  // namespace texmesh

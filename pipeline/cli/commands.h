@@ -26,6 +26,7 @@ void add_verify_command(CLI::App& app, int& exit_code);  // command_verify.cpp
 void add_unpack_command(CLI::App& app, int& exit_code);  // command_pack.cpp
 void add_pack_command(CLI::App& app, int& exit_code);    // command_pack.cpp
 void add_debug_command(CLI::App& app, int& exit_code);   // command_debug.cpp
+void add_study_command(CLI::App& app, int& exit_code);   // command_study.cpp
 void add_stages_command(CLI::App& app, int& exit_code);
 
 }  // namespace texmesh

@@ -47,28 +47,6 @@ DebugView make_view(const StageInputs& in, DebugQuantity what) {
                         in.get<Images>("import.images"), in.get<Fragments>("fragmentation"));
 }
 
-bool makes(const Stage& stage, const std::string& artefact) {
-  return std::any_of(stage.outputs.begin(), stage.outputs.end(),
-                     [&](const Artefact& a) { return a.name == artefact; });
-}
-
-/// The stages that `view` needs, directly or not, in the table's order, and `view` itself.
-std::vector<Stage> graph_towards(Stage view) {
-  const std::vector<Stage>& table = stage_table();
-  std::vector<std::string> needed = view.inputs;
-  std::vector<bool> taken(table.size(), false);
-  for (std::size_t i = table.size(); i-- > 0;) {  // an input stands before its use
-    taken[i] = std::any_of(needed.begin(), needed.end(),
-                           [&](const std::string& artefact) { return makes(table[i], artefact); });
-    if (taken[i]) needed.insert(needed.end(), table[i].inputs.begin(), table[i].inputs.end());
-  }
-  std::vector<Stage> graph;
-  for (std::size_t i = 0; i < table.size(); ++i)
-    if (taken[i]) graph.push_back(table[i]);
-  graph.push_back(std::move(view));
-  return graph;
-}
-
 }  // namespace
 
 DebugView view_input(const CompileRequest& request, DebugQuantity what, Store& store,

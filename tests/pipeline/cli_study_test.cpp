@@ -1,0 +1,111 @@
+// texmesh study as a user runs it: tables, CSV, JSON, pictures, exit codes.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/support/command.h"
+#include "tests/support/images.h"
+
+namespace texmesh::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+CommandResult texmesh(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), TEXMESH_BINARY);
+  return run_command(arguments);
+}
+
+struct StudyCommand : ::testing::Test {
+  std::string image(const std::string& name, int channels) {
+    const auto bytes = png_bytes(160, 96, channels);
+    write_text(folder / name, std::string(bytes.begin(), bytes.end()));
+    return folder / name;
+  }
+  TemporaryFolder folder;
+};
+
+TEST_F(StudyCommand, FragmentsAsTableCsvAndJson) {
+  const std::string rgba = image("with, alpha.png", 4), grey = image("grey.png", 1);
+  const CommandResult text = texmesh({"study", "fragments", rgba, grey, "--grids", "1,2,4", "--qualities",
+                                      "20,80", "--csv", folder / "x.csv"});
+  ASSERT_EQ(text.exit_code, 0) << text.errors;
+  EXPECT_NE(text.output.find("160 x 96 px"), std::string::npos) << text.output;
+  EXPECT_NE(text.output.find("4^2"), std::string::npos) << text.output;
+  const CommandResult machine =
+      texmesh({"study", "fragments", rgba, grey, "--grids", "1,2,4", "--qualities", "20,80", "--json"});
+  ASSERT_EQ(machine.exit_code, 0) << machine.errors;
+  const Json document = Json::parse(machine.output);
+  ASSERT_EQ(document["fragments"].size(), 2u);
+  std::istringstream csv(read_text(folder / "x.csv"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line.substr(0, 24), "image,width_px,height_px");
+  for (const Json& studied : document["fragments"])
+    for (const Json& row : studied["rows"]) {
+      ASSERT_TRUE(std::getline(csv, line));
+      const std::string end = "," + row["quality"].dump() + "," + row["file_standard"].dump() + "," +
+                              row["file_optimised"].dump() + "," + row["sum_standard"].dump() + "," +
+                              row["sum_optimised"].dump() + "," + row["sum_shared"].dump();
+      EXPECT_TRUE(line.ends_with(end)) << line << " " << end;
+      EXPECT_LT(row["sum_shared"], row["sum_standard"].get<int>() + 700);
+    }
+  EXPECT_FALSE(std::getline(csv, line));
+  EXPECT_EQ(read_text(folder / "x.csv").find("\"" + rgba + "\","),
+            read_text(folder / "x.csv").find('\n') + 1);
+}
+
+TEST_F(StudyCommand, QualityOfAModel) {
+  const std::string scan = folder / "scan.glb", png = folder / "x.png";
+  ASSERT_EQ(run_command({TEXMESH_MAKE_SCAN, "--triangles", "1500", "--texture", "512", "-o", scan}).exit_code,
+            0);
+  const CommandResult r = texmesh({"study", "quality", scan, "-o", png, "--size", "64", "--views", "2",
+                                   "--quality", "30", "--json", "--cache", folder / "cache"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const Json choices = Json::parse(r.output)["quality"];
+  ASSERT_EQ(choices.size(), 4u);
+  const Json& uniform = choices[0];
+  EXPECT_EQ(uniform["choice"], "uniform");
+  EXPECT_EQ(uniform["lowest_quality"], 30);
+  EXPECT_EQ(uniform["highest_quality"], 30);
+  for (const Json& c : choices) {
+    EXPECT_LE(c["bytes"], uniform["bytes"]);
+    EXPECT_GT(c["rendered_ssim"], 0.3);
+    EXPECT_LE(c["rendered_ssim"], 1);
+    EXPECT_GE(c["rendered_difference"], 0);
+  }
+  EXPECT_GE(choices[3]["surface_ssim"].get<double>(), uniform["surface_ssim"].get<double>() - 1e-6);
+  const std::string picture = read_text(png);
+  ASSERT_GT(picture.size(), 24u);
+  EXPECT_EQ(picture.substr(1, 3), "PNG");
+  EXPECT_EQ(static_cast<unsigned char>(picture[18]) * 256 + static_cast<unsigned char>(picture[19]), 5 * 64);
+
+  const CommandResult again = texmesh({"study", "quality", scan, "--size", "64", "--views", "2", "--quality",
+                                       "30", "--json", "--no-cache", "-j", "1"});
+  EXPECT_EQ(again.output, r.output);  // the same on one thread
+}
+
+TEST_F(StudyCommand, WhatCannotBeStudied) {
+  EXPECT_EQ(texmesh({"study"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "fragments"}).exit_code, 2);
+  const std::string good = image("good.png", 3);
+  EXPECT_EQ(texmesh({"study", "fragments", good, "--qualities", "50,50"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "fragments", good, "--qualities", "0"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "fragments", good, "--grids", "65"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "quality", good, "-o", folder / "x.jpg"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "quality", good, "--view", "6"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "fragments", folder / "none.png"}).exit_code, 1);
+  write_text(folder / "bad.png", read_text(good).substr(0, 200));
+  const CommandResult bad = texmesh({"study", "fragments", folder / "bad.png"});
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_NE(bad.errors.find("bad.png"), std::string::npos) << bad.errors;
+  write_text(folder / "plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const CommandResult plain = texmesh({"study", "quality", folder / "plain.obj", "--no-cache"});
+  EXPECT_EQ(plain.exit_code, 1);
+  EXPECT_NE(plain.errors.find("texture"), std::string::npos) << plain.errors;
+  EXPECT_EQ(texmesh({"study", "quality", "--help"}).output.find("Fig. 3.9") != std::string::npos, true);
+}
+
+}  // namespace
+}  // namespace texmesh::testing
