@@ -1,0 +1,332 @@
+#include "delivery/cpp/harmonic_time.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "format/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kWindowFactor = 1.5;  // of throughput x round trip
+constexpr std::size_t kWindowSamples = 10, kGuardSamples = 20;
+constexpr double kLargestExponent = 12;  // of kPrice's factor: 1.6e5 either way
+constexpr double kLateFactor = 1.5;      // what is asked for may take this much longer than is left
+
+void require(bool good, const char* what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+void check(const std::vector<FragmentOffer>& offers, const HtcOptions& o) {
+  require(offers.size() < 1u << 24, "HarmonicTimePlan: fewer than 2^24 fragments");
+  require(o.time_limit_s > 0 && o.time_limit_s <= 1e6, "HarmonicTimePlan: time limit in (0, 1e6] s");
+  require(o.throughput.initial_bytes_s > 0, "HarmonicTimePlan: initial throughput > 0");
+  require(o.rtt_s >= 0 && o.rtt_s < 1e4, "HarmonicTimePlan: round trip in [0, 1e4) s");
+  require(o.window >= 0 && o.max_in_flight >= 1 && o.guard > 1, "HarmonicTimePlan: window, guard");
+  for (const FragmentOffer& f : offers) {
+    require(!f.bytes.empty() && f.loss.size() == f.bytes.size() + 1,
+            "FragmentOffer: a loss per rung and one more");
+    require(f.planned_bytes > 0 && f.planned_bytes < 1e12, "FragmentOffer: planned bytes > 0");
+    for (const std::uint32_t b : f.bytes) require(b > 0, "FragmentOffer: bytes > 0");
+    for (const double l : f.loss) require(l >= 0 && l < 1e300, "FragmentOffer: loss >= 0");
+    require(std::isfinite(f.eta), "FragmentOffer: eta");
+  }
+}
+
+std::vector<double> harmonic_numbers(std::size_t n) {
+  std::vector<double> h(n + 2, 0.0);
+  for (std::size_t i = 1; i < h.size(); ++i) h[i] = h[i - 1] + 1.0 / static_cast<double>(i);
+  return h;
+}
+
+/// The fragment with eta nearest the mean (ties: the first).
+std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers) {
+  double sum = 0;
+  for (const FragmentOffer& f : offers) sum += f.eta;
+  const double mean = sum / static_cast<double>(std::max<std::size_t>(offers.size(), 1));
+  std::uint32_t best = 0;
+  for (std::uint32_t i = 1; i < offers.size(); ++i)
+    if (std::abs(offers[i].eta - mean) < std::abs(offers[best].eta - mean)) best = i;
+  return best;
+}
+
+std::size_t lowest(const FragmentOffer& f, bool hard) {
+  return hard ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
+}
+std::size_t highest(const FragmentOffer& f) { return std::min<std::size_t>(f.high_rung, f.bytes.size() - 1); }
+
+}  // namespace
+
+HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcOptions& options)
+    : offers_(std::move(offers)), options_(options), throughput_(options.throughput) {
+  check(offers_, options_);
+  const std::size_t n = offers_.size();
+  std::vector<std::size_t> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return offers_[a].eta > offers_[b].eta; });
+  harmonic_ = harmonic_numbers(n);
+  sorted_.assign(order.begin(), order.end());
+  steps_.reserve(n);
+  step_of_offer_.assign(n, n);
+  taken_.assign(n, false);
+  right_ = static_cast<std::uint32_t>(n);
+  mean_ = mean_fragment(offers_);
+  for (const FragmentOffer& f : offers_) {
+    planned_total_ += f.planned_bytes;
+    smallest_left_ += f.bytes[lowest(f, options_.hard_limits)];
+  }
+  planned_left_ = planned_total_;
+  if (options_.policy == Policy::kPrice) plan_prices();
+}
+
+// The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
+void HarmonicTimePlan::plan_prices() {
+  const double budget = options_.time_limit_s * options_.throughput.initial_bytes_s;
+  const auto bytes_at = [&](double price) {
+    double sum = 0;
+    for (const FragmentOffer& f : offers_) {
+      const std::int32_t rung = cheapest_rung_of(f, price, true, budget);
+      sum += rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)];
+    }
+    return sum;
+  };
+  double low = -60, high = 60;  // of ln(price)
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (bytes_at(portable::exp(middle)) > budget ? low : high) = middle;
+  }
+  price_0_ = portable::exp(high);
+  price_bytes_.reserve(offers_.size());
+  for (const FragmentOffer& f : offers_) {
+    const std::int32_t rung = cheapest_rung_of(f, price_0_, true, budget);
+    price_bytes_.push_back(rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)]);
+    price_total_ += price_bytes_.back();
+  }
+}
+
+double HarmonicTimePlan::throughput_bytes_s() const {
+  // With several requests in flight completions come in bunches: only sums over some of them say anything.
+  if (options_.window != 1 && options_.throughput.estimator == Estimator::kLast)
+    return throughput_.recent_bytes_s(kWindowSamples);
+  return throughput_.bytes_s();
+}
+
+bool HarmonicTimePlan::window_open() const {
+  if (options_.window > 0) return in_flight_ < static_cast<std::uint32_t>(options_.window);
+  if (in_flight_ < 2) return true;
+  if (in_flight_ >= static_cast<std::uint32_t>(options_.max_in_flight)) return false;
+  return in_flight_bytes_ < kWindowFactor * throughput_.recent_bytes_s(kWindowSamples) * options_.rtt_s;
+}
+
+const HtcStep* HarmonicTimePlan::next(double now_s) {
+  while (!all_issued() && window_open()) {
+    const std::size_t position = steps_.size() + 1;
+    const double credit = credit_at(position);
+    const std::uint32_t offer = choose_offer(credit);
+    const FragmentOffer& f = offers_[offer];
+    HtcStep step;
+    step.position = static_cast<std::uint32_t>(position);
+    step.offer = offer;
+    step.credit_s = credit;
+    step.theta_s = theta_of(offer) + credit;
+    step.throughput_bytes_s = throughput_bytes_s();
+    step.target_bytes = target_of(offer, step.theta_s, now_s);
+    step.rung = rung_of(offer, step.target_bytes, now_s);
+    step.bytes = step.rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(step.rung)];
+    step.issued_s = now_s;
+    take(offer);
+    step_of_offer_[offer] = steps_.size();
+    steps_.push_back(step);
+    if (step.rung < 0) {  // no transfer: it takes no time and says nothing of the link
+      HtcStep& skipped = steps_.back();
+      skipped.done_s = now_s;
+      skipped.residual_s = skipped.theta_s;
+      spread(skipped.residual_s);
+      continue;
+    }
+    ++in_flight_;
+    in_flight_bytes_ += step.bytes;
+    return &steps_.back();
+  }
+  return nullptr;
+}
+
+std::uint32_t HarmonicTimePlan::choose_offer(double credit) const {
+  const bool in_order = options_.policy == Policy::kPrice;
+  if (steps_.empty() && !in_order) return mean_;
+  bool finest = true;
+  if (!in_order && options_.order == HtcOrder::kCredit) finest = credit <= 0;
+  if (!in_order && options_.order == HtcOrder::kBeta0)
+    finest = throughput_bytes_s() <= options_.throughput.initial_bytes_s;
+  std::uint32_t left = left_, right = right_;
+  while (left < right && taken_[sorted_[left]]) ++left;
+  while (left < right && taken_[sorted_[right - 1]]) --right;
+  return sorted_[finest ? left : right - 1];
+}
+
+void HarmonicTimePlan::take(std::uint32_t offer) {
+  const FragmentOffer& f = offers_[offer];
+  taken_[offer] = true;
+  while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
+  while (left_ < right_ && taken_[sorted_[right_ - 1]]) --right_;
+  planned_left_ -= f.planned_bytes;
+  smallest_left_ -= f.bytes[lowest(f, options_.hard_limits)];
+  if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
+}
+
+double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
+  return options_.time_limit_s * (offers_[offer].planned_bytes / planned_total_);
+}
+
+// credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
+double HarmonicTimePlan::credit_at(std::size_t position) const {
+  double credit = 0;
+  for (const Credit& c : credits_) credit += c.value / static_cast<double>(position - c.issued + 1);
+  return credit;
+}
+
+void HarmonicTimePlan::spread(double residual_s) {
+  const std::size_t issued = steps_.size(), left = offers_.size() - issued;
+  if (left == 0) {
+    unspent_s_ += residual_s;
+    return;
+  }
+  const double zeta = harmonic_[left + 1] - 1.0;  // 1/2 + ... + 1/(left + 1)
+  credits_.push_back({residual_s / zeta, issued});
+}
+
+/// What a plan in proportion to the planned sizes gives, as a factor of them.
+double HarmonicTimePlan::proportional_share(double now_s, std::size_t samples) const {
+  const double beta = samples ? throughput_.recent_bytes_s(samples) : throughput_bytes_s();
+  const double room = beta * (options_.time_limit_s - now_s) - in_flight_bytes_;
+  return std::max(0.0, room) / std::max(planned_left_, 1.0);
+}
+
+double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double now_s) const {
+  const FragmentOffer& f = offers_[offer];
+  switch (options_.policy) {
+    case Policy::kStatic:
+    case Policy::kPrice:
+      return f.planned_bytes;
+    case Policy::kProportional:
+      return f.planned_bytes * proportional_share(now_s, 0);
+    case Policy::kHtc:
+    case Policy::kGuard:
+      break;
+  }
+  if (steps_.empty()) return f.planned_bytes;  // F-bar has the quality Q_i
+  // Alone in flight it has to wait for a round trip first.
+  const double wait = options_.window == 1 ? options_.rtt_s : 0;
+  const double target = throughput_bytes_s() * (theta_s - wait);
+  if (options_.policy == Policy::kHtc) return target;
+  const double even = f.planned_bytes * proportional_share(now_s, kGuardSamples);
+  return std::clamp(target, even / options_.guard, even * options_.guard);
+}
+
+bool HarmonicTimePlan::may_skip(double now_s) const {
+  if (options_.hard_limits) return false;
+  if (options_.policy == Policy::kHtc || options_.policy == Policy::kStatic) return true;
+  const double room = throughput_.recent_bytes_s(kWindowSamples) * (options_.time_limit_s - now_s);
+  return smallest_left_ > room - in_flight_bytes_;
+}
+
+std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
+  const FragmentOffer& f = offers_[offer];
+  const bool skip = may_skip(now_s);
+  if (options_.policy != Policy::kPrice) return nearest_rung_of(f, target, skip);
+  const double room = throughput_.recent_bytes_s(kWindowSamples) * (options_.time_limit_s - now_s);
+  return cheapest_rung_of(f, price_at(now_s), skip, std::max(0.0, kLateFactor * room - in_flight_bytes_));
+}
+
+std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool may_skip) const {
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, options_.hard_limits));
+  double distance = std::abs(target - (best < 0 ? 0.0 : f.bytes[static_cast<std::size_t>(best)]));
+  for (std::size_t r = lowest(f, options_.hard_limits); r <= highest(f); ++r)
+    if (const double d = std::abs(target - f.bytes[r]); d < distance) {
+      distance = d;
+      best = static_cast<std::int32_t>(r);
+    }
+  return best;
+}
+
+std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double price, bool may_skip,
+                                                double most_bytes) const {
+  const std::size_t low = lowest(f, options_.hard_limits);
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
+  double cost = may_skip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
+  for (std::size_t r = low; r <= highest(f); ++r) {
+    if (f.bytes[r] > most_bytes) continue;
+    if (const double c = f.loss[r + 1] + price * f.bytes[r]; c < cost) {
+      cost = c;
+      best = static_cast<std::int32_t>(r);
+    }
+  }
+  return best;
+}
+
+double HarmonicTimePlan::price_at(double now_s) const {
+  const double planned_s = price_total_ > 0 ? options_.time_limit_s * (price_done_ / price_total_) : 0;
+  // What is in flight has been issued but not paid for yet.
+  const double lag = now_s - (planned_s - in_flight_bytes_ / throughput_bytes_s());
+  const double left = std::max(options_.time_limit_s - now_s, 1e-3 * options_.time_limit_s);
+  const double exponent = std::clamp(options_.price_kappa * lag / left, -kLargestExponent, kLargestExponent);
+  return price_0_ * portable::exp(exponent);
+}
+
+void HarmonicTimePlan::completed(std::uint32_t offer, double now_s) {
+  require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
+  finish(steps_[step_of_offer_[offer]], now_s, true);
+}
+
+void HarmonicTimePlan::failed(std::uint32_t offer, double now_s) {
+  require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
+  HtcStep& step = steps_[step_of_offer_[offer]];
+  finish(step, now_s, false);
+  step.rung = -1;
+}
+
+void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
+  require(step.done_s < 0 && now_s >= last_done_s_, "HarmonicTimePlan: completed twice, or time runs back");
+  step.done_s = now_s;
+  step.spacing_s = now_s - last_done_s_;
+  step.residual_s = step.theta_s - step.spacing_s;
+  if (sample) throughput_.add(step.bytes, now_s - std::max(last_done_s_, step.issued_s + options_.rtt_s));
+  last_done_s_ = now_s;
+  --in_flight_;
+  in_flight_bytes_ -= step.bytes;
+  spread(step.residual_s);
+}
+
+std::vector<std::int32_t> HarmonicTimePlan::rungs() const {
+  std::vector<std::int32_t> rungs(offers_.size(), -1);
+  for (const HtcStep& s : steps_) rungs[s.offer] = s.rung;
+  return rungs;
+}
+
+HtcTheorem theorem_of(const HarmonicTimePlan& plan) {
+  HtcTheorem t;
+  const std::vector<HtcStep>& steps = plan.steps();
+  if (steps.empty()) return t;
+  const std::size_t n = steps.size();
+  const HtcStep& last = steps.back();
+  t.surplus_s = plan.surplus_s();
+  t.last_residual_s = last.residual_s;
+  if (last.bytes > 0) {
+    const double beta_n = last.bytes / last.spacing_s;
+    t.corrected_bound_s = std::abs(last.theta_s) * std::abs(last.throughput_bytes_s / beta_n - 1) +
+                          std::abs(last.target_bytes - last.bytes) / beta_n;
+  } else {
+    t.corrected_bound_s = std::abs(last.theta_s);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k + 1 < n; ++k) sum += steps[k].residual_s;
+  const double mean = n > 1 ? sum / static_cast<double>(n - 1) : 0;
+  const double log_n = portable::log(static_cast<double>(std::max<std::size_t>(n, 3)));
+  t.published_bound_s =
+      last.residual_s + (n > 1 ? steps[n - 2].residual_s / 2 : 0) + (1.088 + portable::log(log_n)) * mean;
+  return t;
+}
+
+}  // namespace texmesh

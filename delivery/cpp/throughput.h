@@ -1,0 +1,42 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace texmesh {
+
+/// How the throughput of the next transfer is guessed from those that have ended (bytes per second).
+/// kLast: the last one's, the thesis's choice and the right one for meeting a deadline with one request at a
+/// time. kHarmonic: bytes over seconds of the last `samples`, a harmonic mean in which large transfers count
+/// more, since small ones mostly measure latency. kEwma: exponentially weighted mean with weight `ewma`, less
+/// for transfers below `small_bytes`.
+enum class Estimator : std::uint8_t { kLast, kHarmonic, kEwma };
+struct ThroughputOptions {
+  Estimator estimator = Estimator::kHarmonic;
+  int samples = 10;              // 1 .. 64
+  double ewma = 0.2;             // 0 .. 1
+  double small_bytes = 4000;     // > 0
+  double initial_bytes_s = 1e5;  // beta_0, until there is a sample; > 0
+};
+
+/// Throughput of a connection or a group of them. Plain double arithmetic: the same bits everywhere.
+class Throughput {
+ public:
+  explicit Throughput(const ThroughputOptions& options);
+  /// `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns.
+  void add(double bytes, double seconds);
+  double bytes_s() const;                            // by the estimator chosen
+  double recent_bytes_s(std::size_t samples) const;  // bytes over seconds of at most so many samples
+  std::size_t sample_count() const { return count_; }
+
+ private:
+  struct Sample {
+    double bytes = 0, seconds = 0;
+  };
+  ThroughputOptions options_;
+  std::vector<Sample> ring_;  // the newest at (count_ - 1) % size
+  std::size_t count_ = 0;
+  double ewma_ = 0;
+};
+
+}  // namespace texmesh
