@@ -18,7 +18,9 @@ struct JpegKind {
   int quality = 75;            // IJG, 1..100
   Subsampling subsampling = Subsampling::k420;
   /// Three channels of data, coded as they are instead of as YCbCr, without subsampling. Streams say so by an
-  /// Adobe marker, which every decoder knows.
+  /// Adobe marker, which every decoder knows. Measured at equal bytes on maps that never were JPEGs: 4:4:4
+  /// YCbCr turns normals by 1.1 to 1.5 times as much and has 1.3 to 2 times the error in other data; 4:2:0
+  /// 1.1 to 2.5 and 1.6 to 4.5 times.
   bool rgb = false;
   bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
 };

@@ -63,7 +63,9 @@ std::uint32_t octave(std::uint32_t x, std::uint32_t y, std::uint32_t c, std::uin
   return static_cast<std::uint32_t>((top * (step - b) + low * b) / (std::uint64_t{step} * step));
 }
 
-/// A spectrum like a photograph's: amplitude falls with frequency; colours vary slowly.
+/// A spectrum like a photograph's down to 128 px, and nothing coarser: neighbouring rows of a fragment are as
+/// different as any two, so every row begins with a large DC step, and fragments have more rows than the
+/// whole image. It costs up to 3 % against one optimised file where scans cost less than 2.
 Pixels made_texture(std::uint32_t size) {
   Pixels out{size, size, 3, {}};
   out.data.resize(std::size_t{size} * size * 3);
