@@ -21,10 +21,12 @@ struct Mesh {
   std::vector<Vec3f> positions;  // local frame, object units, finite
   std::vector<std::uint32_t> wedge_position;  // per wedge: index into positions
   // Per wedge, each either empty (the mesh has no such attribute) or as long as wedge_position:
-  std::vector<Vec2f> uv0, uv1;                   // glTF convention, v grows downwards; may lie outside 0..1
-  std::vector<Vec3f> normals;                    // unit length
-  std::vector<Vec4f> colours;                    // linear RGBA, 0..1
-  std::vector<Triangle> triangles;               // wedge indices
+  std::vector<Vec2f> uv0, uv1;      // glTF convention, v grows downwards; may lie outside 0..1
+  std::vector<Vec3f> normals;       // unit length
+  std::vector<Vec4f> colours;       // linear RGBA, 0..1
+  std::vector<Vec4f> tangents;      // direction of growing u, unit length, and the sign (w = 1 or -1) of
+                                    // cross(normal, tangent) along v, as glTF; all 0 = none here
+  std::vector<Triangle> triangles;  // wedge indices
   std::vector<std::uint16_t> triangle_material;  // per triangle: index into Model::materials
   std::vector<std::uint16_t> triangle_part;      // per triangle: index into part_names
   std::vector<std::string> part_names;           // node names of the source; at least one
@@ -36,7 +38,7 @@ struct Mesh {
   friend bool operator==(const Mesh&, const Mesh&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.triangles,
+    a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.tangents, s.triangles,
       s.triangle_material, s.triangle_part, s.part_names);
   }
 };
@@ -129,6 +131,9 @@ struct Material {
   }
 };
 
+/// A normal map, or a direction, of the material is given in tangent space.
+bool needs_tangents(const Material& material);
+
 /// Calls f with every texture reference of a material, used or not; extensions' after the core's.
 template <class M, class F>
 void for_each_texture(M& material, F&& f) {
@@ -151,11 +156,12 @@ struct Image {
   std::uint32_t width_px = 0, height_px = 0;
   std::uint8_t channels = 0;          // 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
   std::uint8_t bits_per_channel = 0;  // 8, 16 or 32 (float)
+  bool honour_profile = false;        // colours are converted to sRGB by what the file says of them
   std::vector<std::uint8_t> bytes;    // the file
   friend bool operator==(const Image&, const Image&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.name, s.format, s.width_px, s.height_px, s.channels, s.bits_per_channel, s.bytes);
+    a(s.name, s.format, s.width_px, s.height_px, s.channels, s.bits_per_channel, s.honour_profile, s.bytes);
   }
 };
 

@@ -4,6 +4,7 @@
 #include <OpenImageIO/oiioversion.h>
 #include <draco/core/draco_version.h>
 #include <meshoptimizer.h>
+#include <png.h>
 #include <webp/encode.h>
 #include <zlib.h>
 
@@ -26,6 +27,7 @@ const std::map<std::string, std::string>& library_versions() {
       {"cgal", CGAL_VERSION_STR},
       {"draco", draco::kDracoVersion},
       {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
+      {"libpng", PNG_LIBPNG_VER_STRING},
       {"libwebp", webp_version()},
       {"meshoptimizer", std::to_string(MESHOPTIMIZER_VERSION)},
       {"openimageio", OIIO_VERSION_STRING},

@@ -29,7 +29,7 @@ void check_indices(const Mesh& m) {
           m.triangle_material.size());
   require(m.triangle_part.size() == m.triangles.size(), "triangle_part", "one per triangle",
           m.triangle_part.size());
-  for (std::size_t size : {m.uv0.size(), m.uv1.size(), m.normals.size(), m.colours.size()})
+  for (std::size_t size : {m.uv0.size(), m.uv1.size(), m.normals.size(), m.colours.size(), m.tangents.size()})
     require(size == 0 || size == m.wedge_count(), "wedge attributes", "none or one per wedge", size);
 }
 
@@ -64,6 +64,7 @@ Mesh clean_attributes(const Mesh& in, std::uint64_t& repaired) {
   m.uv1 = in.uv1;
   m.normals = in.normals;
   m.colours = in.colours;
+  m.tangents = in.tangents;
   m.positions = in.positions;
   for (std::size_t w = 0; w < m.wedge_count(); ++w) {
     bool sound = true;
@@ -76,6 +77,9 @@ Mesh clean_attributes(const Mesh& in, std::uint64_t& repaired) {
       for (float* x : {&m.colours[w].x, &m.colours[w].y, &m.colours[w].z, &m.colours[w].w})
         sound = clean(*x, 1) && sound;
     if (!m.normals.empty()) sound = clean_normal(m.normals[w]) && sound;
+    if (!m.tangents.empty())
+      for (float* x : {&m.tangents[w].x, &m.tangents[w].y, &m.tangents[w].z, &m.tangents[w].w})
+        sound = clean(*x, 0) && sound;
     repaired += !sound;
   }
   return m;
@@ -214,6 +218,7 @@ void append_wedge(const Mesh& from, std::uint32_t w, std::uint32_t position, Mes
   if (!from.uv1.empty()) to.uv1.push_back(from.uv1[w]);
   if (!from.normals.empty()) to.normals.push_back(from.normals[w]);
   if (!from.colours.empty()) to.colours.push_back(from.colours[w]);
+  if (!from.tangents.empty()) to.tangents.push_back(from.tangents[w]);
 }
 
 /// Wedges in the input's order, then one for every wedge and position that a split added.

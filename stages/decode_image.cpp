@@ -12,7 +12,10 @@
 
 #include "format/errors.h"
 #include "format/portable_math.h"
+#include "stages/colour_profile.h"
 #include "stages/decode_jpeg.h"
+#include "stages/decode_png.h"
+#include "stages/image_metadata.h"
 
 namespace texmesh {
 namespace {
@@ -141,18 +144,15 @@ void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const Imag
     throw InputError(name, "image header", "1 to 64 channels", std::to_string(spec.nchannels));
 }
 
-// Deflate cannot shrink more than 1032-fold: what claims more lies about its size, and is told so before
-// memory is taken.
-void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
-  if (image.format != ImageFormat::kPng) return;
-  const auto bits = static_cast<std::uint64_t>(std::max(1, spec.get_int_attribute("oiio:BitsPerSample", 1)));
-  // A palette entry of one bit is the least a PNG stores per pixel, whatever the decoded channels are.
-  const std::uint64_t raw =
-      static_cast<std::uint64_t>(image.width_px) * image.height_px * (bits < 8 ? bits : 1) / 8;
-  if (raw / 1032 > image.bytes.size())
-    throw InputError(image.name, "image header",
-                     "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
-                     std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
+// No packer of TIFF or EXR shrinks a picture with any noise further: what claims more lies about its size,
+// and is told so before memory is taken. (Deflate ends at 1032; the rest is for the newer ones.)
+void check_plausible(const Image& image) {
+  constexpr std::uint64_t kMostShrunk = 20000;
+  if (std::uint64_t{image.width_px} * image.height_px * image.channels / kMostShrunk <= image.bytes.size())
+    return;
+  throw InputError(image.name, "image header",
+                   "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
+                   std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
 }
 
 OpenImage open_checked(const Image& image) {
@@ -161,18 +161,40 @@ OpenImage open_checked(const Image& image) {
       static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
       colour_channels(open.spec) != image.channels)
     throw InputError(image.name, "image header", "the size that import had found", "another one");
-  check_plausible(image, open.spec);
+  check_plausible(image);
   return open;
 }
 
-// The file's own samples as T. Errors of the reader, truncation included, are InputError.
+[[noreturn]] void fail_pixels(const Image& image, OpenImage& open, const std::string& place) {
+  throw InputError(image.name, place, std::string("a whole ") + image_format_name(image.format),
+                   reader_error(*open.input));
+}
+
+// The file's own samples as T. Errors of the reader, truncation included, are InputError and name the rows.
 template <class T>
 std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc type) {
-  std::vector<T> samples(static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
-  if (!open.input->read_image(0, 0, 0, static_cast<int>(image.channels), type, samples.data()) ||
-      open.input->has_error())
-    throw InputError(image.name, "pixels", std::string("a whole ") + image_format_name(image.format),
-                     reader_error(*open.input));
+  const int channels = static_cast<int>(image.channels), height = static_cast<int>(image.height_px);
+  const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
+  std::vector<T> samples;
+  if (open.spec.tile_width > 0) {
+    samples.resize(row * image.height_px);
+    if (!open.input->read_image(0, 0, 0, channels, type, samples.data()) || open.input->has_error())
+      fail_pixels(image, open, "pixels");
+    return samples;
+  }
+  constexpr int kRows = 64;                // at once
+  samples.reserve(row * image.height_px);  // not touched before it is read
+  const int first = open.spec.y;           // the data window of an EXR may begin anywhere
+  for (int y = 0; y < height; y += kRows) {
+    const int end = std::min(height, y + kRows);
+    samples.resize(row * static_cast<std::size_t>(end));
+    T* to = samples.data() + row * static_cast<std::size_t>(y);
+    if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, type, to) ||
+        open.input->has_error())
+      fail_pixels(
+          image, open,
+          "rows " + std::to_string(y) + " to " + std::to_string(end - 1) + " of " + std::to_string(height));
+  }
   return samples;
 }
 
@@ -214,11 +236,83 @@ Pixels decode_jpeg_pixels(const Image& image) {
   return pixels;
 }
 
+void check_png_unchanged(const Image& image) {
+  const PngHeader header = read_png_header(image.name, image.bytes);
+  if (header.width_px != image.width_px || header.height_px != image.height_px ||
+      header.channels != image.channels || header.bits != image.bits_per_channel)
+    throw InputError(image.name, "PNG header", "the size that import had found", "another one");
+}
+
+// Every sample of a PNG, 16-bit ones as words.
+template <class T>
+std::vector<T> read_png(const Image& image) {
+  const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
+  std::vector<T> samples;
+  samples.reserve(row * image.height_px);  // filled row by row, so that a header that lies costs nothing
+  decode_png(image.name, image.bytes, [&](const std::uint8_t* from) {
+    const std::size_t before = samples.size();
+    samples.resize(before + row);
+    std::memcpy(samples.data() + before, from, row * sizeof(T));
+  });
+  return samples;
+}
+
+std::vector<std::uint8_t> decode_png_pixels(const Image& image) {
+  return image.bits_per_channel == 16 ? bytes_from_words(read_png<std::uint16_t>(image))
+                                      : read_png<std::uint8_t>(image);
+}
+
 void check_jpeg_unchanged(const Image& image) {
   const JpegHeader header = read_jpeg_header(image.name, image.bytes);
   if (header.width_px != image.width_px || header.height_px != image.height_px ||
       header.channels != image.channels)
     throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
+}
+
+Pixels decode_stored(const Image& image, FloatEncoding encoding) {
+  if (image.format == ImageFormat::kJpeg) {
+    check_jpeg_unchanged(image);
+    return decode_jpeg_pixels(image);
+  }
+  Pixels pixels{image.width_px, image.height_px, image.channels, {}};
+  if (image.format == ImageFormat::kWebp) {
+    pixels.data = decode_webp(image);
+    return pixels;
+  }
+  if (image.format == ImageFormat::kPng) {
+    check_png_unchanged(image);
+    pixels.data = decode_png_pixels(image);
+    return pixels;
+  }
+  OpenImage open = open_checked(image);
+  switch (bits_of(open.spec)) {
+    case 8:
+      pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
+      break;
+    case 16:
+      pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16));
+      break;
+    default:
+      pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels,
+                                      encoding);
+  }
+  return pixels;
+}
+
+/// Nothing when the image is sRGB anyway.
+std::optional<ColourProfile> honoured_profile(const Image& image) {
+  const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
+  std::optional<ColourProfile> profile;
+  if (!metadata.icc_profile.empty()) {
+    if (metadata.cmyk)
+      throw InputError(image.name, "colour profile", "an RGB or grey image (convert it to sRGB)",
+                       "CMYK with a profile of its own");
+    profile = read_icc_profile(image.name, metadata.icc_profile, image.channels);
+  } else if (metadata.gamma > 0) {
+    profile = gamma_profile(metadata.gamma, image.channels);
+  }
+  if (profile && is_srgb(*profile)) profile.reset();
+  return profile;
 }
 
 }  // namespace
@@ -265,6 +359,13 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
     image.height_px = header.height_px;
     image.channels = static_cast<std::uint8_t>(header.channels);
     image.bits_per_channel = 8;
+  } else if (*format == ImageFormat::kPng) {
+    const PngHeader header = read_png_header(name, bytes);
+    check_size(name, header.width_px, header.height_px, limits);
+    image.width_px = header.width_px;
+    image.height_px = header.height_px;
+    image.channels = static_cast<std::uint8_t>(header.channels);
+    image.bits_per_channel = static_cast<std::uint8_t>(header.bits);
   } else if (*format == ImageFormat::kWebp) {
     const WebPBitstreamFeatures features = read_webp_header(name, bytes);
     image.width_px = static_cast<std::uint32_t>(features.width);
@@ -286,32 +387,22 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
 }
 
 Pixels decode_image(const Image& image, FloatEncoding encoding) {
-  if (image.format == ImageFormat::kJpeg) {
-    check_jpeg_unchanged(image);
-    return decode_jpeg_pixels(image);
-  }
-  if (image.format == ImageFormat::kWebp)
-    return {image.width_px, image.height_px, image.channels, decode_webp(image)};
-  OpenImage open = open_checked(image);
-  Pixels pixels{image.width_px, image.height_px, image.channels, {}};
-  switch (bits_of(open.spec)) {
-    case 8:
-      pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
-      break;
-    case 16:
-      pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16));
-      break;
-    default:
-      pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels,
-                                      encoding);
-  }
+  std::optional<ColourProfile> profile;  // found first: one that is refused need not wait for the pixels
+  if (encoding == FloatEncoding::kSrgb && image.honour_profile) profile = honoured_profile(image);
+  Pixels pixels = decode_stored(image, encoding);
+  if (profile && image.bits_per_channel <= 16) convert_to_srgb(*profile, pixels);
   return pixels;
 }
 
 FloatPixels decode_float(const Image& image) {
   FloatPixels pixels{image.width_px, image.height_px, image.channels, {}};
   auto widen = [&pixels](const auto& samples) { pixels.data.assign(samples.begin(), samples.end()); };
-  if (image.format == ImageFormat::kJpeg || image.format == ImageFormat::kWebp) {
+  if (image.format == ImageFormat::kPng && image.bits_per_channel == 16) {
+    check_png_unchanged(image);
+    widen(read_png<std::uint16_t>(image));
+    return pixels;
+  }
+  if (image.format != ImageFormat::kTiff && image.format != ImageFormat::kExr) {
     widen(decode_image(image).data);
     return pixels;
   }

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kDecodeImageVersion = 1;
+inline constexpr int kDecodeImageVersion = 2;
 
 /// Decoded pixels, row-major, interleaved, top row first.
 struct Pixels {
@@ -32,9 +32,9 @@ struct ImageLimits {
   std::uint64_t max_pixels = 20000ull * 20000ull;
 };
 
-/// What float samples (EXR, float TIFF) become: kAsIs for data (normals, roughness); kSrgb for colours,
-/// because float files hold linear light and every other image of a material is sRGB encoded. Integer images
-/// are never converted.
+/// What samples become: kAsIs for data (normals, roughness); kSrgb for colours: float files (EXR, float TIFF)
+/// hold linear light where every other image of a material is sRGB encoded, and images with
+/// Image::honour_profile go by their ICC profile or gamma (stages/colour_profile.h).
 enum class FloatEncoding : std::uint8_t { kAsIs, kSrgb };
 
 /// The allow-listed format that the first bytes show, nothing for any other content.
@@ -51,8 +51,10 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
 
 /// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,
 /// NaN is 0), with the channel count of the file (1..4), top row first, no colour conversion beyond
-/// `encoding`, alpha not multiplied in, EXIF orientation ignored as glTF viewers do. Single-threaded; the
-/// same bytes for every run. Throws InputError when the file is truncated or lies about its size.
+/// `encoding`, alpha not multiplied in. Rows and columns are those of the file whatever its EXIF orientation
+/// says: texture coordinates count from the first stored pixel. Single-threaded; the same bytes for every
+/// run. Throws InputError when the file is truncated (with the row), lies about its size, or has a colour
+/// profile to be honoured that cannot be.
 Pixels decode_image(const Image& image, FloatEncoding encoding = FloatEncoding::kAsIs);
 
 /// Decodes without loss of range, for measured data such as range scans. Errors as decode_image.

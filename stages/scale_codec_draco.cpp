@@ -42,7 +42,7 @@ std::string exact(float x) {
 void quantise(draco::ExpertEncoder& encoder, int id, const QuantisationGrid& grid, int dimensions) {
   if (grid.bits == 0) return;
   std::string origin;
-  for (int k = 0; k < dimensions; ++k) origin += exact(grid.origin[k]) + " ";
+  for (int k = 0; k < dimensions; ++k) origin += exact(grid.origin[std::min(k, 2)]) + " ";
   draco::Options options;
   options.SetInt("quantization_bits", grid.bits);
   options.SetString("quantization_origin", origin);
@@ -67,6 +67,8 @@ class DracoPrimitive {
     for (int set = 0; set < 2; ++set)
       if (coding.write_uv[set]) add_uv(set);
     if (!coding.mesh.colours.empty()) add_colours();
+    if (coding.writes_tangents(primitive)) add_tangents();
+    if (!primitive.wedge_part.empty()) add_parts();
   }
 
   CodedPrimitive code(GlbWriter& writer) {
@@ -168,6 +170,22 @@ class DracoPrimitive {
     quantised_.push_back({id, coding_.uv[set], 2});
     attributes_.push_back(
         {"TEXCOORD_" + std::to_string(set), id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC2"}}});
+  }
+
+  void add_parts() {
+    const int id = add_attribute(
+        mesh_, draco::GeometryAttribute::GENERIC, 1, draco::DT_UINT16, false, primitive_.wedges.size(),
+        [&](std::uint32_t i) { return std::array<std::uint16_t, 1>{primitive_.wedge_part[i]}; });
+    attributes_.push_back({"_FEATURE_ID_0", id, {{"componentType", 5123}, {"count", 0}, {"type", "SCALAR"}}});
+  }
+
+  void add_tangents() {
+    const int id = add_attribute(
+        mesh_, draco::GeometryAttribute::GENERIC, 4, draco::DT_FLOAT32, false, primitive_.wedges.size(),
+        [&](std::uint32_t i) { return coding_.mesh.tangents[primitive_.wedges[i]]; });
+    // From -1 to 1, so that w stays 1 or -1.
+    quantised_.push_back({id, {coding_.options.tangent_bits, {-1, -1, -1}, 2}, 4});
+    attributes_.push_back({"TANGENT", id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC4"}}});
   }
 
   template <class Element>

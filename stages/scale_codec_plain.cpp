@@ -22,7 +22,10 @@ void order_for_codec(ScalePrimitive& primitive) {
                               primitive.wedges.size());
   meshopt_optimizeVertexFetchRemap(remap.data(), indices.data(), indices.size(), primitive.wedges.size());
   std::vector<std::uint32_t> wedges(primitive.wedges.size());
+  std::vector<std::uint16_t> parts(primitive.wedge_part.size());
   for (std::size_t i = 0; i < remap.size(); ++i) wedges[remap[i]] = primitive.wedges[i];
+  for (std::size_t i = 0; i < parts.size(); ++i) parts[remap[i]] = primitive.wedge_part[i];
+  primitive.wedge_part = std::move(parts);
   for (std::uint32_t& i : indices) i = remap[i];
   primitive.indices = std::move(indices);
   primitive.wedges = std::move(wedges);
@@ -64,6 +67,8 @@ class PlainPrimitive {
     for (int set = 0; set < 2; ++set)
       if (coding_.write_uv[set]) attributes["TEXCOORD_" + std::to_string(set)] = uvs(set);
     if (!coding_.mesh.colours.empty()) attributes["COLOR_0"] = colours();
+    if (coding_.writes_tangents(primitive_)) attributes["TANGENT"] = tangents();
+    if (!primitive_.wedge_part.empty()) attributes["_FEATURE_ID_0"] = parts();
     coded.json["indices"] = indices();
     return coded;
   }
@@ -162,6 +167,42 @@ class PlainPrimitive {
     if (compact()) accessor["normalized"] = true;
     accessor["count"] = n_;
     accessor["type"] = "VEC3";
+    return writer_.add_accessor(std::move(accessor));
+  }
+
+  std::size_t parts() {
+    const Stream s = make_stream<std::uint16_t, 1>(
+        n_, 4, [&](std::size_t i) { return std::array<std::uint16_t, 1>{primitive_.wedge_part[i]}; });
+    return writer_.add_accessor(
+        {{"bufferView", add(s, false)}, {"componentType", 5123}, {"count", n_}, {"type", "SCALAR"}});
+  }
+
+  template <class T>
+  Stream coded_tangents() const {
+    constexpr float kOne = std::numeric_limits<T>::max();
+    return make_stream<T, 4>(n_, 4 * sizeof(T), [&](std::size_t i) {
+      const Vec4f t = coding_.mesh.tangents[primitive_.wedges[i]];
+      auto code = [](float x) {
+        return static_cast<T>(std::floor(std::clamp(x, -1.0f, 1.0f) * kOne + 0.5f));
+      };
+      return std::array<T, 4>{code(t.x), code(t.y), code(t.z), code(t.w)};
+    });
+  }
+
+  std::size_t tangents() {
+    const bool fine = coding_.options.tangent_bits > 8;
+    const Stream s = !compact() ? make_stream<float, 4>(n_, 16,
+                                                        [&](std::size_t i) {
+                                                          const Vec4f t =
+                                                              coding_.mesh.tangents[primitive_.wedges[i]];
+                                                          return std::array<float, 4>{t.x, t.y, t.z, t.w};
+                                                        })
+                     : fine     ? coded_tangents<std::int16_t>()
+                                : coded_tangents<std::int8_t>();
+    Json accessor{{"bufferView", add(s, false)}, {"componentType", !compact() ? 5126 : fine ? 5122 : 5120}};
+    if (compact()) accessor["normalized"] = true;
+    accessor["count"] = n_;
+    accessor["type"] = "VEC4";
     return writer_.add_accessor(std::move(accessor));
   }
 

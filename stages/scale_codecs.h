@@ -12,6 +12,7 @@ namespace texmesh {
 struct ScalePrimitive {
   std::uint16_t part = 0, material = 0;
   std::vector<std::uint32_t> wedges, indices;
+  std::vector<std::uint16_t> wedge_part;  // where parts are merged to one node: of each wedge; else empty
 };
 
 /// How the primitives of all scales are written.
@@ -20,7 +21,10 @@ struct ScaleCoding {
   const ScalesOptions& options;
   QuantisationGrid position, uv[2];
   bool write_uv[2] = {false, false};
-  bool fine_colours = false;  // 16 bits, because 8 would change them
+  bool fine_colours = false;   // 16 bits, because 8 would change them
+  std::vector<bool> tangents;  // per material: its primitives have them where their wedges do
+  /// Every wedge of the primitive has a tangent and its material needs it.
+  bool writes_tangents(const ScalePrimitive& primitive) const;
   const std::vector<Vec2f>& uv_values(int set) const { return set == 0 ? mesh.uv0 : mesh.uv1; }
   bool positions_are_indices() const {  // the node's transform then leads from grid indices to positions
     return position.bits > 0 &&

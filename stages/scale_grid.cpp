@@ -23,6 +23,36 @@ std::vector<float> edge_lengths(const Mesh& mesh) {
   return lengths;
 }
 
+/// The least mean edge of a part that can be seen beside the whole (1/4096 of its size, a pixel of a large
+/// screen), or 0: a small part under a node of its own scale needs finer steps than the average says.
+double finest_part_edge(const Mesh& mesh, double whole) {
+  struct Part {
+    double edges = 0;
+    std::size_t count = 0;
+    Vec3f lo, hi;
+  };
+  std::vector<Part> parts(mesh.part_names.size());
+  for (std::size_t t = 0; t < mesh.triangles.size() && !parts.empty(); ++t) {
+    Part& part = parts.at(mesh.triangle_part[t]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f p = mesh.positions[mesh.wedge_position[mesh.triangles[t][k]]];
+      const Vec3f q = mesh.positions[mesh.wedge_position[mesh.triangles[t][(k + 1) % 3]]];
+      if (part.count == 0) part.lo = part.hi = p;
+      for (int c = 0; c < 3; ++c)
+        part.lo[c] = std::min(part.lo[c], p[c]), part.hi[c] = std::max(part.hi[c], p[c]);
+      part.edges += length(q - p);
+      ++part.count;
+    }
+  }
+  double finest = 0;
+  for (const Part& part : parts) {
+    if (part.count == 0 || length(part.hi - part.lo) * 4096 < whole) continue;
+    const double mean = part.edges / static_cast<double>(part.count);
+    if (finest == 0 || mean < finest) finest = mean;
+  }
+  return finest;
+}
+
 std::size_t collapsed_triangles(const Mesh& mesh, const QuantisationGrid& grid) {
   std::size_t count = 0;
   for (const Triangle& t : mesh.triangles) {
@@ -77,6 +107,8 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
       std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
   // The farthest that a point moves is half the diagonal of a cell.
   grid.bits = std::max(kLeastBits, bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range));
+  if (const double part = finest_part_edge(mesh, length(size)); part > 0 && grid.bits <= max_bits)
+    grid.bits = std::max(grid.bits, std::min(max_bits, bits_for(grid.range, part / 8 * 2 / std::sqrt(3.0))));
   while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
   if (grid.bits > max_bits) grid.bits = 0;
   return grid;

@@ -24,8 +24,8 @@ struct QuantisationGrid {
 };
 
 /// Bits from the options, or so that a rounded position moves by at most 1/16 of the mean and 1/4 of the
-/// shorter edges, and at most one triangle in a thousand loses its area. `max_bits` is what the codec can
-/// hold; more means floats.
+/// shorter edges and 1/8 of the mean edge of any part that can be seen, and at most one triangle in a
+/// thousand loses its area. `max_bits` is what the codec can hold; more means floats.
 QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits);
 
 /// Bits from the options, or so that a rounded texture coordinate moves by at most 1/4 texel of the largest

@@ -49,7 +49,8 @@ bool needs_fine_colours(const std::vector<Vec4f>& colours) {
 ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials,
                         const std::vector<Image>& images, const ScalesOptions& options) {
   constexpr int kDracoBits = 24, kShortBits = 16;  // floats hold no more than 24; an unsigned short 16
-  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours)};
+  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours), {}};
+  for (const Material& m : materials) coding.tangents.push_back(needs_tangents(m));
   const bool draco = options.mesh_codec == MeshCodec::kDraco;
   coding.write_uv[1] = !mesh.uv1.empty() && uses_texcoord(materials, 1);
   coding.write_uv[0] = !mesh.uv0.empty();
@@ -70,14 +71,40 @@ ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials
 }
 
 /// Above this many parts they are merged: each costs 0.8 KB of JSON and a code stream of its own in every
-/// scale (a SketchUp model of 5,391 groups took 5.9 MB per scale, 4.2 MB of it JSON).
+/// scale (a SketchUp model of 5,391 groups took 5.9 MB per scale, 4.2 MB of it JSON). The names then stand in
+/// the mesh's extras, and a feature id per vertex (EXT_mesh_features) says which is whose.
 constexpr std::size_t kMostNodes = 256;
+
+bool parts_merged(const Mesh& mesh) { return mesh.part_names.size() > kMostNodes; }
+
+/// Numbers wedges in the order of their use. Where parts are merged a wedge that two of them share becomes
+/// two.
+void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
+                   std::vector<std::uint32_t>& index) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::map<std::pair<std::uint32_t, std::uint16_t>, std::uint32_t> shared;
+  for (std::size_t i = 0; i < p.indices.size(); ++i) {
+    const std::uint32_t wedge = p.indices[i];
+    const std::uint16_t of = part.empty() ? std::uint16_t{0} : part[i / 3];
+    std::uint32_t* at = &index[wedge];
+    if (*at != kNone && !part.empty() && p.wedge_part[*at] != of)
+      at = &shared.try_emplace({wedge, of}, kNone).first->second;
+    if (*at == kNone) {
+      *at = static_cast<std::uint32_t>(p.wedges.size());
+      p.wedges.push_back(wedge);
+      if (!part.empty()) p.wedge_part.push_back(of);
+    }
+    p.indices[i] = *at;
+  }
+  for (std::uint32_t w : p.wedges) index[w] = kNone;
+}
 
 /// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
 /// go.
 std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale,
                                              const QuantisationGrid& grid) {
-  std::map<std::array<std::uint16_t, 2>, ScalePrimitive> primitives;
+  std::map<std::array<std::uint16_t, 2>, std::pair<ScalePrimitive, std::vector<std::uint16_t>>> primitives;
+  const bool merged = parts_merged(mesh);
   for (std::size_t i = 0; i < scale.triangles.size(); ++i) {
     const Triangle& t = scale.triangles[i];
     if (grid.bits > 0) {
@@ -86,32 +113,24 @@ std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale
       if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
     }
     const std::uint32_t source = scale.triangle_source[i];
-    const std::uint16_t part =
-        mesh.part_names.size() > kMostNodes ? std::uint16_t{0} : mesh.triangle_part[source];
-    const std::array<std::uint16_t, 2> key{part, mesh.triangle_material[source]};
-    ScalePrimitive& p = primitives[key];
+    const std::uint16_t part = mesh.triangle_part[source];
+    const std::array<std::uint16_t, 2> key{merged ? std::uint16_t{0} : part, mesh.triangle_material[source]};
+    auto& [p, parts] = primitives[key];
     p.part = key[0], p.material = key[1];
     for (std::uint32_t w : t) p.indices.push_back(w);
+    if (merged) parts.push_back(part);
   }
   std::vector<ScalePrimitive> out;
   std::vector<std::uint32_t> index(mesh.wedge_count(), 0xffffffffu);
-  for (auto& [key, p] : primitives) {
-    for (std::uint32_t& w : p.indices) {
-      const std::uint32_t wedge = w;
-      if (index[wedge] == 0xffffffffu) {
-        index[wedge] = static_cast<std::uint32_t>(p.wedges.size());
-        p.wedges.push_back(wedge);
-      }
-      w = index[wedge];
-    }
-    for (std::uint32_t w : p.wedges) index[w] = 0xffffffffu;
-    out.push_back(std::move(p));
+  for (auto& [key, value] : primitives) {
+    number_wedges(value.first, value.second, index);
+    out.push_back(std::move(value.first));
   }
   return out;
 }
 
 std::string node_name(const Mesh& mesh, std::uint16_t part) {
-  return mesh.part_names.size() > kMostNodes ? "parts" : mesh.part_names.at(part);
+  return parts_merged(mesh) ? "parts" : mesh.part_names.at(part);
 }
 
 Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_index) {
@@ -145,6 +164,13 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
       writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
       writer.array("meshes").push_back(
           {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
+      if (parts_merged(coding.mesh))
+        writer.array("meshes").back()["extras"]["partNames"] = coding.mesh.part_names;
+    }
+    if (parts_merged(coding.mesh)) {
+      coded.json["extensions"]["EXT_mesh_features"]["featureIds"] = Json::array(
+          {{{"featureCount", coding.mesh.part_names.size()}, {"attribute", 0}, {"label", "part"}}});
+      writer.use_extension("EXT_mesh_features", false);
     }
     writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));
   }
@@ -205,6 +231,12 @@ double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
 
 }  // namespace
 
+bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
+  if (mesh.tangents.empty() || mesh.normals.empty() || !tangents.at(primitive.material)) return false;
+  return std::all_of(primitive.wedges.begin(), primitive.wedges.end(),
+                     [&](std::uint32_t w) { return mesh.tangents[w].w != 0; });
+}
+
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
                         const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
@@ -215,10 +247,13 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   for (std::size_t k = 0; k < scales.scales.size(); ++k)
     if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
   ScaleFiles result;
-  if (scales.mesh.part_names.size() > kMostNodes)
-    add_info(result.notes, "parts-merged", "",
-             std::to_string(scales.mesh.part_names.size()) + " parts became one node, because more than " +
-                 std::to_string(kMostNodes) + " would cost more bytes than the mesh");
+  if (parts_merged(scales.mesh))
+    add_info(
+        result.notes, "parts-merged", "",
+        std::to_string(scales.mesh.part_names.size()) + " parts became one node, because more than " +
+            std::to_string(kMostNodes) +
+            " would cost more bytes than the mesh; feature ids of the vertices count their names, which its "
+            "mesh lists in extras.partNames");
   result.position_bits = coding.position.bits;
   result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
   result.position_error = largest_rounding(scales.mesh, coding.position);

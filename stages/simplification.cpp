@@ -75,7 +75,8 @@ void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<Neste
               values.push_back(value);
             };
           };
-          repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals), repeat(mesh.colours);
+          repeat(mesh.uv0), repeat(mesh.uv1), repeat(mesh.normals), repeat(mesh.colours),
+              repeat(mesh.tangents);
         }
         w = id;
       }
@@ -102,7 +103,7 @@ void drop_far_scales(NestedScales& result, double limit) {
   auto cut = [last](auto& values) {
     if (values.size() > last + 1) values.resize(last + 1);
   };
-  cut(m.wedge_position), cut(m.uv0), cut(m.uv1), cut(m.normals), cut(m.colours);
+  cut(m.wedge_position), cut(m.uv0), cut(m.uv1), cut(m.normals), cut(m.colours), cut(m.tangents);
 }
 
 }  // namespace
@@ -159,7 +160,7 @@ Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
       if (!from.empty()) to.push_back(from[w]);
     };
     keep(in.uv0, out.uv0), keep(in.uv1, out.uv1), keep(in.normals, out.normals),
-        keep(in.colours, out.colours);
+        keep(in.colours, out.colours), keep(in.tangents, out.tangents);
   }
   out.triangles.reserve(scale.triangles.size());
   for (std::size_t i = 0; i < scale.triangles.size(); ++i) {

@@ -91,12 +91,13 @@ class WeldGrid {
 
 /// All attributes of a wedge, compared as bits.
 struct Attributes {
-  std::array<float, 11> values{};
+  std::array<float, 15> values{};
   Attributes(const Mesh& m, std::uint32_t w) {
     if (!m.uv0.empty()) std::memcpy(&values[0], &m.uv0[w], sizeof(Vec2f));
     if (!m.uv1.empty()) std::memcpy(&values[2], &m.uv1[w], sizeof(Vec2f));
     if (!m.normals.empty()) std::memcpy(&values[4], &m.normals[w], sizeof(Vec3f));
     if (!m.colours.empty()) std::memcpy(&values[7], &m.colours[w], sizeof(Vec4f));
+    if (!m.tangents.empty()) std::memcpy(&values[11], &m.tangents[w], sizeof(Vec4f));
   }
   int compare(const Attributes& other) const {
     return std::memcmp(values.data(), other.values.data(), sizeof values);

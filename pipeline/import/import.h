@@ -26,6 +26,12 @@ struct EnumNames<UpAxis> {
   static constexpr std::array<std::string_view, 3> names{"keep", "y", "z"};
 };
 
+enum class ProfilePolicy : std::uint8_t { kAuto, kHonour, kIgnore };
+template <>
+struct EnumNames<ProfilePolicy> {
+  static constexpr std::array<std::string_view, 3> names{"auto", "honour", "ignore"};
+};
+
 struct ImportOptions {
   int max_vertices = 50'000'000;  // positions, and wedges
   int max_triangles = 100'000'000;
@@ -34,6 +40,7 @@ struct ImportOptions {
   double max_image_pixels = 4e8;
   KdPolicy obj_kd = KdPolicy::kIgnore;
   UpAxis up = UpAxis::kKeep;
+  ProfilePolicy colour_profiles = ProfilePolicy::kAuto;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("max_vertices", s.max_vertices, Range{3, 2e9}, "refuse models with more vertices");
@@ -43,6 +50,10 @@ struct ImportOptions {
     v("max_image_pixels", s.max_image_pixels, Range{1, 4e9}, "refuse larger images");
     v("obj_kd", s.obj_kd,
       "OBJ: Kd beside map_Kd is ignored (as in MeshLab, Blender) or multiplied (as the MTL text says)");
+    v("colour_profiles", s.colour_profiles,
+      "ICC profiles and gamma of textures: auto = ignored in glTF, as its specification says, else converted "
+      "to "
+      "sRGB");
     v("up", s.up, "up axis of the source: keep and y leave coordinates alone, z turns them to glTF's y up");
   }
 };
@@ -94,7 +105,7 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
 
 /// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index
 /// returned; -1 and a warning "missing-texture" when it is not there. Content that no allow-listed reader
-/// takes throws InputError.
+/// takes throws InputError. Notes say what becomes of colour profiles, CMYK and EXIF orientation.
 std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
                        const std::string& place, const ImportOptions& options);
 std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,

@@ -4,8 +4,10 @@
 
 #include "format/errors.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/near_uvs.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/import/uri.h"
+#include "stages/image_metadata.h"
 
 namespace texmesh {
 namespace {
@@ -46,6 +48,32 @@ void note_foreign_extension(Model& model, const Image& image, const std::string&
              image.name + " holds a " + image_format_name(image.format) + " and is read as one");
 }
 
+// What an image says beside its pixels: what is done about it, and that a user should know.
+void apply_metadata(Model& model, Image& image, const std::string& place, const ImportOptions& options) {
+  const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
+  image.honour_profile = options.colour_profiles != ProfilePolicy::kIgnore;
+  const char* what = !metadata.icc_profile.empty() ? "an ICC profile"
+                     : metadata.gamma > 0          ? "a gamma"
+                                                   : nullptr;
+  if (what && !image.honour_profile)
+    add_info(model.notes, "colour-profile-ignored", place,
+             image.name + " has " + what + " that is ignored: its values are taken as sRGB");
+  if (what && image.honour_profile)
+    add_info(model.notes, "colour-profile", place,
+             image.name + " has " + what + ": where it gives colours they are converted to sRGB");
+  if (metadata.other_primaries)
+    add_warning(model.notes, "colour-primaries-ignored", place,
+                image.name + " names primaries (cHRM) other than sRGB's without a profile; they are ignored");
+  if (metadata.cmyk && metadata.icc_profile.empty())
+    add_info(model.notes, "cmyk-image", place,
+             image.name + " is CMYK without a profile; its inks are taken as ideal ones");
+  if (metadata.orientation != 1)
+    add_warning(model.notes, "exif-orientation", place,
+                image.name + " asks to be turned for display (EXIF orientation " +
+                    std::to_string(metadata.orientation) +
+                    "); texture coordinates count from its first stored pixel, so it is not turned");
+}
+
 // --- finish_model
 // -----------------------------------------------------------------------------------------------
 
@@ -69,7 +97,7 @@ void check_structure(const Model& model, const std::string& file_name) {
   };
   auto attribute = [wedges](std::size_t n) { return n == 0 || n == wedges; };
   require(attribute(mesh.uv0.size()) && attribute(mesh.uv1.size()) && attribute(mesh.normals.size()) &&
-              attribute(mesh.colours.size()),
+              attribute(mesh.colours.size()) && attribute(mesh.tangents.size()),
           "one value per wedge for every attribute");
   require(mesh.triangle_material.size() == mesh.triangles.size() &&
               mesh.triangle_part.size() == mesh.triangles.size(),
@@ -172,6 +200,24 @@ void clamp_colours(std::vector<Vec4f>& colours) {
   for (Vec4f& c : colours) c = {clamp(c.x), clamp(c.y), clamp(c.z), clamp(c.w)};
 }
 
+/// Unit length, w one of 1 and -1; what cannot be so is 0. Nothing at all where no normal map needs them.
+void repair_tangents(Model& model) {
+  std::vector<Vec4f>& tangents = model.mesh.tangents;
+  const bool wanted = std::any_of(model.materials.begin(), model.materials.end(),
+                                  [](const Material& m) { return needs_tangents(m); });
+  if (!wanted || model.mesh.normals.empty()) tangents.clear();
+  for (Vec4f& t : tangents) {
+    const Vec3d d{t.x, t.y, t.z};
+    const double l = length(d);
+    if (l > 1e-20 && std::isfinite(l) && std::isfinite(t.w)) {
+      const Vec3f unit = to_float(d * (1 / l));
+      t = {unit.x, unit.y, unit.z, t.w < 0 ? -1.0f : 1.0f};
+    } else {
+      t = {};
+    }
+  }
+}
+
 template <class T>
 void keep_marked(std::vector<T>& values, const std::vector<std::uint32_t>& new_index) {
   if (values.empty()) return;
@@ -207,6 +253,7 @@ void drop_unused_vertices(Model& model) {
   keep_marked(mesh.uv1, wedge);
   keep_marked(mesh.normals, wedge);
   keep_marked(mesh.colours, wedge);
+  keep_marked(mesh.tangents, wedge);
   keep_marked(mesh.wedge_position, wedge);
   keep_marked(mesh.positions, position);
   for (std::uint32_t& p : mesh.wedge_position) p = position[p];
@@ -252,6 +299,7 @@ void drop_unused_images(Model& model, const std::string& file_name) {
 
 void turn_z_up(Mesh& mesh) {
   auto turn = [](auto& v) { v = {v.x, v.z, -v.y}; };
+  for (Vec4f& t : mesh.tangents) t = {t.x, t.z, -t.y, t.w};
   turn(mesh.origin);
   for (Vec3f& p : mesh.positions) turn(p);
   for (Vec3f& n : mesh.normals) turn(n);
@@ -318,6 +366,7 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
                      e.expected(), e.found());
   }
   note_foreign_extension(model, model.images.back(), place);
+  apply_metadata(model, model.images.back(), place, options);
   return static_cast<std::int32_t>(model.images.size() - 1);
 }
 
@@ -346,6 +395,8 @@ void finish_model(Model& model, const std::string& file_name, const ImportOption
   drop_unused_materials(model);
   drop_unused_parts(model.mesh);
   drop_unused_images(model, file_name);
+  repair_tangents(model);
+  bring_uvs_near(model);
   if (options.up == UpAxis::kZ) turn_z_up(model.mesh);
 }
 

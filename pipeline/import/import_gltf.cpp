@@ -162,6 +162,7 @@ class Assembler {
   void check_room(const Primitive& primitive, std::size_t new_wedges) const;
   void add_wedge(const Primitive& primitive, std::uint32_t vertex, std::uint32_t first_position,
                  Vec3f normal);
+  void add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored);
 
   const Source& source_;
   Mesh& mesh_;
@@ -198,6 +199,20 @@ void Assembler::add_wedge(const Primitive& primitive, std::uint32_t vertex, std:
   if (with_normals_) mesh_.normals.push_back(normal);
 }
 
+/// Directions on the surface go the way of positions. A mirrored surface has its bitangents the other way
+/// round.
+void Assembler::add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored) {
+  if (primitive.tangents.empty()) return;
+  mesh_.tangents.resize(mesh_.wedge_count() - primitive.tangents.size());
+  for (const Vec4f& t : primitive.tangents) {
+    Vec3d d;
+    for (int i = 0; i < 3; ++i)
+      d[i] = to_scene.at(i, 0) * t.x + to_scene.at(i, 1) * t.y + to_scene.at(i, 2) * t.z;
+    const Vec3f unit = to_float(normalized(d));
+    mesh_.tangents.push_back({unit.x, unit.y, unit.z, mirrored ? -t.w : t.w});
+  }
+}
+
 void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material,
                     std::uint16_t part) {
   // glTF: without normals a primitive is flat. Where others have normals that means a wedge per corner.
@@ -216,6 +231,7 @@ void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uin
     }
     add_wedge(primitive, v, first_position, to_float(normalized(n)));
   }
+  if (!flat) add_tangents(primitive, to_scene, sign < 0);
   for (std::size_t t = 0; t < primitive.triangles.size(); ++t) {
     Triangle corners = primitive.triangles[t];
     if (sign < 0) std::swap(corners[1], corners[2]);  // a mirrored front face would be seen from behind
@@ -242,6 +258,7 @@ void Assembler::finish() {
   if (!mesh_.uv0.empty()) mesh_.uv0.resize(n);
   if (!mesh_.uv1.empty()) mesh_.uv1.resize(n);
   if (!mesh_.colours.empty()) mesh_.colours.resize(n, {1, 1, 1, 1});
+  if (!mesh_.tangents.empty()) mesh_.tangents.resize(n);
   set_positions(mesh_, positions_);
 }
 
@@ -376,7 +393,9 @@ void Reader::read() {
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
-  const gltf::Source source{file_name, resolver, options, context, out.model.notes};
+  ImportOptions own = options;  // glTF 2.0, 3.8.3: colour space information of PNG and JPEG must be ignored
+  if (own.colour_profiles == ProfilePolicy::kAuto) own.colour_profiles = ProfilePolicy::kIgnore;
+  const gltf::Source source{file_name, resolver, own, context, out.model.notes};
   gltf::Reader reader(source, bytes, out.model);
   reader.read();
   out.format = reader.is_glb() ? "glb" : "gltf";

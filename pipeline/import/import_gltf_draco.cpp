@@ -199,6 +199,7 @@ VertexData decode_draco(const Source& source, const std::string& place, Bytes da
   out.uv0 = attribute("TEXCOORD_0", 2, 2);
   out.uv1 = attribute("TEXCOORD_1", 2, 2);
   out.colour = attribute("COLOR_0", 3, 4);
+  out.tangent = attribute("TANGENT", 4, 4);
   if (out.colour)
     out.colour_components =
         mesh->GetAttributeByUniqueId(attributes["COLOR_0"].get<std::uint32_t>())->num_components();

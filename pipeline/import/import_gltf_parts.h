@@ -130,7 +130,7 @@ using ReadFloats = std::function<void(std::size_t vertex, float* out)>;
 /// Vertices by attribute; an empty function is an attribute that is not there.
 struct VertexData {
   std::size_t count = 0;
-  ReadFloats position, normal, uv0, uv1, colour;
+  ReadFloats position, normal, uv0, uv1, colour, tangent;
   int colour_components = 4;
   std::vector<std::uint32_t> indices;  // empty with indexed == false
   bool indexed = false;
@@ -148,7 +148,7 @@ struct Primitive {
   std::vector<Triangle> triangles;
   std::vector<Vec3f> positions, normals;
   std::vector<Vec2f> uv0, uv1;
-  std::vector<Vec4f> colours;
+  std::vector<Vec4f> colours, tangents;
 };
 bool primitive_has(const tinygltf::Model& model, std::size_t mesh, std::size_t primitive,
                    const char* attribute);

@@ -127,6 +127,7 @@ VertexData PrimitiveReader::vertices() const {
   if (!data.uv0) data.uv0 = attribute("TEXCOORD_0", data, 2, 2);
   if (!data.uv1) data.uv1 = attribute("TEXCOORD_1", data, 2, 2);
   if (!data.colour) data.colour = attribute("COLOR_0", data, 3, 4, &data.colour_components);
+  if (!data.tangent) data.tangent = attribute("TANGENT", data, 4, 4);
   return data;
 }
 
@@ -251,6 +252,11 @@ Primitive PrimitiveReader::read() {
   out.uv0 = gather<Vec2f>(used, data.uv0, vec2);
   out.uv1 = gather<Vec2f>(used, data.uv1, vec2);
   out.colours = gather<Vec4f>(used, data.colour, colour);
+  // glTF: tangents without normals are to be ignored.
+  if (data.normal)
+    out.tangents = gather<Vec4f>(used, data.tangent, [](const float* v) {
+      return Vec4f{v[0], v[1], v[2], v[3]};
+    });
   return out;
 }
 

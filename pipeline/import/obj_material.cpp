@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "format/errors.h"
+#include "pipeline/import/combine_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/import/uri.h"
@@ -146,6 +147,13 @@ class MtlReader {
       m.map_ke = read_texture(rest, lines_.number());
     else if (word == "map_d" || word == "map_opacity")
       m.map_d = read_texture(rest, lines_.number());
+    else if (word == "map_pr")
+      m.map_pr = read_texture(rest, lines_.number());
+    else if (word == "map_pm")
+      m.map_pm = read_texture(rest, lines_.number());
+    else if (word == "map_ks" || word == "map_ns" || word == "map_ps" || word == "disp" ||
+             word == "map_disp" || word == "decal" || word == "refl" || word == "map_refl")
+      m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
     else if (word == "norm" || word == "map_kn")
       m.norm = read_texture(rest, lines_.number());
     else if (word == "bump" || word == "map_bump")
@@ -244,6 +252,39 @@ struct Converter {
     }
   }
 
+  static bool same_place(const MtlTexture& a, const MtlTexture& b) {
+    return a.scale == b.scale && a.offset == b.offset && a.clamp == b.clamp;
+  }
+
+  void separate_alpha(Material& out) const {
+    const TextureRef alpha = texture(mtl.map_d);
+    if (!alpha.used()) return;
+    if (mtl.map_kd && !same_place(*mtl.map_kd, *mtl.map_d)) {
+      add_warning(model.notes, "separate-alpha-map", mtl_name + " " + place(*mtl.map_d),
+                  "map_d lies elsewhere than map_Kd (-s, -o, -clamp) and is not used");
+      return;
+    }
+    const std::int32_t colour = out.base_colour_texture.image;
+    out.base_colour_texture = alpha;
+    out.base_colour_texture.image = combine_alpha(model, colour, alpha.image);
+    out.alpha_mode = AlphaMode::kBlend;
+  }
+
+  void roughness_metallic(Material& out) const {
+    TextureRef rough = texture(mtl.map_pr), metal = texture(mtl.map_pm);
+    if (rough.used() && metal.used() && !same_place(*mtl.map_pr, *mtl.map_pm)) {
+      add_warning(model.notes, "separate-metallic-map", mtl_name + " " + place(*mtl.map_pm),
+                  "map_Pm lies elsewhere than map_Pr (-s, -o, -clamp) and is not used");
+      metal = {};
+    }
+    if (!rough.used() && !metal.used()) return;
+    out.metallic_roughness_texture = rough.used() ? rough : metal;
+    out.metallic_roughness_texture.image = combine_roughness_metallic(model, rough.image, metal.image);
+    if (rough.used())
+      out.roughness = 1;  // the map says it all: Pr beside it is what viewers without maps show
+    if (metal.used()) out.metallic = 1;
+  }
+
   double opacity(bool by_meshlab) const {
     if (mtl.opacity) return *mtl.opacity;
     if (!mtl.transparency) return 1;
@@ -261,10 +302,7 @@ struct Converter {
     if (d <= 0)
       add_warning(model.notes, "invisible-material", mtl_name,
                   "material " + quote(mtl.name) + " has no opacity");
-    const bool own_map = mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file);
-    if (own_map)
-      add_warning(model.notes, "separate-alpha-map", mtl_name + " " + place(*mtl.map_d),
-                  "map_d is another image than map_Kd and is not used");
+    if (mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file)) return separate_alpha(out);
     if (!out.base_colour_texture.used()) return;
     const AlphaMode mode = alpha_of(image_of(out.base_colour_texture));
     if (out.alpha_mode == AlphaMode::kOpaque) out.alpha_mode = mode;
@@ -309,6 +347,10 @@ Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const st
   converter.emission(out);
   if (mtl.roughness) out.roughness = static_cast<float>(std::clamp(*mtl.roughness, 0.0, 1.0));
   if (mtl.metallic) out.metallic = static_cast<float>(std::clamp(*mtl.metallic, 0.0, 1.0));
+  converter.roughness_metallic(out);
+  for (const std::string& statement : mtl.left_out)
+    add_warning(model.notes, "unsupported-map", mtl_name + " material " + quote(mtl.name),
+                statement + " has no counterpart in glTF and is left out");
   return out;
 }
 

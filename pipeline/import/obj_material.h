@@ -25,7 +25,8 @@ struct MtlMaterial {
   std::optional<double> opacity;              // d
   std::optional<double> transparency;         // Tr as written
   std::optional<double> roughness, metallic;  // Pr, Pm
-  std::optional<MtlTexture> map_kd, map_ka, map_ke, map_d, bump, norm;
+  std::optional<MtlTexture> map_kd, map_ka, map_ke, map_d, map_pr, map_pm, bump, norm;
+  std::vector<std::string> left_out;  // texture statements without a counterpart: "map_Ks line 7"
 };
 
 struct MtlFile {
@@ -45,7 +46,11 @@ MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, N
 ///   invisible material, is opaque with a note: exporters mean that.
 /// - The alpha of map_Kd counts where the image has any that is not opaque: cut-out where nearly all texels
 /// are either or,
-///   blended otherwise. map_d counts when it is the same image; another one is a warning.
+///   blended otherwise. map_d becomes the alpha of map_Kd's image, blended.
+/// - map_Pr and map_Pm become one image, roughness in green and metallic in blue. Where two such images do
+/// not
+///   have the same -s, -o and -clamp the second is left out with a warning.
+/// - map_Ks, map_Ns, disp, decal and refl have no counterpart: a warning names them.
 /// - norm is a normal map; bump and map_Bump are one when the picture is the typical blue, else a height map,
 /// which glTF
 ///   cannot show: a note.

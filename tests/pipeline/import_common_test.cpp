@@ -201,5 +201,74 @@ TEST(LinearFromSrgb, EndsAndMiddle) {
   EXPECT_NEAR(linear_from_srgb(0.5), 0.2140411, 1e-6);
 }
 
+/// A triangle at `u` repeats to the right and `v` down, with its own material.
+Model chart_at(float u, float v, const TextureRef& texture) {
+  Model m;
+  m.mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  m.mesh.wedge_position = {0, 1, 2};
+  m.mesh.uv0 = {{u + 0.25f, v + 0.5f}, {u + 0.75f, v + 0.5f}, {u + 0.25f, v + 1.5f}};
+  m.mesh.triangles = {{0, 1, 2}};
+  m.materials.resize(1);
+  m.materials[0].base_colour_texture = texture;
+  Image image;
+  image.bytes = {1};
+  m.images.push_back(image);
+  return m;
+}
+
+TEST(FinishModel, FarChartsMoveNearByWholeRepeats) {
+  TextureRef t;
+  t.image = 0;
+  EXPECT_EQ(finished(chart_at(1553, -721, t)).mesh.uv0, chart_at(0, 0, t).mesh.uv0);
+  EXPECT_EQ(finished(chart_at(-1, 1, t)).mesh.uv0, chart_at(-1, 1, t).mesh.uv0) << "near enough";
+  t.wrap_s = Wrap::kMirror;
+  EXPECT_EQ(finished(chart_at(7, 7, t)).mesh.uv0, chart_at(1, 0, t).mesh.uv0) << "by pairs of repeats";
+  t.wrap_s = Wrap::kClamp;
+  EXPECT_EQ(finished(chart_at(7, 7, t)).mesh.uv0, chart_at(7, 0, t).mesh.uv0);
+  t = {};
+  t.image = 0;
+  t.transform.scale = {2, 0.5f};
+  EXPECT_EQ(finished(chart_at(7, 7, t)).mesh.uv0, chart_at(7, 7, t).mesh.uv0) << "half a repeat would show";
+  t.transform.scale = {2, 3};
+  EXPECT_EQ(finished(chart_at(7, 7, t)).mesh.uv0, chart_at(0, 0, t).mesh.uv0);
+  t.transform.rotation = 1;
+  EXPECT_EQ(finished(chart_at(7, 7, t)).mesh.uv0, chart_at(7, 7, t).mesh.uv0);
+  t = {};
+  t.image = 0;
+  const Mesh far = finished(chart_at(1e6f, 1e6f, t)).mesh;
+  for (Vec2f uv : far.uv0) EXPECT_LT(std::fabs(uv.x) + std::fabs(uv.y), 4);
+}
+
+TEST(FinishModel, TangentsAreMadeSoundAndKeptOnlyWhereTheyCount) {
+  TextureRef t;
+  t.image = 0;
+  Model m = chart_at(0, 0, t);
+  m.mesh.normals.assign(3, {0, 0, 1});
+  m.mesh.tangents = {{2, 0, 0, 0.5f}, {kNan, 0, 0, 1}, {0, 3, 0, -7}};
+  EXPECT_TRUE(finished(m).mesh.tangents.empty()) << "no normal map";
+  m.materials[0].normal_texture = t;
+  EXPECT_EQ(finished(m).mesh.tangents, (std::vector<Vec4f>{{1, 0, 0, 1}, {0, 0, 0, 0}, {0, 1, 0, -1}}));
+  EXPECT_EQ(finished(m, {.up = UpAxis::kZ}).mesh.tangents[2], (Vec4f{0, 0, -1, -1}));
+}
+
+TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
+  testing::MemoryResolver resolver;
+  std::vector<std::uint8_t> exif{0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f',  0, 0, 'I',
+                                 'I',  42,   0,    8,    0, 0,  0,   1,   0,   0x12, 1, 3, 0,
+                                 1,    0,    0,    0,    6, 0,  0,   0,   0,   0,    0, 0};
+  const auto jpeg = testing::jpeg_bytes(8, 8, 3);
+  exif.insert(exif.end(), jpeg.begin() + 2, jpeg.end());
+  resolver.files["turned.jpg"] = exif;
+  resolver.files["inks.jpg"] = testing::cmyk_jpeg(8, 8, {1, 2, 3, 4}, true);
+  Model m;
+  add_image(m, "turned.jpg", resolver, "f", "p", {});
+  add_image(m, "inks.jpg", resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
+  EXPECT_EQ(count_notes(m, "exif-orientation"), 1);
+  EXPECT_EQ(count_notes(m, "cmyk-image"), 1);
+  EXPECT_EQ(m.images[0].width_px, 8u);
+  EXPECT_TRUE(m.images[0].honour_profile);
+  EXPECT_FALSE(m.images[1].honour_profile);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -317,5 +317,21 @@ TEST(ImportGltfMaterials, RefusesImagesOfForeignContentAndForeignPlaces) {
   }
 }
 
+TEST(ImportGltfMaterials, TangentsFollowTheNodes) {
+  GltfBuilder b = textured(base_colour());
+  b.json["materials"][0]["normalTexture"] = {{"index", 0}};
+  json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["NORMAL"] = b.attribute<float>({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  attributes["TANGENT"] = b.attribute<float>({1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, -1, 1, 0, 0, 1}, "VEC4");
+  EXPECT_EQ(import(b).mesh.tangents,
+            (std::vector<Vec4f>{{1, 0, 0, 1}, {1, 0, 0, 1}, {1, 0, 0, -1}, {1, 0, 0, 1}}));
+  b.json["nodes"][0]["scale"] = {-2, 3, 1};  // a mirror
+  EXPECT_EQ(import(b).mesh.tangents[0], (Vec4f{-1, 0, 0, -1}));
+  b.json["nodes"].push_back({{"mesh", 0}});
+  EXPECT_EQ(import(b).mesh.tangents.size(), 8u);
+  attributes.erase("NORMAL");
+  EXPECT_TRUE(import(b).mesh.tangents.empty()) << "glTF: ignored without normals";
+}
+
 }  // namespace
 }  // namespace texmesh

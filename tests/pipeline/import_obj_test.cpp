@@ -265,8 +265,34 @@ TEST(ImportObj, AlphaOfTextures) {
   EXPECT_EQ(MtlCase("map_Kd cutout.png\n").material().alpha_mode, AlphaMode::kMask);
   EXPECT_EQ(MtlCase("map_Kd glass.png\nmap_d glass.png\n").material().alpha_mode, AlphaMode::kBlend);
   EXPECT_EQ(MtlCase("map_Kd opaque.png\n").material().alpha_mode, AlphaMode::kOpaque);
-  EXPECT_EQ(count_notes(MtlCase("map_Kd c.png\nmap_d height.png\n").model, "separate-alpha-map"), 1);
-  EXPECT_EQ(count_notes(MtlCase("map_Kd glass.png\nmap_d glass.png\n").model, "separate-alpha-map"), 0);
+  const MtlCase apart("map_Kd c.png\nmap_d height.png\n");
+  EXPECT_EQ(apart.material().alpha_mode, AlphaMode::kBlend);
+  ASSERT_EQ(apart.model.images.size(), 1u);
+  const Image& both = apart.model.images[0];
+  EXPECT_EQ(both.channels, 4);
+  const MtlCase colour("map_Kd c.png\n"), height("map_Kd height.png\n");
+  const Pixels c = decode_image(colour.model.images[0]), h = decode_image(height.model.images[0]);
+  const Pixels p = decode_image(both);
+  EXPECT_EQ(p.width_px, std::max(c.width_px, h.width_px));
+  EXPECT_EQ(p.at(0, 0)[0], c.at(0, 0)[0]);
+  EXPECT_EQ(p.at(0, 0)[3], h.at(0, 0)[0]);
+  EXPECT_EQ(count_notes(MtlCase("map_Kd c.png\nmap_d -s 2 2 1 height.png\n").model, "separate-alpha-map"), 1);
+}
+
+TEST(ImportObj, RoughnessAndMetallicMapsBecomeOneImage) {
+  const MtlCase both("Pr 0.5\nmap_Pr height.png\nmap_Pm c.png\n");
+  ASSERT_EQ(both.model.images.size(), 1u);
+  EXPECT_TRUE(both.material().metallic_roughness_texture.used());
+  EXPECT_EQ(both.material().roughness, 1);
+  EXPECT_EQ(both.material().metallic, 1);
+  const MtlCase colour("map_Kd c.png\n"), height("map_Kd height.png\n");
+  const Pixels p = decode_image(both.model.images[0]);
+  EXPECT_EQ(p.at(0, 0)[1], decode_image(height.model.images[0]).at(0, 0)[0]);
+  EXPECT_EQ(p.at(0, 0)[2], decode_image(colour.model.images[0]).at(0, 0)[0]);
+  const MtlCase rough("Pm 0\nmap_Pr height.png\n");
+  EXPECT_EQ(rough.material().metallic, 0);
+  EXPECT_EQ(decode_image(rough.model.images[0]).at(0, 0)[2], 255);
+  EXPECT_EQ(count_notes(MtlCase("map_Ks c.png\ndisp height.png\n").model, "unsupported-map"), 2);
 }
 
 TEST(ImportObj, BumpIsANormalMapWhenItLooksLikeOne) {

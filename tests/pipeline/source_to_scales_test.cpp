@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package_reader.h"
@@ -180,6 +182,90 @@ TEST_F(SourceToScales, NoTexturesNoTextureEntries) {
     const Json json = package.glb_json();
     EXPECT_FALSE(json.contains("images") || json.contains("textures"));
     EXPECT_EQ(json["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"), name == "colours.ply");
+  }
+}
+
+/// Height of the georeferenced relief: millimetres on a field of a few metres.
+double relief(int x, int y) { return 0.001 * ((x * 7 + y * 5) % 11); }
+
+TEST_F(SourceToScales, MillimetresTenThousandKilometresAway) {
+  constexpr int kSide = 12;
+  constexpr double kEast = 1.0e7, kNorth = 2.5e7, kStep = 0.05;
+  std::string obj;
+  for (int y = 0; y <= kSide; ++y)
+    for (int x = 0; x <= kSide; ++x) {
+      char line[100];
+      std::snprintf(line, sizeof line, "v %.4f %.4f %.4f\n", kEast + kStep * x, relief(x, y),
+                    kNorth + kStep * y);
+      obj += line;
+    }
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const int a = y * (kSide + 1) + x + 1, b = a + kSide + 1;
+      obj += "f " + std::to_string(a) + " " + std::to_string(b) + " " + std::to_string(b + 1) + "\n";
+      obj += "f " + std::to_string(a) + " " + std::to_string(b + 1) + " " + std::to_string(a + 1) + "\n";
+    }
+  // The same as a glTF that a node puts there.
+  GltfBuilder b = sheet(kSide);
+  b.json["nodes"][0]["translation"] = {kEast, 0, kNorth};
+  b.json["nodes"][0]["scale"] = {kStep, kStep, kStep};
+
+  for (MeshCodec codec : {MeshCodec::kDraco, MeshCodec::kNone}) {
+    CompileOptions options;
+    options.scales.mesh_codec = codec;
+    Package far = compile("far.obj", {obj.begin(), obj.end()}, options);
+    const Vec3d origin = far.reader->manifest().origin;
+    EXPECT_NEAR(origin.x, kEast, 10);
+    EXPECT_NEAR(origin.z, kNorth, 10);
+    const Mesh mesh = far.import_scale().model.mesh;
+    EXPECT_EQ(mesh.triangles.size(), std::size_t{2 * kSide * kSide});
+    double worst = 0;
+    for (const Vec3f& local : mesh.positions) {
+      const Vec3d p = to_double(local) + mesh.origin + origin;
+      const int x = static_cast<int>(std::floor((p.x - kEast) / kStep + 0.5));
+      const int y = static_cast<int>(std::floor((p.z - kNorth) / kStep + 0.5));
+      ASSERT_TRUE(x >= 0 && x <= kSide && y >= 0 && y <= kSide);
+      worst = std::max({worst, std::fabs(p.x - kEast - kStep * x), std::fabs(p.z - kNorth - kStep * y),
+                        std::fabs(p.y - relief(x, y))});
+    }
+    // A quarter of a millimetre would be lost ten times over in floats at 1e7, whose step is 1.
+    EXPECT_LT(worst, codec == MeshCodec::kNone ? 1e-5 : 0.05 / 16);
+    const int coarsest = far.reader->manifest().scales.back().scale;
+    EXPECT_GT(far.import_scale(coarsest).model.mesh.triangles.size(), 0u);
+
+    Package placed = compile("placed.glb", b.glb(), options);
+    const Vec3d there = placed.reader->manifest().origin;
+    EXPECT_NEAR(there.x, kEast, 10);
+    const Mesh same = placed.import_scale().model.mesh;
+    double lowest = 1e30;
+    for (const Vec3f& local : same.positions) lowest = std::min(lowest, local.x + same.origin.x + there.x);
+    EXPECT_NEAR(lowest, kEast, 0.01);
+  }
+}
+
+TEST_F(SourceToScales, TangentsSurviveToEveryScale) {
+  constexpr int kSide = 16;
+  GltfBuilder b = sheet(kSide);
+  Json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
+  std::vector<float> normals, tangents;
+  for (int i = 0; i < (kSide + 1) * (kSide + 1); ++i) {
+    normals.insert(normals.end(), {0, 0, 1});
+    tangents.insert(tangents.end(), {0.6f, 0.8f, 0, i % 3 ? 1.0f : -1.0f});
+  }
+  attributes["NORMAL"] = b.attribute(normals, "VEC3");
+  attributes["TANGENT"] = b.attribute(tangents, "VEC4");
+  b.push("materials", {{"normalTexture", {{"index", texture(b, 64, 64, 3, 1)}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  Package package = compile("m.glb", b.glb());
+  ASSERT_GT(package.reader->manifest().scales.size(), 1u);
+  for (const auto& scale : package.reader->manifest().scales) {
+    const Mesh mesh = package.import_scale(scale.scale).model.mesh;
+    ASSERT_EQ(mesh.tangents.size(), mesh.wedge_count());
+    for (const Vec4f& t : mesh.tangents) {
+      EXPECT_NEAR(t.x, 0.6, 0.01);
+      EXPECT_NEAR(t.y, 0.8, 0.01);
+      EXPECT_TRUE(t.w == 1 || t.w == -1);
+    }
   }
 }
 

@@ -8,8 +8,10 @@
 
 #include <gtest/gtest.h>
 #include <webp/encode.h>
+#include <zlib.h>
 
 #include "format/errors.h"
+#include "stages/image_metadata.h"
 #include "tests/support/images.h"
 
 namespace texmesh {
@@ -291,6 +293,166 @@ TEST(DecodeImage, FlippedBytesNeverHarm) {
         } catch (const InputError&) {
         }
       }
+}
+
+// --- PNGs of every kind, made by hand: OpenImageIO writes only some
+// ---------------------------------------------------------------------------------------------------
+
+void put_chunk(Bytes& out, const char* type, const Bytes& data) {
+  const std::size_t at = out.size();
+  out.resize(at + 8);
+  put32(out, at, static_cast<std::uint32_t>(data.size()));
+  std::memcpy(out.data() + at + 4, type, 4);
+  out.insert(out.end(), data.begin(), data.end());
+  const std::uint32_t crc = crc32_of(out.data() + at + 4, data.size() + 4);
+  out.resize(out.size() + 4);
+  put32(out, out.size() - 4, crc);
+}
+
+/// `rows` are filter bytes and packed samples as they stand in the file before deflate.
+Bytes make_png(std::uint32_t width, std::uint32_t height, std::uint8_t bits, std::uint8_t colour_type,
+               std::uint8_t interlace, const Bytes& rows,
+               const std::vector<std::pair<std::string, Bytes>>& chunks = {}) {
+  Bytes png{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  Bytes header(13, 0);
+  put32(header, 0, width);
+  put32(header, 4, height);
+  header[8] = bits, header[9] = colour_type, header[12] = interlace;
+  put_chunk(png, "IHDR", header);
+  for (const auto& [type, data] : chunks) put_chunk(png, type.c_str(), data);
+  uLongf size = compressBound(static_cast<uLong>(rows.size()));
+  Bytes packed(size);
+  EXPECT_EQ(compress(packed.data(), &size, rows.data(), static_cast<uLong>(rows.size())), Z_OK);
+  packed.resize(size);
+  put_chunk(png, "IDAT", packed);
+  put_chunk(png, "IEND", {});
+  return png;
+}
+
+TEST(DecodeImage, PngOfOneBitPaletteAndTransparentColour) {
+  // 10 x 2, one bit: two bytes a row.
+  const Bytes one_bit{0, 0b10100000, 0b01000000, 0, 0xff, 0xc0};
+  Image image = probe(make_png(10, 2, 1, 0, 0, one_bit));
+  EXPECT_EQ(image.channels, 1);
+  EXPECT_EQ(decode_image(image).data, (Bytes{255, 0,   255, 0,   0,   0,   0,   0,   0,   255,  //
+                                             255, 255, 255, 255, 255, 255, 255, 255, 255, 255}));
+  const Bytes palette{10, 20, 30, 40, 50, 60, 70, 80, 90};
+  const Bytes indices{0, 0b00011000};  // 2 bits: 0, 1, 2
+  image = probe(make_png(3, 1, 2, 3, 0, indices, {{"PLTE", palette}}));
+  EXPECT_EQ(image.channels, 3);
+  EXPECT_EQ(decode_image(image).data, palette);
+  image = probe(make_png(3, 1, 2, 3, 0, indices, {{"PLTE", palette}, {"tRNS", {0, 128}}}));
+  EXPECT_EQ(image.channels, 4);
+  EXPECT_EQ(decode_image(image).data, (Bytes{10, 20, 30, 0, 40, 50, 60, 128, 70, 80, 90, 255}));
+  // Grey 200 is transparent.
+  image = probe(make_png(2, 1, 8, 0, 0, {0, 200, 100}, {{"tRNS", {0, 200}}}));
+  EXPECT_EQ(image.channels, 2);
+  EXPECT_EQ(decode_image(image).data, (Bytes{200, 0, 100, 255}));
+}
+
+TEST(DecodeImage, PngGreyWithAlphaOfSixteenBits) {
+  const Image image = probe(make_png(2, 1, 16, 4, 0, {0, 0x80, 0x80, 0xff, 0xff, 0x00, 0x7f, 0x12, 0x34}));
+  EXPECT_EQ(image.channels, 2);
+  EXPECT_EQ(image.bits_per_channel, 16);
+  EXPECT_EQ(decode_image(image).data, (Bytes{128, 255, 0, 18}));
+  EXPECT_EQ(decode_float(image).data, (std::vector<float>{0x8080, 0xffff, 0x7f, 0x1234}));
+}
+
+/// An 8-bit grey 8 x 8 picture in the seven passes of Adam7.
+Bytes interlaced_rows(const Bytes& samples) {
+  constexpr int kX0[] = {0, 4, 0, 2, 0, 1, 0}, kY0[] = {0, 0, 4, 0, 2, 0, 1};
+  constexpr int kDx[] = {8, 8, 4, 4, 2, 2, 1}, kDy[] = {8, 8, 8, 4, 4, 2, 2};
+  Bytes rows;
+  for (int pass = 0; pass < 7; ++pass)
+    for (int y = kY0[pass]; y < 8; y += kDy[pass]) {
+      rows.push_back(0);
+      for (int x = kX0[pass]; x < 8; x += kDx[pass])
+        rows.push_back(samples[static_cast<std::size_t>(y * 8 + x)]);
+    }
+  return rows;
+}
+
+TEST(DecodeImage, InterlacedPngIsThePlainOne) {
+  const Bytes samples = test_picture(8, 8, 1);
+  const Bytes file = make_png(8, 8, 8, 0, 1, interlaced_rows(samples));
+  EXPECT_EQ(decode_image(probe(file)).data, samples);
+  for (std::size_t n = 0; n + 16 < file.size(); ++n)
+    EXPECT_THROW(decode_image(probe({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(n)})),
+                 InputError);
+}
+
+TEST(DecodeImage, OddSizes) {
+  for (auto [w, h] : {std::pair{1, 1}, {15, 4097}, {4097, 15}})
+    for (const char* writer : {"png", "jpeg", "tiff"}) {
+      const Bytes samples = test_picture(w, h, 3);
+      const Image image = probe(encode_image(writer, w, h, 3, samples, OIIO::TypeDesc::UINT8));
+      EXPECT_EQ(image.width_px, static_cast<std::uint32_t>(w));
+      EXPECT_EQ(image.height_px, static_cast<std::uint32_t>(h));
+      const Pixels pixels = decode_image(image);
+      EXPECT_EQ(pixels.data.size(), samples.size());
+      if (writer != std::string("jpeg")) {
+        EXPECT_EQ(pixels.data, samples) << writer;
+      }
+    }
+}
+
+TEST(DecodeImage, TruncationNamesTheFileAndTheRow) {
+  const Bytes samples = test_picture(64, 200, 3);
+  OIIO::ImageSpec zip;
+  zip.attribute("compression", "none");
+  for (const auto& [writer, row] : {std::pair{"png", "row "}, {"jpeg", "row "}, {"tiff", "rows "}}) {
+    Bytes file = encode_image(writer, 64, 200, 3, samples, OIIO::TypeDesc::UINT8, zip);
+    const Image whole = probe(file);
+    Image cut = whole;
+    cut.bytes.resize(cut.bytes.size() * 3 / 5);
+    const std::string error = error_of([&] { decode_image(cut); });
+    if (error.empty() || writer == std::string("tiff")) continue;  // a TIFF's directory stands at its end
+    EXPECT_NE(error.find("test image"), std::string::npos) << error;
+    EXPECT_NE(error.find(row), std::string::npos) << error;
+    EXPECT_NE(error.find("of 200"), std::string::npos) << error;
+  }
+}
+
+TEST(DecodeImage, SixtyFiveThousandByTheSameCostsNothing) {
+  ImageLimits limits;
+  limits.max_pixels = 1ull << 40;
+  Bytes png = png_claiming(65000, 65000);
+  EXPECT_NE(error_of([&] { decode_image(probe_image("big.png", png, limits)); }).find("big.png"),
+            std::string::npos);
+  Bytes jpeg = jpeg_bytes(32, 32, 1);
+  for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
+    if (jpeg[i] == 0xff && jpeg[i + 1] == 0xc0) {
+      jpeg[i + 5] = 0xfd, jpeg[i + 6] = 0xe8, jpeg[i + 7] = 0xfd, jpeg[i + 8] = 0xe8;
+      break;
+    }
+  EXPECT_THROW(probe_image("big.jpg", jpeg, {}), InputError) << "beyond the limit of pixels";
+  const std::string error = error_of([&] { decode_image(probe_image("big.jpg", jpeg, limits)); });
+  EXPECT_NE(error.find("of 65000"), std::string::npos) << error;
+}
+
+TEST(DecodeImage, JpegOfTwelveAndSixteenBitsIsRefused) {
+  for (std::uint8_t bits : {std::uint8_t{12}, std::uint8_t{16}}) {
+    Bytes jpeg = jpeg_bytes(16, 16, 3);
+    for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
+      if (jpeg[i] == 0xff && jpeg[i + 1] == 0xc0) {
+        jpeg[i + 4] = bits;
+        break;
+      }
+    const std::string error = error_of([&] { probe(jpeg); });
+    EXPECT_NE(error.find("precision " + std::to_string(bits)), std::string::npos) << error;
+  }
+}
+
+TEST(DecodeImage, CmykJpegBecomesRgb) {
+  for (const bool adobe : {false, true}) {
+    const Image image = probe(testing::cmyk_jpeg(16, 16, {255, 128, 0, 64}, adobe));
+    EXPECT_EQ(image.channels, 3);
+    const Pixels pixels = decode_image(image);
+    // Adobe stores 255 - ink; ink 255, 128, 0 over black 64 leaves light (0, 127, 255) x 191 / 255.
+    const int want[3] = {0, 95, 191};
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixels.data[c], want[c], 3) << adobe << c;
+    EXPECT_TRUE(read_image_metadata(ImageFormat::kJpeg, image.bytes).cmyk);
+  }
 }
 
 TEST(DecodeImage, AnImageThatChangedAfterImportIsRefused) {

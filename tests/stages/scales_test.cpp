@@ -56,7 +56,7 @@ struct Case {
   }
   void add_image(TextureRole role, bool alpha = false) {
     const auto image = static_cast<std::uint32_t>(images.size());
-    images.push_back({"image", ImageFormat::kPng, 512, 512, 3, 8, {}});
+    images.push_back({"image", ImageFormat::kPng, 512, 512, 3, 8, false, {}});
     add_plane(image, role, 3);
     if (alpha) add_plane(image, TextureRole::kAlpha, 1);
   }
@@ -107,7 +107,8 @@ struct Primitive {
   int material = 0;
   std::vector<std::array<float, 3>> positions, normals;
   std::vector<std::array<float, 2>> uv0, uv1;
-  std::vector<std::array<float, 4>> colours;
+  std::vector<std::array<float, 4>> colours, tangents;
+  std::vector<std::array<float, 1>> features;
   std::vector<std::uint32_t> indices;
 };
 
@@ -192,6 +193,8 @@ Primitive read_draco_primitive(const Glb& glb, const Json& json) {
   if (ids.contains("TEXCOORD_0")) p.uv0 = read_draco<2>(mesh, ids["TEXCOORD_0"], 1);
   if (ids.contains("TEXCOORD_1")) p.uv1 = read_draco<2>(mesh, ids["TEXCOORD_1"], 1);
   if (ids.contains("COLOR_0")) p.colours = read_draco<4>(mesh, ids["COLOR_0"], 1);
+  if (ids.contains("_FEATURE_ID_0")) p.features = read_draco<1>(mesh, ids["_FEATURE_ID_0"], 1);
+  if (ids.contains("TANGENT")) p.tangents = read_draco<4>(mesh, ids["TANGENT"], 1);
   for (std::uint32_t f = 0; f < mesh.num_faces(); ++f)
     for (std::size_t k = 0; k < 3; ++k) p.indices.push_back(mesh.face(draco::FaceIndex(f))[k].value());
   return p;
@@ -209,7 +212,7 @@ std::vector<Primitive> read(const Glb& glb, Vec3d& translation, double& step) {
     for (const Json& json : glb.json["meshes"][node["mesh"].get<std::size_t>()]["primitives"]) {
       Primitive p;
       const Json& a = json["attributes"];
-      if (json.contains("extensions")) {
+      if (json.contains("extensions") && json["extensions"].contains("KHR_draco_mesh_compression")) {
         p = read_draco_primitive(glb, json);
       } else {
         p.positions = read_accessor<3>(glb, a["POSITION"]);
@@ -217,6 +220,8 @@ std::vector<Primitive> read(const Glb& glb, Vec3d& translation, double& step) {
         if (a.contains("TEXCOORD_0")) p.uv0 = read_accessor<2>(glb, a["TEXCOORD_0"]);
         if (a.contains("TEXCOORD_1")) p.uv1 = read_accessor<2>(glb, a["TEXCOORD_1"]);
         if (a.contains("COLOR_0")) p.colours = read_accessor<4>(glb, a["COLOR_0"]);
+        if (a.contains("_FEATURE_ID_0")) p.features = read_accessor<1>(glb, a["_FEATURE_ID_0"]);
+        if (a.contains("TANGENT")) p.tangents = read_accessor<4>(glb, a["TANGENT"]);
         for (const auto& i : read_accessor<1>(glb, json["indices"]))
           p.indices.push_back(static_cast<std::uint32_t>(i[0]));
       }
@@ -362,11 +367,30 @@ TEST(Scales, VeryManyPartsBecomeOneNode) {
     m.triangle_part[t] = static_cast<std::uint16_t>(t % 257);
   for (int i = 0; i < 257; ++i) m.part_names.push_back("part " + std::to_string(i));
   const Case c(m, 1, 1);
-  expect_round_trip(c, MeshCodec::kDraco);
-  const ScaleFiles files = c.write(MeshCodec::kDraco);
-  EXPECT_EQ(open(files.files[0].glb).json["nodes"].size(), 1u);
-  ASSERT_EQ(files.notes.size(), 1u);
-  EXPECT_EQ(files.notes[0].code, "parts-merged");
+  std::vector<std::size_t> want(257), got;
+  for (std::uint16_t part : c.scales.mesh.triangle_part) ++want[part];
+  for (MeshCodec codec : kCodecs) {
+    expect_round_trip(c, codec);
+    const ScaleFiles files = c.write(codec);
+    const Glb glb = open(files.files[0].glb);
+    EXPECT_EQ(glb.json["nodes"].size(), 1u);
+    ASSERT_EQ(files.notes.size(), 1u);
+    EXPECT_EQ(files.notes[0].code, "parts-merged");
+    // The names are still there, and every triangle's vertices say whose it is.
+    EXPECT_EQ(glb.json["meshes"][0]["extras"]["partNames"].get<std::vector<std::string>>(), m.part_names);
+    const Json& ids = glb.json["meshes"][0]["primitives"][0]["extensions"]["EXT_mesh_features"]["featureIds"];
+    EXPECT_EQ(ids[0]["featureCount"], 257);
+    Vec3d translation;
+    double step = 1;
+    got.assign(257, 0);
+    for (const Primitive& p : read(glb, translation, step))
+      for (std::size_t i = 0; i < p.indices.size(); i += 3) {
+        const float part = p.features[p.indices[i]][0];
+        EXPECT_TRUE(part == p.features[p.indices[i + 1]][0] && part == p.features[p.indices[i + 2]][0]);
+        ++got.at(static_cast<std::size_t>(part));
+      }
+    EXPECT_EQ(got, want);
+  }
 }
 
 TEST(Scales, MeshWithoutTextureCoordinates) {
@@ -458,6 +482,27 @@ TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   expect_round_trip(c, MeshCodec::kDraco, options);
   EXPECT_EQ(c.write(MeshCodec::kNone).position_error, 0);
   EXPECT_EQ(c.write(MeshCodec::kNone).position_bits, 0);
+}
+
+TEST(Scales, ASmallPartBesideALargeOneKeepsItsShape) {
+  // As under nodes of different scales: few triangles, a hundredth of the size.
+  Mesh small = testing::bumpy_sphere(8, 12);
+  for (Vec3f& p : small.positions) p = p * 0.01f;
+  Mesh m = testing::side_by_side({testing::bumpy_sphere(40, 60), small});
+  const std::size_t first = m.triangles.size() - small.triangles.size();
+  m.part_names = {"large", "small"};
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) m.triangle_part[t] = t >= first;
+  const Case c(m, 1, 1);
+  double edges = 0;
+  for (const Triangle& t : small.triangles)
+    edges +=
+        length(small.positions[small.wedge_position[t[0]]] - small.positions[small.wedge_position[t[1]]]);
+  for (MeshCodec codec : kCodecs) {
+    SCOPED_TRACE(std::string(enum_name(codec)));
+    const ScaleFiles files = c.write(codec);
+    EXPECT_EQ(files.files[0].triangles, c.scales.scales[0].triangles.size());
+    EXPECT_LE(files.position_error, edges / static_cast<double>(small.triangles.size()) / 8);
+  }
 }
 
 TEST(Scales, TrianglesThatTheGridCollapsesAreDropped) {
@@ -558,6 +603,46 @@ TEST(Scales, MaterialExtensionsComeBackAsTheyWere) {
   for (const char* name : {"KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_sheen"})
     EXPECT_EQ(std::count(used.begin(), used.end(), name), 1) << name;
   for (const auto& name : glb.json["extensionsRequired"]) EXPECT_EQ(name, "KHR_draco_mesh_compression");
+}
+
+TEST(Scales, TangentsOfTheSourceComeWhereANormalMapNeedsThem) {
+  Mesh m = testing::bumpy_sphere(14, 20);
+  for (std::size_t w = 0; w < m.wedge_count(); ++w) {
+    const Vec3f p = m.positions[m.wedge_position[w]];
+    const float l = std::sqrt(p.x * p.x + p.z * p.z), sign = w % 2 ? 1.0f : -1.0f;
+    m.tangents.push_back(l > 1e-3f ? Vec4f{p.z / l, 0, -p.x / l, sign} : Vec4f{1, 0, 0, sign});
+  }
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) m.triangle_material[t] = t % 3 == 0;
+  Case c(m, 2);
+  c.add_image(TextureRole::kNormal);
+  c.materials[1].normal_texture.image = 0;
+  for (MeshCodec codec : kCodecs)
+    for (int bits : {8, 9, 10}) {
+      const ScaleFiles files = c.write(codec, {.tangent_bits = bits});
+      Vec3d translation;
+      double step = 1;
+      for (const ScaleFile& file : files.files)
+        for (const Primitive& p : read(open(file.glb), translation, step)) {
+          ASSERT_EQ(p.tangents.size(), p.material == 1 ? p.positions.size() : 0u);
+          for (std::size_t i = 0; i < p.tangents.size(); ++i) {
+            const auto& t = p.tangents[i];
+            EXPECT_TRUE(t[3] == 1.0f || t[3] == -1.0f) << t[3];
+            EXPECT_NEAR(std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]), 1, 0.01);
+            const double x = p.positions[i][0] * step + translation.x,
+                         z = p.positions[i][2] * step + translation.z;
+            // Along the circle of latitude; coarser scales have wedges that came from a neighbour's place.
+            EXPECT_NEAR(t[0] * x + t[2] * z, 0, file.scale == 0 ? 0.02 : 0.5);
+          }
+        }
+    }
+  c.scales.mesh
+      .tangents[c.scales.scales[0].triangles[0][0]] = {};  // a wedge without: nothing for its primitive
+  Vec3d translation;
+  double step = 1;
+  for (const Primitive& p : read(open(c.write(MeshCodec::kDraco).files[0].glb), translation, step))
+    if (c.scales.mesh.triangle_material[c.scales.scales[0].triangle_source[0]] == p.material) {
+      EXPECT_TRUE(p.tangents.empty());
+    }
 }
 
 TEST(Scales, PngOfEveryKindReadsBack) {

@@ -1,0 +1,212 @@
+#include "stages/image_metadata.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string_view>
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+constexpr std::size_t kMaxProfile = 16u << 20;
+
+/// Bytes from `at`, `count` of them or none.
+Bytes part(Bytes bytes, std::size_t at, std::size_t count) {
+  if (at > bytes.size() || count > bytes.size() - at) return {};
+  return bytes.subspan(at, count);
+}
+
+std::uint32_t big(Bytes b) {
+  std::uint32_t x = 0;
+  for (std::uint8_t byte : b) x = x << 8 | byte;
+  return x;
+}
+
+std::uint32_t little(Bytes b) {
+  std::uint32_t x = 0;
+  for (std::size_t i = b.size(); i-- > 0;) x = x << 8 | b[i];
+  return x;
+}
+
+bool begins(Bytes bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && !std::memcmp(bytes.data(), magic.data(), magic.size());
+}
+
+// --- TIFF, which EXIF is too
+// ---------------------------------------------------------------------------------------------------
+
+class Tiff {
+ public:
+  explicit Tiff(Bytes bytes) : bytes_(bytes), little_(begins(bytes, "II")) {
+    const std::uint32_t magic = number(2, 2);
+    if (bytes.size() >= 8 && (little_ || begins(bytes, "MM")) && magic == 42) directory_ = number(4, 4);
+  }
+  /// Where the entry of `tag` in the first directory stands; 0 = nowhere.
+  std::size_t entry(std::uint32_t tag) const {
+    if (directory_ == 0) return 0;
+    const std::uint32_t count = number(directory_, 2);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::size_t at = directory_ + 2 + std::size_t{12} * i;
+      if (part(bytes_, at, 12).empty()) return 0;
+      if (number(at, 2) == tag) return at;
+    }
+    return 0;
+  }
+  std::uint32_t number(std::size_t at, std::size_t count) const {
+    const Bytes b = part(bytes_, at, count);
+    return little_ ? little(b) : big(b);
+  }
+  Bytes value(std::size_t entry) const { return part(bytes_, number(entry + 8, 4), number(entry + 4, 4)); }
+
+ private:
+  Bytes bytes_;
+  bool little_;
+  std::size_t directory_ = 0;
+};
+
+void read_orientation(Bytes tiff_bytes, ImageMetadata& out) {
+  constexpr std::uint32_t kOrientation = 0x112;
+  const Tiff tiff(tiff_bytes);
+  const std::size_t at = tiff.entry(kOrientation);
+  if (at == 0) return;
+  const std::uint32_t value = tiff.number(at + 8, 2);
+  if (value >= 1 && value <= 8) out.orientation = static_cast<int>(value);
+}
+
+void read_exif(Bytes exif, ImageMetadata& out) {
+  constexpr std::string_view kHeader("Exif\0\0", 6);
+  read_orientation(begins(exif, kHeader) ? exif.subspan(kHeader.size()) : exif, out);
+}
+
+void read_tiff(Bytes bytes, ImageMetadata& out) {
+  constexpr std::uint32_t kProfile = 34675, kPhotometric = 262, kSeparated = 5;
+  read_orientation(bytes, out);
+  const Tiff tiff(bytes);
+  if (const std::size_t at = tiff.entry(kProfile)) {
+    const Bytes profile = tiff.value(at);
+    if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
+  }
+  if (const std::size_t at = tiff.entry(kPhotometric)) out.cmyk = tiff.number(at + 8, 2) == kSeparated;
+}
+
+// --- JPEG
+// ---------------------------------------------------------------------------------------------------
+
+void read_jpeg(Bytes bytes, ImageMetadata& out) {
+  constexpr std::string_view kIcc("ICC_PROFILE\0", 12);
+  std::map<std::uint8_t, Bytes> profile;  // its pieces by number, from 1
+  std::uint8_t pieces = 0;
+  for (std::size_t at = 2; at + 4 <= bytes.size() && bytes[at] == 0xff;) {
+    const std::uint8_t marker = bytes[at + 1];
+    if (marker == 0xff) {  // fill
+      ++at;
+      continue;
+    }
+    if (marker == 0xda) break;  // the pixels
+    const std::size_t length = big(bytes.subspan(at + 2, 2));
+    if (length < 2) break;
+    const Bytes body = part(bytes, at + 4, length - 2);
+    if (marker == 0xe1 && begins(body, "Exif")) read_exif(body, out);
+    if (marker == 0xe2 && begins(body, kIcc) && body.size() > kIcc.size() + 2) {
+      profile[body[kIcc.size()]] = body.subspan(kIcc.size() + 2);
+      pieces = body[kIcc.size() + 1];
+    }
+    const bool frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (frame && body.size() > 5) out.cmyk = body[5] == 4;
+    at += 2 + length;
+  }
+  if (profile.empty() || profile.size() != pieces || profile.begin()->first != 1) return;
+  for (const auto& [number, piece] : profile)
+    out.icc_profile.insert(out.icc_profile.end(), piece.begin(), piece.end());
+}
+
+// --- PNG
+// ---------------------------------------------------------------------------------------------------
+
+std::vector<std::uint8_t> inflate_profile(Bytes body) {
+  const auto name_end = std::find(body.begin(), body.end(), std::uint8_t{0});
+  const std::size_t begin = static_cast<std::size_t>(name_end - body.begin()) + 2;  // and the method
+  if (begin >= body.size()) return {};
+  std::vector<std::uint8_t> out;
+  for (uLongf size = 64u << 10; size <= kMaxProfile; size *= 16) {
+    out.resize(size);
+    uLongf written = size;
+    const int result =
+        uncompress(out.data(), &written, body.data() + begin, static_cast<uLong>(body.size() - begin));
+    if (result == Z_BUF_ERROR && written == size) continue;
+    out.resize(result == Z_OK ? written : 0);
+    return out;
+  }
+  return {};
+}
+
+bool srgb_primaries(Bytes chrm) {
+  constexpr double kSrgb[8] = {0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
+  for (std::size_t i = 0; i < 8; ++i)
+    if (std::fabs(big(chrm.subspan(4 * i, 4)) / 1e5 - kSrgb[i]) > 0.005) return false;
+  return true;
+}
+
+void read_png(Bytes bytes, ImageMetadata& out) {
+  constexpr std::uint32_t kSrgbGamma = 45455, kNear = 1000;
+  bool srgb = false;
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    const std::size_t length = big(bytes.subspan(at, 4));
+    const Bytes type = bytes.subspan(at + 4, 4), body = part(bytes, at + 8, length);
+    if (body.size() != length || begins(type, "IDAT") || begins(type, "IEND")) break;
+    if (begins(type, "sRGB")) srgb = true;
+    if (begins(type, "iCCP")) out.icc_profile = inflate_profile(body);
+    if (begins(type, "eXIf")) read_exif(body, out);
+    if (begins(type, "cHRM") && length == 32) out.other_primaries = !srgb_primaries(body);
+    if (begins(type, "gAMA") && length == 4) {
+      const std::uint32_t g = big(body);
+      if (g > 0 && (g < kSrgbGamma - kNear || g > kSrgbGamma + kNear)) out.gamma = g / 1e5;
+    }
+    at += 12 + length;
+  }
+  if (srgb || !out.icc_profile.empty()) out.gamma = 0, out.other_primaries = false;
+}
+
+// --- WebP
+// ---------------------------------------------------------------------------------------------------
+
+void read_webp(Bytes bytes, ImageMetadata& out) {
+  for (std::size_t at = 12; at + 8 <= bytes.size();) {
+    const std::size_t length = little(bytes.subspan(at + 4, 4));
+    const Bytes type = bytes.subspan(at, 4), body = part(bytes, at + 8, length);
+    if (body.size() != length) break;
+    if (begins(type, "ICCP") && length <= kMaxProfile) out.icc_profile.assign(body.begin(), body.end());
+    if (begins(type, "EXIF")) read_exif(body, out);
+    at += 8 + length + length % 2;
+  }
+}
+
+}  // namespace
+
+ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8_t> bytes) {
+  ImageMetadata out;
+  switch (format) {
+    case ImageFormat::kJpeg:
+      read_jpeg(bytes, out);
+      break;
+    case ImageFormat::kPng:
+      read_png(bytes, out);
+      break;
+    case ImageFormat::kTiff:
+      read_tiff(bytes, out);
+      break;
+    case ImageFormat::kWebp:
+      read_webp(bytes, out);
+      break;
+    case ImageFormat::kExr:
+      break;
+  }
+  return out;
+}
+
+}  // namespace texmesh
