@@ -374,6 +374,10 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
     image.channels = features.has_alpha ? 4 : 3;
     image.bits_per_channel = 8;
   } else {
+    const std::string colours = read_image_metadata(*format, bytes).foreign_colours;
+    if (!colours.empty())
+      throw InputError(name, "image header", "grey, RGB, palette, YCbCr or CMYK (convert it to sRGB)",
+                       colours);
     const OpenImage open = open_image(name, *format, bytes);
     check_spec(name, open.spec, limits);
     image.width_px = static_cast<std::uint32_t>(open.spec.width);

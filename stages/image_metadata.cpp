@@ -40,32 +40,46 @@ bool begins(Bytes bytes, std::string_view magic) {
 // --- TIFF, which EXIF is too
 // ---------------------------------------------------------------------------------------------------
 
+/// The first directory; of BigTIFF too, whose counts and offsets have eight bytes.
 class Tiff {
  public:
   explicit Tiff(Bytes bytes) : bytes_(bytes), little_(begins(bytes, "II")) {
-    const std::uint32_t magic = number(2, 2);
-    if (bytes.size() >= 8 && (little_ || begins(bytes, "MM")) && magic == 42) directory_ = number(4, 4);
+    constexpr std::uint64_t kClassic = 42, kBig = 43;
+    if (bytes.size() < 16 || !(little_ || begins(bytes, "MM"))) return;
+    const std::uint64_t magic = number(2, 2);
+    big_ = magic == kBig;
+    if (magic == kClassic || big_) directory_ = big_ ? number(8, 8) : number(4, 4);
   }
-  /// Where the entry of `tag` in the first directory stands; 0 = nowhere.
+  /// Where the entry of `tag` stands; 0 = nowhere.
   std::size_t entry(std::uint32_t tag) const {
     if (directory_ == 0) return 0;
-    const std::uint32_t count = number(directory_, 2);
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const std::size_t at = directory_ + 2 + std::size_t{12} * i;
-      if (part(bytes_, at, 12).empty()) return 0;
+    const std::size_t head = big_ ? 8 : 2, size = big_ ? 20 : 12;
+    const std::uint64_t count = number(directory_, head);
+    std::size_t at = directory_ + head;
+    for (std::uint64_t i = 0; i < count && !part(bytes_, at, size).empty(); ++i, at += size)
       if (number(at, 2) == tag) return at;
-    }
     return 0;
   }
-  std::uint32_t number(std::size_t at, std::size_t count) const {
-    const Bytes b = part(bytes_, at, count);
-    return little_ ? little(b) : big(b);
+  /// Of an entry with one number of two bytes.
+  std::uint32_t short_value(std::size_t entry) const {
+    return static_cast<std::uint32_t>(number(entry + (big_ ? 12 : 8), 2));
   }
-  Bytes value(std::size_t entry) const { return part(bytes_, number(entry + 8, 4), number(entry + 4, 4)); }
+  /// Of an entry with so many bytes that they stand elsewhere.
+  Bytes far_value(std::size_t entry) const {
+    return big_ ? part(bytes_, number(entry + 12, 8), number(entry + 4, 8))
+                : part(bytes_, number(entry + 8, 4), number(entry + 4, 4));
+  }
 
  private:
+  std::uint64_t number(std::size_t at, std::size_t count) const {
+    const Bytes b = part(bytes_, at, count);
+    std::uint64_t x = 0;
+    for (std::size_t i = 0; i < b.size(); ++i) x = x << 8 | b[little_ ? b.size() - 1 - i : i];
+    return x;
+  }
+
   Bytes bytes_;
-  bool little_;
+  bool little_, big_ = false;
   std::size_t directory_ = 0;
 };
 
@@ -74,7 +88,7 @@ void read_orientation(Bytes tiff_bytes, ImageMetadata& out) {
   const Tiff tiff(tiff_bytes);
   const std::size_t at = tiff.entry(kOrientation);
   if (at == 0) return;
-  const std::uint32_t value = tiff.number(at + 8, 2);
+  const std::uint32_t value = tiff.short_value(at);
   if (value >= 1 && value <= 8) out.orientation = static_cast<int>(value);
 }
 
@@ -83,15 +97,45 @@ void read_exif(Bytes exif, ImageMetadata& out) {
   read_orientation(begins(exif, kHeader) ? exif.subspan(kHeader.size()) : exif, out);
 }
 
+/// Of the photometric interpretations that libtiff knows, those whose values are no plain colours. Nothing
+/// for white or black is zero, RGB, palette, CMYK, YCbCr.
+std::string foreign_name(std::uint32_t photometric) {
+  switch (photometric) {
+    case 0:
+    case 1:
+    case 2:
+    case 3:
+    case 5:
+    case 6:
+      return "";
+    case 8:
+    case 9:
+    case 10:
+      return "CIE L*a*b*";
+    case 32844:
+    case 32845:
+      return "CIE log L";
+    case 32803:
+    case 34892:
+      return "raw camera data";
+    default:
+      return "photometric interpretation " + std::to_string(photometric);
+  }
+}
+
 void read_tiff(Bytes bytes, ImageMetadata& out) {
   constexpr std::uint32_t kProfile = 34675, kPhotometric = 262, kSeparated = 5;
   read_orientation(bytes, out);
   const Tiff tiff(bytes);
   if (const std::size_t at = tiff.entry(kProfile)) {
-    const Bytes profile = tiff.value(at);
+    const Bytes profile = tiff.far_value(at);
     if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
   }
-  if (const std::size_t at = tiff.entry(kPhotometric)) out.cmyk = tiff.number(at + 8, 2) == kSeparated;
+  if (const std::size_t at = tiff.entry(kPhotometric)) {
+    const std::uint32_t colours = tiff.short_value(at);
+    out.cmyk = colours == kSeparated;
+    out.foreign_colours = foreign_name(colours);
+  }
 }
 
 // --- JPEG

@@ -14,7 +14,8 @@ struct ImageMetadata {
   double gamma = 0;  // PNG gAMA without a profile: file value = light ^ gamma; 0 = not said, or sRGB
   bool other_primaries = false;  // PNG cHRM, without a profile, of other colours than sRGB's
   bool cmyk = false;
-  int orientation = 1;  // as EXIF counts: 1 = as stored, 2..8 = to be turned or mirrored for display
+  std::string foreign_colours;  // TIFF: what its values are, when not grey, RGB, a palette, YCbCr or inks
+  int orientation = 1;          // as EXIF counts: 1 = as stored, 2..8 = to be turned or mirrored for display
 };
 
 /// Walks the file's segments (JPEG), chunks (PNG, WebP) or tags (TIFF, first page). Damaged metadata count as

@@ -67,19 +67,22 @@ void bring_near(const Model& model, const std::vector<std::uint32_t>& chart, int
       period[chart[mesh.triangles[t][0]]].restrict_by(axis, p.move[static_cast<std::size_t>(axis)]);
   }
   constexpr float kMost = std::numeric_limits<float>::max();
-  std::vector<Vec2f> lowest(uvs.size(), {kMost, kMost});
+  std::vector<Vec2f> lowest(uvs.size(), {kMost, kMost}), highest(uvs.size(), {-kMost, -kMost});
   for (std::size_t w = 0; w < uvs.size(); ++w) {
-    Vec2f& lo = lowest[chart[w]];
+    Vec2f &lo = lowest[chart[w]], &hi = highest[chart[w]];
     lo = {std::min(lo.x, uvs[w].x), std::min(lo.y, uvs[w].y)};
+    hi = {std::max(hi.x, uvs[w].x), std::max(hi.y, uvs[w].y)};
   }
-  const auto move = [](float lo, int repeats) {
+  const auto move = [](float lo, float hi, int repeats) {
     if (repeats == 0) return 0.0f;
     const float whole = std::floor(lo / static_cast<float>(repeats)) * static_cast<float>(repeats);
-    return std::fabs(whole) >= kFar ? whole : 0.0f;
+    const bool nearer = hi - whole < std::max(std::fabs(lo), std::fabs(hi));
+    return std::fabs(whole) >= kFar && nearer ? whole : 0.0f;
   };
   for (std::size_t w = 0; w < uvs.size(); ++w) {
     const std::array<int, 2>& p = period[chart[w]].move;
-    uvs[w] = {uvs[w].x - move(lowest[chart[w]].x, p[0]), uvs[w].y - move(lowest[chart[w]].y, p[1])};
+    const Vec2f lo = lowest[chart[w]], hi = highest[chart[w]];
+    uvs[w] = {uvs[w].x - move(lo.x, hi.x, p[0]), uvs[w].y - move(lo.y, hi.y, p[1])};
   }
 }
 

@@ -135,7 +135,7 @@ TEST(ImportPly, VertexUvNames) {
         "\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n"
         "0 1 0 0.25 1500.5\n3 0 1 2\n";
     const Model m = import(bytes_of(text), resolver);
-    EXPECT_EQ(m.mesh.uv0[2], (Vec2f{0.25f, -1499.5f})) << "huge ranges stay as they are, and repeat";
+    EXPECT_EQ(m.mesh.uv0[2], (Vec2f{0.25f, -1499.5f})) << "a chart over a huge range stays where it is";
     EXPECT_TRUE(m.materials[0].base_colour_texture.used());
     EXPECT_EQ(m.materials[0].base_colour_texture.wrap_s, Wrap::kRepeat);
   }

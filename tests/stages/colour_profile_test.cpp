@@ -246,6 +246,22 @@ TEST(ImageMetadata, OrientationAndGamma) {
   EXPECT_EQ(read_image_metadata(ImageFormat::kPng, png_with_chunk(png, "gAMA", gamma)).gamma, 0.0);
 }
 
+TEST(ImageMetadata, BigTiffToo) {
+  std::vector<std::uint8_t> tiff{'I', 'I', 43, 0, 8, 0, 0, 0, 16, 0, 0, 0,
+                                 0,   0,   0,  0, 2, 0, 0, 0, 0,  0, 0, 0};
+  for (const auto& [tag, value] : {std::pair{262, 5}, {274, 6}})
+    for (int byte : {tag & 255, tag >> 8, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, value, 0, 0, 0, 0, 0, 0, 0})
+      tiff.push_back(static_cast<std::uint8_t>(byte));
+  const ImageMetadata whole = read_image_metadata(ImageFormat::kTiff, tiff);
+  EXPECT_TRUE(whole.cmyk);
+  EXPECT_EQ(whole.orientation, 6);
+  EXPECT_EQ(whole.foreign_colours, "");
+  tiff[36] = 8;
+  EXPECT_EQ(read_image_metadata(ImageFormat::kTiff, tiff).foreign_colours, "CIE L*a*b*");
+  for (std::size_t n = 0; n < tiff.size(); ++n)  // reads nothing beyond, whatever is cut
+    read_image_metadata(ImageFormat::kTiff, {tiff.data(), n});
+}
+
 TEST(DecodeImage, ColoursGoByTheProfileWhereItIsToBeHonoured) {
   const Bytes plain = testing::png_bytes(8, 8, 3);
   Image image = probe_image("a.png", png_with_chunk(plain, "iCCP", iccp(adobe_icc())), {});
