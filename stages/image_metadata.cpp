@@ -37,8 +37,7 @@ bool begins(Bytes bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && !std::memcmp(bytes.data(), magic.data(), magic.size());
 }
 
-// --- TIFF, which EXIF is too
-// ---------------------------------------------------------------------------------------------------
+// --- TIFF, which EXIF is too ---------------------------------------------------------------------------
 
 /// The first directory; of BigTIFF too, whose counts and offsets have eight bytes.
 class Tiff {
@@ -138,8 +137,7 @@ void read_tiff(Bytes bytes, ImageMetadata& out) {
   }
 }
 
-// --- JPEG
-// ---------------------------------------------------------------------------------------------------
+// --- JPEG ----------------------------------------------------------------------------------------------
 
 void read_jpeg(Bytes bytes, ImageMetadata& out) {
   constexpr std::string_view kIcc("ICC_PROFILE\0", 12);
@@ -169,8 +167,7 @@ void read_jpeg(Bytes bytes, ImageMetadata& out) {
     out.icc_profile.insert(out.icc_profile.end(), piece.begin(), piece.end());
 }
 
-// --- PNG
-// ---------------------------------------------------------------------------------------------------
+// --- PNG -----------------------------------------------------------------------------------------------
 
 std::vector<std::uint8_t> inflate_profile(Bytes body) {
   const auto name_end = std::find(body.begin(), body.end(), std::uint8_t{0});
@@ -216,8 +213,7 @@ void read_png(Bytes bytes, ImageMetadata& out) {
   if (srgb || !out.icc_profile.empty()) out.gamma = 0, out.other_primaries = false;
 }
 
-// --- WebP
-// ---------------------------------------------------------------------------------------------------
+// --- WebP ----------------------------------------------------------------------------------------------
 
 void read_webp(Bytes bytes, ImageMetadata& out) {
   for (std::size_t at = 12; at + 8 <= bytes.size();) {

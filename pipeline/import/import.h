@@ -51,9 +51,8 @@ struct ImportOptions {
     v("obj_kd", s.obj_kd,
       "OBJ: Kd beside map_Kd is ignored (as in MeshLab, Blender) or multiplied (as the MTL text says)");
     v("colour_profiles", s.colour_profiles,
-      "ICC profiles and gamma of textures: auto = ignored in glTF, as its specification says, else converted "
-      "to "
-      "sRGB");
+      "ICC profiles and gamma of textures are converted to sRGB: auto = except in glTF, whose specification "
+      "says that they are ignored");
     v("up", s.up, "up axis of the source: keep and y leave coordinates alone, z turns them to glTF's y up");
   }
 };

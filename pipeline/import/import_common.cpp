@@ -74,8 +74,7 @@ void apply_metadata(Model& model, Image& image, const std::string& place, const 
                     "); texture coordinates count from its first stored pixel, so it is not turned");
 }
 
-// --- finish_model
-// -----------------------------------------------------------------------------------------------
+// --- finish_model --------------------------------------------------------------------------------------
 
 void fill_defaults(Model& model) {
   Mesh& mesh = model.mesh;
@@ -305,8 +304,7 @@ void turn_z_up(Mesh& mesh) {
   for (Vec3f& n : mesh.normals) turn(n);
 }
 
-// --- set_positions
-// ----------------------------------------------------------------------------------------------
+// --- set_positions -------------------------------------------------------------------------------------
 
 // Beyond this a coordinate is no measure of anything, and squares of differences would overflow a float.
 constexpr double kLargestCoordinate = 1e18;

@@ -295,8 +295,7 @@ TEST(DecodeImage, FlippedBytesNeverHarm) {
       }
 }
 
-// --- PNGs of every kind, made by hand: OpenImageIO writes only some
-// ---------------------------------------------------------------------------------------------------
+// --- PNGs of every kind, made by hand: OpenImageIO writes only some ------------------------------------
 
 void put_chunk(Bytes& out, const char* type, const Bytes& data) {
   const std::size_t at = out.size();
