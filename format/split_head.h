@@ -9,6 +9,7 @@ namespace texmesh {
 
 // Shared by reader and writer of mesh/stream.bin; no interface.
 
+inline constexpr std::size_t kMostScales = 100;
 inline constexpr std::uint32_t kMostSplits = 4096;  // of a block
 /// Faces or splits per byte of a block, at most: so few bytes never become much mesh.
 inline constexpr std::uint32_t kMostPerByte = 64;

@@ -12,8 +12,6 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMostScales = 100;
-
 bool has_grid(SplitKind kind) { return kind == SplitKind::kUv0 || kind == SplitKind::kUv1; }
 
 void write_varint(BytesOut& out, std::uint64_t value) {
@@ -32,6 +30,12 @@ std::uint32_t read_varint(BytesIn& in) {
     }
   }
   in.fail("a number of at most 32 bits in its shortest form", "another");
+}
+
+std::uint32_t read_sum(BytesIn& in, std::uint32_t before) {
+  const std::uint32_t more = read_varint(in);
+  if (more > 0xffffffffu - before) in.fail("a count of at most 32 bits", "a larger one");
+  return before + more;
 }
 
 void write_grid(BytesOut& out, const SplitGrid& grid, std::size_t axes) {
@@ -71,17 +75,17 @@ void read_attributes(BytesIn& in, std::size_t count, SplitStreamHead& head) {
 void read_scales(BytesIn& in, std::size_t count, std::size_t blocks, SplitStreamHead& head) {
   if (count == 0 || count > kMostScales) in.fail("1 to 100 scales", std::to_string(count));
   for (std::size_t i = 0; i < count; ++i) {
-    SplitScale s;
-    s.scale = in.u8();
-    for (std::uint32_t* n : {&s.blocks, &s.points, &s.wedges, &s.faces, &s.triangles}) *n = in.u32();
     const SplitScale before = i > 0 ? head.scales.back() : SplitScale{100, 0, 0, 0, 0, 0};
+    SplitScale s = before;
+    s.scale = in.u8();
+    for (std::uint32_t* n : {&s.blocks, &s.points, &s.wedges, &s.faces}) *n = read_sum(in, *n);
+    const std::uint32_t hidden = read_varint(in);
     if (s.scale >= before.scale) in.fail("falling scale numbers", std::to_string(s.scale));
     if (s.blocks <= before.blocks || s.blocks > blocks)
       in.fail("a rising number of blocks, at most " + std::to_string(blocks), std::to_string(s.blocks));
-    if (s.points < before.points || s.wedges < before.wedges || s.faces < before.faces)
-      in.fail("counts that do not fall", "a smaller one");
-    if (s.triangles > s.faces || s.wedges < s.points || s.faces == 0)
+    if (hidden > s.faces || s.wedges < s.points || s.faces == 0)
       in.fail("counts that can belong together", "others");
+    s.triangles = s.faces - hidden;
     head.scales.push_back(s);
   }
   if (head.scales.back().scale != 0 || head.scales.back().blocks != blocks)
@@ -133,9 +137,15 @@ std::vector<std::uint8_t> write_split_head(const SplitStreamHead& head) {
     if (has_grid(a.kind)) write_grid(out, a.grid, 2);
   }
   for (const SplitGroup& g : head.groups) out.u16(g.material), out.u16(g.part);
+  SplitScale before;
   for (const SplitScale& s : head.scales) {
     out.u8(static_cast<std::uint64_t>(s.scale));
-    for (std::uint32_t n : {s.blocks, s.points, s.wedges, s.faces, s.triangles}) out.u32(n);
+    write_varint(out, s.blocks - before.blocks);
+    write_varint(out, s.points - before.points);
+    write_varint(out, s.wedges - before.wedges);
+    write_varint(out, s.faces - before.faces);
+    write_varint(out, s.faces - s.triangles);
+    before = s;
   }
   for (const auto& m : head.models) out.raw(m);
   for (const SplitBlock& b : head.blocks) {

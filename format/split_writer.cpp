@@ -388,7 +388,8 @@ void check_source(const SplitSource& s) {
     if (!good) fail(what, "in range", "another");
   };
   require(s.splits_per_block >= 1 && s.splits_per_block <= kMostSplits, "splits per block");
-  require(!s.chapters.empty() && !s.chapters[0].patch.empty(), "chapters");
+  require(!s.chapters.empty() && s.chapters.size() <= kMostScales && !s.chapters[0].patch.empty(),
+          "chapters");
   require(s.position.bits >= 1 && s.position.bits <= 24, "position bits");
   require(s.values.size() == s.attributes.size() && !s.groups.empty() && s.groups.size() <= 65536,
           "attributes and groups");
@@ -397,7 +398,8 @@ void check_source(const SplitSource& s) {
   for (std::uint32_t p : s.wedge_point) require(p < s.points.size(), "points of wedges");
   for (std::size_t k = 0; k < s.values.size(); ++k) {
     const SplitAttribute& a = s.attributes[k];
-    require(a.grid.bits >= 1 && a.grid.bits <= 24, "attribute bits");
+    require(k == 0 || s.attributes[k - 1].kind < a.kind, "order of attribute kinds");
+    require(a.grid.bits >= (a.kind == SplitKind::kNormal ? 2 : 1) && a.grid.bits <= 24, "attribute bits");
     require(s.values[k].size() == s.wedge_point.size() * static_cast<std::size_t>(split_components(a.kind)),
             "number of attributes");
     for (std::int32_t x : s.values[k]) require(x >= 0 && x < (1 << a.grid.bits), "attributes");

@@ -40,6 +40,27 @@ inline Corners corners_of(const SplitMesh& mesh) {
   return list;
 }
 
+/// Edges with one face, and with more than two.
+struct SplitEdges {
+  std::size_t border = 0, non_manifold = 0;
+};
+inline SplitEdges count_split_edges(const SplitMesh& mesh) {
+  std::vector<std::uint64_t> edges;
+  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax({mesh.point_at(f, k), mesh.point_at(f, k + 1)});
+      edges.push_back(std::uint64_t{a} << 32 | b);
+    }
+  std::sort(edges.begin(), edges.end());
+  SplitEdges counts;
+  for (std::size_t i = 0, end = 0; i < edges.size(); i = end) {
+    while (end < edges.size() && edges[end] == edges[i]) ++end;
+    counts.border += end - i == 1 ? 1u : 0u;
+    counts.non_manifold += end - i > 2 ? 1u : 0u;
+  }
+  return counts;
+}
+
 /// A source, and what each of its scales must decode to, coarsest first.
 struct SplitFixture {
   SplitSource source;

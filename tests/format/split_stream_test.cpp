@@ -222,6 +222,10 @@ TEST(SplitStream, WriterRefusesSourcesThatContradictThemselves) {
   refuses([](SplitSource& s) { s.position.bits = 25; });
   refuses([](SplitSource& s) { s.points[0][0] = -1; });
   refuses([](SplitSource& s) { s.values[0].pop_back(); });
+  refuses([](SplitSource& s) { s.chapters.resize(101, s.chapters.back()); });
+  refuses([](SplitSource& s) {
+    std::swap(s.attributes[0], s.attributes[1]), std::swap(s.values[0], s.values[1]);
+  });
   refuses([](SplitSource& s) { s.values[1][0] = 256; });
   refuses([](SplitSource& s) { s.face_group[0] = 3; });
   refuses([](SplitSource& s) { s.wedge_point[0] = 1000; });

@@ -16,7 +16,9 @@ namespace {
 
 using testing::bumpy_sphere;
 using testing::Corners;
+using testing::count_split_edges;
 using testing::sheet;
+using testing::SplitEdges;
 
 const RunContext kOneThread{};
 
@@ -76,18 +78,6 @@ Corners corners_of(const NestedScales& scales, const NestedScale& scale, const V
   return list;
 }
 
-struct Edges {
-  std::size_t border = 0, non_manifold = 0;
-};
-Edges count_edges(const SplitMesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> faces;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
-    for (std::uint32_t k = 0; k < 3; ++k) ++faces[std::minmax(mesh.point_at(f, k), mesh.point_at(f, k + 1))];
-  Edges e;
-  for (const auto& [edge, n] : faces) e.border += n == 1 ? 1u : 0u, e.non_manifold += n > 2 ? 1u : 0u;
-  return e;
-}
-
 /// Every kept scale decodes to its own triangles; every block leaves a mesh with three points per face and no
 /// more borders or non-manifold edges than the coarser and finer of the scales around it.
 void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& kept) {
@@ -99,7 +89,7 @@ void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& k
   ASSERT_EQ(head.scales.size(), kept.size());
   SplitStreamReader reader(head), finest(head);
   finest.read_to_scale(kept.size() - 1, stream);
-  const Edges most = count_edges(finest.mesh());
+  const SplitEdges most = count_split_edges(finest.mesh());
   std::size_t scale = 0;
   for (std::size_t i = 0; i < head.blocks.size(); ++i) {
     const SplitBlock& b = head.blocks[i];
@@ -108,7 +98,7 @@ void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& k
     for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
       for (std::uint32_t k = 0; k < 3; ++k) ASSERT_NE(mesh.point_at(f, k), mesh.point_at(f, k + 1));
     if (!b.is_patch) {
-      const Edges edges = count_edges(mesh);
+      const SplitEdges edges = count_split_edges(mesh);
       EXPECT_LE(edges.border, most.border);
       EXPECT_LE(edges.non_manifold, most.non_manifold);
     }
