@@ -1,10 +1,37 @@
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "format/portable_math.h"
 #include "format/tables.h"
 
 namespace texmesh {
 namespace {
+
+// Luma quantisers of ISO/IEC 10918-1, table K.1: what IJG's scale multiplies. Their order does not matter
+// here.
+constexpr std::array<int, 64> kLumaQuantisers{
+    16, 11,  10,  16, 24, 40, 51, 61, 12,  12,  14,  19,  26, 58, 60, 55,  14,  13,  16,  24, 40, 57,
+    69, 56,  14,  17, 22, 29, 51, 87, 80,  62,  18,  22,  37, 56, 68, 109, 103, 77,  24,  35, 55, 64,
+    81, 104, 113, 92, 49, 64, 78, 87, 103, 121, 120, 101, 72, 92, 95, 98,  112, 100, 103, 99};
+
+/// How fine a whole quality quantises: log of the mean of 1 / (step + 1). Unlike g(Q) it knows that steps are
+/// whole numbers from 1 to 255, which is what bends sizes at both ends; 1 instead of the dead zone's half
+/// fitted best. Strictly rising.
+double fineness_at(int quality) {
+  const int percent = quality < 50 ? 5000 / quality : 200 - 2 * quality;
+  double sum = 0;
+  for (const int q : kLumaQuantisers) sum += 1.0 / (std::clamp((q * percent + 50) / 100, 1, 255) + 1);
+  return portable::log(sum / 64);
+}
+
+/// The same for any quality: linear between the whole ones.
+double fineness(double quality) {
+  const double q = std::clamp(quality, 1.0, 100.0);
+  const int below = static_cast<int>(q);
+  const double low = fineness_at(below), part = q - below;
+  return part > 0 ? low + part * (fineness_at(below + 1) - low) : low;
+}
 
 /// Slope of the monotone cubic (Fritsch and Butland 1984) at an inner knot, from the secants on both sides.
 double knot_slope(double width_before, double secant_before, double width_after, double secant_after) {
@@ -29,16 +56,16 @@ double hermite(const std::vector<double>& x, const std::vector<double>& y, std::
 }  // namespace
 
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality) {
-  std::vector<double> x, y;  // g, ln bytes
+  std::vector<double> x, y;  // fineness, ln bytes
   for (std::size_t r = 0; r < tables.rung_count(); ++r) {
     const auto bytes = static_cast<double>(bytes_to_show(tables, r, fragment));
     if (bytes <= 0) continue;
     if (quality == static_cast<double>(tables.rung_quality[r])) return bytes;
-    x.push_back(log_quantiser(tables.rung_quality[r]));
+    x.push_back(fineness(tables.rung_quality[r]));
     y.push_back(portable::log(bytes));
   }
   if (x.empty()) return 0;
-  const double at = log_quantiser(quality);
+  const double at = fineness(quality);
   if (at <= x.front()) return portable::exp(y.front());
   if (at >= x.back()) return portable::exp(y.back());
   const auto k = static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), at) - x.begin()) - 1;

@@ -139,7 +139,8 @@ void print_package(const std::string& path, double log_width) {
   PackageReader package(open_store(path));
   Planes planes;
   for (std::size_t p = 0; p < package.textures().size(); ++p)
-    if (package.textures()[p].role == "base-colour") planes.tables.push_back(package.tables().planes[p]);
+    if (package.textures()[p].role == "base-colour" && package.textures()[p].mip == 0)
+      planes.tables.push_back(package.tables().planes[p]);
   if (planes.tables.empty()) return;
   Curve reference, all;
   const std::size_t rungs = planes.tables[0].rung_count();

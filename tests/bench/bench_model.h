@@ -14,7 +14,7 @@ namespace texmesh {
 struct BenchModel {
   std::vector<Image> images;
   std::vector<Material> materials;
-  Fragments fragments;  // without feature points: eta is 0 everywhere
+  Fragments fragments;  // without mips and feature points: eta is 0 everywhere
 };
 
 inline BenchModel load_bench_model(const std::string& path, const RunContext& context) {
@@ -28,7 +28,9 @@ inline BenchModel load_bench_model(const std::string& path, const RunContext& co
   BenchModel out;
   out.images = std::move(m.model.images);
   out.materials = std::move(m.model.materials);
-  out.fragments = fragment_textures(mesh, out.materials, out.images, scale_map, {}, context);
+  FragmentationOptions options;
+  options.mips = false;
+  out.fragments = fragment_textures(mesh, out.materials, out.images, scale_map, options, context);
   return out;
 }
 

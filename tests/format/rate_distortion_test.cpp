@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -220,12 +221,20 @@ TEST(InterpolatedBytes, ExactAtRungsAndMonotoneBetween) {
   EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 100), 30000);
   EXPECT_NEAR(interpolated_bytes(t, 0, 40), 2500, 1e-6);
   EXPECT_EQ(interpolated_bytes(t, 1, 50), 0);  // not stored
-  // Sizes that are a power of the quantiser's scale are met everywhere.
+  // Sizes that are a power of the mean of 1 / (step + 1) are met everywhere: its logarithm at the rungs, and
+  // between them, from the quantisers as libjpeg scales them.
+  const std::array<double, 6> at_rungs{-5.373343281, -4.941065062, -4.047754894,
+                                       -3.492900817, -2.382324426, -1.238605843};
+  const std::array<int, 6> qualities{6, 20, 45, 60, 75, 90};
+  const std::array<double, 6> between{-5.292657063, -4.444225179, -3.656619744,
+                                      -3.347971742, -2.920718465, -2.099480337};
   for (std::size_t r = 0; r < 6; ++r)
-    t.size_bytes[r * 2] =
-        static_cast<std::uint32_t>(std::lround(1e8 * std::exp(0.8 * log_quantiser(t.rung_quality[r]))));
-  for (const int q : {6, 20, 45, 60, 75, 90})
-    EXPECT_NEAR(interpolated_bytes(t, 0, q) / (1e8 * std::exp(0.8 * log_quantiser(q))), 1, 1e-6);
+    t.size_bytes[r * 2] = static_cast<std::uint32_t>(std::lround(1e9 * std::exp(0.8 * at_rungs[r])));
+  for (std::size_t k = 0; k < 6; ++k)
+    EXPECT_NEAR(interpolated_bytes(t, 0, qualities[k]) / (1e9 * std::exp(0.8 * between[k])), 1, 1e-6);
+  const double middle = interpolated_bytes(t, 0, 45.5);
+  EXPECT_GT(middle, interpolated_bytes(t, 0, 45));
+  EXPECT_LT(middle, interpolated_bytes(t, 0, 46));
   PlaneTables one = make_tables(1, 1, 1, 0);
   EXPECT_DOUBLE_EQ(interpolated_bytes(one, 0, 80), one.size_bytes[0]);
 }
