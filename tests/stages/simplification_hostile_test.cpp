@@ -146,7 +146,7 @@ TEST(SimplificationHostile, OneTriangleFarFromAll) {
 
 TEST(SimplificationHostile, HubOfAWideFan) {
   // The middle of a disc with as many corners as the rim has points; quadratic time would show at once.
-  const std::uint32_t n = std::getenv("TEXMESH_FULL") ? 500'000 : 50'000;
+  const std::uint32_t n = std::getenv("TEXMESH_FULL") ? 500'000 : 10'000;
   std::vector<Vec3f> points{{0, 0, 0}};
   std::vector<Triangle> triangles;
   for (std::uint32_t i = 0; i < n; ++i) {
