@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <set>
 
 namespace texmesh {
@@ -38,6 +39,32 @@ std::string excerpt(const Json& value) {
   return s;
 }
 
+/// Builds the document and notices names that an object has twice. (A parser callback would see them too, but
+/// with one nlohmann's parser goes over an array's elements again after each: hours for a hostile 16 MB.)
+class NameWatcher : public nlohmann::detail::json_sax_dom_parser<Json> {
+ public:
+  using Base = nlohmann::detail::json_sax_dom_parser<Json>;
+  explicit NameWatcher(Json& document) : Base(document, true) {}
+
+  bool start_object(std::size_t size) {
+    names_.emplace_back();
+    return Base::start_object(size);
+  }
+  bool key(std::string& name) {
+    if (!names_.back().insert(name).second && !repeated) repeated = name;
+    return Base::key(name);
+  }
+  bool end_object() {
+    names_.pop_back();
+    return Base::end_object();
+  }
+
+  std::optional<std::string> repeated;  // the first one
+
+ private:
+  std::vector<std::set<std::string>> names_;
+};
+
 std::string print(double v) {
   char text[32];
   const auto result = std::to_chars(text, text + sizeof text, v);
@@ -51,25 +78,16 @@ Json parse_json(std::span<const std::uint8_t> bytes, const std::string& file, st
     throw FormatError(file, "", "at most " + std::to_string(max_bytes) + " bytes",
                       std::to_string(bytes.size()));
   check_depth(bytes, file);
-  std::vector<std::set<std::string>> names;
-  std::string repeated;
-  const auto watch_names = [&](int, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) names.emplace_back();
-    if (event == Json::parse_event_t::object_end) names.pop_back();
-    if (event == Json::parse_event_t::key && !names.back().insert(value.get<std::string>()).second &&
-        repeated.empty())
-      repeated = excerpt(value);
-    return true;
-  };
   Json json;
+  NameWatcher watcher(json);
   try {
-    json = Json::parse(bytes.begin(), bytes.end(), watch_names);
+    Json::sax_parse(bytes.begin(), bytes.end(), &watcher);
   } catch (const Json::parse_error& e) {
     throw FormatError(file, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
   } catch (const Json::exception&) {
     throw FormatError(file, "", "JSON with numbers in range", "another number");
   }
-  if (!repeated.empty()) throw FormatError(file, "", "every name once", repeated + " twice");
+  if (watcher.repeated) throw FormatError(file, "", "every name once", excerpt(*watcher.repeated) + " twice");
   return json;
 }
 

@@ -153,6 +153,7 @@ std::string write_trace(const std::vector<PlannedModel>& models, const std::vect
   for (std::size_t i = 0; i < models.size(); ++i) {
     const WorkerReport& r = reports[i];
     if (!r.ran) continue;
+    lanes.try_emplace(r.lane, 0);
     events.push_back(span(models[i].name, "model", r.start_s, r.start_s + r.seconds, r.lane, 0));
     const std::vector<int> threads = threads_of(r.spans);
     for (std::size_t k = 0; k < r.spans.size(); ++k) {

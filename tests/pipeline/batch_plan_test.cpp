@@ -78,6 +78,14 @@ TEST(Collection, TheSamePackageTwiceAndWrongOptionsAreRefusedWithTheirPlace) {
             "/models/0/output");
 }
 
+TEST(Collection, TooDeepIsRefusedAndBracketsInTextsDoNotCount) {
+  std::string deep = R"({"version":1,"models":[{"input":"a.obj","options":)";
+  for (int i = 0; i < 20; ++i) deep += "[";
+  EXPECT_THROW(read(deep), InputError);
+  EXPECT_EQ(read(R"({"version":1,"models":[{"input":"[[[[[[[[[[[[[[[[[[[[\"[[.obj"}]})").size(), 1u);
+  EXPECT_THROW(read(R"({"version":1,"models":[{"input":"a.obj"}]}])"), InputError);
+}
+
 class Plan : public ::testing::Test {
  protected:
   void add(const std::string& name, const std::string& text = "v 0 0 0") {

@@ -272,5 +272,84 @@ TEST(GraphRun, WaitsForWhoeverComputesTheSameAndTakesTheResult) {
   EXPECT_TRUE(other.ran.contains("left"));
 }
 
+/// A collection of fake models, "geometry|texture" each: import splits them, one stage works on either half
+/// (that of the texture reads zim.difference, and only textures that begin with 'x' depend on it), join takes
+/// both.
+struct FakeCollection {
+  std::multiset<std::string> ran;
+  std::vector<Text> models;
+  MemoryStore store;
+
+  StageOutputs text(const std::string& name, std::vector<Text> values) {
+    ran.insert(name);
+    StageOutputs outputs;
+    for (Text& v : values) outputs.objects.push_back(object(std::move(v)));
+    return outputs;
+  }
+
+  std::vector<Stage> table() {
+    const auto import = [this](const StageInputs& in) {
+      const Text& s = in.get<Text>("source");
+      return text("import", {s.substr(0, s.find('|')), s.substr(s.find('|') + 1)});
+    };
+    const auto geometry = [this](const StageInputs& in) {
+      return text("geometry", {in.get<Text>("import.geometry") + "G"});
+    };
+    const auto texture = [this](const StageInputs& in) {
+      const Text& t = in.get<Text>("import.texture");
+      return text("texture",
+                  {t + "T" + (t.starts_with('x') ? std::to_string(in.options.zim.difference) : Text())});
+    };
+    const auto join = [this](const StageInputs& in) {
+      return text("join", {in.get<Text>("geometry") + in.get<Text>("texture")});
+    };
+    return {{"import",
+             1,
+             "",
+             {"source"},
+             {artefact<Text>("import.geometry"), artefact<Text>("import.texture")},
+             {},
+             {},
+             true,
+             import},
+            {"geometry", 1, "", {"import.geometry"}, {artefact<Text>("geometry")}, {}, {}, true, geometry},
+            {"texture", 1, "", {"import.texture"}, {artefact<Text>("texture")}, {"zim"}, {}, true, texture},
+            {"join", 1, "", {"geometry", "texture"}, {artefact<Text>("join")}, {}, {}, true, join}};
+  }
+
+  void run(const CompileOptions& options = {}) {
+    ran.clear();
+    const std::vector<Stage> stages = table();
+    const RunContext context;
+    for (const Text& source : models) {
+      GraphRun graph(stages, options, store, context);
+      const std::vector<std::uint8_t> bytes(source.begin(), source.end());
+      graph.give("source", object(source), sha256(bytes), bytes.size());
+      graph.run("join");
+    }
+  }
+};
+
+TEST(GraphRun, OfAThousandModelsOnlyWhatDependsOnAChangeRuns) {
+  FakeCollection collection;
+  constexpr int kModels = 1000, kSensitive = 100;
+  for (int i = 0; i < kModels; ++i)
+    collection.models.push_back("g" + std::to_string(i) + "|" + (i < kSensitive ? "x" : "t") +
+                                std::to_string(i));
+  collection.run();
+  EXPECT_EQ(collection.ran.size(), 4u * kModels);
+  collection.run();
+  EXPECT_EQ(collection.ran, Ran{});
+  collection.models[617] = "g617|another";  // one texture of one model
+  collection.run();
+  EXPECT_EQ(collection.ran, (Ran{"import", "join", "texture"}));
+  CompileOptions options;  // one option: its stage everywhere, and what follows where the bytes differ
+  options.zim.difference = 31;
+  collection.run(options);
+  EXPECT_EQ(collection.ran.count("texture"), static_cast<std::size_t>(kModels));
+  EXPECT_EQ(collection.ran.count("join"), static_cast<std::size_t>(kSensitive));
+  EXPECT_EQ(collection.ran.size(), static_cast<std::size_t>(kModels + kSensitive));
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -1,0 +1,285 @@
+// Collections as a user compiles them again and again: what runs after which change, known failures, limits,
+// interruption, reports.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <fstream>
+#include <set>
+#include <thread>
+#include <valijson/adapters/nlohmann_json_adapter.hpp>
+#include <valijson/schema.hpp>
+#include <valijson/schema_parser.hpp>
+#include <valijson/validator.hpp>
+
+#include "tests/support/small_builds.h"
+
+namespace texmesh::testing {
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Stages = std::set<std::string>;
+
+class Collection : public ::testing::Test {
+ protected:
+  void SetUp() override { write_text(folder_ / "profile.json", kCheapProfile); }
+
+  /// OBJ with MTL and JPEG, in a folder of models.
+  void add_model(const std::string& name, int seed) {
+    fs::create_directories(folder_ / "in");
+    const CommandResult made =
+        run_command({TEXMESH_MAKE_SCAN, "--triangles", "48", "--texture", "32", "--seed",
+                     std::to_string(seed), "-o", folder_ / ("in/" + name + ".obj")});
+    ASSERT_EQ(made.exit_code, 0) << made.errors;
+  }
+  void add_three() {
+    ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+    ASSERT_NO_FATAL_FAILURE(add_model("b", 2));
+    ASSERT_NO_FATAL_FAILURE(add_model("c", 3));
+  }
+
+  CommandResult compile(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{TEXMESH_BINARY,          "compile", folder_ / "in",    "-o",
+                                       folder_ / "out",         "--cache", folder_ / "cache", "--profile",
+                                       folder_ / "profile.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+  std::vector<Json> events(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = more;
+    arguments.push_back("--json");
+    return events_of(compile(arguments).output);
+  }
+  std::string model(const std::string& name) const { return folder_ / ("in/" + name); }
+
+  TemporaryFolder folder_;
+};
+
+/// Stages that ran, by model's file name.
+std::map<std::string, Stages> ran_in(const std::vector<Json>& events) {
+  std::map<std::string, Stages> ran;
+  for (const Json& e : events)
+    if (e["event"] == "stage-finished" && e["result"] == "ran")
+      ran[fs::path(e["model"].get<std::string>()).filename()].insert(e["stage"].get<std::string>());
+  return ran;
+}
+
+std::map<std::string, std::string> results_in(const std::vector<Json>& events) {
+  std::map<std::string, std::string> results;
+  for (const Json& e : events)
+    if (e["event"] == "model-finished")
+      results[fs::path(e["model"].get<std::string>()).filename()] = e["result"];
+  return results;
+}
+
+// Not "scales": its files hold previews of the textures.
+const Stages kGeometryStages{"condition", "skeletonization", "ssf", "simplification", "perceptual_values"};
+
+TEST_F(Collection, AnUnchangedOneRunsNothingAndSaysSoInOneLine) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  ASSERT_EQ(compile().exit_code, 0);
+  const auto written = fs::last_write_time(folder_ / "out/a.texmesh");
+  const CommandResult again = compile({"--explain"});
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_EQ(again.output, "3 of 3 models are up to date: no input, option or tool has changed\n");
+  for (const Json& e : events()) EXPECT_FALSE(e["event"] == "model-started") << e;
+  EXPECT_EQ(fs::last_write_time(folder_ / "out/a.texmesh"), written);
+  const CommandResult forecast = compile({"--dry-run"});
+  EXPECT_EQ(forecast.output,
+            "3 of 3 models are up to date: no input, option or tool has changed. Nothing was written.\n");
+}
+
+TEST_F(Collection, AnotherTextureRunsThatModelsTextureStagesOnly) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  ASSERT_EQ(compile().exit_code, 0);
+  const Packages before = packages_in(folder_ / "out");
+  fs::copy_file(model("c.jpg"), model("b.jpg"), fs::copy_options::overwrite_existing);
+  const CommandResult forecast = compile({"--dry-run"});
+  EXPECT_NE(forecast.output.find("2 of 3 models are up to date"), std::string::npos) << forecast.output;
+  const auto ran = ran_in(events());
+  ASSERT_EQ(ran.size(), 1u);
+  const Stages& of_b = ran.at("b.obj");
+  for (const std::string& stage : kGeometryStages) EXPECT_FALSE(of_b.contains(stage)) << stage;
+  for (const char* stage : {"import", "zim", "ladder", "package"}) EXPECT_TRUE(of_b.contains(stage)) << stage;
+  Packages after = packages_in(folder_ / "out");
+  EXPECT_NE(after.at("b.texmesh"), before.at("b.texmesh"));
+  after["b.texmesh"] = before.at("b.texmesh");
+  EXPECT_EQ(after, before);
+  EXPECT_TRUE(ran_in(events()).empty());
+}
+
+TEST_F(Collection, AnotherOptionRunsItsStageAndWhatSeesOtherBytes) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  ASSERT_EQ(compile().exit_code, 0);
+  // Other JPEG qualities: not the geometry, not the zeta maps.
+  const auto ran = ran_in(events({"--rungs", "50"}));
+  ASSERT_EQ(ran.size(), 1u);
+  EXPECT_TRUE(ran.at("a.obj").contains("ladder"));
+  EXPECT_TRUE(ran.at("a.obj").contains("package"));
+  for (const std::string& stage : kGeometryStages) EXPECT_FALSE(ran.at("a.obj").contains(stage)) << stage;
+  EXPECT_FALSE(ran.at("a.obj").contains("zim"));
+  EXPECT_FALSE(ran.at("a.obj").contains("import"));
+  // Nothing but the title.
+  EXPECT_EQ(ran_in(events({"--rungs", "50", "--title", "Coin"})),
+            (std::map<std::string, Stages>{{"a.obj", {"package"}}}));
+  const CommandResult explained = compile({"--rungs", "50", "--title", "Vase", "--explain"});
+  EXPECT_NE(explained.output.find("runs: package.title \"Coin\" -> \"Vase\""), std::string::npos)
+      << explained.output;
+  EXPECT_EQ(explained.output.find("runs: "), explained.output.rfind("runs: ")) << explained.output;
+}
+
+TEST_F(Collection, AKnownFailureIsRememberedUntilItsFileChanges) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  write_text(model("bad.obj"), "f 1 2 3\n");
+  EXPECT_EQ(compile().exit_code, 1);
+  const auto again = events();
+  EXPECT_EQ(results_in(again),
+            (std::map<std::string, std::string>{{"a.obj", "unchanged"}, {"bad.obj", "failed"}}));
+  for (const Json& e : again) EXPECT_NE(e["event"], "model-started");
+  const CommandResult plain = compile();
+  EXPECT_EQ(plain.exit_code, 1);
+  EXPECT_NE(plain.output.find("--retry-failed tries again"), std::string::npos) << plain.output;
+  const auto retried = events({"--retry-failed"});
+  EXPECT_EQ(std::count_if(retried.begin(), retried.end(),
+                          [](const Json& e) { return e["event"] == "model-started"; }),
+            1);
+  EXPECT_EQ(results_in(retried)["bad.obj"], "failed");
+  fs::copy_file(model("a.obj"), model("bad.obj"), fs::copy_options::overwrite_existing);
+  EXPECT_EQ(compile().exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out/bad.texmesh"));
+}
+
+TEST_F(Collection, AnErrorOfTheMachineIsNotRemembered) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  fs::create_directories(folder_ / "out/a.texmesh/in the way");  // the package cannot take this name
+  const CommandResult failed = compile();
+  EXPECT_EQ(failed.exit_code, 1) << failed.output;
+  EXPECT_NE(failed.output.find("expected a writable file"), std::string::npos) << failed.output;
+  fs::remove_all(folder_ / "out/a.texmesh");
+  const CommandResult r = compile();
+  EXPECT_EQ(r.exit_code, 0) << r.output;
+}
+
+TEST_F(Collection, FailFastStartsNothingAfterAFailureAndTheNextRunDoesTheRest) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  write_text(model("bad.obj"), "f 1 2 3\n" + std::string(4'000'000, '#'));  // the largest one starts first
+  const auto stopped = results_in(events({"--fail-fast", "--jobs", "1"}));
+  EXPECT_EQ(stopped.at("bad.obj"), "failed");
+  EXPECT_EQ(packages_in(folder_ / "out").size(), 0u);
+  const CommandResult kept_going = compile({"--keep-going", "--jobs", "1"});
+  EXPECT_EQ(kept_going.exit_code, 1);
+  EXPECT_NE(kept_going.output.find("3 compiled, 0 up to date, 1 failed"), std::string::npos)
+      << kept_going.output;
+}
+
+TEST_F(Collection, ShardsTogetherMakeEveryPackageOnce) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  std::multiset<std::string> made;
+  for (const char* shard : {"0/3", "1/3", "2/3"})
+    for (const auto& [name, result] : results_in(events({"--shard", shard}))) {
+      EXPECT_EQ(result, "ok");
+      made.insert(name);
+    }
+  EXPECT_EQ(made, (std::multiset<std::string>{"a.obj", "b.obj", "c.obj"}));
+  for (const char* wrong : {"3/3", "-1/3", "1", "1/0", "x/3", "1/3x"})
+    EXPECT_EQ(compile({"--shard", wrong}).exit_code, 2) << wrong;
+}
+
+TEST_F(Collection, AFileChangedWithItsTimePutBackIsSeen) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  ASSERT_NO_FATAL_FAILURE(add_model("b", 2));
+  ASSERT_EQ(compile().exit_code, 0);
+  const auto time = fs::last_write_time(model("a.jpg"));
+  std::string jpeg = read_text(model("a.jpg"));
+  const std::string other = read_text(model("b.jpg"));
+  write_text(model("a.jpg"), other);
+  fs::last_write_time(model("a.jpg"), time);
+  EXPECT_EQ(ran_in(events()).size(), 1u);
+  write_text(model("a.jpg"), jpeg);
+  fs::last_write_time(model("a.jpg"), time);
+  EXPECT_EQ(results_in(events())["a.obj"], "ok");
+}
+
+void expect_schema(const std::string& schema_name, const Json& document) {
+  const Json schema_json =
+      Json::parse(read_text(std::string(TEXMESH_SOURCE_DIR) + "/schemas/" + schema_name + ".schema.json"));
+  valijson::Schema schema;
+  valijson::SchemaParser().populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_json), schema);
+  valijson::Validator validator;
+  EXPECT_TRUE(validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), nullptr))
+      << document.dump();
+}
+
+TEST_F(Collection, ReportsAndEventsOfARealRunFollowTheirSchemas) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  write_text(model("bad.obj"), "f 1 2 3\n");
+  const CommandResult r = compile({"--json", "--explain", "--jobs", "2", "--summary", folder_ / "s.json",
+                                   "--junit", folder_ / "j.xml", "--trace", folder_ / "t.json"});
+  EXPECT_EQ(r.exit_code, 1);
+  for (const Json& e : events_of(r.output)) expect_schema("event.v1", e);
+  const Json summary = Json::parse(read_text(folder_ / "s.json"));
+  expect_schema("summary.v1", summary);
+  EXPECT_EQ(summary["compiled"], 3);
+  EXPECT_EQ(summary["failed"], 1);
+  for (const Json& m : summary["models"])
+    if (m["result"] == "ok") {
+      EXPECT_EQ(m["bytes"], fs::file_size(m["output"].get<std::string>()));
+      EXPECT_GT(m["peak_memory_bytes"], 1'000'000);
+    }
+  EXPECT_NE(read_text(folder_ / "j.xml").find("tests=\"4\" failures=\"1\""), std::string::npos);
+  std::set<int> lanes, named;
+  const Json trace = Json::parse(read_text(folder_ / "t.json"));
+  for (const Json& e : trace["traceEvents"])
+    if (e["ph"] == "X")
+      lanes.insert(e["pid"].get<int>());
+    else if (e["name"] == "process_name")
+      named.insert(e["pid"].get<int>());
+  EXPECT_EQ(lanes, named);
+  EXPECT_EQ(lanes, (std::set<int>{0, 1}));
+}
+
+/// Interrupts a run of two models that are quick and one that is not, while it is at the latter.
+void interrupt(const std::string& folder, const std::string& profile, const std::string& signal,
+               bool whole_group) {
+  // The build is a process group of its own, as in a terminal.
+  const std::string script =
+      "set -m; '" TEXMESH_BINARY "' compile '" + folder + "/in' -o '" + folder + "/out' --cache '" + folder +
+      "/cache' --profile '" + profile + "' --jobs 2 >'" + folder +
+      "/log' 2>&1 & p=$!; for ((i = 0; i < 600; ++i)); do [[ -e '" + folder + "/out/a.texmesh' && -e '" +
+      folder + "/out/b.texmesh' ]] && break; sleep 0.05; done; sleep 0.3; s=$(date +%s%N); kill -" + signal +
+      " " + (whole_group ? "-- -$p" : "$p") +
+      "; wait $p; c=$?; e=$(date +%s%N); left=$(pgrep -c -g $p); "
+      "echo \"took $(((e - s) / 1000000)) left $left\"; exit $c";
+  const CommandResult r = run_command({"bash", "-c", script});
+  EXPECT_EQ(r.exit_code, 1) << r.output << r.errors << read_text(folder + "/log");
+  int took = -1, left = -1;
+  ASSERT_EQ(std::sscanf(r.output.c_str(), "took %d left %d", &took, &left), 2) << r.output;
+  EXPECT_LT(took, 2500) << "two seconds, and some for a busy machine";
+  EXPECT_EQ(left, 0);
+  EXPECT_NE(read_text(folder + "/log").find("1 cancelled"), std::string::npos) << read_text(folder + "/log");
+}
+
+TEST_F(Collection, AnInterruptedRunLeavesNothingAndTheNextOneContinues) {
+  const CommandResult made =
+      run_command({TEXMESH_MAKE_SCAN, "--triangles", "200000", "--texture", "0", "-o", folder_ / "slow.ply"});
+  ASSERT_EQ(made.exit_code, 0);
+  for (const bool keyboard : {true, false}) {
+    fs::remove_all(folder_ / "out");
+    ASSERT_NO_FATAL_FAILURE(add_model("a", keyboard ? 1 : 3));
+    ASSERT_NO_FATAL_FAILURE(add_model("b", keyboard ? 2 : 4));
+    fs::rename(folder_ / "slow.ply", model("slow.ply"));
+    ASSERT_NO_FATAL_FAILURE(
+        interrupt(folder_.path().string(), folder_ / "profile.json", keyboard ? "INT" : "TERM", keyboard));
+    EXPECT_EQ(packages_in(folder_ / "out").size(), 2u);  // and no temporary file
+    const CommandResult stat =
+        run_command({TEXMESH_BINARY, "cache", "stat", "--json", "--cache", folder_ / "cache"});
+    EXPECT_EQ(Json::parse(stat.output)["running_builds"], 0);
+    fs::rename(model("slow.ply"), folder_ / "slow.ply");
+    EXPECT_EQ(results_in(events()),
+              (std::map<std::string, std::string>{{"a.obj", "unchanged"}, {"b.obj", "unchanged"}}));
+    EXPECT_TRUE(ran_in(events()).empty());
+  }
+}
+
+}  // namespace
+}  // namespace texmesh::testing
