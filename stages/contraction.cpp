@@ -107,13 +107,34 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
-using Contraction = CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh>;
+
+constexpr int kMaxRays = 1000;
+/// Rays in a row from the same point, in the contraction that this thread is in.
+thread_local int rays_in_a_row = 0;
+
+/// The kernel, but for rays: every one is counted, and too many from one point are an error.
+struct CountingKernel : Kernel {
+  struct Construct_ray_3 {
+    using result_type = Kernel::Ray_3;
+    Kernel::Ray_3 operator()(const Kernel::Point_3& from, const Kernel::Vector_3& along) const {
+      rays_in_a_row = from == last ? rays_in_a_row + 1 : 0;
+      last = from;
+      if (rays_in_a_row > kMaxRays) throw std::runtime_error("contraction cannot tell inside from outside");
+      return Kernel::Ray_3(from, along);
+    }
+    static thread_local Kernel::Point_3 last;
+  };
+  Construct_ray_3 construct_ray_3_object() const { return {}; }
+};
+thread_local Kernel::Point_3 CountingKernel::Construct_ray_3::last{0, 0, 0};
+
+using Contraction = CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh, CountingKernel>;
 
 static_assert(std::is_same_v<Contraction::Meso_skeleton::Allocator, ContractionAllocator<int>>);
 
 }  // namespace
 
-CurveSkeleton contract_to_skeleton(const TriangleSoup& closed) {
+CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions) {
   SurfaceMesh mesh;
   for (const Vec3d& p : closed.points) mesh.add_vertex({p.x, p.y, p.z});
   using Vertex = SurfaceMesh::Vertex_index;
@@ -126,8 +147,12 @@ CurveSkeleton contract_to_skeleton(const TriangleSoup& closed) {
   // goes.
   Arena arena((std::size_t{16} << 20) + closed.triangles.size() * 4096);
   const ArenaScope scope(arena);
+  rays_in_a_row = 0;
   Contraction::Skeleton graph;
-  CGAL::extract_mean_curvature_flow_skeleton(mesh, graph);
+  Contraction contraction(mesh);
+  contraction.set_max_iterations(static_cast<std::size_t>(max_contractions));
+  contraction.contract_until_convergence();
+  contraction.convert_to_skeleton(graph);
   CurveSkeleton out;
   for (const auto v : CGAL::make_range(vertices(graph))) {
     const auto& p = graph[v].point;

@@ -1,7 +1,5 @@
 #include "stages/skeletonization.h"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -10,82 +8,20 @@
 #include <utility>
 
 #include "stages/contraction.h"
+#include "stages/local_radius.h"
 #include "stages/parallel.h"
 #include "stages/segment_tree.h"
 #include "stages/wrap.h"
+#include "stages/wrap_soup.h"
 
 namespace texmesh {
 namespace {
 
-/// Soups larger than this are clustered to it first: the wrap looks at nothing finer than its alpha.
-constexpr std::size_t kMaxSoup = 100000;
 /// No radius is smaller than this fraction of the diagonal: R divides.
 constexpr double kLeastRadius = 1e-6;
-
-/// The frame in which wrap and contraction work: centred, diagonal 1.
-struct Frame {
-  Vec3d centre;
-  double diagonal = 0;
-  Vec3d to_unit(Vec3f p) const { return (to_double(p) - centre) * (1 / diagonal); }
-  Vec3d from_unit(Vec3d p) const { return p * diagonal + centre; }
-};
-
-Frame frame_of(const std::vector<Vec3f>& positions) {
-  Vec3d lo = to_double(positions[0]), hi = lo;
-  for (Vec3f p : positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], double{p[k]});
-      hi[k] = std::max(hi[k], double{p[k]});
-    }
-  return {(lo + hi) * 0.5, length(hi - lo)};
-}
-
-std::vector<std::uint32_t> cluster(const std::vector<float>& points,
-                                   const std::vector<std::uint32_t>& indices) {
-  std::vector<std::uint32_t> fewer(indices.size());
-  fewer.resize(meshopt_simplifySloppy(fewer.data(), indices.data(), indices.size(), points.data(),
-                                      points.size() / 3, 3 * sizeof(float), kMaxSoup * 3, 1.0f, nullptr));
-  return fewer;
-}
-
-/// The triangles that have an area, thinned out when there are many. Points that no triangle uses are left
-/// out: the wrap's search tree would take them in.
-TriangleSoup make_soup(const Mesh& mesh, const Frame& frame) {
-  std::vector<float> points;
-  for (Vec3f p : mesh.positions) {
-    const Vec3d unit = frame.to_unit(p);
-    for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(unit[k]));
-  }
-  std::vector<std::uint32_t> indices;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) indices.push_back(mesh.position_of(t, k));
-  // Clustering may leave nothing of a soup of crumbs; then all of it is wrapped.
-  if (indices.size() > kMaxSoup * 3)
-    if (std::vector<std::uint32_t> fewer = cluster(points, indices); !fewer.empty())
-      indices = std::move(fewer);
-
-  TriangleSoup soup;
-  std::vector<std::uint32_t> number(mesh.positions.size(), 0xffffffffu);
-  for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-    const auto point = [&](std::size_t k) {
-      const float* p = &points[3 * std::size_t{indices[i + k]}];
-      return Vec3d{p[0], p[1], p[2]};
-    };
-    if (cross(point(1) - point(0), point(2) - point(0)) == Vec3d{}) continue;
-    Triangle t{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t& n = number[indices[i + k]];
-      if (n == 0xffffffffu) {
-        n = static_cast<std::uint32_t>(soup.points.size());
-        soup.points.push_back(point(k));
-      }
-      t[k] = n;
-    }
-    soup.triangles.push_back(t);
-  }
-  if (soup.triangles.empty()) throw std::runtime_error("no triangle has an area");
-  return soup;
-}
+/// A note about thin parts is worth reading from this share of the vertices on.
+constexpr double kWorthANote = 0.01;
+constexpr int kWrapAttempts = 3;
 
 void append(const CurveSkeleton& part, CurveSkeleton& all) {
   const auto base = static_cast<std::uint32_t>(all.nodes.size());
@@ -96,41 +32,122 @@ void append(const CurveSkeleton& part, CurveSkeleton& all) {
     for (std::uint32_t n = base; n < all.nodes.size(); ++n) all.segments.push_back({n, n});
 }
 
-CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, const RunContext& context) {
+bool is_finite(const CurveSkeleton& skeleton) {
+  return !skeleton.nodes.empty() && std::all_of(skeleton.nodes.begin(), skeleton.nodes.end(), [](Vec3d p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+  });
+}
+
+CurveSkeleton centroid_of(const TriangleSoup& part) {
+  Vec3d sum;
+  for (const Vec3d& p : part.points) sum = sum + p;
+  return {{sum * (1 / static_cast<double>(part.points.size()))}, {}};
+}
+
+/// Errors that mean "not this way"; the others (Cancelled, a lack of memory: a limit of the machine must not
+/// decide about the result) pass through.
+template <class Try, class Else>
+void try_or(Try&& attempt, Else&& otherwise) {
+  try {
+    attempt();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    otherwise();
+  }
+}
+
+CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_contractions, Notes& notes,
+                             const RunContext& context) {
   CurveSkeleton all;
+  std::size_t failed = 0;
   for (const TriangleSoup& part : parts) {
     context.check_cancelled();
-    append(contract_to_skeleton(part), all);
+    CurveSkeleton skeleton;
+    try_or([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
+    if (!is_finite(skeleton)) {
+      skeleton = centroid_of(part);
+      ++failed;
+    }
+    append(skeleton, all);
   }
-  for (const Vec3d& p : all.nodes)
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-      throw std::runtime_error("a node is not finite");
-  if (all.segments.empty()) throw std::runtime_error("the skeleton is empty");
+  if (failed > 0)
+    add_warning(notes, "skeleton-part-centroid", "",
+                std::to_string(failed) + " of " + std::to_string(parts.size()) +
+                    " parts cannot be contracted to a curve, their centroids take its place");
   return all;
 }
 
-CurveSkeleton extract(const Mesh& mesh, const Frame& frame, const SkeletonizationOptions& options,
-                      const RunContext& context) {
-  const TriangleSoup soup = make_soup(mesh, frame);
-  context.check_cancelled();
-  const std::vector<TriangleSoup> parts =
-      wrap_surface(soup, 1.0 / options.alpha_divisor, 1.0 / options.offset_divisor,
-                   static_cast<std::size_t>(options.max_wrap_faces));
-  context.report(0.7);
-  CurveSkeleton skeleton = contract_parts(parts, context);
-  for (Vec3d& p : skeleton.nodes) p = frame.from_unit(p);
-  return skeleton;
+/// The wrap at the finest alpha that comes to an end within the cap.
+std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOptions& options, Notes& notes,
+                               const RunContext& context) {
+  double alpha = 1.0 / options.alpha_divisor;
+  for (int attempt = 1;; ++attempt, alpha *= 2) {
+    context.check_cancelled();
+    std::vector<TriangleSoup> parts;
+    try_or(
+        [&] {
+          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
+                               static_cast<std::size_t>(options.max_wrap_faces),
+                               static_cast<std::size_t>(options.max_wrap_steps));
+        },
+        [&] {
+          if (attempt == kWrapAttempts) throw;
+        });
+    if (parts.empty() && attempt == kWrapAttempts) throw std::runtime_error("the wrap is empty");
+    if (parts.empty()) continue;
+    if (attempt > 1)
+      add_warning(notes, "skeleton-coarser-wrap", "",
+                  "the surface is too intricate for alpha_divisor " + std::to_string(options.alpha_divisor) +
+                      ", wrapped with " + std::to_string(options.alpha_divisor >> (attempt - 1)));
+    return parts;
+  }
 }
 
-std::vector<float> distances_to(const CurveSkeleton& skeleton, const std::vector<Vec3f>& positions,
-                                const RunContext& context) {
+std::vector<double> distances_to(const CurveSkeleton& skeleton, const std::vector<Vec3d>& points,
+                                 const RunContext& context) {
   const SegmentTree tree(skeleton.nodes, skeleton.segments);
-  std::vector<float> distance(positions.size());
-  parallel_for(context, positions.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p)
-      distance[p] = static_cast<float>(tree.distance(to_double(positions[p])));
+  std::vector<double> distance(points.size());
+  parallel_for(context, points.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) distance[p] = tree.distance(points[p]);
   });
   return distance;
+}
+
+void note_limits(const LocalRadius& local, Notes& notes) {
+  if (local.plates > 0)
+    add_info(notes, "skeleton-plates", "",
+             std::to_string(local.plates) + " of " + std::to_string(local.parts) +
+                 " parts are plates, where R is half the local thickness");
+  const auto count = static_cast<double>(local.radius.size());
+  if (local.plates < local.parts && static_cast<double>(local.limited) >= kWorthANote * count)
+    add_info(notes, "skeleton-thin-parts", "",
+             "R is bounded by the local thickness at " +
+                 std::to_string(static_cast<int>(100 * static_cast<double>(local.limited) / count + 0.5)) +
+                 " % of the vertices, which the skeleton does not reach");
+}
+
+/// Skeleton and R in the unit frame, then in the mesh's.
+CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
+                      const SkeletonizationOptions& options, const RunContext& context,
+                      std::vector<float>& distance, Notes& notes) {
+  const TriangleSoup soup = make_wrap_soup(mesh, frame);
+  const std::vector<TriangleSoup> parts = wrap(soup, options, notes, context);
+  context.report(0.7);
+  CurveSkeleton skeleton = contract_parts(parts, options.max_contractions, notes, context);
+  context.report(0.8);
+  std::vector<Vec3d> points;
+  points.reserve(mesh.mesh.positions.size());
+  for (Vec3f p : mesh.mesh.positions) points.push_back(frame.to_unit(p));
+  const std::vector<double> far = distances_to(skeleton, points, context);
+  const LocalRadius local = limit_by_thickness(
+      parts, points, far, {options.plate_ratio, options.limb_ratio, 1.0 / options.offset_divisor}, context);
+  note_limits(local, notes);
+  for (double r : local.radius) distance.push_back(static_cast<float>(r * frame.diagonal));
+  for (Vec3d& p : skeleton.nodes) p = frame.from_unit(p);
+  return skeleton;
 }
 
 /// The mean of each component's positions; distances are to the own one, not to the closest.
@@ -167,22 +184,16 @@ std::vector<float> floored(const std::vector<float>& distance, double floor, dou
 
 Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& options,
                      const RunContext& context) {
-  const Frame frame = frame_of(mesh.mesh.positions);
+  const UnitFrame frame = unit_frame_of(mesh.mesh.positions);
   Skeleton out;
   CurveSkeleton skeleton;
-  try {
-    skeleton = extract(mesh.mesh, frame, options, context);
-    out.distance = distances_to(skeleton, mesh.mesh.positions, context);
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;  // a limit of the machine must not decide about the result
-  } catch (const std::exception&) {
-    use_centroids(mesh, skeleton, out.distance);
-    out.fallback_centroid = true;
-    add_warning(out.notes, "skeleton-fallback", "",
-                "no skeleton, distances are to the centroids of the components");
-  }
+  try_or([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
+         [&] {
+           use_centroids(mesh, skeleton, out.distance);
+           out.fallback_centroid = true;
+           add_warning(out.notes, "skeleton-fallback", "",
+                       "no skeleton, distances are to the centroids of the components");
+         });
   for (const Vec3d& p : skeleton.nodes) out.nodes.push_back(to_float(p));
   out.segments = std::move(skeleton.segments);
   out.radius = floored(out.distance, options.radius_floor, frame.diagonal);

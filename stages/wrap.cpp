@@ -12,6 +12,8 @@
 #include <CGAL/alpha_wrap_3.h>
 
 #include <array>
+#include <stdexcept>
+#include <string>
 
 namespace texmesh {
 namespace {
@@ -20,6 +22,19 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 using SurfaceMesh = CGAL::Surface_mesh<Point>;
 using PartMap = SurfaceMesh::Property_map<SurfaceMesh::Face_index, std::size_t>;
+
+/// Counts the steps of the wrapping; CGAL calls it before each.
+class StepCounter : public CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
+ public:
+  explicit StepCounter(std::size_t most) : left_(most) {}
+  template <class Wrapper, class Gate>
+  void before_facet_treatment(const Wrapper&, const Gate&) {
+    if (left_-- == 0) throw std::runtime_error("the wrap takes too many steps");
+  }
+
+ private:
+  std::size_t left_;
+};
 
 void decimate(SurfaceMesh& wrap, std::size_t max_faces) {
   if (wrap.number_of_faces() <= max_faces) return;
@@ -52,7 +67,7 @@ std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
 }  // namespace
 
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
-                                       std::size_t max_faces) {
+                                       std::size_t max_faces, std::size_t max_steps) {
   std::vector<Point> points;
   points.reserve(soup.points.size());
   for (const Vec3d& p : soup.points) points.emplace_back(p.x, p.y, p.z);
@@ -60,7 +75,9 @@ std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, d
   triangles.reserve(soup.triangles.size());
   for (const Triangle& t : soup.triangles) triangles.push_back({t[0], t[1], t[2]});
   SurfaceMesh wrap;
-  CGAL::alpha_wrap_3(points, triangles, alpha, offset, wrap);
+  StepCounter counter(max_steps);
+  CGAL::alpha_wrap_3(points, triangles, alpha, offset, wrap, CGAL::parameters::default_values(),
+                     CGAL::parameters::visitor(std::ref(counter)));
   decimate(wrap, max_faces);
   return split_parts(wrap);
 }

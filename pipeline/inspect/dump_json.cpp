@@ -1,3 +1,4 @@
+#include "format/viewing.h"
 #include "pipeline/inspect/dump.h"
 #include "pipeline/inspect/package_figures.h"
 #include "pipeline/inspect/provenance.h"
@@ -18,12 +19,24 @@ std::uint64_t package_bytes(PackageReader& p) {
   return bytes;
 }
 
+/// Every step function, with the viewing distance in object heights at which a step begins (null = 0, at any
+/// distance).
+Json steps_json(const std::vector<ManifestStep>& steps) {
+  Json list = Json::array();
+  for (const ManifestStep& s : steps) {
+    const bool any = s.up_to_px >= kAnyDisplayPx;
+    list.push_back({{"up_to_px", s.up_to_px},
+                    {"scale", s.scale},
+                    {"from_distance", any ? Json() : Json(viewing_distance(1, s.up_to_px, {}))}});
+  }
+  return list;
+}
+
 Json summary_json(PackageReader& p) {
   const Manifest& m = p.manifest();
-  Json kinds = Json::array(), steps = Json::array(), textures = Json::array();
+  Json kinds = Json::array(), textures = Json::array();
   for (const KindBytes& k : bytes_by_kind(m, p.store().read_manifest().size(), p.index()))
     kinds.push_back({{"kind", k.kind}, {"entries", k.entries}, {"bytes", k.bytes}});
-  for (const ManifestStep& s : m.steps) steps.push_back({{"up_to_px", s.up_to_px}, {"scale", s.scale}});
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& t = p.textures()[k];
     textures.push_back({{"plane", k},
@@ -64,7 +77,12 @@ Json summary_json(PackageReader& p) {
             {"bounds_max", vector_json(m.bounds_max)},
             {"height", m.object_height},
             {"jnd", m.jnd}}},
-          {"steps", steps},
+          {"steps", steps_json(m.steps)},
+          {"step_rules",
+           {{"jnd", steps_json(step_function(m.scales, StepRule::kJnd))},
+            {"error", steps_json(step_function(m.scales, StepRule::kError))},
+            {"edge", steps_json(step_function(m.scales, StepRule::kEdge))}}},
+          {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
           {"stream", stream},
           {"textures", textures},
           {"bytes", kinds},

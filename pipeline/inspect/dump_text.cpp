@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "format/viewing.h"
 #include "pipeline/inspect/dump.h"
 #include "pipeline/inspect/option_changes.h"
 #include "pipeline/inspect/package_figures.h"
@@ -70,12 +71,40 @@ std::string stream_text(PackageReader& p) {
          table.text();
 }
 
+/// "up to 1 234" of the rule's step to this scale, "" where it has none; and the least distance that is.
+void add_step_cells(const std::vector<ManifestStep>& steps, int scale, std::vector<std::string>& cells) {
+  const auto step =
+      std::find_if(steps.begin(), steps.end(), [scale](const ManifestStep& s) { return s.scale == scale; });
+  if (step == steps.end()) {
+    cells.insert(cells.end(), {"", ""});
+    return;
+  }
+  cells.push_back(pixels(step->up_to_px));
+  cells.push_back(step->up_to_px >= kAnyDisplayPx ? "any"
+                                                  : shortest(viewing_distance(1, step->up_to_px, {}), 3));
+}
+
 std::string steps_text(const Manifest& m) {
+  const auto rule = [&](StepRule r) { return step_function(m.scales, r); };
+  const std::vector<std::vector<ManifestStep>> rules{m.steps, rule(StepRule::kJnd), rule(StepRule::kError),
+                                                     rule(StepRule::kEdge)};
   TextTable table;
-  table.column("displayed height up to [px]");
   table.column("show");
-  for (const ManifestStep& s : m.steps) table.row({pixels(s.up_to_px), fmt::format("S_{}", s.scale)});
-  return "step function\n" + table.text();
+  for (const char* name : {"px", "JND px", "1 px error px", "O_V/E_S px"}) {
+    table.column(name);
+    table.column("distance");
+  }
+  for (auto s = m.scales.rbegin(); s != m.scales.rend(); ++s) {
+    std::vector<std::string> cells{fmt::format("S_{}", s->scale)};
+    for (const auto& steps : rules) add_step_cells(steps, s->scale, cells);
+    table.row(cells);
+  }
+  return fmt::format(
+             "step function: displayed height in px up to which a scale is shown, and the distance in object "
+             "heights from\nwhich on that is (field of view {:.0f} degrees, {:.0f} px high); the package's "
+             "own (finer of JND and 1 px error), then\nby single rules\n",
+             Camera{}.fov_degrees, Camera{}.viewport_px) +
+         table.text();
 }
 
 std::string textures_text(PackageReader& p) {

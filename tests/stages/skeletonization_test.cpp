@@ -177,6 +177,56 @@ TEST(Skeletonization, ContractionRefusesWhatIsNotClosed) {
                std::exception);
 }
 
+TEST(Skeletonization, WhatCgalWouldNotEndOnIsGivenUp) {
+  // Coordinates whose products overflow: every ray from a point leaves CGAL undecided, and it would try the
+  // next one for ever.
+  TriangleSoup soup;
+  const Mesh m = testing::bumpy_sphere(10, 14, 0);
+  const ConditionedMesh closed = condition_mesh(m, true, {}, RunContext{});
+  for (Vec3f p : closed.mesh.positions) soup.points.push_back(to_double(p) * 1e160);
+  for (std::uint32_t t = 0; t < closed.mesh.triangles.size(); ++t)
+    soup.triangles.push_back(
+        {closed.mesh.position_of(t, 0), closed.mesh.position_of(t, 1), closed.mesh.position_of(t, 2)});
+  EXPECT_THROW(contract_to_skeleton(soup), std::exception);
+}
+
+TEST(Skeletonization, WorkCapsFallBackStepByStep) {
+  const Mesh m = testing::bumpy_sphere(24, 36, 0.1f);
+  const auto codes = [](const Skeleton& s) {
+    std::vector<std::string> list;
+    for (const Note& n : s.notes)
+      if (n.severity == Severity::kWarning) list.push_back(n.code);
+    return list;
+  };
+  EXPECT_TRUE(codes(run(m)).empty());
+  // Enough for a coarser wrap only.
+  bool coarser = false;
+  for (int steps = 64000; steps >= 1000 && !coarser; steps /= 2) {
+    const Skeleton s = run(m, {.max_wrap_steps = steps});
+    expect_sound(s, m.positions.size());
+    coarser = codes(s) == std::vector<std::string>{"skeleton-coarser-wrap"};
+  }
+  EXPECT_TRUE(coarser);
+  // Not even for that.
+  const Skeleton none = run(m, {.alpha_divisor = 400, .max_wrap_steps = 1000});
+  expect_sound(none, m.positions.size());
+  EXPECT_TRUE(none.fallback_centroid);
+  EXPECT_EQ(codes(none), std::vector<std::string>{"skeleton-fallback"});
+}
+
+TEST(Skeletonization, AnOpenBaseDoesNotMakeABowl) {
+  // A ball without its cap has the radius of a ball, not that of the wall that a wrap of a bowl would have.
+  Mesh m = testing::sphere(24, 36);
+  std::erase_if(m.triangles,
+                [&](const Triangle& t) { return m.positions[m.wedge_position[t[0]]].y < -0.8f; });
+  m.triangle_material.resize(m.triangles.size());
+  m.triangle_part.resize(m.triangles.size());
+  Skeleton s = run(m);
+  std::nth_element(s.distance.begin(),
+                   s.distance.begin() + static_cast<std::ptrdiff_t>(s.distance.size() / 2), s.distance.end());
+  EXPECT_GT(s.distance[s.distance.size() / 2], 0.6f);
+}
+
 TEST(Skeletonization, StopsWhenCancelled) {
   std::atomic<bool> cancelled = true;
   RunContext context;
