@@ -5,17 +5,18 @@
 #include <eigen3/Eigen/Dense>
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 
 #include "format/archive.h"
 #include "format/portable_math.h"
 #include "stages/heat_kernel.h"
+#include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
 namespace {
 
+using testing::even_sphere;
 using testing::Random;
 
 ConditionedMesh conditioned(const Mesh& m) { return condition_mesh(m, true, {}, RunContext{}); }
@@ -152,40 +153,6 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
     EXPECT_LE(flips, std::max(1.0, 0.001 * 3 * static_cast<double>(n))) << "time " << t;
     EXPECT_LE(smooth_error, 2e-5) << "time " << t;
   }
-}
-
-/// An octahedron split `levels` times and blown up to a sphere, with or without bumps: nearly even triangles
-/// everywhere, where the poles of a UV sphere are slivers whose capped rates read as features.
-Mesh even_sphere(int levels, double amplitude) {
-  std::vector<Vec3d> points{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-  Mesh m;
-  m.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
-  for (int level = 0; level < levels; ++level) {
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middle;
-    const auto split = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [at, added] =
-          middle.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(points.size()));
-      if (added) points.push_back(normalized(points[a] + points[b]));
-      return at->second;
-    };
-    std::vector<Triangle> finer;
-    for (const Triangle& t : m.triangles) {
-      const std::uint32_t a = split(t[0], t[1]), b = split(t[1], t[2]), c = split(t[2], t[0]);
-      for (const Triangle& part :
-           {Triangle{t[0], a, c}, Triangle{a, t[1], b}, Triangle{c, b, t[2]}, Triangle{a, b, c}})
-        finer.push_back(part);
-    }
-    m.triangles = finer;
-  }
-  for (const Vec3d p : points) {
-    const double relief = portable::sin(9 * p.x) * portable::sin(8 * p.y + 1) * portable::sin(7 * p.z + 2);
-    m.wedge_position.push_back(static_cast<std::uint32_t>(m.positions.size()));
-    m.positions.push_back(to_float(p * (1 + amplitude * relief)));
-  }
-  m.triangle_material.assign(m.triangles.size(), 0);
-  m.triangle_part.assign(m.triangles.size(), 0);
-  m.part_names = {"part"};
-  return m;
 }
 
 TEST(Ssf, FindsReliefAndLittleOnAPlainSphere) {
@@ -400,6 +367,83 @@ TEST(RangeScan, AgreesWithTheMeshOnACylinderLikeObject) {
   ASSERT_GT(marked, 100u);
   EXPECT_GT(static_cast<double>(near) / static_cast<double>(marked), 0.98);
   EXPECT_LT(static_cast<double>(background) / static_cast<double>(total), 0.75);
+}
+
+/// Ranks from 0, equal values sharing the mean of theirs.
+std::vector<double> ranks(const std::vector<double>& value) {
+  std::vector<std::size_t> order(value.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return value[a] < value[b]; });
+  std::vector<double> rank(value.size());
+  for (std::size_t i = 0; i < order.size();) {
+    std::size_t end = i;
+    while (end < order.size() && value[order[end]] == value[order[i]]) ++end;
+    for (std::size_t k = i; k < end; ++k) rank[order[k]] = 0.5 * static_cast<double>(i + end - 1);
+    i = end;
+  }
+  return rank;
+}
+
+double spearman(const std::vector<double>& a, const std::vector<double>& b) {
+  const std::vector<double> x = ranks(a), y = ranks(b);
+  const double mean = 0.5 * static_cast<double>(x.size() - 1);
+  double xy = 0, xx = 0, yy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    xy += (x[i] - mean) * (y[i] - mean);
+    xx += (x[i] - mean) * (x[i] - mean);
+    yy += (y[i] - mean) * (y[i] - mean);
+  }
+  return xy / std::sqrt(xx * yy);
+}
+
+/// A vase with relief of many sizes; sharp detail here, smooth there, so that persistence differs from place
+/// to place.
+RangeGrid vase(std::uint32_t columns, std::uint32_t rows) {
+  RangeGrid g = relief_grid(columns, rows, 0);
+  for (std::uint32_t y = 0; y < rows; ++y)
+    for (std::uint32_t x = 0; x < columns; ++x) {
+      const double a = 2 * portable::kPi * x / columns, h = 3.0 * y / rows;
+      const double coarse = 0.04 * portable::sin(2 * a + h) * portable::sin(2.2 * h);
+      const double middle = 0.02 * portable::sin(5 * a - 4 * h) * (0.5 + 0.5 * portable::sin(a + 1));
+      const double fine =
+          0.008 * portable::sin(13 * a) * portable::sin(14 * h) * (0.5 - 0.5 * portable::sin(a + 1));
+      g.radius[y * columns + x] = static_cast<float>(1 + 0.1 * portable::sin(h) + coarse + middle + fine);
+    }
+  return g;
+}
+
+/// Highest crossing within `reach` samples around every sample `margin` rows away from the ends.
+std::vector<double> around(const std::vector<std::uint8_t>& crossing, const RangeGrid& g, int reach,
+                           int margin) {
+  std::vector<double> out;
+  const int columns = static_cast<int>(g.columns), rows = static_cast<int>(g.rows);
+  for (int y = margin; y < rows - margin; ++y)
+    for (int x = 0; x < columns; ++x) {
+      int highest = 0;
+      for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx)
+          highest = std::max(
+              highest,
+              int{crossing[static_cast<std::size_t>((y + dy) * columns + (x + dx + columns) % columns)]});
+      out.push_back(highest);
+    }
+  return out;
+}
+
+TEST(RangeScan, PersistenceRanksAsThatOfTheMesh) {
+  const RangeGrid g = vase(160, 80);
+  // One level: the coarser ones of the pyramid mark fewer vertices than there are samples on a crossing.
+  SsfOptions options{.scales = 10, .sigma_max = 0.08, .convergence = 0, .error_ratio = 1000};
+  const ScaleMap range = filter_range_scan(g, 160 * 80, options, RunContext{});
+  const ScaleMap mesh = run(mesh_of(g), options);
+  // Crossings are curves that lie a sample or two apart in both; the mesh's are those of the band, without
+  // the base shape's curvature, so that the ranks agree well but not wholly.
+  EXPECT_GT(spearman(around(range.crossing, g, 3, 16), around(mesh.crossing, g, 3, 16)), 0.7);
+  const std::vector<double> self = around(range.crossing, g, 3, 16);
+  EXPECT_NEAR(spearman(self, self), 1, 1e-12);
+  std::vector<double> reversed = self;
+  std::reverse(reversed.begin(), reversed.end());
+  EXPECT_LT(spearman(self, reversed), 0.3);
 }
 
 }  // namespace
