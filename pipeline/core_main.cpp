@@ -34,6 +34,9 @@ int main(int argc, char** argv) {
     add_pack_command(app, exit_code);
     add_debug_command(app, exit_code);
     add_study_command(app, exit_code);
+    add_plan_command(app, exit_code);
+    add_check_command(app, exit_code);
+    add_simulate_command(app, exit_code);
     add_stages_command(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -35,7 +35,7 @@ class PackageStore {
 std::unique_ptr<PackageStore> open_container(std::unique_ptr<ByteSource> source);
 std::unique_ptr<PackageStore> open_folder(
     const std::string& path);  // InputError; no symlinks are followed beneath it
-/// A folder or a file, by what `path` is.
+/// An http or https URL (http_store.h), a folder or a file, by what `path` is.
 std::unique_ptr<PackageStore> open_store(const std::string& path);
 
 /// Reads a package on demand. The constructor reads the manifest only; index, textures and tables are read

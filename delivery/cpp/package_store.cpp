@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "delivery/cpp/http_store.h"
 #include "delivery/cpp/package_reader.h"
 
 namespace texmesh {
@@ -173,6 +174,7 @@ std::unique_ptr<PackageStore> open_folder(const std::string& path) {
 }
 
 std::unique_ptr<PackageStore> open_store(const std::string& path) {
+  if (is_url(path)) return open_url(path);
   std::error_code error;
   if (fs::is_directory(path, error)) return open_folder(path);
   return open_container(open_file_source(path));

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <mutex>
 
+#include "delivery/cpp/http_client.h"
 #include "pipeline/cache/cache_layer.h"
 
 namespace texmesh {
@@ -38,13 +39,6 @@ struct Easy {
   ~Easy() { ::curl_easy_cleanup(handle); }
 };
 
-/// scheme://host/path without user and password.
-std::string shown(const std::string& url) {
-  const std::size_t host = url.find("://") + 3, path = std::min(url.find('/', host), url.size());
-  const std::size_t at = url.rfind('@', path);
-  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
-}
-
 class HttpLayer : public CacheLayer {
  public:
   explicit HttpLayer(std::string url) : url_(std::move(url)) {
@@ -52,7 +46,7 @@ class HttpLayer : public CacheLayer {
     static std::once_flag once;
     std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
   }
-  std::string name() const override { return shown(url_); }
+  std::string name() const override { return shown_url(url_); }
 
   std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
                                                std::uint64_t max_bytes) override {

@@ -38,4 +38,18 @@ std::int64_t parse_seconds(const std::string& text, const std::string& flag) {
   return static_cast<std::int64_t>(parse(text, flag, kUnits, "a time such as 90d, 12h or 30min"));
 }
 
+double parse_duration(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{{"", 1}, {"s", 1}, {"ms", 1e-3}, {"min", 60}};
+  return parse(text, flag, kUnits, "a time such as 4, 1.5s or 250ms");
+}
+
+double parse_bandwidth(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"B/s", 1},         {"kB/s", 1e3},      {"MB/s", 1e6},       {"GB/s", 1e9},       {"KiB/s", 1024},
+      {"MiB/s", 1048576}, {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"Mbit/s", 1e6 / 8}, {"Gbit/s", 1e9 / 8}};
+  const double v = parse(text, flag, kUnits, "a rate such as 2Mbit/s or 41.68kB/s");
+  if (!(v > 0)) throw InputError(flag, "", "a rate above 0", text);
+  return v;
+}
+
 }  // namespace texmesh

@@ -1,0 +1,180 @@
+#include "delivery/cpp/delivery_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace texmesh {
+namespace {
+
+/// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network.
+double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
+  NetworkModel model(network);
+  while (model.now_s() < from_s) model.advance(from_s);
+  model.request(0, 0, static_cast<double>(bytes));
+  const auto arrival = model.advance(1e9);
+  return arrival ? arrival->time_s : 1e9;
+}
+
+BandwidthTrace shifted(const BandwidthTrace& trace, double by_s) {
+  BandwidthTrace out{{0}, {trace.at(by_s)}};
+  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
+    if (trace.time_s[i] > by_s) {
+      out.time_s.push_back(trace.time_s[i] - by_s);
+      out.bytes_s.push_back(trace.bytes_s[i]);
+    }
+  return out;
+}
+
+NetworkOptions shifted(NetworkOptions network, double by_s) {
+  network.link = shifted(network.link, by_s);
+  for (MirrorModel& m : network.mirrors) {
+    m.rate = shifted(m.rate, by_s);
+    m.dead_from_s = std::max(0.0, m.dead_from_s - by_s);
+  }
+  return network;
+}
+
+void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPlan& plan) {
+  double weight = 0, mean = 0;
+  plan.worst_quality = list.offers.empty() ? 100 : 1e9;
+  for (std::size_t i = 0; i < list.offers.size(); ++i) {
+    const PlaneTables& t = package.tables().planes[list.fragments[i].plane];
+    const std::int32_t rung = plan.textures.rungs[i];
+    const double quality = rung < 0 ? 0 : t.rung_quality[static_cast<std::size_t>(rung)];
+    const double w = t.surface_fraction[list.fragments[i].fragment];
+    mean += w * quality;
+    weight += w;
+    plan.worst_quality = std::min(plan.worst_quality, quality);
+  }
+  plan.mean_quality = list.offers.empty() ? 100 : weight > 0 ? mean / weight : 0;
+  plan.texture_dssim = list.total_weight > 0 ? plan.textures.loss / list.total_weight : 0;
+}
+
+DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& request, int scale) {
+  const Manifest& m = package.manifest();
+  DeliveryPlan plan;
+  plan.scale = scale;
+  plan.planes = planes_for_display(package, request.displayed_px);
+  plan.bootstrap_bytes = kBootstrapBytes;
+  plan.first_picture_bytes = m.first_picture_bytes;
+  // Index, tables, textures.json: asked for together with the first picture's end.
+  plan.table_bytes = m.index.bytes + m.tables.bytes + m.textures.bytes;
+  const bool coarsest = scale == m.scales.back().scale;
+  for (const ManifestScale& s : m.scales)
+    if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
+
+  const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
+  plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
+  plan.mesh_s =
+      fetched_s(request.network, manifest_s, plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+
+  HtcOptions htc = request.htc;
+  htc.time_limit_s = request.time_limit_s - plan.mesh_s;
+  htc.rtt_s = request.network.rtt_s;
+  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+  htc.throughput.initial_bytes_s =
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s
+                                : moved / std::max(1e-9, plan.mesh_s - manifest_s - request.network.rtt_s);
+  ListOptions options;
+  options.scale = scale;
+  FragmentList list = fragment_list(package, plan.planes, options);
+  if (htc.time_limit_s <= 0) {
+    plan.warnings.push_back("no time is left for textures: previews are shown");
+    plan.textures.rungs.assign(list.offers.size(), -1);
+    for (const FragmentOffer& f : list.offers) plan.textures.loss += f.loss[0];
+    plan.textures.skipped = static_cast<std::uint32_t>(list.offers.size());
+    plan.complete_s = plan.mesh_s;
+  } else {
+    if (htc.time_limit_s < 30 * htc.rtt_s)
+      plan.warnings.push_back(
+          "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
+    plan.textures = simulate(list.offers, htc, shifted(request.network, plan.mesh_s));
+    plan.complete_s = plan.mesh_s + plan.textures.end_s;
+  }
+  plan.texture_bytes = plan.textures.bytes;
+  rate_textures(package, list, plan);
+  plan.ssim =
+      predicted_ssim(package.quality(), scale, equivalent_quality(package, plan.planes, plan.texture_dssim));
+  return plan;
+}
+
+}  // namespace
+
+double predicted_ssim(const QualityTable& table, int scale, double quality) {
+  if (table.scales.empty() || table.rungs.empty()) return 0;
+  const auto place = [](const auto& values, double at, auto&& axis) {
+    std::size_t i = 0;
+    while (i + 2 < values.size() && axis(values[i + 1]) < at) ++i;
+    const double a = axis(values[i]), b = axis(values[std::min(i + 1, values.size() - 1)]);
+    return std::pair(i, b > a ? std::clamp((at - a) / (b - a), 0.0, 1.0) : 0.0);
+  };
+  const auto [s, u] = place(table.scales, scale, [](int v) { return static_cast<double>(v); });
+  const auto [r, v] = place(table.rungs, log_quantiser(std::clamp(quality, 1.0, 100.0)),
+                            [](int q) { return log_quantiser(q); });
+  const std::size_t s1 = std::min(s + 1, table.scales.size() - 1),
+                    r1 = std::min(r + 1, table.rungs.size() - 1);
+  const auto at = [&](std::size_t i, std::size_t j) {
+    return static_cast<double>(table.ssim[i * table.rungs.size() + j]);
+  };
+  return (1 - u) * ((1 - v) * at(s, r) + v * at(s, r1)) + u * ((1 - v) * at(s1, r) + v * at(s1, r1));
+}
+
+double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
+                          double texture_dssim) {
+  // Mean loss of uniform rungs, by quality, over the planes that are shown.
+  std::vector<std::pair<double, double>> curve;  // quality, loss
+  double weight = 0;
+  std::vector<double> loss;
+  std::vector<int> quality;
+  for (const PlaneChoice& p : planes) {
+    const PlaneTables& t = package.tables().planes[p.plane];
+    if (role_weight(package.textures()[p.plane].role) < 1) continue;
+    if (quality.empty()) {
+      quality.assign(t.rung_quality.begin(), t.rung_quality.end());
+      loss.assign(quality.size(), 0);
+    }
+    if (t.rung_count() != quality.size()) continue;
+    const std::vector<float> weights = surface_weights(t);
+    for (const std::uint16_t f : t.order) {
+      weight += weights[f];
+      for (std::size_t r = 0; r < quality.size(); ++r)
+        loss[r] += weights[f] * t.dssim[r * t.fragment_count() + f];
+    }
+  }
+  if (quality.empty() || !(weight > 0)) return 100;
+  for (std::size_t r = 0; r < quality.size(); ++r) curve.emplace_back(quality[r], loss[r] / weight);
+  if (texture_dssim >= curve.front().second)
+    return std::max(1.0, curve.front().first * curve.front().second / std::max(texture_dssim, 1e-9));
+  for (std::size_t r = 1; r < curve.size(); ++r) {
+    if (texture_dssim < curve[r].second) continue;
+    const double span = curve[r - 1].second - curve[r].second;
+    const double u = span > 0 ? (curve[r - 1].second - texture_dssim) / span : 1;
+    return curve[r - 1].first + u * (curve[r].first - curve[r - 1].first);
+  }
+  return curve.back().first;
+}
+
+DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request) {
+  const Manifest& m = package.manifest();
+  const int wanted = request.scale >= 0
+                         ? request.scale
+                         : scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  DeliveryPlan best;
+  bool first = true;
+  for (const ManifestScale& s : m.scales) {
+    if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;
+    DeliveryPlan plan = plan_at_scale(package, request, s.scale);
+    // A coarser scale must pay: it has to look better, not only as good.
+    if (first || (plan.ssim > best.ssim + 1e-4 && best.complete_s > 0)) best = std::move(plan);
+    first = false;
+  }
+  if (first)
+    throw InputError(package.store().name(), "scale " + std::to_string(wanted), "a scale of the package",
+                     "none");
+  if (best.scale != wanted)
+    best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
+                            std::to_string(best.scale) + " leaves more for the texture and looks better");
+  return best;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,55 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/fragment_list.h"
+#include "delivery/cpp/network_model.h"
+#include "delivery/cpp/simulation.h"
+#include "format/viewing.h"
+
+namespace texmesh {
+
+/// How somebody looks at the object, and over what.
+struct DeliveryRequest {
+  double displayed_px = 1000;  // displayed height, device pixels
+  StepRule rule = StepRule::kDefault;
+  int scale = -1;            // -1 = by the rule
+  double time_limit_s = 5;   // from the first request on
+  double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
+  HtcOptions htc;            // policy, order, window ..: its time limit and beta_0 are set from the others
+  NetworkOptions network;
+};
+
+/// What a viewer will get.
+struct DeliveryPlan {
+  int scale = 0;
+  std::vector<PlaneChoice> planes;
+  std::uint64_t bootstrap_bytes = 0, first_picture_bytes = 0, mesh_bytes = 0, table_bytes = 0,
+                texture_bytes = 0;
+  double first_picture_s = 0;                  // coarsest mesh with previews is complete
+  double mesh_s = 0;                           // the chosen scale and all tables are there
+  double complete_s = 0;                       // the last fragment
+  SimulationResult textures;                   // its times count from mesh_s
+  double mean_quality = 0, worst_quality = 0;  // IJG quality of fragments, surface-weighted mean; skipped = 0
+  double ssim = 0;                             // predicted, from the package's measured table
+  double texture_dssim = 0;                    // surface-weighted 1 - SSIM of the textures
+  std::vector<std::string> warnings;
+  std::uint64_t bytes() const {
+    return bootstrap_bytes + first_picture_bytes + mesh_bytes + table_bytes + texture_bytes;
+  }
+};
+
+/// The scale is the rule's, or a coarser one where a simulation of both shows a better picture in the time:
+/// mesh first, then texture. Deterministic.
+DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
+
+/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
+/// measured table (scale number, log-quantiser of the quality).
+double predicted_ssim(const QualityTable& table, int scale, double quality);
+/// The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs'
+/// losses.
+double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
+                          double texture_dssim);
+
+}  // namespace texmesh

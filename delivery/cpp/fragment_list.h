@@ -1,0 +1,49 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/harmonic_time.h"
+#include "delivery/cpp/package_reader.h"
+
+namespace texmesh {
+
+/// Which plane shows each texture: the full-size one or a mip of it.
+struct PlaneChoice {
+  std::uint32_t base = 0;   // full-size plane
+  std::uint32_t plane = 0;  // what is fetched; == base for full size
+};
+
+/// Where an offer of the list comes from.
+struct ListedFragment {
+  std::uint32_t plane = 0, fragment = 0;
+};
+
+/// The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4),
+/// ordered by eta x weight of the role x share of the surface.
+struct FragmentList {
+  std::vector<FragmentOffer> offers;
+  std::vector<ListedFragment> fragments;  // by offer
+  double total_weight = 0;                // of the losses: a loss of this is 1 - SSIM = 1 everywhere
+};
+
+/// What a role counts for in the list and in losses: 1 for base colour, less for what changes the picture
+/// less.
+double role_weight(const std::string& role);
+
+struct ListOptions {
+  int scale = 0;
+  double gamma = -1;                          // of q_i(x, y); -1 = the mean of eta
+  double quality_low = 5, quality_high = 97;  // limits, see HtcOptions::hard_limits
+};
+FragmentList fragment_list(PackageReader& package, const std::vector<PlaneChoice>& planes,
+                           const ListOptions& options);
+
+/// Every texture at full size.
+std::vector<PlaneChoice> full_size(PackageReader& package);
+/// The smallest mips that still have a texel for every pixel where the object is displayed `displayed_px`
+/// high (device pixels): by the texels and the share of the surface of each texture, and the surface that the
+/// object shows at most.
+std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px);
+
+}  // namespace texmesh

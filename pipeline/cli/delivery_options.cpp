@@ -1,0 +1,140 @@
+#include "pipeline/cli/delivery_options.h"
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <sstream>
+
+#include "pipeline/cli/units.h"
+
+namespace texmesh {
+namespace {
+
+template <class T>
+T choice(const std::string& name, const std::vector<std::pair<std::string, T>>& names) {
+  for (const auto& [n, value] : names)
+    if (n == name) return value;
+  throw InputError(name, "", "a name that the option's help lists", name);
+}
+
+std::string read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  if (!in || !(text << in.rdbuf())) throw InputError(path, "", "a readable file", "none");
+  return text.str();
+}
+
+/// "2Mbit/s" or "2Mbit/s,dead=3.5s".
+MirrorModel mirror_of(const std::string& text) {
+  MirrorModel m;
+  const std::size_t comma = text.find(',');
+  m.rate = BandwidthTrace::constant(parse_bandwidth(text.substr(0, comma), "--mirror"));
+  if (comma == std::string::npos) return m;
+  const std::string rest = text.substr(comma + 1);
+  if (!rest.starts_with("dead=")) throw InputError("--mirror", "", "RATE or RATE,dead=SECONDS", text);
+  m.dead_from_s = parse_duration(rest.substr(5), "--mirror");
+  return m;
+}
+
+}  // namespace
+
+void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_required) {
+  auto* package =
+      c.add_option("package", a.package, "A .texmesh file, a folder that unpack made, or an http(s) URL");
+  if (package_required) package->required();
+  c.add_option("--display", a.display_px, "Displayed height of the object, device pixels")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  c.add_option("--time", a.time, "Time limit from the first request on: 4, 1.5s, 800ms")
+      ->capture_default_str();
+  auto* bandwidth = c.add_option("--bandwidth", a.bandwidth, "Throughput of the link: 2Mbit/s, 41.68kB/s");
+  c.add_option("--trace", a.trace, "CSV of the link's throughput: lines of seconds,bytes per second")
+      ->excludes(bandwidth);
+  c.add_option("--rtt", a.rtt, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds")
+      ->capture_default_str();
+  c.add_option(
+       "--policy", a.policy,
+       "htca = the method; guard = the method within 1.5 x of a proportional plan; price = one price of "
+       "bytes that rises with delay; proportional; static = does not adapt")
+      ->check(CLI::IsMember({"htca", "guard", "price", "proportional", "static", "htca-guard", "htca-price"}))
+      ->capture_default_str();
+  c.add_option("--order", a.order,
+               "Next fragment: credit = by the sign of the credit; beta0 = as first published; finest")
+      ->check(CLI::IsMember({"credit", "beta0", "finest"}))
+      ->capture_default_str();
+  c.add_option("--estimator", a.estimator,
+               "Throughput: last transfer, harmonic mean or ewma of several; auto = by the policy")
+      ->check(CLI::IsMember({"auto", "last", "harmonic", "ewma"}))
+      ->capture_default_str();
+  c.add_option("--samples", a.samples, "Transfers that the harmonic mean takes")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  c.add_option("--beta0", a.beta0,
+               "First guess of the throughput (default: what the mesh's transfer has shown)");
+  c.add_option("--window", a.window, "Requests in flight; 0 = by throughput and round trip")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
+  c.add_flag("--hard-limits", a.hard_limits,
+             "Qualities stay within 5 .. 97 whatever happens, nothing is skipped");
+  c.add_option("--scale", a.scale, "This scale instead of the one that suits the display")
+      ->check(CLI::Range(0, 99));
+  c.add_option("--rule", a.rule, "What decides about the scale: default = the finer of jnd and error")
+      ->check(CLI::IsMember({"default", "jnd", "error", "edge"}))
+      ->capture_default_str();
+  c.add_option("--connections", a.connections, "Connections per server")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  c.add_flag("--connect-costs", a.connect_costs, "A connection's first request takes another round trip");
+  c.add_flag("--slow-start", a.slow_start, "Connections begin slowly, as TCP's do");
+  c.add_option("--loss", a.loss, "Share of packets lost")->check(CLI::Range(0.0, 0.5))->capture_default_str();
+  c.add_option("--mirror", a.mirrors,
+               "A server's own rate, 2Mbit/s, or 2Mbit/s,dead=3s; several times for several servers");
+  c.add_option("--seed", a.seed, "Of lost packets")->capture_default_str();
+}
+
+DeliveryRequest delivery_request(const DeliveryArguments& a) {
+  DeliveryRequest r;
+  r.displayed_px = a.display_px;
+  r.scale = a.scale;
+  r.rule = choice<StepRule>(a.rule, {{"default", StepRule::kDefault},
+                                     {"jnd", StepRule::kJnd},
+                                     {"error", StepRule::kError},
+                                     {"edge", StepRule::kEdge}});
+  r.time_limit_s = parse_duration(a.time, "--time");
+  if (!(r.time_limit_s > 0)) throw InputError("--time", "", "a time above 0", a.time);
+  if (a.bandwidth.empty() && a.trace.empty())
+    throw InputError("--bandwidth", "", "the throughput of the link, or --trace FILE", "neither");
+  r.network.link = a.trace.empty() ? BandwidthTrace::constant(parse_bandwidth(a.bandwidth, "--bandwidth"))
+                                   : read_trace_csv(read_file(a.trace), a.trace);
+  // Round trips are told in milliseconds everywhere else, so a bare number is one.
+  const bool bare = a.rtt.find_first_not_of("0123456789.") == std::string::npos;
+  r.network.rtt_s = parse_duration(bare ? a.rtt + "ms" : a.rtt, "--rtt");
+  r.network.connections = a.connections;
+  r.network.connect_costs = a.connect_costs;
+  r.network.slow_start = a.slow_start;
+  r.network.loss = a.loss;
+  r.network.seed = a.seed;
+  if (!a.mirrors.empty()) r.network.mirrors.clear();
+  for (const std::string& m : a.mirrors) r.network.mirrors.push_back(mirror_of(m));
+  r.htc.policy = choice<Policy>(a.policy, {{"htca", Policy::kHtc},
+                                           {"guard", Policy::kGuard},
+                                           {"htca-guard", Policy::kGuard},
+                                           {"price", Policy::kPrice},
+                                           {"htca-price", Policy::kPrice},
+                                           {"proportional", Policy::kProportional},
+                                           {"static", Policy::kStatic}});
+  r.htc.order = choice<HtcOrder>(
+      a.order, {{"credit", HtcOrder::kCredit}, {"beta0", HtcOrder::kBeta0}, {"finest", HtcOrder::kFinest}});
+  const bool last = r.htc.policy == Policy::kHtc || r.htc.policy == Policy::kGuard;
+  r.htc.throughput.estimator = a.estimator == "auto"
+                                   ? (last ? Estimator::kLast : Estimator::kHarmonic)
+                                   : choice<Estimator>(a.estimator, {{"last", Estimator::kLast},
+                                                                     {"harmonic", Estimator::kHarmonic},
+                                                                     {"ewma", Estimator::kEwma}});
+  r.htc.throughput.samples = a.samples;
+  r.htc.window = a.window;
+  r.htc.hard_limits = a.hard_limits;
+  if (!a.beta0.empty()) r.beta0_bytes_s = parse_bandwidth(a.beta0, "--beta0");
+  return r;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,27 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/delivery_plan.h"
+
+namespace CLI {
+class App;
+}
+
+namespace texmesh {
+
+/// What plan, check and simulate ask about how a package is looked at and over what.
+struct DeliveryArguments {
+  std::string package, time = "5", bandwidth, trace, rtt = "0", policy = "guard", order = "credit",
+                       estimator = "auto", rule = "default", beta0;
+  std::vector<std::string> mirrors;
+  double display_px = 1000, loss = 0;
+  int scale = -1, window = 0, connections = 6, samples = 10;
+  std::uint64_t seed = 1;
+  bool hard_limits = false, slow_start = false, connect_costs = false, json = false;
+};
+void add_delivery_options(CLI::App& command, DeliveryArguments& args, bool package_required);
+/// InputError names the flag.
+DeliveryRequest delivery_request(const DeliveryArguments& args);
+
+}  // namespace texmesh

@@ -1,0 +1,95 @@
+// simulate, plan and check as programs, on the golden package.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command.h"
+
+namespace texmesh::testing {
+namespace {
+
+using Json = nlohmann::json;
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.0-scan.texmesh";
+
+CommandResult texmesh(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), TEXMESH_BINARY);
+  return run_command(arguments);
+}
+Json json_of(std::vector<std::string> arguments) {
+  arguments.push_back("--json");
+  const CommandResult r = texmesh(arguments);
+  EXPECT_EQ(r.exit_code, 0) << r.errors;
+  return Json::parse(r.output);
+}
+
+TEST(CliSimulate, Table42HasTwelveRowsOfTheSetUp) {
+  const Json rows = json_of({"simulate", "--table", "4.2"})["rows"];
+  ASSERT_EQ(rows.size(), 12u);
+  for (const Json& r : rows) {
+    const double beta0 = r["beta0"];
+    EXPECT_NEAR(r["t0_s"].get<double>(), 418 / beta0, 1e-9);
+    EXPECT_NEAR(r["static_percent"].get<double>(), 100 * (1 - beta0 / 41.68), 1e-9);
+    if (beta0 >= 32) EXPECT_LE(r["deviation_percent"].get<double>(), 0.1);
+  }
+  const Json theorem = json_of({"simulate", "--theorem"});
+  EXPECT_LE(theorem["identity_error"].get<double>(), 1e-9);
+  EXPECT_EQ(theorem["corrected_bound_broken"], 0);
+}
+
+TEST(CliSimulate, APackageIsPlayedByEveryPolicy) {
+  for (const char* policy : {"htca", "guard", "price", "proportional", "static"}) {
+    const Json r = json_of(
+        {"simulate", kGolden, "--time", "3", "--bandwidth", "40kB/s", "--rtt", "10", "--policy", policy});
+    EXPECT_EQ(r["late_s"].get<double>() > 0.3, false) << policy << r;
+    EXPECT_GT(r["texture_ssim"].get<double>(), 0.5) << policy;
+  }
+  TemporaryFolder folder;
+  write_text(folder / "t.csv", "0,40000\n0.5,4000\n");
+  const CommandResult r = texmesh(
+      {"simulate", kGolden, "--time", "3", "--trace", folder / "t.csv", "--csv", "--plot", folder / "p.svg"});
+  EXPECT_EQ(r.exit_code, 0) << r.errors;
+  EXPECT_EQ(r.output.rfind("position,plane,", 0), 0u);
+  EXPECT_NE(read_text(folder / "p.svg").find("</svg>"), std::string::npos);
+  EXPECT_EQ(texmesh({"simulate"}).exit_code, 2);
+  EXPECT_NE(texmesh({"simulate", kGolden, "--bandwidth", "fast"}).exit_code, 0);
+  EXPECT_NE(texmesh({"simulate", folder / "none", "--bandwidth", "1MB/s"}).exit_code, 0);
+}
+
+TEST(CliPlan, MoreTimeGivesAPictureAsGoodOrBetter) {
+  double before = 0;
+  for (const char* time : {"1", "2", "4", "30"}) {
+    const Json p = json_of(
+        {"plan", kGolden, "--display", "800", "--time", time, "--bandwidth", "60kB/s", "--rtt", "20"});
+    EXPECT_GE(p["ssim"].get<double>(), before - 0.01) << time;
+    before = p["ssim"];
+    EXPECT_GE(p["mesh_s"].get<double>(), p["first_picture_s"].get<double>() - 1e-9);
+    std::uint64_t sum = 0;
+    for (const char* kind : {"bootstrap", "first_picture", "mesh", "tables", "texture"})
+      sum += p["bytes"][kind].get<std::uint64_t>();
+    EXPECT_EQ(p["bytes"]["all"], sum);
+  }
+}
+
+TEST(CliPlan, ASmallDisplayTakesACoarserScale) {
+  const auto scale = [](const char* px) {
+    return json_of({"plan", kGolden, "--display", px, "--time", "60", "--bandwidth", "1MB/s"})["scale"]
+        .get<int>();
+  };
+  EXPECT_GT(scale("20"), scale("5000"));
+}
+
+TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
+  const std::vector<std::string> base{"check", kGolden, "--time", "10", "--bandwidth", "1MB/s"};
+  auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), base.begin(), base.end());
+    return texmesh(more);
+  };
+  EXPECT_EQ(with({"--min-ssim", "0.1", "--max-first-picture", "5s"}).exit_code, 0);
+  const CommandResult r = with({"--min-ssim", "0.99999", "--max-bytes", "1kB", "--max-first-picture", "1ms"});
+  EXPECT_EQ(r.exit_code, 4);
+  for (const char* reason : {"predicted SSIM", "first picture at", "expected at most 1kB"})
+    EXPECT_NE(r.output.find(reason), std::string::npos) << r.output;
+}
+
+}  // namespace
+}  // namespace texmesh::testing
