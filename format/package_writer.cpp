@@ -101,7 +101,7 @@ Sha256 first_picture_digest(const Manifest& m, const std::vector<EntryRef>& refs
       [&](std::span<const std::uint8_t> part) { head.insert(head.end(), part.begin(), part.end()); });
   writer.add(kManifestPath, Bytes(static_cast<std::size_t>(manifest_bytes), ' '));
   for (const EntryRef& ref : refs) {
-    if (ref.offset >= end) break;
+    if (head.size() >= end) break;  // by bytes, not by ref.offset: an empty entry may stand last
     writer.add(ref.path, *data.at(ref.path));
   }
   return sha256(std::span(head).subspan(static_cast<std::size_t>(m.first_picture_offset),

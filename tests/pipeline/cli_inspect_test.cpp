@@ -46,6 +46,27 @@ struct CliInspect : ::testing::Test {
   std::string damaged = folder / "damaged.texmesh";
 };
 
+TEST_F(CliInspect, EveryCodecIsUnpackedAndPackedAgain) {
+  ASSERT_EQ(testing::run_command({TEXMESH_MAKE_SCAN, "--triangles", "600", "--texture", "512", "--textures",
+                                  "-o", folder / "scan.glb"})
+                .exit_code,
+            0);
+  for (const char* codec : {"jpeg", "progressive", "webp"}) {
+    const std::string package = folder / (std::string(codec) + ".texmesh"), tree = folder / codec,
+                      again = folder / (std::string(codec) + "-again.texmesh");
+    const CommandResult made = texmesh(
+        {"compile", folder / "scan.glb", "-o", package, "--ladder", codec, "--cache", folder / "cache"});
+    ASSERT_EQ(made.exit_code, 0) << codec << made.output << made.errors;
+    EXPECT_EQ(texmesh({"verify", package}).exit_code, 0) << codec;
+    for (const char* fragments : {"packs", "files"}) {
+      EXPECT_EQ(texmesh({"unpack", package, "-o", tree + fragments, "--fragments", fragments}).exit_code, 0);
+      const CommandResult packed = texmesh({"pack", tree + fragments, "-o", again});
+      EXPECT_EQ(packed.exit_code, 0) << codec << packed.errors;
+      EXPECT_TRUE(read_text(package) == read_text(again)) << codec << ' ' << fragments;
+    }
+  }
+}
+
 TEST_F(CliInspect, DumpShowsEveryPart) {
   for (const char* part :
        {"summary", "scales", "fragments", "ladder", "tables", "entries", "provenance", "all"}) {
