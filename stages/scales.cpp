@@ -129,6 +129,23 @@ std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale
   return out;
 }
 
+/// Names of the parts that a scale still has, and their numbers in wedge_part: most of a many-part model's
+/// are gone from its coarse scales, whose names would cost a hundred times their meshes.
+std::vector<std::string> name_merged_parts(const Mesh& mesh, std::vector<ScalePrimitive>& primitives) {
+  std::vector<std::uint16_t> number(mesh.part_names.size(), 0);
+  for (const ScalePrimitive& p : primitives)
+    for (std::uint16_t part : p.wedge_part) number.at(part) = 1;
+  std::vector<std::string> names;
+  for (std::size_t part = 0; part < number.size(); ++part) {
+    if (number[part] == 0) continue;
+    number[part] = static_cast<std::uint16_t>(names.size());
+    names.push_back(mesh.part_names[part]);
+  }
+  for (ScalePrimitive& p : primitives)
+    for (std::uint16_t& part : p.wedge_part) part = number[part];
+  return names;
+}
+
 std::string node_name(const Mesh& mesh, std::uint16_t part) {
   return parts_merged(mesh) ? "parts" : mesh.part_names.at(part);
 }
@@ -151,7 +168,9 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   GlbWriter writer;
   std::size_t fallback_bytes = 0;
   int open_part = -1;
-  for (ScalePrimitive& primitive : split_primitives(coding.mesh, scale, coding.position)) {
+  std::vector<ScalePrimitive> primitives = split_primitives(coding.mesh, scale, coding.position);
+  const std::vector<std::string> merged_names = name_merged_parts(coding.mesh, primitives);
+  for (ScalePrimitive& primitive : primitives) {
     const std::uint16_t part = primitive.part, material = primitive.material;
     CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco
                                ? code_draco(writer, coding, primitive)
@@ -164,12 +183,11 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
       writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
       writer.array("meshes").push_back(
           {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
-      if (parts_merged(coding.mesh))
-        writer.array("meshes").back()["extras"]["partNames"] = coding.mesh.part_names;
+      if (parts_merged(coding.mesh)) writer.array("meshes").back()["extras"]["partNames"] = merged_names;
     }
     if (parts_merged(coding.mesh)) {
-      coded.json["extensions"]["EXT_mesh_features"]["featureIds"] = Json::array(
-          {{{"featureCount", coding.mesh.part_names.size()}, {"attribute", 0}, {"label", "part"}}});
+      coded.json["extensions"]["EXT_mesh_features"]["featureIds"] =
+          Json::array({{{"featureCount", merged_names.size()}, {"attribute", 0}, {"label", "part"}}});
       writer.use_extension("EXT_mesh_features", false);
     }
     writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));

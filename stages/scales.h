@@ -66,18 +66,18 @@ struct ScaleFiles {
 };
 
 /// Writes every kept scale as a GLB: one node per part, one primitive per material in it (above 256 parts one
-/// node for all, whose mesh lists the names in extras.partNames and whose vertices have feature ids), the
-/// source's materials with the previews of the planes as images (RGBA PNG where a material needs alpha). GLB
-/// image k is named "texture/<k>" for source image k. Positions are quantised on one grid for all scales, so
-/// shared vertices are bit-equal between scales; triangles with two corners in one place of the grid are left
-/// out. Texture coordinates of unused sets are left out, and textures whose coordinates the mesh does not
-/// have. Tangents of the source are kept where a normal map needs them; none are made, since glTF says how a
-/// viewer makes them (MikkTSpace). Positions stay in the local frame (Mesh::origin is the manifest's). draco
-/// = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same under
-/// EXT_meshopt_compression; none = plain floats. The stream (format/split_stream.h) holds the same scales on
-/// the same grid, or on one of 24 bits where the files have floats; there is none, and a note says so, when
-/// only one scale is kept or it would break the format's bounds. Throws StageError when nothing is left on
-/// the grid. Same bytes for any thread count.
+/// node for all, whose mesh lists the names of those that are left in extras.partNames and whose vertices
+/// have feature ids), the source's materials with the previews of the planes as images (RGBA PNG where a
+/// material needs alpha). GLB image k is named "texture/<k>" for source image k. Positions are quantised on
+/// one grid for all scales, so shared vertices are bit-equal between scales; triangles with two corners in
+/// one place of the grid are left out. Texture coordinates of unused sets are left out, and textures whose
+/// coordinates the mesh does not have. Tangents of the source are kept where a normal map needs them; none
+/// are made, since glTF says how a viewer makes them (MikkTSpace). Positions stay in the local frame
+/// (Mesh::origin is the manifest's). draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization;
+/// meshopt = the same under EXT_meshopt_compression; none = plain floats. The stream (format/split_stream.h)
+/// holds the same scales on the same grid, or on one of 24 bits where the files have floats; there is none,
+/// and a note says so, when only one scale is kept or it would break the format's bounds. Throws StageError
+/// when nothing is left on the grid. Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
                         const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,

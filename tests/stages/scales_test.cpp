@@ -390,6 +390,15 @@ TEST(Scales, VeryManyPartsBecomeOneNode) {
         ++got.at(static_cast<std::size_t>(part));
       }
     EXPECT_EQ(got, want);
+    // A coarser scale names the parts that it still has.
+    const NestedScale& coarsest = c.scales.scales.back();
+    std::set<std::string> left, named;
+    for (std::uint32_t t : coarsest.triangle_source)
+      left.insert(m.part_names[c.scales.mesh.triangle_part[t]]);
+    for (const Json& name : open(files.files.back().glb).json["meshes"][0]["extras"]["partNames"])
+      named.insert(name.get<std::string>());
+    EXPECT_LT(left.size(), 257u);
+    EXPECT_EQ(named, left);
   }
 }
 
