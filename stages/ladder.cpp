@@ -10,6 +10,7 @@
 
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
+#include "stages/rung_hull.h"
 
 namespace texmesh {
 namespace {
@@ -331,6 +332,7 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   });
   context.report(0.2);
   encode_planes(fragments, pixels, codecs, ladder.planes, context);
+  drop_rungs_off_hull(fragments, pixels, options.hull_tolerance, ladder, context);
   return ladder;
 }
 

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 2;
+inline constexpr int kLadderVersion = 3;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>
@@ -31,6 +31,7 @@ struct LadderOptions {
   Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
   int training_fragments = 64;
   int preview_quality = 60;
+  double hull_tolerance = 0.1;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
@@ -46,6 +47,10 @@ struct LadderOptions {
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
+    v("hull_tolerance", s.hull_tolerance, Range{0.0, 1e9},
+      "a mip's rung is stored when its 1 - SSIM against the full size is at most 1 + this times the least "
+      "that "
+      "all rungs and mips give for its bytes");
   }
 };
 
@@ -86,7 +91,8 @@ struct Ladder {
 /// needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment has tables and a
 /// preview but no data. Works on the pixels as they stand: beside the result it takes some fragments' streams
 /// per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for pixels that do not
-/// fit the planes. Same bytes for any thread count.
+/// fit the planes. Same bytes for any thread count. Rungs of mips that lie off
+/// the hull are dropped (stages/rung_hull.h).
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context);
 

@@ -1,0 +1,278 @@
+#include "stages/rung_hull.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "stages/distortion.h"
+#include "stages/parallel.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kWindows = 6;
+constexpr std::uint32_t kWindowPx = 128;
+
+struct Window {
+  std::size_t fragment = 0;
+  std::uint32_t x = 0, y = 0, width = 0, height = 0;  // within the full-size plane's padded pixels
+  std::uint64_t covered = 0;
+};
+
+std::uint8_t luma_of(const std::uint8_t* p, std::uint32_t channels) {
+  if (channels == 1) return p[0];
+  return static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
+}
+
+std::vector<std::uint8_t> mask_of(const TexturePlane& plane, const Window& w) {
+  const std::size_t stride = (std::size_t{plane.width_px} + 7) / 8;
+  std::vector<std::uint8_t> out(std::size_t{w.width} * w.height);
+  for (std::uint32_t v = 0; v < w.height && w.y + v < plane.height_px; ++v)
+    for (std::uint32_t u = 0; u < w.width && w.x + u < plane.width_px; ++u)
+      if (plane.coverage[(w.y + v) * stride + (w.x + u) / 8] >> (7 - (w.x + u) % 8) & 1)
+        out[std::size_t{v} * w.width + u] = 255;
+  return out;
+}
+
+/// Of the fragment's middle and corners the one with most covered texels.
+Window window_in(const TexturePlane& plane, std::size_t fragment) {
+  const std::uint32_t w = std::min(kWindowPx, plane.fragment_width_px);
+  const std::uint32_t h = std::min(kWindowPx, plane.fragment_height_px);
+  const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * plane.fragment_width_px;
+  const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * plane.fragment_height_px;
+  const std::uint32_t right = plane.fragment_width_px - w, low = plane.fragment_height_px - h;
+  Window best;
+  for (const auto& [x, y] : {std::pair{right / 2, low / 2}, std::pair{0u, 0u}, std::pair{right, 0u},
+                             std::pair{0u, low}, std::pair{right, low}}) {
+    Window window{fragment, left + x, top + y, w, h, 0};
+    const std::vector<std::uint8_t> mask = mask_of(plane, window);
+    window.covered = static_cast<std::uint64_t>(std::count(mask.begin(), mask.end(), 255));
+    if (best.width == 0 || window.covered > best.covered) best = window;
+  }
+  return best;
+}
+
+std::vector<Window> sample_windows(const TexturePlane& plane) {
+  std::vector<std::size_t> covered;
+  for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
+    if (plane.covered_texels[f] > 0) covered.push_back(f);
+  const std::size_t count = std::min(kWindows, (covered.size() + 3) / 4);
+  std::vector<Window> out;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)]);
+    if (w.covered > 0) out.push_back(w);
+  }
+  return out;
+}
+
+/// Where between two coarse texels a full-size one lies, in 1 / 256.
+struct Place {
+  std::uint32_t first, second, part;
+};
+
+Place place_of(std::uint32_t at, std::uint32_t size, std::uint32_t coarse) {
+  const std::int64_t centre = (2 * std::int64_t{at} + 1) * coarse * 128 / size - 128;
+  const auto clamped =
+      static_cast<std::uint32_t>(std::clamp<std::int64_t>(centre, 0, (std::int64_t{coarse} - 1) * 256));
+  return {clamped / 256, std::min(clamped / 256 + 1, coarse - 1), clamped % 256};
+}
+
+/// Luma of a rectangle of a plane as one rung shows it; of the source where no fragment is stored.
+struct Patch {
+  std::uint32_t x, y, width, height;
+  std::vector<std::uint8_t> luma;
+};
+
+Patch decode_patch(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                   std::size_t rung, Patch patch) {
+  patch.luma.resize(std::size_t{patch.width} * patch.height);
+  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
+  for (std::uint32_t row = patch.y / h; row <= (patch.y + patch.height - 1) / h; ++row)
+    for (std::uint32_t column = patch.x / w; column <= (patch.x + patch.width - 1) / w; ++column) {
+      const std::size_t f = std::size_t{row} * plane.columns + column;
+      const bool stored = !fragment_stream(ladder.rungs[rung], f).empty();
+      const Pixels decoded = stored ? decode_fragment_luma(ladder, rung, f, std::uint64_t{w} * h) : Pixels{};
+      for (std::uint32_t y = std::max(patch.y, row * h); y < std::min(patch.y + patch.height, (row + 1) * h);
+           ++y)
+        for (std::uint32_t x = std::max(patch.x, column * w);
+             x < std::min(patch.x + patch.width, (column + 1) * w); ++x)
+          patch.luma[std::size_t{y - patch.y} * patch.width + x - patch.x] =
+              stored ? *decoded.at(x - column * w, y - row * h) : luma_of(pixels.at(x, y), pixels.channels);
+    }
+  return patch;
+}
+
+/// The window as a level shows it, scaled up to the full size.
+std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
+                               const PlaneLadder& ladder, std::size_t rung, const Window& window) {
+  const auto places = [](std::uint32_t first, std::uint32_t count, std::uint32_t size, std::uint32_t coarse) {
+    std::vector<Place> out;
+    for (std::uint32_t k = 0; k < count; ++k)
+      out.push_back(place_of(std::min(first + k, size - 1), size, coarse));
+    return out;
+  };
+  const std::vector<Place> across = places(window.x, window.width, full.width_px, plane.width_px);
+  const std::vector<Place> down = places(window.y, window.height, full.height_px, plane.height_px);
+  const Patch patch = decode_patch(plane, pixels, ladder, rung,
+                                   {across.front().first,
+                                    down.front().first,
+                                    across.back().second - across.front().first + 1,
+                                    down.back().second - down.front().first + 1,
+                                    {}});
+  std::vector<std::uint8_t> out;
+  out.reserve(across.size() * down.size());
+  for (const Place& v : down) {
+    const std::uint8_t* a = patch.luma.data() + std::size_t{v.first - patch.y} * patch.width;
+    const std::uint8_t* b = patch.luma.data() + std::size_t{v.second - patch.y} * patch.width;
+    for (const Place& u : across) {
+      const std::uint32_t l = u.first - patch.x, r = u.second - patch.x;
+      const std::uint32_t upper = a[l] * (256 - u.part) + a[r] * u.part;
+      const std::uint32_t lower = b[l] * (256 - u.part) + b[r] * u.part;
+      out.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+    }
+  }
+  return out;
+}
+
+/// The full-size plane `base` and its mips.
+std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base) {
+  std::vector<std::size_t> chain{base};
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
+    if (fragments.planes[p].mip > 0 && fragments.planes[p].base == base) chain.push_back(p);
+  return chain;
+}
+
+/// Lower convex hull of (bytes, loss), where loss falls; indices by rising bytes.
+std::vector<std::size_t> hull_of(const std::vector<RungPair>& pairs) {
+  std::vector<std::size_t> order(pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    if (pairs[a].bytes != pairs[b].bytes) return pairs[a].bytes < pairs[b].bytes;
+    if (pairs[a].loss != pairs[b].loss) return pairs[a].loss < pairs[b].loss;
+    return a < b;
+  });
+  const auto slope = [&](std::size_t a, std::size_t b) {
+    return (pairs[b].loss - pairs[a].loss) / static_cast<double>(pairs[b].bytes - pairs[a].bytes);
+  };
+  std::vector<std::size_t> hull;
+  for (const std::size_t k : order) {
+    if (!hull.empty() && (pairs[k].loss >= pairs[hull.back()].loss)) continue;
+    while (hull.size() > 1 && slope(hull[hull.size() - 2], hull.back()) >= slope(hull.back(), k))
+      hull.pop_back();
+    hull.push_back(k);
+  }
+  return hull;
+}
+
+double hull_loss(const std::vector<RungPair>& pairs, const std::vector<std::size_t>& hull,
+                 std::uint64_t bytes) {
+  for (std::size_t k = 1; k < hull.size(); ++k) {
+    const RungPair &a = pairs[hull[k - 1]], &b = pairs[hull[k]];
+    if (bytes > b.bytes) continue;
+    if (bytes == b.bytes) return b.loss;  // what interpolation would miss by rounding
+    return a.loss + (b.loss - a.loss) *
+                        (static_cast<double>(bytes - a.bytes) / static_cast<double>(b.bytes - a.bytes));
+  }
+  return pairs[hull.back()].loss;
+}
+
+void keep_rungs(const std::vector<RungPair>& pairs, const std::vector<std::uint8_t>& keep, std::size_t level,
+                PlaneLadder& plane) {
+  std::vector<std::uint8_t> of_rung(plane.rungs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    if (pairs[k].level == level) of_rung[pairs[k].rung] = keep[k];
+  if (codec_traits(plane.codec).incremental)
+    for (std::size_t r = of_rung.size() - 1; r-- > 0;) of_rung[r] |= of_rung[r + 1];
+  std::vector<LadderRung> rungs;
+  for (std::size_t r = 0; r < of_rung.size(); ++r)
+    if (of_rung[r]) rungs.push_back(std::move(plane.rungs[r]));
+  plane.rungs = std::move(rungs);
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> near_hull(const std::vector<RungPair>& pairs, double tolerance) {
+  std::vector<std::uint8_t> keep(pairs.size());
+  if (pairs.empty()) return keep;
+  const std::vector<std::size_t> hull = hull_of(pairs);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  std::vector<double> excess(pairs.size());
+  std::size_t levels = 0;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const double best = hull_loss(pairs, hull, pairs[k].bytes);
+    excess[k] = pairs[k].loss <= best ? 1 : best > 0 ? pairs[k].loss / best : kNever;
+    keep[k] = excess[k] <= 1 + tolerance;
+    levels = std::max(levels, pairs[k].level + 1);
+  }
+  for (std::size_t level = 0; level < levels; ++level) {
+    std::size_t nearest = pairs.size();
+    bool any = false;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (pairs[k].level != level) continue;
+      if (level == 0) keep[k] = 1;
+      any = any || keep[k];
+      if (nearest == pairs.size() || excess[k] < excess[nearest]) nearest = k;
+    }
+    if (!any && nearest < pairs.size()) keep[nearest] = 1;
+  }
+  return keep;
+}
+
+std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                    const Ladder& ladder, std::size_t base, const RunContext& context) {
+  const TexturePlane& full = fragments.planes[base];
+  const std::vector<std::size_t> chain = chain_of(fragments, base);
+  std::vector<RungPair> pairs;
+  for (std::size_t level = 0; level < chain.size(); ++level)
+    for (std::size_t r = 0; r < ladder.planes[chain[level]].rungs.size(); ++r) {
+      const LadderRung& rung = ladder.planes[chain[level]].rungs[r];
+      std::uint64_t bytes = rung.data.size() + rung.tables.size();
+      if (codec_traits(ladder.planes[chain[level]].codec).incremental && r > 0) bytes += pairs.back().bytes;
+      pairs.push_back({level, r, bytes, 0});
+    }
+  const std::vector<Window> windows = sample_windows(full);
+  std::vector<double> loss(windows.size() * pairs.size());
+  parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t w = begin; w < end; ++w) {
+      const Window& window = windows[w];
+      std::vector<std::uint8_t> source;
+      for (std::uint32_t y = 0; y < window.height; ++y)
+        for (std::uint32_t x = 0; x < window.width; ++x)
+          source.push_back(luma_of(pixels[base].at(window.x + x, window.y + y), full.channels));
+      const DistortionMeter meter(std::move(source), mask_of(full, window), window.width, window.height);
+      for (std::size_t k = 0; k < pairs.size(); ++k) {
+        const std::size_t p = chain[pairs[k].level];
+        const auto shown =
+            show(full, fragments.planes[p], pixels[p], ladder.planes[p], pairs[k].rung, window);
+        loss[w * pairs.size() + k] = std::max(meter.against(shown).dssim, 0.0);
+      }
+    }
+  });
+  double whole = 0;
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const double weight = std::max(static_cast<double>(full.surface_fraction[windows[w].fragment]), 1e-9);
+    whole += weight;
+    for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss += weight * loss[w * pairs.size() + k];
+  }
+  for (RungPair& pair : pairs) pair.loss /= std::max(whole, 1e-9);
+  return pairs;
+}
+
+void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double tolerance,
+                         Ladder& ladder, const RunContext& context) {
+  RunContext inner = context;
+  inner.progress = nullptr;
+  for (std::size_t base = 0; base < fragments.planes.size(); ++base) {
+    if (fragments.planes[base].mip > 0) break;
+    const std::vector<std::size_t> chain = chain_of(fragments, base);
+    if (chain.size() == 1) continue;
+    const std::vector<RungPair> pairs = measure_pairs(fragments, pixels, ladder, base, inner);
+    const std::vector<std::uint8_t> keep = near_hull(pairs, tolerance);
+    for (std::size_t level = 0; level < chain.size(); ++level)
+      keep_rungs(pairs, keep, level, ladder.planes[chain[level]]);
+  }
+}
+
+}  // namespace texmesh
