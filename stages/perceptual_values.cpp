@@ -150,6 +150,24 @@ void find_majors(const std::vector<float>& value, std::size_t n, double jnd,
   }
 }
 
+/// Of kept scales with nearly the same number of triangles the finest stays (and the coarsest of all): it is
+/// enough wherever the others are, majors too, and what each of them would add to the package buys nothing.
+/// Atlases at their floor make such rows.
+template <class LogTriangles>
+void drop_neighbours(std::size_t n, const LogTriangles& log_triangles, std::vector<std::uint8_t>& kept) {
+  const double least = portable::log(1.5);
+  std::size_t finer = 0;
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    if (!kept[k]) continue;
+    const bool near =
+        log_triangles(finer) - log_triangles(k) < least || log_triangles(k) - log_triangles(n - 1) < least;
+    if (near)
+      kept[k] = 0;
+    else
+      finer = k;
+  }
+}
+
 void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& out) {
   const std::size_t n = scales.scales.size();
   out.kept = out.major;
@@ -166,6 +184,7 @@ void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& 
       if (std::fabs(log_triangles(k) - want) < std::fabs(log_triangles(nearest) - want)) nearest = k;
     out.kept[nearest] = 1;
   }
+  drop_neighbours(n, log_triangles, out.kept);
 }
 
 double shortest_edge(const Mesh& mesh, const NestedScale& scale, double percent) {

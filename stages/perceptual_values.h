@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPerceptualValuesVersion = 2;
+inline constexpr int kPerceptualValuesVersion = 3;
 
 /// Which table decides what is just noticeable. kP95 and kP99: the relative distance between two scales. The
 /// others are the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2):
@@ -75,9 +75,9 @@ struct PerceptualValues {
   std::vector<std::uint8_t>
       major;  // [k]: 1 = last of its tier: walking from S_0 or the last major, the last scale
               // before the value reaches the JND, or the next one where none is under it
-  std::vector<std::uint8_t>
-      kept;  // [k]: 1 = stored in the package: S_0, majors, the coarsest, and the scales
-             // nearest to kept_scales equal steps of the triangles' number, of 2x or more
+  std::vector<std::uint8_t> kept;  // [k]: 1 = stored in the package: S_0, majors, the coarsest, and the
+                                   // scales nearest to kept_scales equal steps of the triangles' number, of
+                                   // 2x or more; of those within 1.5x of each other only the finest
   // Displayed heights never grow with k; kAnyHeightPx for S_0 (edges excepted) and for what does not differ
   // from it.
   std::vector<float>

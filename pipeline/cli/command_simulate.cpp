@@ -15,6 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr int kPlotSamples = 400;
+
 struct SimulateArguments : DeliveryArguments {
   std::string table, plot;
   bool theorem = false, csv = false;
@@ -167,9 +169,10 @@ void simulate_package(const SimulateArguments& a) {
   const std::vector<double> qualities = qualities_of(package, plan, list);
   if (!a.plot.empty()) {
     BandwidthTrace link{{}, {}};
-    for (double t = 0; t <= plan.textures.time_limit_s * 1.1; t += plan.textures.time_limit_s / 400) {
-      link.time_s.push_back(t);
-      link.bytes_s.push_back(request.network.link.at(plan.mesh_s + t));
+    const double span_s = std::max(1.1 * plan.textures.time_limit_s, 1e-3);
+    for (int i = 0; i <= kPlotSamples; ++i) {
+      link.time_s.push_back(span_s * i / kPlotSamples);
+      link.bytes_s.push_back(request.network.link.at(plan.mesh_s + link.time_s.back()));
     }
     const std::string svg = simulation_svg(plan.textures, qualities, link,
                                            fmt::format("{}: S_{}, textures within {:.2f} s, {}", a.package,

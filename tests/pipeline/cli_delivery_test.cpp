@@ -50,6 +50,11 @@ TEST(CliSimulate, APackageIsPlayedByEveryPolicy) {
   EXPECT_EQ(r.exit_code, 0) << r.errors;
   EXPECT_EQ(r.output.rfind("position,plane,", 0), 0u);
   EXPECT_NE(read_text(folder / "p.svg").find("</svg>"), std::string::npos);
+  // A link on which nothing is left of the time once the mesh is there.
+  const CommandResult late = texmesh(
+      {"simulate", kGolden, "--time", "100ms", "--bandwidth", "1kB/s", "--plot", folder / "late.svg"});
+  EXPECT_EQ(late.exit_code, 0) << late.errors;
+  EXPECT_NE(late.output.find("no time is left"), std::string::npos) << late.output;
   EXPECT_EQ(texmesh({"simulate"}).exit_code, 2);
   EXPECT_NE(texmesh({"simulate", kGolden, "--bandwidth", "fast"}).exit_code, 0);
   EXPECT_NE(texmesh({"simulate", folder / "none", "--bandwidth", "1MB/s"}).exit_code, 0);

@@ -395,7 +395,8 @@ TEST(Scales, VeryManyPartsBecomeOneNode) {
     std::set<std::string> left, named;
     for (std::uint32_t t : coarsest.triangle_source)
       left.insert(m.part_names[c.scales.mesh.triangle_part[t]]);
-    for (const Json& name : open(files.files.back().glb).json["meshes"][0]["extras"]["partNames"])
+    const Glb last = open(files.files.back().glb);
+    for (const Json& name : last.json["meshes"][0]["extras"]["partNames"])
       named.insert(name.get<std::string>());
     EXPECT_LT(left.size(), 257u);
     EXPECT_EQ(named, left);
