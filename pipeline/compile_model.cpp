@@ -58,13 +58,21 @@ class ModelSource {
     if (may_write_notes) store.put_note(note_key, to_json(requests_).dump());
   }
 
-  Sha256 digest() const {
+  /// What the model is made of: its own bytes, and every file that it asked for, found or not.
+  std::vector<std::pair<std::string, std::string>> parts() const {
     Key key("source", 1);
     key.add("extension", lower_extension(path_));
     key.add_input("model", main_.digest, main_.bytes);
-    key.add("files", to_json(requests_).dump());
-    return key.digest();
+    for (const FileRequest& r : requests_)
+      if (r.found)
+        key.add_input("file " + r.uri, r.digest, r.bytes);
+      else
+        key.add("input file " + r.uri, "not there");
+    std::vector<std::pair<std::string, std::string>> parts = key.parts();
+    parts.erase(parts.begin(), parts.begin() + 3);  // schema, stage and version are the reading stage's own
+    return parts;
   }
+  Sha256 digest() const { return digest_of_parts(parts()); }
 
   Source source() {
     return {[this](const RunContext& context) {
@@ -194,7 +202,7 @@ void refuse_warnings(const Notes& notes, const std::string& input) {
 }
 
 void give_inputs(GraphRun& graph, ModelSource& source, const std::string& provenance_json) {
-  graph.give("source", object(source.source()), source.digest(), 0);
+  graph.give("source", object(source.source()), source.digest(), 0, source.parts());
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
                         provenance_json.size());
   graph.give("provenance", object(provenance_json), sha256(bytes), provenance_json.size());

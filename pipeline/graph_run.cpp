@@ -45,7 +45,8 @@ struct GraphRun::State {
     Object object;
     Sha256 digest{};
     std::uint64_t bytes = 0;
-    bool known = false;  // digest stands
+    std::vector<std::pair<std::string, std::string>> parts;  // see give()
+    bool known = false;                                      // digest stands
     int uses_left = 0;
     std::shared_ptr<std::recursive_mutex> mutex = std::make_shared<std::recursive_mutex>();
   };
@@ -115,8 +116,11 @@ struct GraphRun::State {
     for (const std::string& library : stage.libraries)
       key.add("library " + library, library_versions().at(library));
     const std::lock_guard lock(mutex);
-    for (const std::string& input : stage.inputs)
-      key.add_input(input, slots.at(input).digest, slots.at(input).bytes);
+    for (const std::string& input : stage.inputs) {
+      const Slot& slot = slots.at(input);
+      if (slot.parts.empty()) key.add_input(input, slot.digest, slot.bytes);
+      for (const auto& [label, value] : slot.parts) key.add(label, value);
+    }
     return key;
   }
 
@@ -298,11 +302,13 @@ GraphRun::GraphRun(const std::vector<Stage>& stages, const CompileOptions& optio
     : state_(std::make_unique<State>(stages, options, store, context, std::move(observer))) {}
 GraphRun::~GraphRun() = default;
 
-void GraphRun::give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes) {
+void GraphRun::give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes,
+                    std::vector<std::pair<std::string, std::string>> parts) {
   State::Slot& slot = state_->slots[artefact];
   slot.object = std::move(object);
   slot.digest = digest;
   slot.bytes = bytes;
+  slot.parts = std::move(parts);
   slot.known = true;
 }
 

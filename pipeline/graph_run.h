@@ -50,8 +50,11 @@ class GraphRun {
            const RunContext& context, StageObserver observer = {});
   ~GraphRun();
 
-  /// An artefact from outside the graph, with the digest that stands for it in keys.
-  void give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes);
+  /// An artefact from outside the graph, with the digest that stands for it in keys. `parts` stand there
+  /// instead where there are any: what the digest is made of, so that explain() can say which of them has
+  /// changed.
+  void give(const std::string& artefact, Object object, const Sha256& digest, std::uint64_t bytes,
+            std::vector<std::pair<std::string, std::string>> parts = {});
 
   /// What a stage's key is compared with, and who is told, for every stage, before it runs. Called from any
   /// thread, one call at a time.
