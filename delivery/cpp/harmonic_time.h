@@ -81,7 +81,6 @@ class HarmonicTimePlan {
   bool finished() const { return all_issued() && in_flight_ == 0; }
   const std::vector<FragmentOffer>& offers() const { return offers_; }
   const std::vector<HtcStep>& steps() const { return steps_; }
-  std::uint32_t in_flight() const { return in_flight_; }
   double throughput_bytes_s() const;
   /// Pi: T_0 less the time taken = the residuals that no fragment was left to take. Once finished().
   double surplus_s() const { return options_.time_limit_s - last_done_s_; }

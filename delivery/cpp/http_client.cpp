@@ -143,7 +143,6 @@ HttpAnswer HttpClient::get(const std::string& url, const std::optional<Range>& r
   ::curl_easy_setopt(h, CURLOPT_HTTPHEADER, headers);
   const CURLcode rc = ::curl_easy_perform(h);
   ::curl_slist_free_all(headers);
-  ++requests_;
   ::curl_easy_getinfo(h, CURLINFO_RESPONSE_CODE, &transfer.answer.status);
   transfer.answer.complete = rc == CURLE_OK;
   if (rc != CURLE_OK) transfer.answer.problem = ::curl_easy_strerror(rc);

@@ -48,13 +48,11 @@ class HttpClient {
   };
   HttpAnswer get(const std::string& url, const std::optional<Range>& range, const std::string& if_range_etag,
                  std::uint64_t max_bytes);
-  std::uint64_t requests() const { return requests_; }
 
  private:
   struct Handle;
   std::unique_ptr<Handle> handle_;
   HttpOptions options_;
-  std::uint64_t requests_ = 0;
 };
 
 }  // namespace texmesh

@@ -54,7 +54,6 @@ class NetworkModel {
   void cancel(std::uint32_t number);
   /// Runs until a request is complete or the time comes, whichever is first.
   std::optional<Arrival> advance(double until_s);
-  std::size_t in_flight() const { return flows_.size(); }
   double bytes_moved() const { return bytes_moved_; }
 
  private:

@@ -27,7 +27,6 @@ class Throughput {
   void add(double bytes, double seconds);
   double bytes_s() const;                            // by the estimator chosen
   double recent_bytes_s(std::size_t samples) const;  // bytes over seconds of at most so many samples
-  std::size_t sample_count() const { return count_; }
 
  private:
   struct Sample {

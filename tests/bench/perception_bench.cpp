@@ -16,6 +16,7 @@
 #include "stages/perceptual_values.h"
 #include "stages/simplification.h"
 #include "stages/ssf.h"
+#include "tests/bench/growth.h"
 
 namespace {
 
@@ -139,14 +140,10 @@ void print_growth(double largest, const RunContext& context) {
     PerceptualValues values;
     const Cost c = measure(mesh, stand_in(mesh.mesh), random_map(mesh.mesh), context, values);
     print("bumpy ball", c);
-    x.push_back(std::log(static_cast<double>(c.triangles)));
-    y.push_back(std::log(c.measure_s));
+    x.push_back(static_cast<double>(c.triangles));
+    y.push_back(c.measure_s);
   }
-  double mx = 0, my = 0, xy = 0, xx = 0;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    mx += x[i] / static_cast<double>(x.size()), my += y[i] / static_cast<double>(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) xy += (x[i] - mx) * (y[i] - my), xx += (x[i] - mx) * (x[i] - mx);
-  if (x.size() > 1) std::printf("exponent %.2f\n", xy / xx);
+  if (x.size() > 1) std::printf("exponent %.2f\n", growth_exponent(x, y));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "pipeline/import/import.h"
 #include "stages/condition.h"
 #include "stages/skeletonization.h"
+#include "tests/bench/growth.h"
 
 namespace {
 
@@ -165,14 +166,10 @@ void print_growth(double largest, const RunContext& context) {
     timed(mesh, {}, context, s);
     std::printf("%9zu triangles  %6.2f s\n", mesh.mesh.triangles.size(), s);
     std::fflush(stdout);
-    x.push_back(std::log(static_cast<double>(mesh.mesh.triangles.size())));
-    y.push_back(std::log(s));
+    x.push_back(static_cast<double>(mesh.mesh.triangles.size()));
+    y.push_back(s);
   }
-  double mx = 0, my = 0, xy = 0, xx = 0;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    mx += x[i] / static_cast<double>(x.size()), my += y[i] / static_cast<double>(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) xy += (x[i] - mx) * (y[i] - my), xx += (x[i] - mx) * (x[i] - mx);
-  if (x.size() > 1) std::printf("exponent %.2f\n", xy / xx);
+  if (x.size() > 1) std::printf("exponent %.2f\n", growth_exponent(x, y));
 }
 
 }  // namespace
