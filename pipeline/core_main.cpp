@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
       "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
       "  texmesh dump scan.texmesh                    see what is in the package\n"
       "  texmesh verify scan.texmesh                  check every byte of it\n"
+      "  texmesh view scan.texmesh                    look at it in a browser\n"
       "Each command explains itself: texmesh compile --help");
   int exit_code = kExitOk;
   try {
@@ -37,6 +38,7 @@ int main(int argc, char** argv) {
     add_plan_command(app, exit_code);
     add_check_command(app, exit_code);
     add_simulate_command(app, exit_code);
+    add_view_command(app, exit_code);
     add_stages_command(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

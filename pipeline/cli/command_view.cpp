@@ -1,0 +1,93 @@
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/view/view_server.h"
+
+namespace texmesh {
+namespace {
+
+struct Arguments {
+  std::string package, viewer, host = "127.0.0.1";
+  int port = 0;
+  bool open = false, json = false;
+};
+
+std::string url_host(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : "[" + host + "]";
+}
+
+void announce(const Arguments& args, const Site& site, const std::string& base) {
+  const std::vector<std::string> packages = site.packages();
+  const std::string page = packages.size() == 1 ? base + "?pkg=" + packages[0] : base;
+  if (args.json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const std::string& p : packages) list.push_back(base + p);
+    std::cout << nlohmann::ordered_json{{"version", 1}, {"url", page}, {"packages", list}}.dump()
+              << std::endl;
+  } else {
+    std::cout << page << "\nserving " << packages.size() << (packages.size() == 1 ? " package" : " packages")
+              << "; Ctrl-C ends it" << std::endl;
+  }
+  if (!args.open) return;
+  if (::fork() == 0) {
+    ::execlp("xdg-open", "xdg-open", page.c_str(), nullptr);
+    ::_exit(127);
+  }
+}
+
+void view(const Arguments& args) {
+  const Site site(args.package, viewer_folder(args.viewer));
+  ViewServer server(site);
+  const int port = server.bind(args.host, args.port);
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, s);
+  ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before there are threads, so that none of them takes it
+  std::thread serving([&server] { server.serve(); });
+  announce(args, site, "http://" + url_host(args.host) + ":" + std::to_string(port) + "/");
+  int signal = 0;
+  ::sigwait(&ends, &signal);
+  server.stop();
+  // Connections that browsers keep open would hold the library's threads for seconds; nothing here needs an
+  // end.
+  ::_exit(kExitOk);
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& app, int& exit_code) {
+  auto args = std::make_shared<Arguments>();
+  CLI::App* c = app.add_subcommand("view", "Look at packages in a browser: serves them and the viewer");
+  c->add_option("package", args->package,
+                "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
+      ->required();
+  c->add_option("--host", args->host, "Address to listen on; others than this machine's own let others in")
+      ->capture_default_str();
+  c->add_option("--port", args->port, "Port; 0 = any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  c->add_option("--viewer", args->viewer, "Folder with the built viewer, instead of the one of this build")
+      ->type_name("DIR");
+  c->add_flag("--open", args->open, "Open the page with xdg-open");
+  c->add_flag("--json", args->json, "Print one JSON object with the URLs, for programs");
+  c->footer(
+      "Prints the page's URL and serves until Ctrl-C. Only the viewer's files and packages can be reached.\n"
+      "Examples:\n"
+      "  texmesh view bust.texmesh\n"
+      "  texmesh view packages/ --port 8080 --open\n"
+      "Exit code: 0, 1 when the package or the viewer is not there or the port is taken, 2 usage.");
+  c->callback([args, &exit_code] {
+    view(*args);
+    exit_code = kExitOk;
+  });
+}
+
+}  // namespace texmesh

@@ -1,0 +1,66 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace texmesh {
+
+/// An open regular file; closed with the object.
+class SiteFile {
+ public:
+  SiteFile(int fd, std::uint64_t bytes, std::string type, std::string etag)
+      : fd_(fd), bytes_(bytes), type_(std::move(type)), etag_(std::move(etag)) {}
+  ~SiteFile();
+  SiteFile(SiteFile&& other) noexcept;
+  SiteFile(const SiteFile&) = delete;
+  SiteFile& operator=(const SiteFile&) = delete;
+
+  std::uint64_t bytes() const { return bytes_; }
+  const std::string& type() const { return type_; }  // media type by the path's ending (SPEC.md, section 3)
+  const std::string& etag() const { return etag_; }  // strong: another file or another time is another tag
+  /// Up to `size` bytes from `offset`; 0 at the end of the file or where it cannot be read.
+  std::size_t read(std::uint64_t offset, char* to, std::size_t size) const;
+
+ private:
+  int fd_;
+  std::uint64_t bytes_;
+  std::string type_, etag_;
+};
+
+/// What `texmesh view` serves: the viewer's files beneath `/`, packages beneath `/packages/`, and
+/// `/packages.json`, a list of them. Nothing else can be reached: paths go down part by part, follow no
+/// symbolic link, and in a folder of packages lead to `.texmesh` files and into unpacked packages only,
+/// whatever stands beside them.
+class Site {
+ public:
+  /// `package` is a .texmesh file, an unpacked package, or a folder of such; `viewer` a folder with
+  /// index.html. InputError when one of them is not there or the folder holds no package.
+  Site(const std::string& package, const std::string& viewer);
+  ~Site();
+  Site(const Site&) = delete;
+  Site& operator=(const Site&) = delete;
+
+  /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there is
+  /// none. Thread-safe.
+  std::optional<SiteFile> open(const std::string& path) const;
+  /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
+  std::vector<std::string> packages() const;
+  /// `{"packages":[{"url":"packages/bust.texmesh","name":"bust"}, ...]}`, what the viewer offers to choose
+  /// from.
+  std::string package_list() const;
+
+ private:
+  int viewer_ = -1, root_ = -1;  // folders
+  std::string only_;             // the one entry of root_ that is served, "" = every package beneath
+};
+
+/// The folder with the built viewer: `wanted` where it is not empty, otherwise viewer/ beside the
+/// executable's folder (a build tree) or share/texmesh/viewer of an installation. InputError, which says how
+/// to build it, where there is none.
+std::string viewer_folder(const std::string& wanted);
+
+/// Bytes as they stand in a URL path; slashes stay.
+std::string percent_encoded(const std::string& path);
+
+}  // namespace texmesh
