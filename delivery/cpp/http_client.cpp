@@ -2,7 +2,10 @@
 
 #include <curl/curl.h>
 
+#include <algorithm>
 #include <charconv>
+#include <chrono>
+#include <map>
 #include <mutex>
 #include <string_view>
 
@@ -99,14 +102,59 @@ std::string shown_url(const std::string& url) {
 
 bool is_url(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
+namespace {
+
+void start_curl() {
+  static std::once_flag once;
+  std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
+}
+
+/// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
+curl_slist* prepare(CURL* h, Transfer& transfer, const std::string& url,
+                    const std::optional<HttpRange>& range, const std::string& if_range_etag,
+                    const HttpOptions& options) {
+  ::curl_easy_setopt(h, CURLOPT_URL, url.c_str());
+  ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
+  ::curl_easy_setopt(h, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
+  ::curl_easy_setopt(h, CURLOPT_FOLLOWLOCATION, 1L);
+  ::curl_easy_setopt(h, CURLOPT_MAXREDIRS, kMaxRedirects);
+  ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
+  ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options.connect_timeout_s * 1000));
+  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_LIMIT, 1L);
+  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(options.stall_timeout_s)));
+  ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
+  ::curl_easy_setopt(h, CURLOPT_HEADERFUNCTION, take_header);
+  ::curl_easy_setopt(h, CURLOPT_HEADERDATA, &transfer);
+  ::curl_easy_setopt(h, CURLOPT_WRITEFUNCTION, take_body);
+  ::curl_easy_setopt(h, CURLOPT_WRITEDATA, &transfer);
+  // Ranges are of the bytes as stored.
+  curl_slist* headers = ::curl_slist_append(nullptr, "Accept-Encoding: identity");
+  if (range) {
+    const std::string asked = "Range: bytes=" + std::to_string(range->first) + "-" +
+                              std::to_string(range->first + range->bytes - 1);
+    headers = ::curl_slist_append(headers, asked.c_str());
+    if (!if_range_etag.empty())
+      headers = ::curl_slist_append(headers, ("If-Range: " + if_range_etag).c_str());
+  }
+  ::curl_easy_setopt(h, CURLOPT_HTTPHEADER, headers);
+  return headers;
+}
+
+void conclude(Transfer& transfer, CURLcode rc) {
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &transfer.answer.status);
+  transfer.answer.complete = rc == CURLE_OK;
+  if (rc != CURLE_OK) transfer.answer.problem = ::curl_easy_strerror(rc);
+}
+
+}  // namespace
+
 struct HttpClient::Handle {
   CURL* curl = nullptr;
   ~Handle() { ::curl_easy_cleanup(curl); }
 };
 
 HttpClient::HttpClient(const HttpOptions& options) : handle_(std::make_unique<Handle>()), options_(options) {
-  static std::once_flag once;
-  std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
+  start_curl();
   handle_->curl = ::curl_easy_init();
 }
 HttpClient::~HttpClient() = default;
@@ -116,37 +164,88 @@ HttpAnswer HttpClient::get(const std::string& url, const std::optional<Range>& r
   CURL* h = handle_->curl;
   ::curl_easy_reset(h);  // keeps the connection
   Transfer transfer{h, {}, max_bytes, range.has_value()};
-  ::curl_easy_setopt(h, CURLOPT_URL, url.c_str());
-  ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
-  ::curl_easy_setopt(h, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
-  ::curl_easy_setopt(h, CURLOPT_FOLLOWLOCATION, 1L);
-  ::curl_easy_setopt(h, CURLOPT_MAXREDIRS, kMaxRedirects);
-  ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
-  ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options_.connect_timeout_s * 1000));
-  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_LIMIT, 1L);
-  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(options_.stall_timeout_s)));
-  ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
-  ::curl_easy_setopt(h, CURLOPT_HEADERFUNCTION, take_header);
-  ::curl_easy_setopt(h, CURLOPT_HEADERDATA, &transfer);
-  ::curl_easy_setopt(h, CURLOPT_WRITEFUNCTION, take_body);
-  ::curl_easy_setopt(h, CURLOPT_WRITEDATA, &transfer);
-  struct curl_slist* headers = nullptr;
-  if (range) {
-    headers = ::curl_slist_append(headers, ("Range: bytes=" + std::to_string(range->first) + "-" +
-                                            std::to_string(range->first + range->bytes - 1))
-                                               .c_str());
-    if (!if_range_etag.empty())
-      headers = ::curl_slist_append(headers, ("If-Range: " + if_range_etag).c_str());
-  }
-  // Ranges are of the bytes as stored.
-  headers = ::curl_slist_append(headers, "Accept-Encoding: identity");
-  ::curl_easy_setopt(h, CURLOPT_HTTPHEADER, headers);
+  curl_slist* headers = prepare(h, transfer, url, range, if_range_etag, options_);
   const CURLcode rc = ::curl_easy_perform(h);
   ::curl_slist_free_all(headers);
-  ::curl_easy_getinfo(h, CURLINFO_RESPONSE_CODE, &transfer.answer.status);
-  transfer.answer.complete = rc == CURLE_OK;
-  if (rc != CURLE_OK) transfer.answer.problem = ::curl_easy_strerror(rc);
+  conclude(transfer, rc);
   return std::move(transfer.answer);
+}
+
+struct HttpPool::State {
+  struct Running {
+    Transfer transfer;
+    curl_slist* headers = nullptr;
+    ~Running() {
+      ::curl_slist_free_all(headers);
+      ::curl_easy_cleanup(transfer.handle);
+    }
+  };
+  CURLM* multi = nullptr;
+  HttpOptions options;
+  std::map<std::uint64_t, std::unique_ptr<Running>> running;
+
+  ~State() {
+    while (!running.empty()) drop(running.begin()->first);
+    ::curl_multi_cleanup(multi);
+  }
+  void drop(std::uint64_t number) {
+    const auto it = running.find(number);
+    if (it == running.end()) return;
+    ::curl_multi_remove_handle(multi, it->second->transfer.handle);
+    running.erase(it);
+  }
+  std::optional<Ended> ended() {
+    int left = 0;
+    while (const CURLMsg* message = ::curl_multi_info_read(multi, &left)) {
+      if (message->msg != CURLMSG_DONE) continue;
+      const CURLcode rc = message->data.result;
+      for (auto& [number, r] : running) {
+        if (r->transfer.handle != message->easy_handle) continue;
+        conclude(r->transfer, rc);
+        Ended ended{number, std::move(r->transfer.answer)};
+        drop(number);
+        return ended;
+      }
+    }
+    return std::nullopt;
+  }
+};
+
+HttpPool::HttpPool(const HttpOptions& options, int connections_per_server)
+    : state_(std::make_unique<State>()) {
+  start_curl();
+  state_->multi = ::curl_multi_init();
+  state_->options = options;
+  ::curl_multi_setopt(state_->multi, CURLMOPT_MAX_HOST_CONNECTIONS,
+                      static_cast<long>(connections_per_server));
+  ::curl_multi_setopt(state_->multi, CURLMOPT_PIPELINING, static_cast<long>(CURLPIPE_MULTIPLEX));
+}
+HttpPool::~HttpPool() = default;
+
+void HttpPool::start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
+                     std::uint64_t max_bytes) {
+  cancel(number);
+  auto running = std::make_unique<State::Running>();
+  running->transfer = {::curl_easy_init(), {}, max_bytes, range.has_value()};
+  running->headers = prepare(running->transfer.handle, running->transfer, url, range, "", state_->options);
+  ::curl_multi_add_handle(state_->multi, running->transfer.handle);
+  state_->running[number] = std::move(running);
+}
+
+void HttpPool::cancel(std::uint64_t number) { state_->drop(number); }
+bool HttpPool::idle() const { return state_->running.empty(); }
+
+std::optional<HttpPool::Ended> HttpPool::wait(double seconds) {
+  const auto start = std::chrono::steady_clock::now();
+  for (;;) {
+    int active = 0;
+    ::curl_multi_perform(state_->multi, &active);
+    if (auto ended = state_->ended()) return ended;
+    const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
+    const double left_ms = 1000 * (seconds - gone.count());
+    if (left_ms <= 0 || idle()) return std::nullopt;
+    ::curl_multi_poll(state_->multi, nullptr, 0, static_cast<int>(std::clamp(left_ms, 1.0, 1000.0)), nullptr);
+  }
 }
 
 }  // namespace texmesh

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
+#include "delivery/cpp/transfer.h"
 #include "format/portable_math.h"
 
 namespace texmesh {
 namespace {
-
-constexpr double kRetryFactor = 4, kLeastRetryRtts = 8, kLeastRetry_s = 0.5;
-constexpr double kForEver = 1e9;
 
 double loss_of(const FragmentOffer& f, std::int32_t rung) {
   return f.loss[static_cast<std::size_t>(rung + 1)];
@@ -23,6 +20,8 @@ std::int32_t nearest_rung_to(const FragmentOffer& f, double bytes) {
       best = static_cast<std::int32_t>(r);
   return best;
 }
+
+}  // namespace
 
 SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double end_s) {
   SimulationResult r;
@@ -44,53 +43,28 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
   return r;
 }
 
-/// Which mirror delivers first, by what each has delivered so far and has to deliver yet.
-class Mirrors {
+namespace {
+
+/// A model of a network as a transport.
+class ModelTransport final : public Transport {
  public:
-  Mirrors(std::size_t count, double initial_bytes_s) {
-    ThroughputOptions options;
-    options.initial_bytes_s = initial_bytes_s;
-    for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options), 0, 0, true});
+  explicit ModelTransport(const NetworkOptions& network)
+      : model_(network), mirrors_(network.mirrors.size()) {}
+  std::size_t mirrors() const override { return mirrors_; }
+  double now_s() override { return model_.now_s(); }
+  void start(const TransferRequest& request, std::uint32_t mirror) override {
+    model_.request(request.number, mirror, static_cast<double>(request.bytes));
   }
-  std::uint32_t choose(double bytes) const {
-    std::size_t best = mirrors_.size();
-    double best_s = 0;
-    for (std::size_t m = 0; m < mirrors_.size(); ++m) {
-      if (!mirrors_[m].alive) continue;
-      const double s = (mirrors_[m].owed_bytes + bytes) / mirrors_[m].throughput.bytes_s();
-      if (best == mirrors_.size() || s < best_s) best = m, best_s = s;
-    }
-    return static_cast<std::uint32_t>(best == mirrors_.size() ? 0 : best);
-  }
-  double asked(std::uint32_t m, double bytes) {
-    mirrors_[m].owed_bytes += bytes;
-    return mirrors_[m].owed_bytes / mirrors_[m].throughput.bytes_s();
-  }
-  void delivered(std::uint32_t m, double bytes, double from_s, double now_s) {
-    Mirror& mirror = mirrors_[m];
-    mirror.throughput.add(bytes, now_s - std::max(mirror.last_s, from_s));
-    mirror.last_s = now_s;
-    mirror.owed_bytes -= bytes;
-  }
-  void silent(std::uint32_t m, double bytes) {
-    mirrors_[m].owed_bytes -= bytes;
-    std::size_t alive = 0;
-    for (const Mirror& mirror : mirrors_) alive += mirror.alive;
-    if (alive > 1) mirrors_[m].alive = false;
+  void cancel(std::uint32_t number) override { model_.cancel(number); }
+  std::optional<Outcome> wait(double until_s) override {
+    const auto arrival = model_.advance(until_s);
+    if (!arrival) return std::nullopt;
+    return Outcome{arrival->request, arrival->time_s, true, {}};
   }
 
  private:
-  struct Mirror {
-    Throughput throughput;
-    double owed_bytes = 0, last_s = 0;
-    bool alive = true;
-  };
-  std::vector<Mirror> mirrors_;
-};
-
-struct Asked {
-  std::uint32_t mirror = 0;
-  double at_s = 0, patience_s = 0, bytes = 0;
+  NetworkModel model_;
+  std::size_t mirrors_;
 };
 
 }  // namespace
@@ -98,45 +72,13 @@ struct Asked {
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
                           const NetworkOptions& network) {
   HarmonicTimePlan plan(std::move(offers), options);
-  NetworkModel model(network);
-  Mirrors mirrors(network.mirrors.size(), options.throughput.initial_bytes_s);
-  std::map<std::uint32_t, Asked> asked;
-  double end_s = 0;
-  const bool retries = network.mirrors.size() > 1;  // a single one can only be waited for
-  const auto ask = [&](std::uint32_t offer, double bytes) {
-    const std::uint32_t m = mirrors.choose(bytes);
-    const double expected = mirrors.asked(m, bytes);
-    const double patience =
-        std::max({kLeastRetry_s, kLeastRetryRtts * network.rtt_s, kRetryFactor * expected});
-    asked[offer] = {m, model.now_s(), patience, bytes};
-    model.request(offer, m, bytes);
-  };
-  while (!plan.finished()) {
-    while (const HtcStep* step = plan.next(model.now_s())) ask(step->offer, step->bytes);
-    if (plan.finished()) break;
-    double until = kForEver;
-    if (retries)
-      for (const auto& [offer, a] : asked) until = std::min(until, a.at_s + a.patience_s);
-    if (const auto arrival = model.advance(until)) {
-      const Asked a = asked.at(arrival->request);
-      asked.erase(arrival->request);
-      mirrors.delivered(a.mirror, a.bytes, a.at_s + network.rtt_s, arrival->time_s);
-      plan.completed(arrival->request, arrival->time_s);
-      end_s = arrival->time_s;
-      continue;
-    }
-    if (model.now_s() >= kForEver) break;
-    std::vector<std::pair<std::uint32_t, Asked>> late;
-    for (const auto& [offer, a] : asked)
-      if (a.at_s + a.patience_s <= model.now_s()) late.emplace_back(offer, a);
-    for (const auto& [offer, a] : late) {
-      model.cancel(offer);
-      mirrors.silent(a.mirror, a.bytes);
-      asked.erase(offer);
-      ask(offer, a.bytes);
-    }
-  }
-  return result_of(plan, options.time_limit_s, end_s);
+  ModelTransport transport(network);
+  PlanSource source(plan);
+  TransferOptions how;
+  how.rtt_s = network.rtt_s;
+  how.initial_bytes_s = options.throughput.initial_bytes_s;
+  const TransferEnd end = transfer(source, transport, how);
+  return result_of(plan, options.time_limit_s, end.last_s);
 }
 
 SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,

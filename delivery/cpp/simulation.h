@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-/// A transfer that was played through without a network.
+/// A transfer, played through without a network or a real one.
 struct SimulationResult {
   double time_limit_s = 0, end_s = 0;
   double deviation_percent = 0;  // of the limit: positive = ended early (the thesis's surplus)
@@ -21,8 +21,10 @@ struct SimulationResult {
   std::vector<std::int32_t> rungs;  // by offer
 };
 
-/// Plays the plan over the network model. Requests go to the mirror that is expected to deliver first; one
-/// that delivers nothing for four times what it should take (at least 8 round trips) is asked elsewhere.
+/// What became of a plan that has ended, or was left, at `end_s`.
+SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double end_s);
+
+/// Plays the plan over the network model, as transfer() runs it over a network.
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
                           const NetworkOptions& network);
 
