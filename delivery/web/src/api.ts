@@ -1,0 +1,167 @@
+import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
+import type { HtcOrder, Policy } from './harmonic_time';
+import type { RequestRecord } from './http';
+import type { StepRule, VisiblePart } from './viewing';
+
+/** How the object is looked at; lengths in device pixels. */
+export interface Display {
+  /** Height on screen of the object's largest extent, the whole of it, seen or not. */
+  heightPx: number;
+  /** What of it is seen (Fig. 7.5); left out: all. */
+  part?: VisiblePart;
+}
+
+/** What GLTFLoader (three/addons) offers and this library uses. */
+export interface GltfLoaderLike {
+  register(plugin: (parser: never) => unknown): unknown;
+  parseAsync(data: ArrayBuffer, path: string): Promise<unknown>;
+}
+
+/** Options of TexmeshPackage.load. */
+export interface LoadOptions {
+  /** The renderer that shows the scene: textures are composed in its context. */
+  renderer: WebGLRenderer;
+  /**
+   * Makes a GLTFLoader with whatever decoders the package's meshes need: `() => new GLTFLoader().setDRACOLoader(...)`.
+   * Called once for every mesh.
+   */
+  gltfLoader: () => GltfLoaderLike;
+  /** Camera that looks at the object; with it scale and textures follow the display, see LoadedModel.update. */
+  camera?: Camera;
+  /** Without a camera (or instead of it): displayed height in device px, or a function that says. Default 1000. */
+  display?: number | Display | (() => number | Display);
+  /**
+   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
+   * Infinity: no limit, everything that the display can show. Default 5.
+   */
+  time?: number;
+  /** How the time is spent. Default guard. */
+  policy?: Policy;
+  order?: HtcOrder;
+  /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
+  beta0BytesS?: number;
+  /** Which rule says what scale is enough. */
+  rule?: StepRule;
+  /** This scale instead of what the display asks for. */
+  scale?: number;
+  /** This rung of every fragment (clipped to those there are) instead of what fits the time. */
+  rung?: number;
+  /** Full-size textures, whatever the display can show. */
+  fullSize?: boolean;
+  /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default glb. */
+  meshes?: 'glb' | 'stream' | 'auto';
+  /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
+  autoRefine?: boolean;
+  /** Where worker.js is, when not beside the library; '' = decode on the main thread. */
+  workerUrl?: string | URL;
+  /** Workers that decode images. Default: 2 to 4 by the number of cores. */
+  workers?: number;
+  signal?: AbortSignal;
+}
+
+/** Phases of a load, in their order. */
+export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
+
+/** A decision of the plan for one fragment; sent when it is taken and again when its transfer has ended. */
+export interface DecisionEvent {
+  /** k = 1 .. n */
+  position: number;
+  plane: number;
+  fragment: number;
+  eta: number;
+  /** -1: skipped */
+  rung: number;
+  bytes: number;
+  /** theta_k, the seconds it may take, and gamma_k, those it took (undefined until it has ended). */
+  plannedSeconds: number;
+  actualSeconds?: number;
+  creditSeconds: number;
+  bytesPerSecond: number;
+  /** Seconds after the first request for a fragment. */
+  issued: number;
+  done?: number;
+  skipped: boolean;
+}
+
+/** Events of a load; every one has the time `at`, milliseconds of performance.now(). */
+export interface LoadEvents {
+  /** A request of the package has ended. */
+  request: RequestRecord & { at: number };
+  /** The coarsest mesh with its previews stands in the scene. */
+  'first-picture': { at: number; scale: number; bytes: number };
+  /** Another scale stands in the scene. */
+  scale: { at: number; scale: number; triangles: number };
+  /** A plane was chosen, or a finer one, to show a texture. */
+  plane: { at: number; base: number; plane: number; widthPx: number; heightPx: number };
+  /** A fragment is in its texture. */
+  fragment: { at: number; plane: number; fragment: number; rung: number };
+  decision: DecisionEvent & { at: number };
+  progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
+  /** The timed part is over: limit and what it took, seconds from the same start. */
+  deadline: { at: number; limit: number; actual: number; skipped: number };
+  /** Something went wrong; fatal: the load has ended. */
+  error: { at: number; fatal: boolean; message: string; what: string; error: unknown };
+  /** Nothing is left to fetch for what the display can show now. */
+  done: { at: number };
+}
+
+/** A texture as it is composed. */
+export interface ComposedPlane {
+  /** Full-size plane, and the plane that is shown: it or a mip of it. */
+  base: number;
+  plane: number;
+  image: number;
+  role: string;
+  widthPx: number;
+  heightPx: number;
+  /** Rung of each fragment in the texture; -1: the preview. */
+  rungs: Int16Array;
+  /** As used by materials; the same GPU texture for all of them. */
+  textures: readonly Texture[];
+}
+
+/** State of a load, for panels and tests. */
+export interface LoadState {
+  phase: LoadPhase;
+  /** Scale in the scene; -1: none yet. */
+  scale: number;
+  /** Scale that the display asks for. */
+  wantedScale: number;
+  displayedPx: number;
+  planes: readonly ComposedPlane[];
+  /** Bytes received by this package so far. */
+  bytes: number;
+  throughputBytesS: number;
+  rttS: number;
+  /** Fragments whose transfer, decoding or upload is under way. */
+  pending: number;
+}
+
+/** A package in a scene. */
+export interface LoadedModel {
+  /** What was added to the scene; in the frame of the package's meshes (Manifest.origin). */
+  readonly object: Object3D;
+  readonly state: LoadState;
+  /** When the first picture stands in the scene. */
+  readonly firstPicture: Promise<void>;
+  /** When the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
+  readonly done: Promise<void>;
+  on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
+  /**
+   * The view may have changed: call it for every frame, or when the camera moves. Picks the scale (with hysteresis),
+   * finer planes, and what to refine first. Cheap when nothing has changed.
+   */
+  update(camera?: Camera): void;
+  /** Fetches what the display can show but the time did not allow; resolves when nothing is left to fetch. */
+  refine(): Promise<void>;
+  /** Changes what was chosen at loading; takes effect at once. undefined: by the display again. */
+  setOverride(override: { scale?: number; rung?: number }): void;
+  /** Stops all transfers; what is shown stays. */
+  cancel(): void;
+  /** Stops, takes the object out of the scene and frees geometries, materials, textures and workers. */
+  dispose(): void;
+  /** RGBA bytes of a composed plane, row 0 at the top: reads back from the GPU, for tests. */
+  readPlane(base: number): Uint8Array;
+  /** Materials in use, for effects of the application's own. */
+  readonly materials: readonly Material[];
+}

@@ -1,0 +1,24 @@
+/**
+ * What every texmesh error carries: the file (or URL), the place in it, what was expected and what was found. Any of
+ * them may be empty; the message joins those that are not.
+ */
+export class TexmeshError extends Error {
+  constructor(
+    readonly file: string,
+    readonly place: string,
+    readonly expected: string,
+    readonly found: string,
+  ) {
+    let text = [file, place].filter((part) => part !== '').join(': ');
+    if (expected !== '') text += `${text && ': '}expected ${expected}`;
+    if (found !== '') text += `${text && (expected === '' ? ': ' : ', ')}found ${found}`;
+    super(text);
+    this.name = new.target.name;
+  }
+}
+
+/** A server or a caller does not give what it must: no answer, no such file, an option out of range. */
+export class InputError extends TexmeshError {}
+
+/** The bytes of a package do not follow the format, or are not those that their digests promise. */
+export class FormatError extends TexmeshError {}

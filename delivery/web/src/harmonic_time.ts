@@ -1,0 +1,453 @@
+import { exp, log } from './portable_math';
+import { Throughput, ThroughputOptions } from './throughput';
+
+// Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred so that
+// the whole ends at the time limit T_0, though throughput moves. The same decisions, bit for bit, as
+// delivery/cpp/harmonic_time: it does no I/O and knows no clock.
+
+/** One fragment as the plan sees it. */
+export interface FragmentOffer {
+  /** By rung, lowest first; at least one, all > 0. */
+  bytes: number[];
+  /** [rungs + 1] what is lost when it is skipped, then by rung; any unit, >= 0. */
+  loss: number[];
+  /** Feature density times weights; orders the list. */
+  eta: number;
+  /** d_g > 0: what it gets by Eq. 3.2. */
+  plannedBytes: number;
+  /** Limits of quality, see HtcOptions.hardLimits. */
+  lowRung: number;
+  highRung: number;
+}
+
+/**
+ * How rungs are chosen. htc: the method. guard: the method, with sizes kept within a factor of a proportional plan.
+ * price: one price of bytes in units of loss that rises when the plan is late. proportional: sizes scaled by what is
+ * left of time over what is left to send. static: the planned sizes, whatever happens.
+ */
+export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static';
+/** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
+export type HtcOrder = 'credit' | 'beta0' | 'finest';
+
+export interface HtcOptions {
+  policy: Policy;
+  order: HtcOrder;
+  /** T_0, of the fragments alone. */
+  timeLimitS: number;
+  /** initialBytesS is beta_0. */
+  throughput: ThroughputOptions;
+  rttS: number;
+  /** Requests in flight; 0 = until 1.5 x throughput x round trip, at least 2. */
+  window: number;
+  maxInFlight: number;
+  /** true: never below lowRung, nothing skipped, as in the thesis. */
+  hardLimits: boolean;
+  /** Factor of guard, > 1. */
+  guard: number;
+  /** How fast price's price rises with delay. */
+  priceKappa: number;
+}
+
+export function defaultHtcOptions(): HtcOptions {
+  return {
+    policy: 'htc',
+    order: 'credit',
+    timeLimitS: 5,
+    throughput: { estimator: 'last', samples: 10, ewma: 0.2, smallBytes: 4000, initialBytesS: 1e5 },
+    rttS: 0,
+    window: 0,
+    maxInFlight: 64,
+    hardLimits: false,
+    guard: 1.5,
+    priceKappa: 10,
+  };
+}
+
+/** A decision and what became of it. */
+export interface HtcStep {
+  /** k = 1 .. n in the order of decisions. */
+  position: number;
+  offer: number;
+  /** -1 = skipped */
+  rung: number;
+  bytes: number;
+  /** credit_k and theta_k = theta_g + credit_k. */
+  creditS: number;
+  thetaS: number;
+  /** d_k asked for. */
+  targetBytes: number;
+  /** beta_{k-1} it was asked with. */
+  throughputBytesS: number;
+  issuedS: number;
+  /** -1: in flight */
+  doneS: number;
+  /** gamma_k: since the completion before. */
+  spacingS: number;
+  /** dT_k = theta_k - gamma_k */
+  residualS: number;
+}
+
+const windowFactor = 1.5;
+const windowSamples = 10;
+const guardSamples = 20;
+const largestExponent = 12;
+const lateFactor = 1.5;
+const anyRung = 0xffff;
+
+const clamp = (v: number, least: number, most: number): number => (v < least ? least : most < v ? most : v);
+
+function require(good: boolean, what: string): void {
+  if (!good) throw new RangeError(what);
+}
+
+function check(offers: readonly FragmentOffer[], o: HtcOptions): void {
+  require(offers.length < 1 << 24, 'HarmonicTimePlan: fewer than 2^24 fragments');
+  require(o.timeLimitS > 0 && o.timeLimitS <= 1e6, 'HarmonicTimePlan: time limit in (0, 1e6] s');
+  require(o.throughput.initialBytesS > 0, 'HarmonicTimePlan: initial throughput > 0');
+  require(o.rttS >= 0 && o.rttS < 1e4, 'HarmonicTimePlan: round trip in [0, 1e4) s');
+  require(o.window >= 0 && o.maxInFlight >= 1 && o.guard > 1, 'HarmonicTimePlan: window, guard');
+  for (const f of offers) {
+    require(f.bytes.length > 0 && f.loss.length === f.bytes.length + 1, 'FragmentOffer: a loss per rung and one more');
+    require(f.plannedBytes > 0 && f.plannedBytes < 1e12, 'FragmentOffer: planned bytes > 0');
+    for (const b of f.bytes) require(b > 0, 'FragmentOffer: bytes > 0');
+    for (const l of f.loss) require(l >= 0 && l < 1e300, 'FragmentOffer: loss >= 0');
+    require(Number.isFinite(f.eta), 'FragmentOffer: eta');
+  }
+}
+
+/** The fragment with eta nearest the mean (ties: the first). */
+function meanFragment(offers: readonly FragmentOffer[]): number {
+  let sum = 0;
+  for (const f of offers) sum += f.eta;
+  const mean = sum / Math.max(offers.length, 1);
+  let best = 0;
+  for (let i = 1; i < offers.length; ++i)
+    if (Math.abs(offers[i].eta - mean) < Math.abs(offers[best].eta - mean)) best = i;
+  return best;
+}
+
+const lowest = (f: FragmentOffer, hard: boolean): number => (hard ? Math.min(f.lowRung, f.bytes.length - 1) : 0);
+const highest = (f: FragmentOffer): number => Math.min(f.highRung ?? anyRung, f.bytes.length - 1);
+
+export class HarmonicTimePlan {
+  /** Decisions so far, skipped fragments included. */
+  readonly steps: HtcStep[] = [];
+  private readonly throughput: Throughput;
+  private readonly harmonic: number[];
+  private readonly credits: { value: number; issued: number }[] = [];
+  private readonly sorted: number[];
+  private readonly stepOfOffer: number[];
+  private readonly taken: boolean[];
+  private left = 0;
+  private right: number;
+  private readonly mean: number;
+  private plannedTotal = 0;
+  private plannedLeft = 0;
+  private smallestLeft = 0;
+  private price0 = 0;
+  private priceTotal = 0;
+  private priceDone = 0;
+  private readonly priceBytes: number[] = [];
+  private inFlight = 0;
+  private inFlightBytes = 0;
+  private lastDoneS = 0;
+  private unspent = 0;
+
+  /** The list is taken by falling eta (ties: index). RangeError for values out of range. */
+  constructor(
+    readonly offers: readonly FragmentOffer[],
+    private readonly options: HtcOptions,
+  ) {
+    check(offers, options);
+    const n = offers.length;
+    this.throughput = new Throughput(options.throughput);
+    this.harmonic = new Array<number>(n + 2).fill(0);
+    for (let i = 1; i < n + 2; ++i) this.harmonic[i] = this.harmonic[i - 1] + 1 / i;
+    this.sorted = offers.map((_, i) => i).sort((a, b) => offers[b].eta - offers[a].eta);
+    this.stepOfOffer = new Array<number>(n).fill(n);
+    this.taken = new Array<boolean>(n).fill(false);
+    this.right = n;
+    this.mean = meanFragment(offers);
+    for (const f of offers) {
+      this.plannedTotal += f.plannedBytes;
+      this.smallestLeft += f.bytes[lowest(f, options.hardLimits)];
+    }
+    this.plannedLeft = this.plannedTotal;
+    if (options.policy === 'price') this.planPrices();
+  }
+
+  get allIssued(): boolean {
+    return this.steps.length === this.offers.length;
+  }
+  get finished(): boolean {
+    return this.allIssued && this.inFlight === 0;
+  }
+  /** Pi: T_0 less the time taken. Once finished. */
+  get surplusS(): number {
+    return this.options.timeLimitS - this.lastDoneS;
+  }
+  get unspentS(): number {
+    return this.unspent;
+  }
+  /** A limit under 30 round trips cannot be met well. */
+  get tooShortForRtt(): boolean {
+    return this.options.timeLimitS < 30 * this.options.rttS;
+  }
+  /** Chosen rung by offer; -1 skipped or not decided. */
+  rungs(): number[] {
+    const rungs = new Array<number>(this.offers.length).fill(-1);
+    for (const s of this.steps) rungs[s.offer] = s.rung;
+    return rungs;
+  }
+
+  // The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
+  private planPrices(): void {
+    const budget = this.options.timeLimitS * this.options.throughput.initialBytesS;
+    const rungBytes = (f: FragmentOffer, price: number): number => {
+      const rung = this.cheapestRungOf(f, price, true, budget);
+      return rung < 0 ? 0 : f.bytes[rung];
+    };
+    const bytesAt = (price: number): number => {
+      let sum = 0;
+      for (const f of this.offers) sum += rungBytes(f, price);
+      return sum;
+    };
+    let low = -60;
+    let high = 60;
+    for (let i = 0; i < 60; ++i) {
+      const middle = (low + high) / 2;
+      if (bytesAt(exp(middle)) > budget) low = middle;
+      else high = middle;
+    }
+    this.price0 = exp(high);
+    for (const f of this.offers) {
+      this.priceBytes.push(rungBytes(f, this.price0));
+      this.priceTotal += this.priceBytes[this.priceBytes.length - 1];
+    }
+  }
+
+  throughputBytesS(): number {
+    // With several requests in flight completions come in bunches: only sums over some of them say anything.
+    if (this.options.window !== 1 && this.options.throughput.estimator === 'last')
+      return this.throughput.recentBytesS(windowSamples);
+    return this.throughput.bytesS();
+  }
+
+  private windowOpen(): boolean {
+    if (this.options.window > 0) return this.inFlight < this.options.window;
+    if (this.inFlight < 2) return true;
+    if (this.inFlight >= this.options.maxInFlight) return false;
+    return this.inFlightBytes < windowFactor * this.throughput.recentBytesS(windowSamples) * this.options.rttS;
+  }
+
+  /**
+   * The next request, while the window has room; skipped fragments are decided on the way. undefined: nothing more to
+   * issue now (wait for a completion) or at all. `nowS` >= 0 counts from the first request.
+   */
+  next(nowS: number): HtcStep | undefined {
+    while (!this.allIssued && this.windowOpen()) {
+      const position = this.steps.length + 1;
+      const creditS = this.creditAt(position);
+      const offer = this.chooseOffer(creditS);
+      const f = this.offers[offer];
+      const thetaS = this.thetaOf(offer) + creditS;
+      const throughputBytesS = this.throughputBytesS();
+      const targetBytes = this.targetOf(offer, thetaS, nowS);
+      const rung = this.rungOf(offer, targetBytes, nowS);
+      const step: HtcStep = {
+        position, offer, rung, bytes: rung < 0 ? 0 : f.bytes[rung], creditS, thetaS, targetBytes, throughputBytesS,
+        issuedS: nowS, doneS: -1, spacingS: 0, residualS: 0,
+      };
+      this.take(offer);
+      this.stepOfOffer[offer] = this.steps.length;
+      this.steps.push(step);
+      if (rung < 0) {
+        // No transfer: it takes no time and says nothing of the link.
+        step.doneS = nowS;
+        step.residualS = step.thetaS;
+        this.spread(step.residualS);
+        continue;
+      }
+      ++this.inFlight;
+      this.inFlightBytes += step.bytes;
+      return step;
+    }
+    return undefined;
+  }
+
+  private chooseOffer(credit: number): number {
+    const inOrder = this.options.policy === 'price';
+    if (this.steps.length === 0 && !inOrder) return this.mean;
+    let finest = true;
+    if (!inOrder && this.options.order === 'credit') finest = credit <= 0;
+    if (!inOrder && this.options.order === 'beta0')
+      finest = this.throughputBytesS() <= this.options.throughput.initialBytesS;
+    let { left, right } = this;
+    while (left < right && this.taken[this.sorted[left]]) ++left;
+    while (left < right && this.taken[this.sorted[right - 1]]) --right;
+    return this.sorted[finest ? left : right - 1];
+  }
+
+  private take(offer: number): void {
+    const f = this.offers[offer];
+    this.taken[offer] = true;
+    while (this.left < this.right && this.taken[this.sorted[this.left]]) ++this.left;
+    while (this.left < this.right && this.taken[this.sorted[this.right - 1]]) --this.right;
+    this.plannedLeft -= f.plannedBytes;
+    this.smallestLeft -= f.bytes[lowest(f, this.options.hardLimits)];
+    if (this.priceBytes.length > 0) this.priceDone += this.priceBytes[offer];
+  }
+
+  private thetaOf(offer: number): number {
+    return this.options.timeLimitS * (this.offers[offer].plannedBytes / this.plannedTotal);
+  }
+
+  // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
+  private creditAt(position: number): number {
+    let credit = 0;
+    for (const c of this.credits) credit += c.value / (position - c.issued + 1);
+    return credit;
+  }
+
+  private spread(residualS: number): void {
+    const issued = this.steps.length;
+    const left = this.offers.length - issued;
+    if (left === 0) {
+      this.unspent += residualS;
+      return;
+    }
+    const zeta = this.harmonic[left + 1] - 1; // 1/2 + ... + 1/(left + 1)
+    this.credits.push({ value: residualS / zeta, issued });
+  }
+
+  /** What a plan in proportion to the planned sizes gives, as a factor of them. */
+  private proportionalShare(nowS: number, samples: number): number {
+    const beta = samples ? this.throughput.recentBytesS(samples) : this.throughputBytesS();
+    const room = beta * (this.options.timeLimitS - nowS) - this.inFlightBytes;
+    return Math.max(0, room) / Math.max(this.plannedLeft, 1);
+  }
+
+  private targetOf(offer: number, thetaS: number, nowS: number): number {
+    const f = this.offers[offer];
+    const { policy } = this.options;
+    if (policy === 'static' || policy === 'price') return f.plannedBytes;
+    if (policy === 'proportional') return f.plannedBytes * this.proportionalShare(nowS, 0);
+    if (this.steps.length === 0) return f.plannedBytes; // F-bar has the quality Q_i
+    // Alone in flight it has to wait for a round trip first.
+    const wait = this.options.window === 1 ? this.options.rttS : 0;
+    const target = this.throughputBytesS() * (thetaS - wait);
+    if (policy === 'htc') return target;
+    const even = f.plannedBytes * this.proportionalShare(nowS, guardSamples);
+    return clamp(target, even / this.options.guard, even * this.options.guard);
+  }
+
+  private maySkip(nowS: number): boolean {
+    if (this.options.hardLimits) return false;
+    if (this.options.policy === 'htc' || this.options.policy === 'static') return true;
+    const room = this.throughput.recentBytesS(windowSamples) * (this.options.timeLimitS - nowS);
+    return this.smallestLeft > room - this.inFlightBytes;
+  }
+
+  private rungOf(offer: number, target: number, nowS: number): number {
+    const f = this.offers[offer];
+    const skip = this.maySkip(nowS);
+    if (this.options.policy !== 'price') return this.nearestRungOf(f, target, skip);
+    const room = this.throughput.recentBytesS(windowSamples) * (this.options.timeLimitS - nowS);
+    return this.cheapestRungOf(f, this.priceAt(nowS), skip, Math.max(0, lateFactor * room - this.inFlightBytes));
+  }
+
+  private nearestRungOf(f: FragmentOffer, target: number, maySkip: boolean): number {
+    const low = lowest(f, this.options.hardLimits);
+    let best = maySkip ? -1 : low;
+    let distance = Math.abs(target - (best < 0 ? 0 : f.bytes[best]));
+    for (let r = low; r <= highest(f); ++r) {
+      const d = Math.abs(target - f.bytes[r]);
+      if (d < distance) {
+        distance = d;
+        best = r;
+      }
+    }
+    return best;
+  }
+
+  private cheapestRungOf(f: FragmentOffer, price: number, maySkip: boolean, mostBytes: number): number {
+    const low = lowest(f, this.options.hardLimits);
+    let best = maySkip ? -1 : low;
+    let cost = maySkip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
+    for (let r = low; r <= highest(f); ++r) {
+      if (f.bytes[r] > mostBytes) continue;
+      const c = f.loss[r + 1] + price * f.bytes[r];
+      if (c < cost) {
+        cost = c;
+        best = r;
+      }
+    }
+    return best;
+  }
+
+  private priceAt(nowS: number): number {
+    const limit = this.options.timeLimitS;
+    const plannedS = this.priceTotal > 0 ? limit * (this.priceDone / this.priceTotal) : 0;
+    // What is in flight has been issued but not paid for yet.
+    const lag = nowS - (plannedS - this.inFlightBytes / this.throughputBytesS());
+    const left = Math.max(limit - nowS, 1e-3 * limit);
+    return this.price0 * exp(clamp((this.options.priceKappa * lag) / left, -largestExponent, largestExponent));
+  }
+
+  /** The request for this offer has ended. Completions may come in any order; times must not fall. */
+  completed(offer: number, nowS: number): void {
+    this.finish(this.stepOf(offer), nowS, true);
+  }
+  /** The request failed and was given up: its time is spent, its fragment counts as skipped. */
+  failed(offer: number, nowS: number): void {
+    const step = this.stepOf(offer);
+    this.finish(step, nowS, false);
+    step.rung = -1;
+  }
+  private stepOf(offer: number): HtcStep {
+    const step = this.steps[this.stepOfOffer[offer]];
+    require(step !== undefined, 'HarmonicTimePlan: not issued');
+    return step;
+  }
+
+  private finish(step: HtcStep, nowS: number, sample: boolean): void {
+    require(step.doneS < 0 && nowS >= this.lastDoneS, 'HarmonicTimePlan: completed twice, or time runs back');
+    step.doneS = nowS;
+    step.spacingS = nowS - this.lastDoneS;
+    step.residualS = step.thetaS - step.spacingS;
+    if (sample) this.throughput.add(step.bytes, nowS - Math.max(this.lastDoneS, step.issuedS + this.options.rttS));
+    this.lastDoneS = nowS;
+    --this.inFlight;
+    this.inFlightBytes -= step.bytes;
+    this.spread(step.residualS);
+  }
+}
+
+/** The bounds of the thesis for a finished serial run, and what really holds (Appendix A). */
+export interface HtcTheorem {
+  surplusS: number;
+  lastResidualS: number;
+  correctedBoundS: number;
+  publishedBoundS: number;
+}
+/** For plans with one request at a time in which nothing failed. */
+export function theoremOf(plan: HarmonicTimePlan): HtcTheorem {
+  const { steps } = plan;
+  const n = steps.length;
+  if (n === 0) return { surplusS: 0, lastResidualS: 0, correctedBoundS: 0, publishedBoundS: 0 };
+  const last = steps[n - 1];
+  let correctedBoundS = Math.abs(last.thetaS);
+  if (last.bytes > 0) {
+    const betaN = last.bytes / last.spacingS;
+    correctedBoundS =
+      Math.abs(last.thetaS) * Math.abs(last.throughputBytesS / betaN - 1) +
+      Math.abs(last.targetBytes - last.bytes) / betaN;
+  }
+  let sum = 0;
+  for (let k = 0; k + 1 < n; ++k) sum += steps[k].residualS;
+  const mean = n > 1 ? sum / (n - 1) : 0;
+  const logN = log(Math.max(n, 3));
+  const publishedBoundS =
+    last.residualS + (n > 1 ? steps[n - 2].residualS / 2 : 0) + (1.088 + log(logN)) * mean;
+  return { surplusS: plan.surplusS, lastResidualS: last.residualS, correctedBoundS, publishedBoundS };
+}

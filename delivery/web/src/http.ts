@@ -1,0 +1,343 @@
+import { InputError } from './errors';
+
+/** What bytes are for; of request events and of the bytes counted by kind. */
+export type RequestKind =
+  | 'manifest'
+  | 'index'
+  | 'tables'
+  | 'textures'
+  | 'quality'
+  | 'first-picture'
+  | 'mesh'
+  | 'preview'
+  | 'texture'
+  | 'stream'
+  | 'other';
+
+/** One finished request; times in seconds of performance.now(). */
+export interface RequestRecord {
+  url: string;
+  /** First byte and number of bytes asked for; 0 and -1 for whole files. */
+  offset: number;
+  bytes: number;
+  /** Bytes of the body that came. */
+  received: number;
+  kind: RequestKind;
+  started: number;
+  /** When the answer's head came; -1 when none did. */
+  firstByte: number;
+  ended: number;
+  status: number;
+  ok: boolean;
+}
+
+/** Limits of what a server may do to us. */
+export interface HttpOptions {
+  /** Instead of the browser's; gets a URL and a RequestInit. */
+  fetch?: typeof fetch;
+  /** Of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
+  retries: number;
+  /** Before the first retry, doubled for each further one. */
+  retryDelayS: number;
+  /** Without a byte. */
+  stallTimeoutS: number;
+  /** Requests at once while the server speaks HTTP/1.1. */
+  connections: number;
+  /** Requests at once over HTTP/2 and HTTP/3. */
+  streams: number;
+  /** Of a container from a server that knows no ranges. */
+  maxWholeBytes: number;
+  /** Bytes per second at most, for trying slow links; 0 = no limit. */
+  capBytesS: number;
+}
+export const defaultHttpOptions: HttpOptions = {
+  retries: 3,
+  retryDelayS: 0.2,
+  stallTimeoutS: 10,
+  connections: 6,
+  streams: 32,
+  maxWholeBytes: 1 << 30,
+  capBytesS: 0,
+};
+
+export interface Answer {
+  /** 0: no answer at all, see problem. */
+  status: number;
+  problem: string;
+  body: Uint8Array;
+  /** Strong ones only. */
+  etag: string;
+  /** Of Content-Range, when it may be read. */
+  range?: { first: number; last: number; total: number };
+  /** The body ended as it should. */
+  complete: boolean;
+  tooLong: boolean;
+}
+
+export interface GetOptions {
+  range?: { offset: number; bytes: number };
+  ifRange?: string;
+  maxBytes: number;
+  kind: RequestKind;
+  signal?: AbortSignal;
+  stallTimeoutS?: number;
+  /** Called with the bytes that have come so far. */
+  onBytes?: (received: number) => void;
+  reload?: boolean;
+}
+
+export const nowS = (): number => performance.now() / 1000;
+export const sleepS = (seconds: number): Promise<void> => new Promise((done) => setTimeout(done, seconds * 1000));
+
+/** https://host/path without user, password and query, for messages. */
+export function shownUrl(url: string): string {
+  return url.replace(/^(\w+:\/\/)[^/@]*@/, '$1').replace(/[?#].*$/, '');
+}
+
+export function isAbort(error: unknown): boolean {
+  return error instanceof Error && error.name === 'AbortError';
+}
+
+function abortError(): Error {
+  return new DOMException('The load was cancelled', 'AbortError');
+}
+export function throwIfAborted(signal?: AbortSignal): void {
+  if (signal?.aborted) throw abortError();
+}
+
+function contentRange(text: string | null): Answer['range'] {
+  const m = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text ?? '');
+  if (!m) return undefined;
+  const [first, last, total] = m.slice(1).map(Number);
+  return first <= last && last < total ? { first, last, total } : undefined;
+}
+
+/** Requests to one or more servers: a window of connections, stalls, a cap; one try each. */
+export class HttpClient {
+  readonly options: HttpOptions;
+  /** Least time from asking to the answer's head, without the first request, which opens the connection. */
+  rttS = 0;
+  received = 0;
+  requests = 0;
+  onRequest?: (record: RequestRecord) => void;
+  private active = 0;
+  private readonly waiting: (() => void)[] = [];
+  private limit: number;
+  private capFreeS = 0;
+
+  constructor(options: Partial<HttpOptions> = {}) {
+    this.options = { ...defaultHttpOptions, ...options };
+    this.limit = this.options.connections;
+  }
+
+  private async enter(): Promise<void> {
+    if (this.active >= this.limit) await new Promise<void>((go) => this.waiting.push(go));
+    else ++this.active;
+  }
+  private leave(): void {
+    const next = this.waiting.shift();
+    if (next) next();
+    else --this.active;
+  }
+
+  /** One GET; network problems come back in the answer, only cancelling throws. */
+  async get(url: string, get: GetOptions): Promise<Answer> {
+    throwIfAborted(get.signal);
+    await this.enter();
+    const abort = new AbortController();
+    const cancel = (): void => abort.abort();
+    get.signal?.addEventListener('abort', cancel);
+    const record: RequestRecord = {
+      url, offset: get.range?.offset ?? 0, bytes: get.range?.bytes ?? -1, received: 0, kind: get.kind,
+      started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
+    };
+    const answer: Answer = {
+      status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false,
+    };
+    const stall = new StallTimer(get.stallTimeoutS ?? this.options.stallTimeoutS, () => abort.abort());
+    try {
+      throwIfAborted(get.signal);
+      await this.transfer(url, get, abort.signal, answer, record, stall);
+    } catch (error) {
+      if (get.signal?.aborted) throw abortError();
+      answer.problem = stall.fired ? `no byte for ${stall.seconds.toFixed(1)} s` : String((error as Error).message);
+    } finally {
+      stall.stop();
+      get.signal?.removeEventListener('abort', cancel);
+      if (!answer.complete) abort.abort();
+      this.leave();
+      record.ended = nowS();
+      record.status = answer.status;
+      record.ok = answer.complete && (answer.status === 206 || (answer.status === 200 && !get.range));
+      this.note(url, record);
+    }
+    return answer;
+  }
+
+  private async transfer(
+    url: string,
+    get: GetOptions,
+    signal: AbortSignal,
+    answer: Answer,
+    record: RequestRecord,
+    stall: StallTimer,
+  ): Promise<void> {
+    const headers: Record<string, string> = {};
+    if (get.range) headers.Range = `bytes=${get.range.offset}-${get.range.offset + get.range.bytes - 1}`;
+    if (get.ifRange) headers['If-Range'] = get.ifRange;
+    const doFetch = this.options.fetch ?? globalThis.fetch;
+    const response = await doFetch(url, { headers, signal, ...(get.reload ? { cache: 'reload' as const } : {}) });
+    stall.restart();
+    record.firstByte = nowS();
+    answer.status = response.status;
+    const etag = response.headers.get('etag') ?? '';
+    answer.etag = etag.startsWith('"') ? etag : '';
+    answer.range = contentRange(response.headers.get('content-range'));
+    const wanted = response.status === 206 ? !!get.range : response.status === 200 && !get.range;
+    if (!wanted) {
+      void response.body?.cancel().catch(() => undefined);
+      answer.complete = response.status !== 206;
+      return;
+    }
+    await this.readBody(response, get, answer, record, stall);
+    const said = answer.range && response.status === 206 ? answer.range.last - answer.range.first + 1 : -1;
+    const length = said >= 0 ? said : plainLength(response);
+    answer.complete = !answer.tooLong && (length < 0 || length === answer.body.length);
+  }
+
+  private async readBody(
+    response: Response,
+    get: GetOptions,
+    answer: Answer,
+    record: RequestRecord,
+    stall: StallTimer,
+  ): Promise<void> {
+    const chunks: Uint8Array[] = [];
+    let total = 0;
+    const reader = response.body?.getReader();
+    try {
+      while (reader && !answer.tooLong) {
+        const { done, value } = await reader.read();
+        stall.restart();
+        if (done) break;
+        chunks.push(value);
+        total += value.length;
+        record.received = total;
+        this.received += value.length;
+        if (total > get.maxBytes) answer.tooLong = true;
+        else get.onBytes?.(total);
+        await this.holdBack(value.length, stall);
+      }
+    } finally {
+      // What came before a cut is worth keeping.
+      answer.body = chunks.length === 1 ? chunks[0] : concat(chunks, total);
+    }
+  }
+
+  /** Waits as long as the cap wants. */
+  private async holdBack(bytes: number, stall: StallTimer): Promise<void> {
+    if (!(this.options.capBytesS > 0)) return;
+    const now = nowS();
+    this.capFreeS = Math.max(now, this.capFreeS) + bytes / this.options.capBytesS;
+    stall.stop();
+    if (this.capFreeS > now) await sleepS(this.capFreeS - now);
+    stall.restart();
+  }
+
+  private note(url: string, record: RequestRecord): void {
+    if (record.ok && record.firstByte >= 0 && this.requests > 0) {
+      const wait = record.firstByte - record.started;
+      this.rttS = this.rttS > 0 ? Math.min(this.rttS, wait) : wait;
+    }
+    ++this.requests;
+    if (this.requests === 1 && typeof performance.getEntriesByName === 'function') {
+      const timing = performance.getEntriesByName(url, 'resource').at(-1) as PerformanceResourceTiming | undefined;
+      if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit = this.options.streams;
+    }
+    this.onRequest?.(record);
+  }
+}
+
+/** Content-Length, where nothing was decoded on the way; -1 when nobody says. */
+function plainLength(response: Response): number {
+  if (response.headers.get('content-encoding')) return -1;
+  const length = response.headers.get('content-length');
+  return length !== null && /^\d+$/.test(length) ? Number(length) : -1;
+}
+
+export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array {
+  const out = new Uint8Array(total);
+  let at = 0;
+  for (const c of chunks) {
+    out.set(c, at);
+    at += c.length;
+  }
+  return out;
+}
+
+class StallTimer {
+  fired = false;
+  private timer?: ReturnType<typeof setTimeout>;
+  constructor(
+    readonly seconds: number,
+    private readonly onStall: () => void,
+  ) {
+    this.restart();
+  }
+  restart(): void {
+    this.stop();
+    if (this.fired) return;
+    this.timer = setTimeout(() => {
+      this.fired = true;
+      this.onStall();
+    }, this.seconds * 1000);
+  }
+  stop(): void {
+    if (this.timer !== undefined) clearTimeout(this.timer);
+    this.timer = undefined;
+  }
+}
+
+export function mayRetry(a: Answer): boolean {
+  const { status } = a;
+  if (status === 0 || status === 408 || status === 429 || status >= 500) return true;
+  return (status === 200 || status === 206) && !a.complete && !a.tooLong;
+}
+
+export function whatCame(a: Answer): string {
+  return a.problem !== '' ? a.problem : a.status === 0 ? 'no answer' : `status ${a.status}`;
+}
+
+/** Waits longer from try to try; false when there have been enough. */
+export class Retries {
+  private left: number;
+  private delayS: number;
+  constructor(options: HttpOptions) {
+    this.left = options.retries;
+    this.delayS = options.retryDelayS;
+  }
+  async wait(signal?: AbortSignal): Promise<boolean> {
+    if (this.left-- <= 0) return false;
+    await sleepS(this.delayS);
+    throwIfAborted(signal);
+    this.delayS *= 2;
+    return true;
+  }
+}
+
+/** A whole file, with retries. */
+export async function getWhole(
+  client: HttpClient,
+  url: string,
+  maxBytes: number,
+  how: { kind: RequestKind; signal?: AbortSignal; onBytes?: (n: number) => void; retries?: boolean },
+): Promise<Uint8Array> {
+  const retries = new Retries(client.options);
+  for (;;) {
+    const a = await client.get(url, { maxBytes, ...how });
+    if (a.status === 200 && a.complete) return a.body;
+    if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${maxBytes} bytes`, 'more');
+    if (how.retries === false || !mayRetry(a) || !(await retries.wait(how.signal)))
+      throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
+  }
+}

@@ -1,0 +1,109 @@
+import { BytesIn, toHex } from './bytes';
+import { FormatError } from './errors';
+import * as layout from './layout';
+import { EntryRef, formatMajor, formatMinor } from './manifest';
+import { sha256 } from './sha256';
+
+const file = layout.indexPath;
+const noPlane = 0xffffffff;
+
+/** One page of index.bin: the entries of a plane, or (plane -1) of none. */
+export interface IndexPage {
+  plane: number;
+  entries: number;
+  /** Within index.bin. */
+  offset: number;
+  bytes: number;
+  sha256: Uint8Array;
+}
+export interface IndexHead {
+  minor: number;
+  bytes: number;
+  pages: IndexPage[];
+}
+
+/** Head of index.bin (format/SPEC.md, section 6); the bytes may stop after it. */
+export function readIndexHead(bytes: Uint8Array): IndexHead {
+  const input = new BytesIn(bytes, file);
+  input.expect('TXMX');
+  const major = input.u16();
+  if (major !== formatMajor) input.fail(`major version ${formatMajor}`, `${major}`);
+  const minor = input.u16();
+  const pageCount = input.u32();
+  const entryCount = input.u32();
+  if (pageCount === 0 || pageCount > input.left / 44) input.fail('a page count that fits the file', `${pageCount}`);
+  const head: IndexHead = { minor, bytes: 16 + pageCount * 44, pages: [] };
+  let offset = head.bytes;
+  let entries = 0;
+  for (let i = 0; i < pageCount; ++i) {
+    const plane = input.u32();
+    const before = i > 1 ? head.pages[i - 1].plane : -1;
+    if (i === 0 ? plane !== noPlane : plane === noPlane || plane <= before)
+      input.fail('page 0 without a plane, then rising planes', `${plane}`);
+    const page: IndexPage = {
+      plane: i === 0 ? -1 : plane,
+      entries: input.u32(),
+      offset,
+      bytes: input.u32(),
+      sha256: input.raw(32),
+    };
+    if (page.entries > page.bytes / 49) input.fail('an entry count that fits the page', `${page.entries}`);
+    offset += page.bytes;
+    entries += page.entries;
+    head.pages.push(page);
+  }
+  if (entries !== entryCount) input.fail(`${entryCount} entries on all pages`, `${entries}`);
+  return head;
+}
+
+function checkOrder(entries: EntryRef[]): void {
+  const paths = new Set<string>();
+  entries.forEach((e, i) => {
+    if (paths.has(e.path)) throw new FormatError(file, `entry ${e.path}`, 'each path once', 'twice');
+    paths.add(e.path);
+    const before = entries[i - 1];
+    if (before && e.offset <= before.offset + before.bytes)
+      throw new FormatError(file, `offset of ${e.path}`, `more than where ${before.path} ends`, `${e.offset}`);
+  });
+}
+
+function readRecord(input: BytesIn, plane: number): EntryRef {
+  const offset = input.u64();
+  const bytes = input.u64();
+  const digest = input.raw(32);
+  const path = input.text(input.u8());
+  if (!layout.isValidEntryPath(path) || path === layout.manifestPath || path === layout.indexPath)
+    input.fail('a valid path of an entry', path);
+  if (offset % 64 !== 0 || offset === 0) input.fail('an offset that is a multiple of 64', `${offset}`);
+  if (layout.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);
+  return { path, offset, bytes, sha256: digest };
+}
+
+/** One page's entries, in container order; its digest is checked. */
+export async function readIndexPage(head: IndexHead, page: number, bytes: Uint8Array): Promise<EntryRef[]> {
+  const p = head.pages[page];
+  const place = `page ${page}`;
+  if (bytes.length !== p.bytes) throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`);
+  const digest = toHex(await sha256(bytes));
+  if (digest !== toHex(p.sha256)) throw new FormatError(file, place, `SHA-256 ${toHex(p.sha256)}`, digest);
+  const input = new BytesIn(bytes, `${file}: ${place}`);
+  const entries: EntryRef[] = [];
+  for (let i = 0; i < p.entries; ++i) entries.push(readRecord(input, p.plane));
+  if (head.minor <= formatMinor) input.finish();
+  checkOrder(entries);
+  return entries;
+}
+
+/** All pages, merged into container order. */
+export async function readIndex(bytes: Uint8Array): Promise<EntryRef[]> {
+  const head = readIndexHead(bytes);
+  const last = head.pages[head.pages.length - 1];
+  if (last.offset + last.bytes !== bytes.length)
+    throw new FormatError(file, '', `${last.offset + last.bytes} bytes`, `${bytes.length}`);
+  const pages = await Promise.all(
+    head.pages.map((p, i) => readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))),
+  );
+  const entries = pages.flat().sort((a, b) => a.offset - b.offset);
+  checkOrder(entries);
+  return entries;
+}

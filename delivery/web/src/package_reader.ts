@@ -1,0 +1,435 @@
+import { samePrefix, toHex } from './bytes';
+import { CodecId, codecTraits, joinFragment } from './codec';
+import { FormatError, InputError } from './errors';
+import { PackageData } from './fragment_list';
+import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS } from './http';
+import { IndexHead, readIndex, readIndexHead, readIndexPage } from './index_table';
+import * as layout from './layout';
+import {
+  ByteRange, EntryRef, Manifest, PagedRef, mostManifestPreviews, readManifest,
+} from './manifest';
+import { QualityTable, readQuality } from './quality_table';
+import { sha256 } from './sha256';
+import { PackageForm, PackageStore, ReadOptions, StoreMode, openBytes, openStore } from './store';
+import {
+  PlaneTables, TablesHead, fragmentCount, readTablesHead, readTablesSection, rungCount,
+} from './tables';
+import { TextureInfo, fullSizePlanes, missingFeature, readTextures } from './textures';
+
+/** Of a package's opening. */
+export interface OpenOptions extends Partial<HttpOptions> {
+  /**
+   * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges, and the tree
+   * (or at last the whole container) where the server answers 200 to a range.
+   */
+  mode?: StoreMode;
+  /** Further URLs of the same container. */
+  mirrors?: readonly string[];
+  signal?: AbortSignal;
+}
+
+/** A whole document up to so many bytes is read at once; larger ones by pages. */
+const wholeDocumentBytes = 192 << 10;
+/** Sections of tables closer together than this are read by one request. */
+const gapBytes = 4096;
+
+const sum = (values: ArrayLike<number>, from = 0, to = values.length): number => {
+  let total = 0;
+  for (let i = from; i < to; ++i) total += values[i];
+  return total;
+};
+
+/**
+ * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they are first
+ * asked for, and never twice. Everything handed out has been checked: entries against their SHA-256, fragments against
+ * the truncated digest in the tables, documents against each other.
+ */
+export class PackageReader {
+  readonly manifest: Manifest;
+  /** Package id: SHA-256 of the bytes of manifest.json, in hexadecimal digits. */
+  readonly id: string;
+  /** When the first request was made, seconds of performance.now(). */
+  readonly openedS: number;
+  /** Bytes received by kind. */
+  readonly bytesByKind: Partial<Record<RequestKind, number>> = {};
+  private readonly listeners = new Set<(record: RequestRecord) => void>();
+  private indexPages = new Map<number, Promise<Map<string, EntryRef>>>();
+  private indexHead?: Promise<IndexHead>;
+  private texturesOnce?: Promise<TextureInfo[]>;
+  private tablesHead?: Promise<TablesHead>;
+  private wholeTables?: Promise<Uint8Array>;
+  private readonly tablesOnce = new Map<number, Promise<PlaneTables>>();
+  private qualityOnce?: Promise<QualityTable>;
+  private firstPictureOnce?: Promise<void>;
+  private readonly tableStreams = new Map<number, Promise<Uint8Array>>();
+  private readonly offsets = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
+
+  constructor(
+    readonly store: PackageStore,
+    readonly client: HttpClient,
+    readonly url: string,
+    manifest: { parsed: Manifest; id: string },
+    openedS: number,
+  ) {
+    this.manifest = manifest.parsed;
+    this.id = manifest.id;
+    this.openedS = openedS;
+  }
+
+  /** Reads the manifest of a package at a URL; see OpenOptions. */
+  static async openUrl<T extends PackageReader>(
+    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
+    url: string,
+    options: OpenOptions = {},
+  ): Promise<T> {
+    const client = new HttpClient(options);
+    const openedS = nowS();
+    const bytes: Partial<Record<RequestKind, number>> = {};
+    const early: RequestRecord[] = [];
+    client.onRequest = (record) => {
+      bytes[record.kind] = (bytes[record.kind] ?? 0) + record.received;
+      early.push(record);
+    };
+    const { store, manifest } = await openStore(url, options.mirrors ?? [], options.mode ?? 'auto', client, options.signal);
+    const id = toHex(await sha256(manifest));
+    const reader = new this(store, client, url, { parsed: readManifest(manifest), id }, openedS);
+    Object.assign(reader.bytesByKind, bytes);
+    reader.requests = early;
+    client.onRequest = (record) => reader.noteRequest(record);
+    return reader;
+  }
+
+  /** Reads a container that is in memory. */
+  static async openBytes<T extends PackageReader>(
+    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
+    bytes: Uint8Array,
+    name = 'package',
+  ): Promise<T> {
+    const store = openBytes(bytes, name);
+    const manifest = await store.manifest();
+    const id = toHex(await sha256(manifest));
+    return new this(store, new HttpClient(), name, { parsed: readManifest(manifest), id }, nowS());
+  }
+
+  /** Requests so far, those of opening included. */
+  requests: RequestRecord[] = [];
+  /** Calls back for every finished request; gives a function that ends it. */
+  onRequest(listener: (record: RequestRecord) => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+  private noteRequest(record: RequestRecord): void {
+    this.requests.push(record);
+    this.bytesByKind[record.kind] = (this.bytesByKind[record.kind] ?? 0) + record.received;
+    for (const listener of this.listeners) listener(record);
+  }
+
+  /** How the bytes come: ranges of the container, files of a tree, or one whole container. */
+  get form(): PackageForm {
+    return this.store.form;
+  }
+  /** Forgets what was read. Loads of this package must be disposed of on their own. */
+  dispose(): void {
+    this.store.dispose();
+    this.indexPages.clear();
+    this.tablesOnce.clear();
+    this.tableStreams.clear();
+    this.offsets.clear();
+    this.wholeTables = undefined;
+  }
+
+  private fail(place: string, expected: string, found: string): never {
+    throw new FormatError(this.store.name, place, expected, found);
+  }
+  private digestCheck(place: string, digest: Uint8Array): (bytes: Uint8Array) => Promise<void> {
+    return async (bytes) => {
+      const found = await sha256(bytes);
+      if (!samePrefix(found, digest)) this.fail(place, `SHA-256 ${toHex(digest)}`, toHex(found.subarray(0, digest.length)));
+    };
+  }
+  private readAll(ref: EntryRef, how: ReadOptions): Promise<Uint8Array> {
+    return this.store.read(ref, 0, ref.bytes, { ...how, verify: this.digestCheck(`entry ${ref.path}`, ref.sha256) });
+  }
+  private async readPaged(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
+    const bytes = await this.readAll(ref, how);
+    await this.digestCheck(`head of ${ref.path}`, ref.headSha256)(bytes.subarray(0, ref.headBytes));
+    return bytes;
+  }
+  private readHead(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
+    const verify = this.digestCheck(`head of ${ref.path}`, ref.headSha256);
+    return this.store.read(ref, 0, ref.headBytes, { ...how, verify });
+  }
+  private requireHead(ref: PagedRef, headBytes: number): void {
+    if (ref.headBytes !== headBytes) this.fail(`head of ${ref.path}`, `${ref.headBytes} bytes`, `${headBytes}`);
+  }
+
+  // ---- index
+
+  /** Every entry but manifest.json and index.bin, in container order. */
+  async index(): Promise<EntryRef[]> {
+    const bytes = await this.readPaged(this.manifest.index, { kind: 'index' });
+    return readIndex(bytes);
+  }
+
+  private async loadIndexHead(): Promise<IndexHead> {
+    const ref = this.manifest.index;
+    const small = ref.bytes <= wholeDocumentBytes || this.form !== 'range';
+    const bytes = small ? await this.readPaged(ref, { kind: 'index' }) : await this.readHead(ref, { kind: 'index' });
+    const head = readIndexHead(bytes);
+    this.requireHead(ref, head.bytes);
+    return head;
+  }
+  private async loadIndexPage(plane: number): Promise<Map<string, EntryRef>> {
+    const head = await (this.indexHead ??= this.loadIndexHead());
+    const page = head.pages.findIndex((p) => p.plane === plane);
+    const entries = new Map<string, EntryRef>();
+    if (page < 0) return entries;
+    const { offset, bytes } = head.pages[page];
+    const got = await this.store.read(this.manifest.index, offset, bytes, { kind: 'index' });
+    for (const e of await readIndexPage(head, page, got)) entries.set(e.path, e);
+    if (plane < 0) this.checkManifestRefs(entries);
+    return entries;
+  }
+  private checkManifestRefs(entries: Map<string, EntryRef>): void {
+    const m = this.manifest;
+    for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+      const e = entries.get(ref.path);
+      if (!e || e.offset !== ref.offset || e.bytes !== ref.bytes || !samePrefix(e.sha256, ref.sha256))
+        this.fail(`index entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+    }
+  }
+  /** An entry of the index, of which only the page that has it is read. */
+  async find(path: string): Promise<EntryRef> {
+    const plane = layout.planeOfPath(path);
+    let page = this.indexPages.get(plane);
+    if (!page) {
+      page = this.loadIndexPage(plane);
+      this.indexPages.set(plane, page);
+      page.catch(() => this.indexPages.delete(plane));
+    }
+    const entry = (await page).get(path);
+    if (!entry) return this.fail(`entry ${path}`, 'an entry of the index', 'none');
+    return entry;
+  }
+  /** The bytes of an entry. */
+  async entry(path: string, kind: RequestKind = 'other', signal?: AbortSignal): Promise<Uint8Array> {
+    return this.readAll(await this.find(path), { kind, signal });
+  }
+
+  // ---- documents
+
+  /** The texture planes: full-size ones first, then mips. */
+  textures(): Promise<TextureInfo[]> {
+    return (this.texturesOnce ??= this.loadTextures());
+  }
+  private async loadTextures(): Promise<TextureInfo[]> {
+    const m = this.manifest;
+    const textures = readTextures(await this.readAll(m.textures, { kind: 'textures' }));
+    if (textures.length !== m.planeCount) this.fail(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
+    const feature = missingFeature(textures, m.requiredFeatures);
+    if (feature !== '') this.fail('/requiredFeatures', feature, 'a codec without it');
+    const full = fullSizePlanes(textures);
+    const mips = m.requiredFeatures.includes('mips');
+    if (mips !== full < textures.length)
+      this.fail(layout.texturesPath, mips ? 'mips, as the manifest requires' : 'no mips', `${textures.length - full}`);
+    if (m.previews.length !== Math.min(full, mostManifestPreviews))
+      this.fail(layout.manifestPath, 'previews of the full-size planes', `${m.previews.length}`);
+    return textures;
+  }
+
+  /** Measured quality of scales and rungs. */
+  quality(): Promise<QualityTable> {
+    return (this.qualityOnce ??= this.readAll(this.manifest.quality, { kind: 'quality' }).then(readQuality));
+  }
+
+  /** What the package was made from and with, as JSON. */
+  async provenance(): Promise<unknown> {
+    const bytes = await this.readAll(this.manifest.provenance, { kind: 'other' });
+    return JSON.parse(new TextDecoder().decode(bytes));
+  }
+
+  private async loadTablesHead(): Promise<TablesHead> {
+    const ref = this.manifest.tables;
+    if (ref.bytes <= wholeDocumentBytes || this.form !== 'range')
+      this.wholeTables = this.readPaged(ref, { kind: 'tables' });
+    const head = readTablesHead(await (this.wholeTables ?? this.readHead(ref, { kind: 'tables' })));
+    this.requireHead(ref, head.bytes);
+    if (head.planes.length !== this.manifest.planeCount)
+      this.fail(layout.tablesPath, `${this.manifest.planeCount} planes`, `${head.planes.length}`);
+    const last = head.planes[head.planes.length - 1];
+    const end = last ? last.offset + last.bytes : head.bytes;
+    if (end !== ref.bytes) this.fail(layout.tablesPath, `${end} bytes`, `${ref.bytes}`);
+    return head;
+  }
+
+  /** Tables of one plane. */
+  async planeTables(plane: number): Promise<PlaneTables> {
+    return (await this.tables([plane]))[plane]!;
+  }
+
+  /**
+   * Tables by plane number: of these planes (and of those read before), or of all. Sections that stand together are
+   * read by one request.
+   */
+  async tables(planes?: readonly number[]): Promise<(PlaneTables | undefined)[]> {
+    const head = await (this.tablesHead ??= this.loadTablesHead());
+    const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
+    for (const p of wanted)
+      if (!(p >= 0 && p < head.planes.length))
+        throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
+    const missing = wanted.filter((p) => !this.tablesOnce.has(p));
+    for (const run of this.runsOf(head, missing)) {
+      const begin = head.planes[run[0]].offset;
+      const last = head.planes[run[run.length - 1]];
+      const bytes = (async () =>
+        this.wholeTables
+          ? (await this.wholeTables).subarray(begin)
+          : this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true }))();
+      for (const p of run) {
+        const { offset, bytes: size } = head.planes[p];
+        const table = bytes
+          .then((b) => readTablesSection(head, p, b.subarray(offset - begin, offset - begin + size)))
+          .then(async (t) => (await this.checkPlane(p, t), t));
+        this.tablesOnce.set(p, table);
+        table.catch(() => this.tablesOnce.delete(p));
+      }
+    }
+    const all: (PlaneTables | undefined)[] = new Array<undefined>(head.planes.length).fill(undefined);
+    await Promise.all([...this.tablesOnce].map(async ([p, t]) => (all[p] = await t)));
+    return all;
+  }
+  private runsOf(head: TablesHead, planes: readonly number[]): number[][] {
+    const runs: number[][] = [];
+    for (const p of planes) {
+      const last = runs[runs.length - 1];
+      const before = last && head.planes[last[last.length - 1]];
+      if (before && head.planes[p].offset - before.offset - before.bytes <= gapBytes) last.push(p);
+      else runs.push([p]);
+    }
+    return runs;
+  }
+  /** Tables, textures.json and index speak of the same fragments and bytes. */
+  private async checkPlane(plane: number, t: PlaneTables): Promise<void> {
+    const info = (await this.textures())[plane];
+    const place = `texture plane ${plane}`;
+    const sameRungs =
+      t.rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === t.rungQuality[r]);
+    if (t.columns !== info.columns || t.rows !== info.rows || !sameRungs)
+      this.fail(place, 'the grid and rungs of textures.json in tables.bin', 'others');
+    if (t.incremental !== codecTraits(info.codec).incremental)
+      this.fail(place, 'tables of the codec in textures.json', 'others');
+    const requireSum = async (path: string, bytes: number): Promise<void> => {
+      const entry = await this.find(path);
+      if (entry.bytes !== bytes) this.fail(`entry ${path}`, `${bytes} bytes, as tables.bin adds up`, `${entry.bytes}`);
+    };
+    await requireSum(layout.tableStreamsPath(plane), sum(t.tableBytes));
+    const n = fragmentCount(t);
+    const offsets = new Float64Array(n * rungCount(t));
+    for (let r = 0; r < rungCount(t); ++r) {
+      await requireSum(layout.rungPath(plane, r), sum(t.sizeBytes, r * n, (r + 1) * n));
+      let at = 0;
+      for (const f of t.order) {
+        offsets[r * n + f] = at;
+        at += t.sizeBytes[r * n + f];
+      }
+    }
+    this.offsets.set(plane, offsets);
+  }
+
+  /** What decisions about textures are made from, with the tables of these planes. */
+  async data(planes?: readonly number[]): Promise<PackageData> {
+    const [textures, tables] = [await this.textures(), await this.tables(planes)];
+    return { manifest: this.manifest, textures, tables };
+  }
+
+  // ---- meshes and images
+
+  /** Reads the range of the first picture, so that what it holds needs no further request. */
+  firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
+    return (this.firstPictureOnce ??= this.loadFirstPicture(how));
+  }
+  private async loadFirstPicture(how: Partial<ReadOptions>): Promise<void> {
+    if (this.form !== 'range') return;
+    const { offset, bytes, sha256: digest } = this.manifest.firstPicture;
+    const verify = this.digestCheck('first picture', digest);
+    await this.store.read({ path: 'first picture', offset, bytes }, 0, bytes, { kind: 'first-picture', ...how, verify });
+  }
+  /** The GLB of a scale; needs no index. */
+  async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
+    const s = this.manifest.scales.find((k) => k.scale === scale);
+    if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
+    return this.readAll(s.glb, { kind: 'mesh', once: true, ...how });
+  }
+  /** preview/PPP.jpg of a full-size plane. */
+  async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
+    const range = this.manifest.previews[plane];
+    const path = layout.previewPath(plane);
+    // The first picture's digest covers its parts.
+    if (range && this.form === 'range' && this.firstPictureOnce) {
+      await this.firstPictureOnce;
+      return this.store.read({ path, ...range }, 0, range.bytes, { kind: 'preview', signal });
+    }
+    return this.entry(path, 'preview', signal);
+  }
+  /** What the fragments of a rung have in common. */
+  async tableStream(plane: number, rung: number): Promise<Uint8Array> {
+    const t = await this.planeTables(plane);
+    if (!(rung >= 0 && rung < rungCount(t)))
+      throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${rungCount(t)}`, `${rung}`);
+    let streams = this.tableStreams.get(plane);
+    if (!streams) {
+      streams = this.entry(layout.tableStreamsPath(plane), 'texture');
+      this.tableStreams.set(plane, streams);
+      streams.catch(() => this.tableStreams.delete(plane));
+    }
+    const begin = sum(t.tableBytes, 0, rung);
+    return (await streams).subarray(begin, begin + t.tableBytes[rung]);
+  }
+
+  /** Where a fragment's stream stands within its rung's entry; bytes 0 = not stored. */
+  async fragmentRange(plane: number, rung: number, fragment: number): Promise<ByteRange> {
+    const t = await this.planeTables(plane);
+    if (!(rung >= 0 && rung < rungCount(t) && fragment >= 0 && fragment < fragmentCount(t)))
+      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it', `${rung}, ${fragment}`);
+    const at = rung * fragmentCount(t) + fragment;
+    return { offset: this.offsets.get(plane)![at], bytes: t.sizeBytes[at] };
+  }
+  /** The first 8 bytes of the SHA-256 of a fragment's stream. */
+  async fragmentDigest(plane: number, rung: number, fragment: number): Promise<Uint8Array> {
+    const t = await this.planeTables(plane);
+    const at = 8 * (rung * fragmentCount(t) + fragment);
+    return t.digest.subarray(at, at + 8);
+  }
+  /** A fragment's stream at a rung, digest checked. */
+  async fragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+    const range = await this.fragmentRange(plane, rung, fragment);
+    const pack = await this.find(layout.rungPath(plane, rung));
+    const place = `fragment ${fragment} of ${pack.path}`;
+    if (range.bytes === 0) this.fail(place, 'a stored fragment', 'none');
+    const verify = this.digestCheck(place, await this.fragmentDigest(plane, rung, fragment));
+    return this.store.read(pack, range.offset, range.bytes, { kind: 'texture', once: true, signal, verify });
+  }
+  /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
+  async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+    const codec: CodecId = (await this.textures())[plane].codec;
+    const first = codecTraits(codec).incremental ? 0 : rung;
+    const streams: Uint8Array[] = [];
+    for (let r = first; r <= rung; ++r) streams.push(await this.fragment(plane, r, fragment, signal));
+    return joinFragment(codec, await this.tableStream(plane, first), streams);
+  }
+
+  /** Head of the vertex-split stream; undefined when the package has none. */
+  async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
+    const ref = this.manifest.stream;
+    if (!ref) return undefined;
+    const verify = this.digestCheck(`head of ${layout.splitStreamPath}`, ref.headSha256);
+    return this.store.read({ path: layout.splitStreamPath, ...ref }, 0, ref.headBytes, { kind: 'stream', signal, verify });
+  }
+  /** Bytes of the vertex-split stream; whoever takes blocks of it checks them by its head. */
+  async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
+    const ref = this.manifest.stream;
+    if (!ref) return this.fail(layout.splitStreamPath, 'a stream of vertex splits', 'none');
+    return this.store.read({ path: layout.splitStreamPath, ...ref }, offset, bytes, { kind: 'stream', once: true, ...how });
+  }
+}
+

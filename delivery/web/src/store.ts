@@ -1,0 +1,415 @@
+import { FormatError, InputError, TexmeshError } from './errors';
+import {
+  Answer, GetOptions, HttpClient, RequestKind, Retries, concat, getWhole, isAbort, mayRetry, nowS, shownUrl, whatCame,
+} from './http';
+import { isValidEntryPath, manifestPath } from './layout';
+import { bootstrapBytes, manifestOfContainer } from './manifest';
+import { Throughput, defaultThroughput } from './throughput';
+
+/** How a package's bytes are read: ranges of a container, files of a tree, or one whole container. */
+export type PackageForm = 'range' | 'files' | 'whole';
+
+/** What a read needs to know about an entry. */
+export interface Place {
+  path: string;
+  offset: number;
+  bytes: number;
+}
+export interface ReadOptions {
+  kind: RequestKind;
+  signal?: AbortSignal;
+  onBytes?: (received: number) => void;
+  /** Not to be remembered: what is read once only. */
+  once?: boolean;
+  /** Throws FormatError when the bytes are not what they should be; they are then asked for elsewhere. */
+  verify?: (bytes: Uint8Array) => Promise<void>;
+}
+
+/** Where a package's bytes come from. */
+export interface PackageStore {
+  readonly form: PackageForm;
+  /** For messages. */
+  readonly name: string;
+  manifest(): Promise<Uint8Array>;
+  /** Exactly these bytes of an entry. */
+  read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
+  /** Forgets what it remembers. */
+  dispose(): void;
+}
+
+/** The server answers whole files only. */
+class NoRanges extends Error {}
+
+const silenceFactor = 4;
+const leastPatienceRtts = 8;
+const leastPatienceS = 0.5;
+
+/** A URL that a package can be had from, and what it has shown so far. */
+class Mirror {
+  alive = true;
+  etag = '';
+  total = -1;
+  readonly throughput = new Throughput({ ...defaultThroughput });
+  owedBytes = 0;
+  lastS = 0;
+  constructor(readonly url: string) {}
+}
+
+/** Which mirror delivers first, by what each has delivered so far and has to deliver yet. */
+class Mirrors {
+  readonly all: Mirror[];
+  constructor(urls: readonly string[]) {
+    this.all = urls.map((url) => new Mirror(url));
+  }
+  get alive(): number {
+    return this.all.filter((m) => m.alive).length;
+  }
+  choose(bytes: number): Mirror {
+    let best: Mirror | undefined;
+    let bestS = 0;
+    for (const m of this.all) {
+      if (!m.alive) continue;
+      const s = (m.owedBytes + bytes) / m.throughput.bytesS();
+      if (!best || s < bestS) {
+        best = m;
+        bestS = s;
+      }
+    }
+    return best ?? this.all[0];
+  }
+  asked(m: Mirror, bytes: number): number {
+    m.owedBytes += bytes;
+    return m.owedBytes / m.throughput.bytesS();
+  }
+  delivered(m: Mirror, bytes: number, fromS: number, atS: number): void {
+    m.throughput.add(bytes, atS - Math.max(m.lastS, fromS));
+    m.lastS = atS;
+    m.owedBytes -= bytes;
+  }
+  /** A mirror that fails is not asked again, as long as there are others. */
+  failed(m: Mirror, bytes: number): boolean {
+    m.owedBytes -= bytes;
+    if (this.alive <= 1) return false;
+    m.alive = false;
+    return true;
+  }
+}
+
+/** Tries mirror after mirror; a failure of the last one is everybody's. */
+async function fromMirrors<T>(
+  mirrors: Mirrors,
+  client: HttpClient,
+  bytes: number,
+  ask: (m: Mirror, patienceS: number) => Promise<T>,
+): Promise<T> {
+  for (;;) {
+    const m = mirrors.choose(bytes);
+    const expectedS = mirrors.asked(m, bytes);
+    const patient = Math.max(leastPatienceS, leastPatienceRtts * client.rttS, silenceFactor * expectedS);
+    const patience = mirrors.alive > 1 ? Math.min(patient, client.options.stallTimeoutS) : client.options.stallTimeoutS;
+    const started = nowS();
+    try {
+      const result = await ask(m, patience);
+      mirrors.delivered(m, bytes, started + client.rttS, nowS());
+      return result;
+    } catch (error) {
+      const elsewhere = error instanceof TexmeshError && !isAbort(error);
+      if (!mirrors.failed(m, bytes) || !elsewhere) throw error;
+    }
+  }
+}
+
+/** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
+class RangeStore implements PackageStore {
+  readonly form = 'range';
+  private readonly parts: { begin: number; bytes: Uint8Array }[] = []; // by begin, not overlapping
+  private readonly mirrors: Mirrors;
+
+  constructor(
+    urls: readonly string[],
+    private readonly client: HttpClient,
+  ) {
+    this.mirrors = new Mirrors(urls);
+  }
+  get name(): string {
+    return shownUrl(this.mirrors.all[0].url);
+  }
+
+  async manifest(): Promise<Uint8Array> {
+    const bytes = await this.fetchRange(0, bootstrapBytes, { kind: 'manifest' });
+    this.keep(0, bytes);
+    return manifestOfContainer(bytes, this.name);
+  }
+
+  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const begin = place.offset + offset;
+    if (bytes === 0) return new Uint8Array(0);
+    const missing = this.missing(begin, begin + bytes);
+    if (missing) {
+      const got = await this.fetchRange(missing.begin, missing.end - missing.begin, how, (part) =>
+        how.verify ? how.verify(this.assemble(begin, bytes, missing.begin, part)) : Promise.resolve(),
+      );
+      if (how.once) return this.assemble(begin, bytes, missing.begin, got);
+      const whole = this.assemble(begin, bytes, missing.begin, got);
+      this.keep(missing.begin, got);
+      return whole;
+    }
+    const whole = this.assemble(begin, bytes, 0, new Uint8Array(0));
+    await how.verify?.(whole);
+    return whole;
+  }
+
+  /** The range from the first to the last byte that is not known; known gaps inside are asked for again. */
+  private missing(begin: number, end: number): { begin: number; end: number } | undefined {
+    let from = begin;
+    let to = end;
+    for (const p of this.parts) if (p.begin <= from && p.begin + p.bytes.length > from) from = p.begin + p.bytes.length;
+    for (let i = this.parts.length - 1; i >= 0; --i) {
+      const p = this.parts[i];
+      if (p.begin < to && p.begin + p.bytes.length >= to) to = Math.max(from, p.begin);
+    }
+    return from < to ? { begin: from, end: to } : undefined;
+  }
+  private assemble(begin: number, bytes: number, gotAt: number, got: Uint8Array): Uint8Array {
+    if (gotAt === begin && got.length === bytes) return got;
+    const out = new Uint8Array(bytes);
+    for (const p of [...this.parts, { begin: gotAt, bytes: got }]) {
+      const from = Math.max(begin, p.begin);
+      const to = Math.min(begin + bytes, p.begin + p.bytes.length);
+      if (from < to) out.set(p.bytes.subarray(from - p.begin, to - p.begin), from - begin);
+    }
+    return out;
+  }
+  private keep(begin: number, bytes: Uint8Array): void {
+    this.parts.push({ begin, bytes });
+    this.parts.sort((a, b) => a.begin - b.begin);
+  }
+
+  private fetchRange(
+    offset: number,
+    bytes: number,
+    how: ReadOptions,
+    verify?: (got: Uint8Array) => Promise<void>,
+  ): Promise<Uint8Array> {
+    return fromMirrors(this.mirrors, this.client, bytes, async (m, patience) => {
+      const got = await this.fetchFrom(m, offset, bytes, how, patience, false);
+      try {
+        await verify?.(got);
+        return got;
+      } catch (error) {
+        if (this.mirrors.alive > 1) throw error;
+        // A cache on the way may hold something bad; the server itself is asked once.
+        const fresh = await this.fetchFrom(m, offset, bytes, how, patience, true);
+        await verify?.(fresh);
+        return fresh;
+      }
+    });
+  }
+
+  private async fetchFrom(
+    m: Mirror,
+    offset: number,
+    bytes: number,
+    how: ReadOptions,
+    patience: number,
+    reload: boolean,
+  ): Promise<Uint8Array> {
+    let got: Uint8Array[] = [];
+    let have = 0;
+    const retries = new Retries(this.client.options);
+    for (;;) {
+      const before = have;
+      const a = await this.client.get(m.url, {
+        range: { offset: offset + have, bytes: bytes - have },
+        ifRange: sameOrigin(m.url) ? m.etag : '',
+        maxBytes: bytes - have,
+        kind: how.kind,
+        signal: how.signal,
+        stallTimeoutS: patience,
+        onBytes: how.onBytes && ((n) => how.onBytes!(before + n)),
+        reload,
+      } satisfies GetOptions);
+      if (a.status === 206) this.checkRange(m, a, offset + have, bytes - have);
+      if (a.status === 206) {
+        got.push(a.body);
+        have += a.body.length;
+      }
+      const wanted = m.total >= 0 ? Math.min(bytes, m.total - offset) : bytes;
+      if (a.status === 206 && a.complete) {
+        if (have === wanted || (m.total < 0 && offset === 0)) return got.length === 1 ? got[0] : concat(got, have);
+        throw new FormatError(this.name, `byte ${offset}`, `${wanted} bytes`, `${have}`);
+      }
+      this.refuse(m, a, offset, bytes);
+      if (!mayRetry(a) || (this.mirrors.alive > 1 && have === before) || !(await retries.wait(how.signal)))
+        throw new InputError(shownUrl(m.url), `byte ${offset + have}`, 'an answer with status 206', whatCame(a));
+      if (have === 0) got = [];
+    }
+  }
+
+  /** Answers after which there is no use in trying again. */
+  private refuse(m: Mirror, a: Answer, offset: number, bytes: number): void {
+    const file = shownUrl(m.url);
+    if (a.status === 200) {
+      if (m.total < 0) throw new NoRanges();
+      throw new FormatError(
+        file, '', 'the file that reading began with',
+        'status 200: it was replaced, or the server no longer answers ranges',
+      );
+    }
+    if (a.status === 416) throw new FormatError(file, `byte ${offset}`, 'a longer file', 'status 416');
+    if (a.tooLong) throw new FormatError(file, `byte ${offset}`, `${bytes} bytes`, 'more');
+  }
+
+  private checkRange(m: Mirror, a: Answer, offset: number, bytes: number): void {
+    const fail = (expected: string, found: string): never => {
+      throw new FormatError(shownUrl(m.url), `byte ${offset}`, expected, found);
+    };
+    if (m.etag !== '' && a.etag !== '' && a.etag !== m.etag)
+      fail('the file that reading began with', 'another one (ETag)');
+    if (m.etag === '') m.etag = a.etag;
+    const { range } = a;
+    if (!range) {
+      // Another origin may keep the header to itself; then only the length tells.
+      if (sameOrigin(m.url)) fail('a Content-Range', 'none that can be read');
+      return;
+    }
+    if (m.total >= 0 && range.total !== m.total) fail(`a file of ${m.total} bytes`, `${range.total}`);
+    if (range.first !== offset || range.last !== Math.min(offset + bytes, range.total) - 1)
+      fail('the range that was asked for', `${range.first}-${range.last}`);
+    m.total = range.total;
+  }
+
+  dispose(): void {
+    this.parts.length = 0;
+  }
+}
+
+/** If-Range from another origin would cost a preflight request. */
+function sameOrigin(url: string): boolean {
+  const here = globalThis.location;
+  return !here || new URL(url, here.href).origin === here.origin;
+}
+
+/** Whole files of a tree, beside the container or by itself: for servers without ranges. */
+class TreeStore implements PackageStore {
+  readonly form = 'files';
+  private readonly files = new Map<string, Promise<Uint8Array>>();
+  private readonly mirrors: Mirrors;
+
+  constructor(
+    roots: readonly string[],
+    private readonly client: HttpClient,
+  ) {
+    this.mirrors = new Mirrors(roots);
+  }
+  get name(): string {
+    return shownUrl(this.mirrors.all[0].url);
+  }
+  manifest(): Promise<Uint8Array> {
+    return this.file(manifestPath, bootstrapBytes, { kind: 'manifest' });
+  }
+  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const whole = await this.file(place.path, place.bytes, how);
+    if (whole.length !== place.bytes)
+      throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
+    const part = whole.subarray(offset, offset + bytes);
+    await how.verify?.(part);
+    return part;
+  }
+  /** A file of the tree; a failed one may be asked for again. */
+  file(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const known = this.files.get(path);
+    if (known) return known;
+    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
+    const wanted = fromMirrors(this.mirrors, this.client, maxBytes, (m) => {
+      const { kind, signal, onBytes } = how;
+      return getWhole(this.client, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes });
+    });
+    if (how.once) return wanted;
+    this.files.set(path, wanted);
+    wanted.catch(() => this.files.delete(path));
+    return wanted;
+  }
+  dispose(): void {
+    this.files.clear();
+  }
+}
+
+/** https://host/a/NAME/?query and a path beneath it; query and fragment stay behind the path. */
+function joinUrl(root: string, path: string): string {
+  const end = root.search(/[?#]/);
+  return end < 0 ? root + path : root.slice(0, end) + path + root.slice(end);
+}
+
+/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+export function treeUrl(url: string): string {
+  const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
+  return m ? `${m[1]}/${m[2] ?? ''}` : '';
+}
+
+/** A container in memory. */
+class WholeStore implements PackageStore {
+  readonly form = 'whole';
+  constructor(
+    private bytes: Uint8Array,
+    readonly name: string,
+  ) {}
+  manifest(): Promise<Uint8Array> {
+    return Promise.resolve(manifestOfContainer(this.bytes.subarray(0, bootstrapBytes), this.name));
+  }
+  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const begin = place.offset + offset;
+    if (begin + bytes > this.bytes.length)
+      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes.length}`);
+    const part = this.bytes.subarray(begin, begin + bytes);
+    await how.verify?.(part);
+    return part;
+  }
+  dispose(): void {
+    this.bytes = new Uint8Array(0);
+  }
+}
+
+/** A container that is in memory already. */
+export function openBytes(bytes: Uint8Array, name: string): PackageStore {
+  return new WholeStore(bytes, name);
+}
+
+export type StoreMode = 'auto' | 'range' | 'files';
+
+/**
+ * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside it where it
+ * answers 200 to a range; the whole container where there is no tree. Gives the store and the manifest's bytes.
+ */
+export async function openStore(
+  url: string,
+  mirrors: readonly string[],
+  mode: StoreMode,
+  client: HttpClient,
+  signal?: AbortSignal,
+): Promise<{ store: PackageStore; manifest: Uint8Array }> {
+  const urls = [url, ...mirrors.filter((m) => m !== url)];
+  const use = async (store: PackageStore): Promise<{ store: PackageStore; manifest: Uint8Array }> => ({
+    store,
+    manifest: await store.manifest(),
+  });
+  const path = url.replace(/[?#].*$/, '');
+  if (path.endsWith('/')) return use(new TreeStore(urls, client));
+  const roots = urls.map(treeUrl).filter((root) => root !== '');
+  if (mode === 'files') return use(new TreeStore(roots, client));
+  try {
+    return await use(new RangeStore(urls, client));
+  } catch (error) {
+    if (!(error instanceof NoRanges)) throw error;
+    if (mode === 'range') throw new InputError(shownUrl(url), '', 'a server that answers ranges', 'status 200');
+  }
+  if (roots.length > 0) {
+    try {
+      return await use(new TreeStore(roots, client));
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+    }
+  }
+  const bytes = await getWhole(client, url, client.options.maxWholeBytes, { kind: 'other', signal });
+  return use(openBytes(bytes, shownUrl(url)));
+}

@@ -1,0 +1,68 @@
+/**
+ * How the throughput of the next transfer is guessed from those that have ended: the last one's; bytes over seconds of
+ * the last `samples` (harmonic); an exponentially weighted mean.
+ */
+export type Estimator = 'last' | 'harmonic' | 'ewma';
+
+export interface ThroughputOptions {
+  estimator: Estimator;
+  /** 1 .. 64 */
+  samples: number;
+  /** 0 .. 1 */
+  ewma: number;
+  /** Transfers below weigh less in the mean, > 0. */
+  smallBytes: number;
+  /** beta_0, until there is a sample; > 0. */
+  initialBytesS: number;
+}
+export const defaultThroughput: ThroughputOptions = {
+  estimator: 'harmonic',
+  samples: 10,
+  ewma: 0.2,
+  smallBytes: 4000,
+  initialBytesS: 1e5,
+};
+
+const ringSize = 64;
+const leastSeconds = 1e-9;
+
+/** Throughput of a connection or a group of them: delivery/cpp/throughput.h. */
+export class Throughput {
+  private readonly ring: { bytes: number; seconds: number }[] = [];
+  private count = 0;
+  private mean: number;
+
+  constructor(private readonly options: ThroughputOptions = defaultThroughput) {
+    this.mean = options.initialBytesS;
+  }
+
+  /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
+  add(bytes: number, seconds: number): void {
+    const sample = { bytes, seconds: Math.max(seconds, leastSeconds) };
+    this.ring[this.count++ % ringSize] = sample;
+    const weight = this.options.ewma * Math.min(1, bytes / this.options.smallBytes);
+    this.mean += weight * (sample.bytes / sample.seconds - this.mean);
+  }
+
+  /** Bytes per second by the estimator chosen. */
+  bytesS(): number {
+    if (this.count === 0) return this.options.initialBytesS;
+    if (this.options.estimator === 'last') return this.recentBytesS(1);
+    if (this.options.estimator === 'harmonic') return this.recentBytesS(Math.max(this.options.samples, 1));
+    return this.mean;
+  }
+
+  /** Bytes over seconds of at most so many samples. */
+  recentBytesS(samples: number): number {
+    const n = Math.min(samples, this.count, ringSize);
+    if (n === 0) return this.options.initialBytesS;
+    let bytes = 0;
+    let seconds = 0;
+    for (let i = 1; i <= n; ++i) {
+      const s = this.ring[(this.count - i) % ringSize];
+      bytes += s.bytes;
+      seconds += s.seconds;
+    }
+    return bytes / seconds;
+  }
+}

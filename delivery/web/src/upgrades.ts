@@ -1,0 +1,81 @@
+import type { FragmentOffer } from './harmonic_time';
+
+/** What may be fetched after the deadline: an upgrade of a fragment to a higher rung. */
+export interface Upgrade {
+  offer: number;
+  rung: number;
+  bytes: number;
+  gainPerByte: number;
+}
+
+/** The upgrade that saves most loss per byte, from this rung on; gain 0 when none saves any. */
+function bestUpgrade(f: FragmentOffer, offer: number, rung: number, incremental: boolean): Upgrade {
+  let best: Upgrade = { offer, rung, bytes: 0, gainPerByte: 0 };
+  let bytes = 0;
+  for (let r = rung + 1; r < f.bytes.length; ++r) {
+    bytes = incremental ? bytes + f.bytes[r] : f.bytes[r];
+    const gainPerByte = (f.loss[rung + 1] - f.loss[r + 1]) / bytes;
+    if (gainPerByte > best.gainPerByte) best = { offer, rung: r, bytes, gainPerByte };
+  }
+  return best;
+}
+
+const before = (a: Upgrade, b: Upgrade): boolean =>
+  a.gainPerByte !== b.gainPerByte ? a.gainPerByte > b.gainPerByte : a.offer < b.offer;
+
+/** A binary heap; no two of its elements are equal in order, so that what comes out is determined. */
+class Heap {
+  private readonly items: Upgrade[] = [];
+  get size(): number {
+    return this.items.length;
+  }
+  push(item: Upgrade): void {
+    let at = this.items.push(item) - 1;
+    while (at > 0) {
+      const parent = (at - 1) >> 1;
+      if (!before(item, this.items[parent])) break;
+      this.items[at] = this.items[parent];
+      at = parent;
+    }
+    this.items[at] = item;
+  }
+  pop(): Upgrade {
+    const top = this.items[0];
+    const last = this.items.pop()!;
+    const n = this.items.length;
+    if (n === 0) return top;
+    let at = 0;
+    for (let child = 1; child < n; child = 2 * at + 1) {
+      if (child + 1 < n && before(this.items[child + 1], this.items[child])) ++child;
+      if (!before(this.items[child], last)) break;
+      this.items[at] = this.items[child];
+      at = child;
+    }
+    this.items[at] = last;
+    return top;
+  }
+}
+
+/**
+ * Upgrades of fragments in order of loss saved per byte, each from the rung before. `rungs` by offer, -1 = skipped.
+ * With `incremental` rungs only the missing bytes count.
+ */
+export function upgradesInOrder(
+  offers: readonly FragmentOffer[],
+  rungs: readonly number[],
+  incremental = false,
+): Upgrade[] {
+  const heap = new Heap();
+  const push = (offer: number, rung: number): void => {
+    const u = bestUpgrade(offers[offer], offer, rung, incremental);
+    if (u.gainPerByte > 0) heap.push(u);
+  };
+  offers.forEach((_, i) => push(i, rungs[i]));
+  const order: Upgrade[] = [];
+  while (heap.size > 0) {
+    const u = heap.pop();
+    order.push(u);
+    push(u.offer, u.rung);
+  }
+  return order;
+}

@@ -1,0 +1,20 @@
+import { readFileSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+/** The project's root. */
+export const root = join(dirname(fileURLToPath(import.meta.url)), '..', '..', '..');
+
+export function readBytes(path: string): Uint8Array {
+  return new Uint8Array(readFileSync(join(root, path)));
+}
+export function readText(path: string): string {
+  return readFileSync(join(root, path), 'utf8');
+}
+export const golden = (name: string): Uint8Array => readBytes(`tests/golden/${name}.texmesh`);
+export const goldenNames = ['v1.0-scan', 'v1.1-scan'] as const;
+
+/** Doubles with the same bits, NaN and signed zeros told apart. */
+export function sameBits(a: number, b: number): boolean {
+  return Object.is(a, b) || (a === 0 && b === 0);
+}

@@ -1,0 +1,185 @@
+import { readdirSync } from 'node:fs';
+import { join } from 'node:path';
+import { describe, expect, it } from 'vitest';
+import * as t from '../src/reader';
+import { readBytes, readText, root, sameBits } from './support';
+
+// Every decision that delivery/cpp takes, to the same bits (delivery/vectors/README.md).
+
+type Json = any;
+
+const camel = (name: string): string => name.replace(/_(\w)/g, (_, c: string) => c.toUpperCase());
+/** Names of C++ to those of TypeScript, all the way down. */
+function camelCased(value: Json): Json {
+  if (Array.isArray(value)) return value.map(camelCased);
+  if (value === null || typeof value !== 'object') return value;
+  return Object.fromEntries(Object.entries(value).map(([k, v]) => [camel(k), camelCased(v)]));
+}
+
+function expectBits(found: ArrayLike<number>, expected: ArrayLike<number>, what: string): void {
+  expect(found.length, what).toBe(expected.length);
+  for (let i = 0; i < expected.length; ++i)
+    if (!sameBits(found[i], expected[i])) expect(found[i], `${what}[${i}]`).toBe(expected[i]);
+}
+
+function runMath(cases: Json[]): void {
+  const functions: Record<string, (x: number) => number> = { ...t.portable, log_quantiser: t.logQuantiser } as never;
+  for (const c of cases)
+    it(c.name, () => {
+      for (const [x, y] of c.x_y) expectBits([functions[c.name](x)], [y], `${c.name}(${x})`);
+    });
+}
+
+function runThroughput(cases: Json[]): void {
+  for (const c of cases)
+    it(c.name, () => {
+      const throughput = new t.Throughput(camelCased(c.options));
+      for (const [bytes, seconds, estimate, recent] of c.add_bytes_seconds_then_bytes_s_and_recent_3) {
+        throughput.add(bytes, seconds);
+        expectBits([throughput.bytesS(), throughput.recentBytesS(3)], [estimate, recent], 'estimates');
+      }
+    });
+}
+
+function runUpgrades(cases: Json[]): void {
+  for (const c of cases)
+    it(c.name, () => {
+      const order = t.upgradesInOrder(camelCased(c.offers), c.rungs, c.incremental);
+      expect(order.length).toBe(c.offer_rung_bytes_gain.length);
+      order.forEach((u, i) =>
+        expectBits([u.offer, u.rung, u.bytes, u.gainPerByte], c.offer_rung_bytes_gain[i], `upgrade ${i}`),
+      );
+    });
+}
+
+function runPlan(cases: Json[]): void {
+  for (const c of cases)
+    it(c.name, () => {
+      const plan = new t.HarmonicTimePlan(camelCased(c.offers), camelCased(c.options));
+      c.calls.forEach(([what, ...args]: [string, ...Json[]], i: number) => {
+        if (what === 'next') {
+          const step: Json = plan.next(args[0]);
+          const expected = camelCased(args[1]);
+          if (expected === null) expect(step, `call ${i}`).toBeUndefined();
+          else
+            for (const name of Object.keys(expected)) expectBits([step[name]], [expected[name]], `call ${i}: ${name}`);
+        } else if (what === 'completed') plan.completed(args[0], args[1]);
+        else if (what === 'failed') plan.failed(args[0], args[1]);
+        else throw new Error(`unknown call ${what}`);
+      });
+      const r = camelCased(c.result);
+      plan.steps.forEach((s, i) =>
+        expectBits([s.offer, s.rung, s.bytes, s.doneS, s.spacingS, s.residualS], r.steps[i], `step ${i}`),
+      );
+      expectBits(plan.rungs(), r.rungs, 'rungs');
+      expectBits([plan.throughputBytesS(), plan.surplusS, plan.unspentS], [r.throughputBytesS, r.surplusS, r.unspentS], 'end');
+      expect(plan.tooShortForRtt).toBe(r.tooShortForRtt);
+      if (r.theorem) {
+        const theorem: Json = t.theoremOf(plan);
+        for (const name of Object.keys(r.theorem)) expectBits([theorem[name]], [r.theorem[name]], name);
+      }
+    });
+}
+
+function checkViewing(manifest: t.Manifest, v: Json): void {
+  const rules = Object.keys(v.rules) as t.StepRule[];
+  for (const rule of rules) {
+    const steps = t.stepFunction(manifest.scales, rule);
+    expectBits(steps.flatMap((s) => [s.upToPx, s.scale]), v.rules[rule].steps.flat(), `steps of ${rule}`);
+    for (const [px, scale] of v.rules[rule].displayed_px_scale) expect(t.scaleAt(steps, px)).toBe(scale);
+  }
+  const rect = ([x0, y0, x1, y1]: number[]): t.ScreenRect => ({ x0, y0, x1, y1 });
+  for (const clip of v.clips) {
+    const part = t.clipTo(rect(v.object), rect(clip.view));
+    expect([part.widthPx, part.heightPx, part.clipped]).toEqual(clip.part);
+    for (const rule of rules) expect(t.selectScale(manifest, 1200, part, rule)).toBe(clip.scale_of_1200_px[rule]);
+  }
+  const camera = { fovDegrees: 45, viewportPx: 1080 };
+  expectBits([t.viewingDistance(manifest.objectHeight, 300, camera)], [v.distance_at_300_px], 'distance');
+  expectBits(
+    [t.displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight, camera)],
+    [v.displayed_px_at_distance_3_heights],
+    'displayed height',
+  );
+  for (const [scale, ...errors] of v.scale_error_p95_rms_max_at_700_px) {
+    const e = t.pixelError(manifest, manifest.scales.find((s) => s.scale === scale)!, 700);
+    expectBits([e.p95, e.rms, e.max], errors, `errors of S_${scale}`);
+  }
+}
+
+function checkTables(table: t.PlaneTables, v: Json): void {
+  expectBits(t.surfaceWeights(table), v.surface_weights, 'weights');
+  for (const s of v.scales) {
+    expectBits(t.etaOf(table, s.scale), s.eta, 'eta');
+    for (const g of s.gammas) {
+      const gamma = g.gamma < 0 ? t.meanEta(table, s.scale) : g.gamma;
+      expectBits(t.qualityOf(table, s.scale, gamma), g.quality, 'quality');
+      expectBits(t.rungsOf(table, s.scale, gamma), g.rungs, 'rungs');
+    }
+  }
+  for (const [fragment, quality, bytes] of v.fragment_quality_bytes)
+    expectBits([t.interpolatedBytes(table, fragment, quality)], [bytes], `bytes of ${fragment} at ${quality}`);
+  for (const [budget, rungs] of v.budget_rungs) expectBits(t.allocateRd(table, budget), rungs, `budget ${budget}`);
+}
+
+async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
+  const data = await reader.data();
+  const planes = t.planesForDisplay(data, v.displayed_px);
+  expect(planes.map((p) => [p.base, p.plane])).toEqual(v.planes);
+  const list = t.fragmentList(data, planes, { scale: v.scale });
+  expect(list.fragments.map((f) => [f.plane, f.fragment])).toEqual(v.fragments);
+  camelCased(v.offers).forEach((o: Json, i: number) => {
+    for (const name of Object.keys(o))
+      expectBits([(list.offers[i] as Json)[name]].flat(), [o[name]].flat(), `offer ${i}: ${name}`);
+  });
+  expectBits([list.totalWeight], [v.total_weight], 'weight');
+  const quality = await reader.quality();
+  for (const [dssim, equivalent, ssim] of v.dssim_quality_ssim) {
+    const q = t.equivalentQuality(data, planes, dssim);
+    expectBits([q, t.predictedSsim(quality, v.scale, q)], [equivalent, ssim], `dssim ${dssim}`);
+  }
+}
+
+async function runPackages(cases: Json[]): Promise<void> {
+  for (const c of cases)
+    describe(c.name, async () => {
+      const reader = await t.PackageReader.openBytes(readBytes(c.file), c.file);
+      it('entries', async () => {
+        expect(reader.id).toBe(c.id);
+        const entries = (await reader.index()).map((e) => [e.path, e.offset, e.bytes, t.toHex(e.sha256)]);
+        expect(entries).toEqual(c.entry_path_offset_bytes_sha256);
+      });
+      it('viewing', () => checkViewing(reader.manifest, c.viewing));
+      it('tables', async () => {
+        for (const v of c.tables) checkTables(await reader.planeTables(v.plane), v);
+      });
+      for (const v of c.lists) it(`list at ${v.displayed_px} px, S_${v.scale}`, () => checkList(reader, v));
+      it('fragments', async () => {
+        const rows = c.fragment_plane_rung_index_path_offset_bytes_sha256;
+        for (const [plane, rung, fragment, path, offset, bytes, digest] of rows) {
+          const range = await reader.fragmentRange(plane, rung, fragment);
+          const entry = await reader.find(path);
+          expect([entry.offset + range.offset, range.bytes]).toEqual([offset, bytes]);
+          expect(path).toBe(t.rungPath(plane, rung));
+          expect(t.toHex(await t.sha256(await reader.fragment(plane, rung, fragment)))).toBe(digest);
+        }
+      });
+    });
+}
+
+const runners: Record<string, (cases: Json[]) => void | Promise<void>> = {
+  'portable-math': runMath,
+  throughput: runThroughput,
+  upgrades: runUpgrades,
+  'harmonic-time': runPlan,
+  packages: runPackages,
+};
+const files = readdirSync(join(root, 'delivery/vectors')).filter((f) => f.endsWith('.json'));
+
+it('every file of vectors has a runner', () => {
+  expect(files.map((f) => f.replace('.json', '')).sort()).toEqual(Object.keys(runners).sort());
+});
+for (const file of files)
+  describe(file, async () => {
+    await runners[file.replace('.json', '')]?.(JSON.parse(readText(`delivery/vectors/${file}`)).cases);
+  });
