@@ -42,7 +42,7 @@ export function equivalentQuality(data: PackageData, planes: readonly PlaneChoic
     const weights = surfaceWeights(t);
     for (const f of t.order) {
       weight += weights[f];
-      for (let r = 0; r < quality.length; ++r) loss[r] += weights[f] * t.dssim[r * fragmentCount(t) + f];
+      for (let r = 0; r < quality.length; ++r) loss[r] += Math.fround(weights[f] * t.dssim[r * fragmentCount(t) + f]); // a product of floats there
     }
   }
   if (quality.length === 0 || !(weight > 0)) return 100;

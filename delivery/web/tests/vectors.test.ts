@@ -161,7 +161,7 @@ async function runPackages(cases: Json[]): Promise<void> {
           const entry = await reader.find(path);
           expect([entry.offset + range.offset, range.bytes]).toEqual([offset, bytes]);
           expect(path).toBe(t.rungPath(plane, rung));
-          expect(t.toHex(await t.sha256(await reader.fragment(plane, rung, fragment)))).toBe(digest);
+          expect(t.toHex(await t.sha256(await reader.completeFragment(plane, rung, fragment)))).toBe(digest);
         }
       });
     });
