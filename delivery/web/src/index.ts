@@ -1,10 +1,35 @@
+import type { Object3D } from 'three';
+import type { LoadOptions, LoadedModel } from './api';
+import { nowS } from './http';
+import { ModelLoad } from './load';
 import { OpenOptions, PackageReader } from './package_reader';
 
 export * from './reader';
 export type * from './api';
 
-/** A package that can be shown in a three.js scene. */
-export class TexmeshPackage extends PackageReader {}
+/** A package that can be shown in three.js scenes. */
+export class TexmeshPackage extends PackageReader {
+  private readonly loads = new Set<LoadedModel>();
+  private loaded = false;
+
+  /**
+   * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
+   * counts from the package's first request for the first load, from this call for others.
+   */
+  load(scene: Object3D, options: LoadOptions): LoadedModel {
+    const load = new ModelLoad(this, scene, options, this.loaded ? nowS() : this.openedS);
+    this.loaded = true;
+    this.loads.add(load);
+    return load;
+  }
+
+  /** Disposes of all loads and forgets what was read. */
+  override dispose(): void {
+    for (const load of this.loads) load.dispose();
+    this.loads.clear();
+    super.dispose();
+  }
+}
 
 /**
  * Opens a package: one request of 16 KiB. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made

@@ -2,6 +2,7 @@ import { samePrefix, toHex } from './bytes';
 import { CodecId, codecTraits, joinFragment } from './codec';
 import { FormatError, InputError } from './errors';
 import { PackageData } from './fragment_list';
+import { FragmentFiles, fragmentFilesPath, readFragmentFiles } from './fragment_files';
 import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS } from './http';
 import { IndexHead, readIndex, readIndexHead, readIndexPage } from './index_table';
 import * as layout from './layout';
@@ -26,6 +27,17 @@ export interface OpenOptions extends Partial<HttpOptions> {
   /** Further URLs of the same container. */
   mirrors?: readonly string[];
   signal?: AbortSignal;
+}
+
+/** Where the fragments of a plane are. */
+export interface PlaneFiles {
+  tables: PlaneTables;
+  /** By rung. */
+  packs: EntryRef[];
+  /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
+  offsets: Float64Array;
+  /** Complete files instead of packs, where the package is a tree that has them: [rung] by fragment. */
+  complete?: FragmentFiles[number];
 }
 
 /** A whole document up to so many bytes is read at once; larger ones by pages. */
@@ -61,6 +73,7 @@ export class PackageReader {
   private readonly tablesOnce = new Map<number, Promise<PlaneTables>>();
   private qualityOnce?: Promise<QualityTable>;
   private firstPictureOnce?: Promise<void>;
+  private fragmentFilesOnce?: Promise<FragmentFiles | undefined>;
   private readonly tableStreams = new Map<number, Promise<Uint8Array>>();
   private readonly offsets = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
 
@@ -400,6 +413,41 @@ export class PackageReader {
     const at = 8 * (rung * fragmentCount(t) + fragment);
     return t.digest.subarray(at, at + 8);
   }
+  /** Tables, packs and offsets of a plane. */
+  async planeFiles(plane: number): Promise<PlaneFiles> {
+    const tables = await this.planeTables(plane);
+    const paths = Array.from({ length: rungCount(tables) }, (_, r) => layout.rungPath(plane, r));
+    const packs = await Promise.all(paths.map((path) => this.find(path)));
+    const complete = (await this.fragmentFiles())?.[plane];
+    return { tables, packs, offsets: this.offsets.get(plane)!, complete };
+  }
+  /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
+  fragmentFiles(): Promise<FragmentFiles | undefined> {
+    return (this.fragmentFilesOnce ??= this.loadFragmentFiles());
+  }
+  private async loadFragmentFiles(): Promise<FragmentFiles | undefined> {
+    const { store } = this;
+    if (!store.extraFile) return undefined;
+    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' });
+    return bytes && readFragmentFiles(bytes);
+  }
+  /** A fragment's complete file of such a tree; its digest is the caller's to check. */
+  async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+    const { extension } = codecTraits((await this.textures())[plane].codec);
+    const path = layout.fragmentFilePath(plane, rung, fragment, extension);
+    const bytes = (await this.planeFiles(plane)).complete?.[rung]?.get(fragment)?.bytes ?? 0;
+    const got = await this.store.extraFile?.(path, bytes, { kind: 'texture', signal, once: true });
+    return got ?? this.fail(path, 'a file', 'none');
+  }
+
+  /** Reads index, tables, textures.json and quality.json by one request, where they are small. */
+  async prefetchDocuments(signal?: AbortSignal): Promise<void> {
+    const { index, quality } = this.manifest;
+    const bytes = quality.offset + quality.bytes - index.offset;
+    if (this.form !== 'range' || bytes > wholeDocumentBytes || bytes <= 0) return;
+    await this.store.read({ path: 'documents', offset: index.offset, bytes }, 0, bytes, { kind: 'tables', signal });
+  }
+
   /** A fragment's stream at a rung, digest checked. */
   async fragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
     const range = await this.fragmentRange(plane, rung, fragment);

@@ -33,6 +33,8 @@ export interface PackageStore {
   manifest(): Promise<Uint8Array>;
   /** Exactly these bytes of an entry. */
   read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
+  /** A file of a tree that is no entry; undefined where there is none. */
+  extraFile?(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined>;
   /** Forgets what it remembers. */
   dispose(): void;
 }
@@ -329,6 +331,15 @@ class TreeStore implements PackageStore {
     this.files.set(path, wanted);
     wanted.catch(() => this.files.delete(path));
     return wanted;
+  }
+  async extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
+    const { kind, signal } = how;
+    try {
+      return await getWhole(this.client, joinUrl(this.mirrors.choose(0).url, path), maxBytes, { kind, signal });
+    } catch (error) {
+      if (error instanceof InputError) return undefined;
+      throw error;
+    }
   }
   dispose(): void {
     this.files.clear();

@@ -2,6 +2,7 @@ import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
 import * as t from '../src/reader';
+import { SplitStreamReader } from '../src/split_stream';
 import { readBytes, readText, root, sameBits } from './support';
 
 // Every decision that delivery/cpp takes, to the same bits (delivery/vectors/README.md).
@@ -140,6 +141,43 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
   }
 }
 
+async function digestOf(values: ArrayLike<number> & { buffer: ArrayBufferLike }, bytesEach = 4): Promise<string> {
+  const bytes = new DataView(new ArrayBuffer(values.length * bytesEach));
+  for (let i = 0; i < values.length; ++i)
+    if (bytesEach === 2) bytes.setUint16(2 * i, values[i], true);
+    else bytes.setInt32(4 * i, values[i], true);
+  return t.toHex(await t.sha256(new Uint8Array(bytes.buffer)));
+}
+
+/** Every scale of the vertex-split stream, to the bit. */
+async function checkSplits(reader: t.PackageReader, scales: Json[]): Promise<void> {
+  const head = await reader.splitStreamHead();
+  if (!head) return expect(scales).toEqual([]);
+  const stream = new SplitStreamReader(head);
+  for (const [k, s] of stream.head.scales.entries()) {
+    const blocks = stream.head.blocks.slice(stream.nextBlock, s.blocks);
+    const bytes = blocks.reduce((sum, b) => sum + b.bytes, 0);
+    await stream.addBlocks(await reader.splitStream(blocks[0].offset, bytes));
+    const { mesh } = stream;
+    let visible = 0;
+    for (let f = 0; f < mesh.faceCount; ++f) visible += mesh.isVisible(f) ? 1 : 0;
+    const used = (g: { data: Int32Array; length: number }): Int32Array => g.data.subarray(0, g.length);
+    expect({
+      scale: s.scale,
+      points: mesh.points,
+      wedges: mesh.wedges,
+      faces: mesh.faceCount,
+      visible_faces: visible,
+      points_sha256: await digestOf(used(mesh.places)),
+      wedge_points_sha256: await digestOf(used(mesh.wedgePoint)),
+      faces_sha256: await digestOf(used(mesh.faces)),
+      groups_sha256: await digestOf(used(mesh.faceGroup), 2),
+      values_sha256: await Promise.all(mesh.values.map((v) => digestOf(used(v)))),
+    }).toEqual(scales[k]);
+    expect(visible).toBe(s.triangles);
+  }
+}
+
 async function runPackages(cases: Json[]): Promise<void> {
   for (const c of cases)
     describe(c.name, async () => {
@@ -154,6 +192,7 @@ async function runPackages(cases: Json[]): Promise<void> {
         for (const v of c.tables) checkTables(await reader.planeTables(v.plane), v);
       });
       for (const v of c.lists) it(`list at ${v.displayed_px} px, S_${v.scale}`, () => checkList(reader, v));
+      it('vertex splits', () => checkSplits(reader, c.split_stream ?? []));
       it('fragments', async () => {
         const rows = c.fragment_plane_rung_index_path_offset_bytes_sha256;
         for (const [plane, rung, fragment, path, offset, bytes, digest] of rows) {

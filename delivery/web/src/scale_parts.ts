@@ -1,0 +1,149 @@
+import { BufferGeometry, Material, Mesh, Object3D, Texture } from 'three';
+import type { GltfLoaderLike } from './api';
+import { FormatError } from './errors';
+
+/** What this library uses of GLTFLoader's result and parser. */
+export interface ParsedGltf {
+  scene: Object3D;
+  parser: {
+    json: GltfJson;
+    associations: Map<object, { materials?: number; textures?: number; nodes?: number } | undefined>;
+    getDependency(kind: string, index: number): Promise<unknown>;
+    assignFinalMaterial(mesh: Mesh): void;
+  };
+}
+interface GltfJson {
+  images?: { name?: string }[];
+  textures?: { source?: number; sampler?: number; extensions?: Record<string, { source?: number }> }[];
+  materials?: unknown[];
+}
+
+const imageName = /^texture\/(\d+)$/;
+
+/** Number of the source image that a texture of a GLB shows; -1 when it is none of the package's. */
+function imageOfTexture(json: GltfJson, index: number | undefined): number {
+  const def = index === undefined ? undefined : json.textures?.[index];
+  const source = def?.source ?? Object.values(def?.extensions ?? {}).find((e) => e.source !== undefined)?.source;
+  const match = imageName.exec(json.images?.[source ?? -1]?.name ?? '');
+  return match ? Number(match[1]) : -1;
+}
+
+/** A texture in a material, by the name of the slot. */
+export interface Slot {
+  material: Material;
+  name: string;
+  image: number;
+}
+
+export function texturesOf(material: Material): [string, Texture][] {
+  return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
+}
+
+/**
+ * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
+ * shared with the first scale.
+ */
+export async function parseScale(
+  loader: GltfLoaderLike,
+  glb: Uint8Array,
+  placeholders: boolean,
+): Promise<ParsedGltf> {
+  if (placeholders)
+    loader.register((parser: { json: GltfJson }) => ({
+      name: 'TEXMESH_placeholders',
+      loadTexture: (index: number) => {
+        const texture = new Texture();
+        const image = imageOfTexture(parser.json, index);
+        if (image < 0) return null;
+        texture.name = `texture/${image}`;
+        return Promise.resolve(texture);
+      },
+    }));
+  const data = glb.byteOffset === 0 && glb.byteLength === glb.buffer.byteLength ? glb.buffer : glb.slice().buffer;
+  return (await loader.parseAsync(data as ArrayBuffer, '')) as ParsedGltf;
+}
+
+function require(good: unknown, what: string): asserts good {
+  if (!good) throw new FormatError('mesh', '', what, 'none');
+}
+
+export function meshesOf(object: Object3D): Mesh[] {
+  const meshes: Mesh[] = [];
+  object.traverse((o) => {
+    if ((o as Mesh).isMesh) meshes.push(o as Mesh);
+  });
+  return meshes;
+}
+
+/** Materials of all scales: those of the first one that has them. */
+export class MaterialSet {
+  readonly slots: Slot[] = [];
+  private readonly byKey = new Map<string, Material>();
+
+  get all(): Material[] {
+    return [...this.byKey.values()];
+  }
+
+  /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
+  adopt(gltf: ParsedGltf, added: (slot: Slot) => void): void {
+    for (const mesh of meshesOf(gltf.scene)) mesh.material = this.shared(gltf, mesh.material as Material, added);
+  }
+  private shared(gltf: ParsedGltf, material: Material, added: (slot: Slot) => void): Material {
+    const { parser } = gltf;
+    const index = parser.associations.get(material)?.materials ?? -1;
+    const m = material as Material & { flatShading?: boolean; normalScale?: { y: number } };
+    const key = [index, m.vertexColors, m.flatShading ?? false, (m.normalScale?.y ?? 0) < 0, m.type].join();
+    const known = this.byKey.get(key);
+    if (known) {
+      if (known !== material) {
+        for (const [, texture] of texturesOf(material)) texture.dispose();
+        material.dispose();
+      }
+      return known;
+    }
+    this.byKey.set(key, material);
+    for (const [name, texture] of texturesOf(material)) {
+      const match = imageName.exec(texture.name);
+      const image = match ? Number(match[1]) : imageOfTexture(parser.json, parser.associations.get(texture)?.textures);
+      if (image < 0) continue;
+      const slot = { material, name, image };
+      this.slots.push(slot);
+      added(slot);
+    }
+    return material;
+  }
+  textureAt(slot: Slot): Texture | null {
+    return (slot.material as unknown as Record<string, Texture | null>)[slot.name];
+  }
+  setTexture(slot: Slot, texture: Texture): void {
+    const m = slot.material as unknown as Record<string, Texture | null>;
+    if (!m[slot.name]) slot.material.needsUpdate = true;
+    m[slot.name] = texture;
+  }
+
+  dispose(): void {
+    for (const material of this.byKey.values()) {
+      for (const [, texture] of texturesOf(material)) texture.dispose();
+      material.dispose();
+    }
+    this.byKey.clear();
+    this.slots.length = 0;
+  }
+}
+
+export function disposeGeometries(object: Object3D): void {
+  for (const mesh of meshesOf(object)) mesh.geometry.dispose();
+}
+
+/** The material that a mesh of the vertex-split stream gets: that of the GLB with this number. */
+export async function materialFor(gltf: ParsedGltf, index: number, geometry: BufferGeometry): Promise<Mesh> {
+  const materials = gltf.parser.json.materials ?? [];
+  const material =
+    index < materials.length ? ((await gltf.parser.getDependency('material', index)) as Material) : undefined;
+  const fallback = meshesOf(gltf.scene)[0]?.material as Material | undefined;
+  const chosen = material ?? fallback;
+  require(chosen, `material ${index}`);
+  const mesh = new Mesh(geometry, chosen);
+  gltf.parser.assignFinalMaterial(mesh);
+  return mesh;
+}

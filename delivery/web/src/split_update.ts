@@ -1,0 +1,62 @@
+import { octahedralVector } from './split_codec';
+import type { SplitGrid, SplitStreamReader } from './split_stream';
+import type { SplitUpdate } from './worker_protocol';
+
+const f = Math.fround;
+
+function gridValues(
+  places: Int32Array,
+  stride: number,
+  grid: SplitGrid,
+  count: number,
+  placeOf: (i: number) => number,
+): Float32Array {
+  const step = f(grid.range / f(2 ** grid.bits - 1));
+  const out = new Float32Array(count * stride);
+  for (let i = 0; i < count; ++i) {
+    const from = placeOf(i) * stride;
+    for (let k = 0; k < stride; ++k) out[i * stride + k] = f(f(places[from + k] * step) + grid.origin[k]);
+  }
+  return out;
+}
+
+function normals(codes: Int32Array, from: number, to: number, bits: number): Float32Array {
+  const out = new Float32Array(3 * (to - from));
+  for (let w = from; w < to; ++w) {
+    const [x, y, z] = octahedralVector(codes[2 * w], codes[2 * w + 1], bits);
+    const length = Math.sqrt(x * x + y * y + z * z);
+    out.set(length > 0 ? [x / length, y / length, z / length] : [0, 0, 1], 3 * (w - from));
+  }
+  return out;
+}
+
+/** What has been added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
+export function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
+  const { mesh, head } = reader;
+  const to = mesh.wedges;
+  const points = mesh.wedgePoint.data;
+  const attributes = head.attributes.map((a, k) => {
+    const data = mesh.values[k].data;
+    if (a.kind === 'normal') return normals(data, from, to, a.grid.bits);
+    if (a.kind === 'colour') {
+      const most = 2 ** a.grid.bits - 1;
+      return Float32Array.from(data.subarray(4 * from, 4 * to), (v) => v / most);
+    }
+    return gridValues(data, 2, a.grid, to - from, (i) => from + i);
+  });
+  const groupTriangles = new Uint32Array(head.groups.length);
+  const visible = new Uint8Array(mesh.faceCount);
+  for (let face = 0; face < visible.length; ++face)
+    if (mesh.isVisible(face)) {
+      visible[face] = 1;
+      ++groupTriangles[mesh.faceGroup.data[face]];
+    }
+  let total = 0;
+  const next = groupTriangles.map((n) => (total += n) - n);
+  const index = new Uint32Array(3 * total);
+  for (let face = 0; face < visible.length; ++face)
+    if (visible[face])
+      index.set(mesh.faces.data.subarray(3 * face, 3 * face + 3), 3 * next[mesh.faceGroup.data[face]]++);
+  const positions = gridValues(mesh.places.data, 3, head.position, to - from, (i) => points[from + i]);
+  return { from, to, blocks: reader.nextBlock, positions, attributes, index, groupTriangles };
+}

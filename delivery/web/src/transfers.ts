@@ -1,0 +1,250 @@
+import { codecTraits } from './codec';
+import { isAbort } from './http';
+import { PackageReader, PlaneFiles } from './package_reader';
+import { bytesToShow } from './allocation';
+import { fragmentCount } from './tables';
+import type { TextureInfo } from './textures';
+import type { WorkerPool } from './worker_pool';
+
+/** A fragment to be had at a rung. */
+export interface Wish {
+  plane: number;
+  fragment: number;
+  rung: number;
+  /** Index into the caller's list. */
+  offer: number;
+}
+/** What becomes of wishes. Bytes arrive first; the picture follows when it is decoded. */
+export interface TransferHooks {
+  decoded(wish: Wish, bitmap: ImageBitmap): void;
+  /** It cannot be had, or not decoded; the preview stays. */
+  lost(wish: Wish, error: unknown): void;
+}
+interface Part {
+  wish: Wish;
+  rung: number;
+  offset: number;
+  bytes: number;
+  job: Job;
+}
+/** A wish under way: the streams it still lacks. */
+interface Job {
+  wish: Wish;
+  first: number;
+  streams: (Uint8Array | undefined)[];
+  missing: number;
+  failed: boolean;
+}
+interface Group {
+  plane: number;
+  rung: number;
+  offset: number;
+  bytes: number;
+  parts: Part[];
+}
+export interface GroupOptions {
+  /** Streams that nobody asked for but are fetched to join two requests, at most. */
+  gapBytes: number;
+  mostBytes: number;
+  signal?: AbortSignal;
+}
+
+/**
+ * Fetches fragments: streams of one rung that stand together by one request, lower rungs of incremental codecs once
+ * only, decoding off the main thread.
+ */
+export class Transfers {
+  private readonly planes = new Map<number, PlaneFiles>();
+  private readonly held = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
+  private decoding = 0;
+
+  constructor(
+    private readonly reader: PackageReader,
+    private readonly textures: readonly TextureInfo[],
+    private readonly pool: WorkerPool,
+    private readonly hooks: TransferHooks,
+  ) {}
+
+  /** Fragments being decoded. */
+  get pending(): number {
+    return this.decoding;
+  }
+  /** Must have been called for the planes of all wishes. */
+  async prepare(planes: readonly number[]): Promise<void> {
+    await Promise.all(
+      planes.map(async (p) => {
+        if (!this.planes.has(p)) this.planes.set(p, await this.reader.planeFiles(p));
+      }),
+    );
+  }
+  filesOf(plane: number): PlaneFiles {
+    return this.planes.get(plane)!;
+  }
+  private incremental(plane: number): boolean {
+    return codecTraits(this.textures[plane].codec).incremental && !this.filesOf(plane).complete;
+  }
+  /** Bytes of a fragment at a rung: of what has to be fetched at most. */
+  bytesOf(plane: number, rung: number, fragment: number): number {
+    const { complete, tables } = this.filesOf(plane);
+    return complete ? (complete[rung]?.get(fragment)?.bytes ?? 0) : bytesToShow(tables, rung, fragment);
+  }
+
+  /**
+   * Fetches wishes. `arrived` is called when all bytes of one are there (before they are checked), `failed` when they
+   * cannot be had. Resolves when every wish has arrived or failed.
+   */
+  async fetch(
+    wishes: readonly Wish[],
+    options: GroupOptions,
+    arrived: (wish: Wish) => void,
+    failed: (wish: Wish, error: unknown) => void,
+  ): Promise<void> {
+    const files = wishes.filter((w) => this.filesOf(w.plane).complete);
+    const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf(w, arrived));
+    await Promise.all([
+      ...files.map((w) => this.fetchFile(w, options, arrived, failed)),
+      ...groupsOf(parts, options).map((g) => this.fetchGroup(g, options, arrived, failed)),
+    ]);
+  }
+
+  private partsOf(wish: Wish, arrived: (wish: Wish) => void): Part[] {
+    const { tables, offsets } = this.filesOf(wish.plane);
+    const n = fragmentCount(tables);
+    const incremental = this.incremental(wish.plane);
+    const held = incremental ? (this.held.get(`${wish.plane}/${wish.fragment}`) ?? []) : [];
+    const first = incremental ? 0 : wish.rung;
+    const job: Job = { wish, first, streams: [], missing: 0, failed: false };
+    const parts: Part[] = [];
+    for (let rung = first; rung <= wish.rung; ++rung) {
+      job.streams.push(held[rung - first]);
+      if (job.streams[rung - first]) continue;
+      const at = rung * n + wish.fragment;
+      parts.push({ wish, rung, offset: offsets[at], bytes: tables.sizeBytes[at], job });
+      ++job.missing;
+    }
+    if (parts.length === 0) {
+      arrived(wish);
+      void this.decode(job);
+    }
+    return parts;
+  }
+
+  private async fetchGroup(
+    group: Group,
+    options: GroupOptions,
+    arrived: (wish: Wish) => void,
+    failed: (wish: Wish, error: unknown) => void,
+  ): Promise<void> {
+    const pack = this.filesOf(group.plane).packs[group.rung];
+    const said = new Set<Part>();
+    // The plan hears of each fragment when its last byte comes, though the answer ends later.
+    const say = (upTo: number): void => {
+      for (const p of group.parts)
+        if (!said.has(p) && p.offset + p.bytes - group.offset <= upTo) {
+          said.add(p);
+          if (--p.job.missing === 0 && !p.job.failed) arrived(p.wish);
+        }
+    };
+    try {
+      const got = await this.reader.store.read(pack, group.offset, group.bytes, {
+        kind: 'texture', once: this.reader.form !== 'files', signal: options.signal, onBytes: say,
+      });
+      for (const p of group.parts) {
+        const at = p.offset - group.offset;
+        p.job.streams[p.rung - p.job.first] = got.subarray(at, at + p.bytes);
+      }
+      say(Infinity);
+      for (const p of group.parts)
+        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode(p.job);
+    } catch (error) {
+      for (const p of group.parts) {
+        if (p.job.failed) continue;
+        p.job.failed = true;
+        if (said.has(p) && p.job.missing === 0) this.hooks.lost(p.wish, error);
+        else failed(p.wish, error);
+      }
+    }
+  }
+
+  private async fetchFile(
+    wish: Wish,
+    options: GroupOptions,
+    arrived: (wish: Wish) => void,
+    failed: (wish: Wish, error: unknown) => void,
+  ): Promise<void> {
+    try {
+      const file = await this.reader.fragmentFile(wish.plane, wish.rung, wish.fragment, options.signal);
+      arrived(wish);
+      void this.decode({ wish, first: wish.rung, streams: [file], missing: 0, failed: false });
+    } catch (error) {
+      failed(wish, error);
+    }
+  }
+
+  private async decode(job: Job): Promise<void> {
+    const { plane, fragment } = job.wish;
+    ++this.decoding;
+    try {
+      try {
+        this.hooks.decoded(job.wish, await this.decodeStreams(job));
+      } catch (error) {
+        if (isAbort(error) || job.failed) throw error;
+        // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
+        this.held.delete(`${plane}/${fragment}`);
+        for (let rung = job.first; rung <= job.wish.rung; ++rung)
+          job.streams[rung - job.first] = this.filesOf(plane).complete
+            ? await this.reader.fragmentFile(plane, rung, fragment)
+            : await this.reader.fragment(plane, rung, fragment);
+        this.hooks.decoded(job.wish, await this.decodeStreams(job));
+      }
+    } catch (error) {
+      this.hooks.lost(job.wish, error);
+    } finally {
+      --this.decoding;
+    }
+  }
+  private async decodeStreams(job: Job): Promise<ImageBitmap> {
+    const { plane, fragment, rung } = job.wish;
+    const { tables, complete } = this.filesOf(plane);
+    const streams = job.streams as Uint8Array[];
+    const { codec } = this.textures[plane];
+    if (complete) {
+      const digests = [complete[rung].get(fragment)!.sha256];
+      return this.pool.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true });
+    }
+    const digests = streams.map((_, i) => {
+      const at = 8 * ((job.first + i) * fragmentCount(tables) + fragment);
+      return tables.digest.slice(at, at + 8);
+    });
+    const bitmap = await this.pool.decode({
+      codec, tables: await this.reader.tableStream(plane, job.first), streams, digests, complete: false,
+    });
+    if (this.incremental(plane)) this.held.set(`${plane}/${fragment}`, streams);
+    return bitmap;
+  }
+
+  dispose(): void {
+    this.held.clear();
+    this.planes.clear();
+  }
+}
+
+/** Parts of one rung that stand together (or nearly) become one range. */
+function groupsOf(parts: readonly Part[], options: GroupOptions): Group[] {
+  const sorted = [...parts].sort(
+    (a, b) => a.wish.plane - b.wish.plane || a.rung - b.rung || a.offset - b.offset,
+  );
+  const groups: Group[] = [];
+  for (const p of sorted) {
+    const g = groups[groups.length - 1];
+    const end = g ? g.offset + g.bytes : 0;
+    const joins =
+      g && g.plane === p.wish.plane && g.rung === p.rung && p.offset - end <= options.gapBytes &&
+      p.offset + p.bytes - g.offset <= options.mostBytes;
+    if (joins) {
+      g.bytes = p.offset + p.bytes - g.offset;
+      g.parts.push(p);
+    } else groups.push({ plane: p.wish.plane, rung: p.rung, offset: p.offset, bytes: p.bytes, parts: [p] });
+  }
+  return groups;
+}

@@ -1,0 +1,53 @@
+import type { CodecId } from './codec';
+
+/** Decode one fragment (or preview): streams are joined with their tables, digests checked first. */
+export interface DecodeRequest {
+  op: 'decode';
+  codec: CodecId;
+  tables: Uint8Array;
+  streams: Uint8Array[];
+  /** First bytes of each stream's SHA-256; empty = not to be checked. */
+  digests: Uint8Array[];
+  /** The stream is a complete file. */
+  complete: boolean;
+}
+/** Start a vertex-split stream under a number of the caller's. */
+export interface SplitOpenRequest {
+  op: 'split-open';
+  key: number;
+  head: Uint8Array;
+}
+/** Decode the next blocks of a stream, which stand one after the other. */
+export interface SplitAddRequest {
+  op: 'split-add';
+  key: number;
+  blocks: Uint8Array;
+}
+export interface SplitCloseRequest {
+  op: 'split-close';
+  key: number;
+}
+export type WorkerRequest = DecodeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
+
+/** What has been added to a split mesh, and its triangles now. */
+export interface SplitUpdate {
+  /** Wedges before and now; arrays hold those between. */
+  from: number;
+  to: number;
+  /** Blocks decoded so far. */
+  blocks: number;
+  positions: Float32Array;
+  /** By attribute of the head: 2 floats (UV), 3 (normals), 4 (colours). */
+  attributes: Float32Array[];
+  /** Wedges of all visible triangles, sorted by group. */
+  index: Uint32Array;
+  /** Triangles of each group. */
+  groupTriangles: Uint32Array;
+}
+
+export interface WorkerAnswer {
+  id: number;
+  /** ImageBitmap of decode, SplitUpdate of split-add. */
+  result?: unknown;
+  error?: { name: string; message: string; parts?: [string, string, string, string] };
+}
