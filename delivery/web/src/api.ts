@@ -13,7 +13,7 @@ export interface Display {
 
 /** What GLTFLoader (three/addons) offers and this library uses. */
 export interface GltfLoaderLike {
-  register(plugin: (parser: never) => unknown): unknown;
+  register(callback: (parser: any) => any): unknown;
   parseAsync(data: ArrayBuffer, path: string): Promise<unknown>;
 }
 
