@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
     add_plan_command(app, exit_code);
     add_check_command(app, exit_code);
     add_simulate_command(app, exit_code);
+    add_fetch_command(app, exit_code);
     add_view_command(app, exit_code);
     add_stages_command(app, exit_code);
     app.parse(argc, argv);
