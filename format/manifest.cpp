@@ -92,6 +92,7 @@ Json manifest_json(const Manifest& m) {
   j["bounds"]["min"] = vector_json(m.bounds_min);
   j["bounds"]["max"] = vector_json(m.bounds_max);
   j["objectHeight"] = m.object_height;
+  if (m.surface_area > 0) j["surfaceArea"] = six_digits(m.surface_area);
   j["jnd"] = m.jnd;
   j["scales"] = scales_json(m.scales);
   j["steps"] = Json::array();
@@ -262,6 +263,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   Manifest m;
   read_version(at, m);
   read_shape(at, m);
+  if (document.contains("surfaceArea")) m.surface_area = at["surfaceArea"].number(0, kLargest);
   const JsonAt scales = at["scales"];
   read_scales(scales, document["scales"].is_object() && document["scales"].contains("floor"), m);
   read_steps(at["steps"], m);

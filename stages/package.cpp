@@ -116,6 +116,15 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
   return result;
 }
 
+double surface_area(const Mesh& mesh, const NestedScale& scale) {
+  double area = 0;
+  for (const Triangle& t : scale.triangles) {
+    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
+  }
+  return area;
+}
+
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
                         const ScaleFiles& files, const Fragments& fragments, double jnd,
                         const std::string& title) {
@@ -131,6 +140,7 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
       m.bounds_max[i] = std::max(m.bounds_max[i], static_cast<double>(p[i]));
     }
   m.object_height = static_cast<double>(perceptual.object_height);
+  m.surface_area = surface_area(scales.mesh, scales.scales.front());
   m.jnd = jnd;
   m.scales = describe_scales(scales, perceptual, files);
   m.steps = step_function(m.scales, StepRule::kDefault);

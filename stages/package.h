@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 1;
+inline constexpr int kPackageVersion = 2;
 
 struct PackageOptions {
   std::string title;

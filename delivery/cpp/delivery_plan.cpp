@@ -50,19 +50,34 @@ void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPla
   plan.texture_dssim = list.total_weight > 0 ? plan.textures.loss / list.total_weight : 0;
 }
 
+double ssim_of(PackageReader& package, double displayed_px, int scale, double texture_dssim) {
+  const std::vector<PlaneChoice> planes = planes_for_display(package, displayed_px);
+  return predicted_ssim(package.quality(), scale, equivalent_quality(package, planes, texture_dssim));
+}
+
+/// Bytes of a range that the first request has not brought yet.
+std::uint64_t beyond_bootstrap(std::uint64_t offset, std::uint64_t bytes) {
+  return offset >= kBootstrapBytes ? bytes : bytes - std::min(bytes, kBootstrapBytes - offset);
+}
+
+/// What every delivery takes besides fragments.
+void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
+  plan.bootstrap_bytes = kBootstrapBytes;
+  plan.first_picture_bytes = beyond_bootstrap(m.first_picture_offset, m.first_picture_bytes);
+  // Index, tables, textures.json: asked for together with the first picture's end.
+  plan.table_bytes = 0;
+  for (const EntryRef& e : {static_cast<EntryRef>(m.index), static_cast<EntryRef>(m.tables), m.textures})
+    plan.table_bytes += beyond_bootstrap(e.offset, e.bytes);
+  const bool coarsest = scale == m.scales.back().scale;
+  for (const ManifestScale& s : m.scales)
+    if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
+}
+
 DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& request, int scale) {
   const Manifest& m = package.manifest();
   DeliveryPlan plan;
   plan.scale = scale;
-  plan.planes = planes_for_display(package, request.displayed_px);
-  plan.bootstrap_bytes = kBootstrapBytes;
-  plan.first_picture_bytes = m.first_picture_bytes;
-  // Index, tables, textures.json: asked for together with the first picture's end.
-  plan.table_bytes = m.index.bytes + m.tables.bytes + m.textures.bytes;
-  const bool coarsest = scale == m.scales.back().scale;
-  for (const ManifestScale& s : m.scales)
-    if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
-
+  count_fixed_bytes(m, scale, plan);
   const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
   plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
   plan.mesh_s =
@@ -77,7 +92,11 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
                                 : moved / std::max(1e-9, plan.mesh_s - manifest_s - request.network.rtt_s);
   ListOptions options;
   options.scale = scale;
-  FragmentList list = fragment_list(package, plan.planes, options);
+  TextureBudget budget = texture_for_budget(
+      package, request.displayed_px, options,
+      static_cast<std::uint64_t>(std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s));
+  plan.planes = budget.planes;
+  const FragmentList& list = budget.list;
   if (htc.time_limit_s <= 0) {
     plan.warnings.push_back("no time is left for textures: previews are shown");
     plan.textures.rungs.assign(list.offers.size(), -1);
@@ -93,8 +112,9 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
   }
   plan.texture_bytes = plan.textures.bytes;
   rate_textures(package, list, plan);
-  plan.ssim =
-      predicted_ssim(package.quality(), scale, equivalent_quality(package, plan.planes, plan.texture_dssim));
+  plan.texture_dssim =
+      1 - (1 - plan.texture_dssim) * (1 - mip_loss(package, plan.planes, request.displayed_px));
+  plan.ssim = ssim_of(package, request.displayed_px, scale, plan.texture_dssim);
   return plan;
 }
 
@@ -175,6 +195,43 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
                             std::to_string(best.scale) + " leaves more for the texture and looks better");
   return best;
+}
+
+DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes) {
+  const Manifest& m = package.manifest();
+  const int wanted = request.scale >= 0
+                         ? request.scale
+                         : scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  std::optional<DeliveryPlan> best;
+  for (const ManifestScale& s : m.scales) {
+    if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;
+    DeliveryPlan plan;
+    plan.scale = s.scale;
+    count_fixed_bytes(m, s.scale, plan);
+    const std::uint64_t fixed = plan.bytes();
+    ListOptions options;
+    options.scale = s.scale;
+    const TextureBudget budget =
+        texture_for_budget(package, request.displayed_px, options, bytes > fixed ? bytes - fixed : 0);
+    plan.planes = budget.planes;
+    plan.texture_bytes = budget.bytes;
+    plan.textures.rungs = budget.rungs;
+    plan.textures.bytes = budget.bytes;
+    plan.textures.skipped = static_cast<std::uint32_t>(std::ranges::count(budget.rungs, -1));
+    rate_textures(package, budget.list, plan);
+    plan.texture_dssim = budget.dssim;
+    plan.ssim = ssim_of(package, request.displayed_px, s.scale, budget.dssim);
+    if (fixed > bytes)
+      plan.warnings.push_back("mesh and tables alone take " + std::to_string(fixed) + " bytes");
+    const bool fits = fixed <= bytes, best_fits = best && best->bytes() <= bytes;
+    if (!best || (fits && !best_fits) ||
+        (fits == best_fits && (fits ? plan.ssim > best->ssim : plan.bytes() < best->bytes())))
+      best = std::move(plan);
+  }
+  if (!best)
+    throw InputError(package.store().name(), "scale " + std::to_string(wanted), "a scale of the package",
+                     "none");
+  return *best;
 }
 
 }  // namespace texmesh

@@ -33,7 +33,7 @@ struct DeliveryPlan {
   SimulationResult textures;                   // its times count from mesh_s
   double mean_quality = 0, worst_quality = 0;  // IJG quality of fragments, surface-weighted mean; skipped = 0
   double ssim = 0;                             // predicted, from the package's measured table
-  double texture_dssim = 0;                    // surface-weighted 1 - SSIM of the textures
+  double texture_dssim = 0;                    // surface-weighted 1 - SSIM of the textures as displayed
   std::vector<std::string> warnings;
   std::uint64_t bytes() const {
     return bootstrap_bytes + first_picture_bytes + mesh_bytes + table_bytes + texture_bytes;
@@ -43,6 +43,9 @@ struct DeliveryPlan {
 /// The scale is the rule's, or a coarser one where a simulation of both shows a better picture in the time:
 /// mesh first, then texture. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
+/// The scale and the textures that look best in so many bytes, whatever the time: no scale finer than the
+/// display needs, mesh first, then texture. Where nothing fits the least there is, with a warning.
+DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
 /// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
 /// measured table (scale number, log-quantiser of the quality).

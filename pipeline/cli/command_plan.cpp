@@ -41,6 +41,15 @@ Json plan_json(const DeliveryPlan& p) {
           {"warnings", p.warnings}};
 }
 
+std::string textures_text(const DeliveryPlan& p) {
+  std::string text;
+  if (!p.textures.rungs.empty())
+    text += fmt::format("fragments: {}, {} skipped; quality {:.0f} in the mean, {:.0f} at worst\n",
+                        p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
+  for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
+  return text;
+}
+
 std::string plan_text(const DeliveryPlan& p) {
   std::string text = fmt::format(
       "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
@@ -50,12 +59,21 @@ std::string plan_text(const DeliveryPlan& p) {
       grouped(p.bootstrap_bytes + p.first_picture_bytes), p.mesh_s, p.complete_s, grouped(p.bootstrap_bytes),
       grouped(p.first_picture_bytes), grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes),
       grouped(p.bytes()));
-  if (!p.textures.rungs.empty())
-    text += fmt::format("fragments: {}, {} skipped; quality {:.0f} in the mean, {:.0f} at worst\n",
-                        p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
-  for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
-  return text;
+  return text + textures_text(p);
 }
+
+std::string budget_text(const DeliveryPlan& p) {
+  return fmt::format(
+             "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
+             "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
+             p.scale, p.ssim, 1 - p.texture_dssim, grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes),
+             grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes())) +
+         textures_text(p);
+}
+
+struct PlanArguments : DeliveryArguments {
+  std::string budget;
+};
 
 struct CheckArguments : DeliveryArguments {
   double min_ssim = 0, min_texture_ssim = 0;
@@ -65,9 +83,12 @@ struct CheckArguments : DeliveryArguments {
 }  // namespace
 
 void add_plan_command(CLI::App& app, int& exit_code) {
-  auto args = std::make_shared<DeliveryArguments>();
-  CLI::App* c = app.add_subcommand("plan", "Say what a viewer will get in a time over a link");
+  auto args = std::make_shared<PlanArguments>();
+  CLI::App* c =
+      app.add_subcommand("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
   add_delivery_options(*c, *args, true);
+  c->add_option("--budget", args->budget,
+                "Bytes instead of time: the mesh and the textures that look best together in 500kB");
   c->add_flag("--json", args->json, "One JSON object, for programs");
   c->footer(
       "Plays the transfer over a model of the network; the package alone decides. The predicted SSIM comes "
@@ -76,13 +97,25 @@ void add_plan_command(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  texmesh plan bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --rtt 40\n"
       "  texmesh plan https://host/bust.texmesh --display 400 --time 1.5 --trace monday.csv --rtt 80\n"
-      "Exit code: 0, 1 when the package cannot be read, 2 usage.");
+      "  texmesh plan bust.texmesh --display 800 --budget 500kB\n"
+      "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c->callback([args, &exit_code] {
+    const bool budget = !args->budget.empty();
+    if (budget && args->bandwidth.empty() && args->trace.empty()) args->bandwidth = "1Mbit/s";  // not asked
     const DeliveryRequest request = delivery_request(*args);
     PackageReader package(open_store(args->package));
-    const DeliveryPlan plan = plan_delivery(package, request);
-    std::cout << (args->json ? plan_json(plan).dump() + "\n" : plan_text(plan));
-    exit_code = kExitOk;
+    if (!budget) {
+      const DeliveryPlan plan = plan_delivery(package, request);
+      std::cout << (args->json ? plan_json(plan).dump() + "\n" : plan_text(plan));
+      exit_code = kExitOk;
+      return;
+    }
+    const std::uint64_t bytes = parse_bytes(args->budget, "--budget");
+    const DeliveryPlan plan = plan_budget(package, request, bytes);
+    Json j = plan_json(plan);
+    for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
+    std::cout << (args->json ? j.dump() + "\n" : budget_text(plan));
+    exit_code = plan.bytes() <= bytes ? kExitOk : kExitDifferent;
   });
 }
 

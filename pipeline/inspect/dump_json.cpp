@@ -76,6 +76,7 @@ Json summary_json(PackageReader& p) {
             {"bounds_min", vector_json(m.bounds_min)},
             {"bounds_max", vector_json(m.bounds_max)},
             {"height", m.object_height},
+            {"surface_area", m.surface_area},
             {"jnd", m.jnd}}},
           {"steps", steps_json(m.steps)},
           {"step_rules",

@@ -264,6 +264,8 @@ Json portable_math() {
   add("log", portable::log, 0.5, 1e9);
   add("sin", portable::sin, -10, 10);
   add("cos", portable::cos, -10, 10);
+  add(
+      "pow of 0.37", [](double x) { return portable::pow(0.37, x); }, -3, 3);
   add("log_quantiser", log_quantiser, 1, 100);
   return cases;
 }
@@ -353,6 +355,22 @@ Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
           {"budget_rungs", rd}};
 }
 
+Json budgets(PackageReader& package, double displayed_px, const ListOptions& options) {
+  Json out = Json::array();
+  for (const std::uint64_t bytes : {0ull, 1500ull, 6000ull, 20000ull, 1000000ull}) {
+    const TextureBudget b = texture_for_budget(package, displayed_px, options, bytes);
+    Json shown = Json::array();
+    for (const PlaneChoice& p : b.planes) shown.push_back({p.base, p.plane});
+    out.push_back({{"budget_bytes", bytes},
+                   {"planes", shown},
+                   {"mip_loss", mip_loss(package, b.planes, displayed_px)},
+                   {"rungs", b.rungs},
+                   {"bytes", b.bytes},
+                   {"dssim", b.dssim}});
+  }
+  return out;
+}
+
 Json lists(PackageReader& package) {
   Json out = Json::array();
   for (const double px : {40.0, 200.0, 1000.0}) {
@@ -374,7 +392,8 @@ Json lists(PackageReader& package) {
                    {"fragments", fragments},
                    {"offers", offers_json(list.offers)},
                    {"total_weight", list.total_weight},
-                   {"dssim_quality_ssim", qualities}});
+                   {"dssim_quality_ssim", qualities},
+                   {"budgets", budgets(package, px, o)}});
   }
   return out;
 }

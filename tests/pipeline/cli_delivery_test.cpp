@@ -1,7 +1,10 @@
-// simulate, plan and check as programs, on the golden package.
+// simulate, plan, check and fetch as programs, on the golden packages.
 #include <gtest/gtest.h>
+#include <httplib.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "tests/support/command.h"
 
@@ -81,6 +84,52 @@ TEST(CliPlan, ASmallDisplayTakesACoarserScale) {
         .get<int>();
   };
   EXPECT_GT(scale("20"), scale("5000"));
+}
+
+TEST(CliPlan, ABudgetIsKeptAndMoreBytesLookBetter) {
+  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+  double before = 0;
+  for (const int kb : {30, 50, 60, 100, 200}) {
+    const CommandResult r =
+        texmesh({"plan", golden, "--display", "800", "--budget", std::to_string(kb) + "kB", "--json"});
+    ASSERT_EQ(r.exit_code, kb == 30 ? 4 : 0) << r.errors;  // the least there is takes 39 kB
+    const Json p = Json::parse(r.output);
+    EXPECT_EQ(r.exit_code == 0, p["bytes"]["all"].get<int>() <= 1000 * kb);
+    EXPECT_GE(p["ssim"].get<double>(), before) << kb;
+    before = p["ssim"];
+    EXPECT_FALSE(p.contains("complete_s"));
+  }
+  EXPECT_EQ(texmesh({"plan", golden, "--budget", "1kB"}).exit_code, 4);
+  EXPECT_NE(texmesh({"plan", golden, "--budget", "much"}).exit_code, 0);
+}
+
+TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
+  httplib::Server server;
+  server.set_mount_point("/", std::string(TEXMESH_SOURCE_DIR) + "/tests/golden");
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const std::string host = "http://127.0.0.1:" + std::to_string(port);
+  TemporaryFolder folder;
+  const CommandResult r =
+      texmesh({"fetch", host + "/v1.1-scan.texmesh", "--mirror", "http://127.0.0.1:9/none.texmesh", "--time",
+               "1", "--refine", "2", "-o", folder / "got", "--json"});
+  const CommandResult none = texmesh({"fetch", host + "/none.texmesh"});
+  server.stop();
+  thread.join();
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const Json got = Json::parse(r.output);
+  EXPECT_EQ(got["given_up"], 0);
+  EXPECT_GT(got["texture_ssim"].get<double>(), 0.9);
+  std::size_t meshes = 0, fragments = 0;
+  for (const auto& e : std::filesystem::recursive_directory_iterator(folder / "got")) {
+    meshes += e.path().extension() == ".glb";
+    fragments += e.path().extension() == ".jpg";
+  }
+  EXPECT_EQ(meshes, 1u);
+  EXPECT_EQ(fragments, got["fragments"].get<std::size_t>());
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_EQ(texmesh({"fetch", kGolden}).exit_code, 1);  // a file needs no fetching
 }
 
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
