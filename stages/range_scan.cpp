@@ -125,6 +125,16 @@ Response respond(const Grid& grid, const Axis& alpha, const Axis& y, double sigm
   return r;
 }
 
+/// The response as meshes have it: t (H(sigma) - H(band sigma)), the base shape's curvature taken off.
+void take_band_off(const Grid& grid, const Axis& alpha, const Axis& y, double sigma,
+                   const SsfOptions& options, Response& r, const RunContext& context) {
+  const double band = options.range_band;
+  if (band <= 1) return;
+  const Response wide = respond(grid, alpha, y, sigma * band, options.window, context);
+  for (std::size_t i = 0; i < r.curvature.value.size(); ++i)
+    r.curvature.value[i] -= wide.curvature.value[i] / (band * band);
+}
+
 /// Samples whose response changes sign towards a neighbour and is the smaller of the two.
 std::vector<std::uint8_t> find_crossings(const Grid& g, double noise) {
   std::vector<std::uint8_t> found(g.value.size(), 0);
@@ -207,7 +217,8 @@ class RangeFilter {
     take_crossings(0, respond(grid_, alpha_, y_, narrow, 1, context_).curvature);
     for (int i = 1; i <= options_.scales; ++i) {
       const double sigma = sigma_min_ * portable::exp(step * (i - 1));
-      const Response r = respond(grid_, alpha_, y_, sigma, options_.window, context_);
+      Response r = respond(grid_, alpha_, y_, sigma, options_.window, context_);
+      take_band_off(grid_, alpha_, y_, sigma, options_, r, context_);
       const auto s = static_cast<std::size_t>(i);
       map_.sigma[s] = static_cast<float>(sigma);
       map_.convergence[s] = whole > 0 ? static_cast<float>(value_range(r.smooth) / whole) : 0;
