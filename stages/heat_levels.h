@@ -27,10 +27,13 @@ HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> cor
 /// cells and direction; only normals need them. Deterministic: ties go to the earlier seed. O(n log n).
 HeatLevel coarsen(const HeatLevel& fine, double radius, double rate_cap);
 
-/// Whether heat that has flowed as far as sigma is smooth enough for a level: up to 1.4 error_ratio spacings
+/// Whether heat that has flowed as far as sigma is smooth enough for a level: up to 2.4 error_ratio spacings
 /// of it the level below is nearer to the truth. Levels of few vertices carry everything.
 bool carries(const HeatLevel& level, double sigma, double error_ratio);
 /// Radius to coarsen by for a level whose first sigma this is.
 double seed_radius(double sigma, double error_ratio);
+/// Largest sigma of the state that a level whose first sigma this is should start from. What its operator
+/// makes of points that another one smoothed is roughest at first and gone by then.
+double handover_sigma(double first_sigma);
 
 }  // namespace texmesh

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSsfVersion = 2;
+inline constexpr int kSsfVersion = 3;
 
 struct SsfOptions {
   int scales = 20;          // smoothed copies beside the original

@@ -195,17 +195,24 @@ class ComponentFilter {
     return end;
   }
 
+  /// One past the scale, of [begin, end), whose points the next level starts from; `begin` for those that
+  /// this level started from, unless nothing has smoothed them.
+  std::size_t handover_scale(const LevelState& state, std::size_t begin, std::size_t end) const {
+    const std::size_t first = state.time > 0 ? begin : begin + 1;
+    std::size_t scale = end;
+    while (scale > first && ladder_.sigma[scale - 1] > handover_sigma(ladder_.sigma[end])) --scale;
+    return scale;
+  }
+
   /// Features of the scales [begin, end), whose subtrahends are taken on the same level: operators of
-  /// different levels differ by more than shallow relief. Leaves `state` at the last of the scales. Returns
+  /// different levels differ by more than shallow relief. Leaves `state` where the next level starts. Returns
   /// the first scale after the first one that has converged, or `scales`.
   std::size_t carry(LevelState& state, std::size_t begin, std::size_t end) {
     fit_work(state, ladder_.time[end - 1 + ladder_.band]);
     std::size_t converged = scales_;
     std::vector<std::vector<float>> curvature;
     LevelState walker{{}, {}, state.points, state.time, state.normals};
-    // The next level starts from the last scale but one: what its operator makes of points that another one
-    // smoothed is roughest at first.
-    const std::size_t handover = std::max(begin + 1, end - 1);
+    const std::size_t handover = handover_scale(state, begin, end);
     for (std::size_t i = begin; i < end + ladder_.band;) {
       const std::size_t stop = std::min(i + kTimesAtOnce, i < handover ? handover : end + ladder_.band);
       const std::span<const double> times(ladder_.time.data() + i, stop - i);

@@ -250,20 +250,26 @@ void print_accuracy(const std::string& name, const ConditionedMesh& mesh, const 
   std::printf("single %.1f s\n", seconds() - start);
   std::vector<std::uint32_t> vertex = level.vertex;
   const std::vector<std::uint32_t> all = vertex;
-  std::vector<Vec3d> points = c.points;
-  double time = 0;
+  std::vector<std::vector<Vec3d>> states{c.points};
+  std::vector<double> state_times{0};
   for (std::size_t i = 0; i < times.size(); ++i) {
     if (!carries(level, ladder.sigma[i], options.error_ratio) && i > 0) {
       HeatLevel coarse = coarsen(level, seed_radius(ladder.sigma[i], options.error_ratio), options.rate_cap);
+      std::size_t s = states.size() - 1;
+      const double wanted = handover_sigma(ladder.sigma[i]);
+      while (s > 0 && state_times[s - 1] > 0 && std::sqrt(2 * state_times[s]) > wanted) --s;
+      std::vector<Vec3d> points;
       for (std::size_t v = 0; v < coarse.vertex.size(); ++v) {
         vertex[v] = vertex[coarse.vertex[v]];
-        points[v] = points[coarse.vertex[v]];
+        points.push_back(states[s][coarse.vertex[v]]);
       }
       vertex.resize(coarse.vertex.size());
-      points.resize(coarse.vertex.size());
+      states = {std::move(points)};
+      state_times = {state_times[s]};
       level = std::move(coarse);
     }
-    const std::vector<HeatFlow> flow = diffuse(level.laplacian, points, time, times.subspan(i, 1), context);
+    const std::vector<HeatFlow> flow =
+        diffuse(level.laplacian, states.back(), state_times.back(), times.subspan(i, 1), context);
     const Difference one = compare(single[i], truth[i], all), pyramid = compare(flow[0], truth[i], vertex);
     std::printf(
         "  S%-2zu sigma %6.2f  single: error %.4f %% flips %.4f %%   pyramid: %8zu vertices, bound %5.0f, "
@@ -275,8 +281,10 @@ void print_accuracy(const std::string& name, const ConditionedMesh& mesh, const 
     const Difference nn = compare_n(normals(c, truth[i]), flow[0], truth[i], vertex);
     std::printf("     normal part: error %6.3f %%  significant flips %.3f %%   tangential/normal %.3f\n",
                 100 * nn.error, 100 * nn.significant, nn.flips);
-    for (std::size_t v = 0; v < points.size(); ++v) points[v] = points[v] + to_double(flow[0].moved[v]);
-    time = times[i];
+    states.push_back(states.back());
+    for (std::size_t v = 0; v < vertex.size(); ++v)
+      states.back()[v] = states.back()[v] + to_double(flow[0].moved[v]);
+    state_times.push_back(times[i]);
   }
 }
 
