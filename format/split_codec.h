@@ -220,6 +220,7 @@ class SplitCodec {
     while (channel_.bit(models_.extra_face, [](auto& t) { return t.take_any(); })) code_extra_face();
     predict_point(u);
     code_fresh_values();
+    channel_.made(mesh_, u);
     parent_ = child_ = kNone;
     channel_.know([&](auto& t) { t.end_split(); });
     queue_around(v, u);

@@ -3,6 +3,7 @@
 #include "format/errors.h"
 #include "format/split_codec.h"
 #include "format/split_coder.h"
+#include "format/split_fill.h"
 #include "format/split_head.h"
 #include "format/split_stream.h"
 
@@ -29,6 +30,7 @@ class PartDecoder {
       out[i] = (std::clamp(guess[i], 0, largest) + residual) & largest;
     }
   }
+  bool present() const { return present_; }
   bool same() { return present_ && walk_.same(*this, false); }
 
   // What ValueWalk asks of its bits:
@@ -41,10 +43,11 @@ class PartDecoder {
   ValueWalk walk_;
 };
 
-/// The reader's side of SplitCodec.
+/// The reader's side of SplitCodec. Blocks of patches have no splits: what their points lack stays predicted.
 class DecodingChannel {
  public:
-  explicit DecodingChannel(const SplitStreamHead& head) : head_(head), parts_(head.attributes.size() + 1) {}
+  DecodingChannel(const SplitStreamHead& head, SplitFill fill)
+      : head_(head), fill_(fill), parts_(head.attributes.size() + 1) {}
   void start(std::span<const Bytes> parts) {
     connectivity_ = BitDecoder(parts[0]);
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
@@ -63,6 +66,12 @@ class DecodingChannel {
   void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&&) {
     parts_[0].values(point.data(), guess.data(), 3, head_.position.bits);
   }
+  void made(SplitMesh& mesh, std::uint32_t point) {
+    if (parts_[0].present()) return;
+    lost_.push_back(point);
+    if (fill_ == SplitFill::kTexture) fill_lost_point(head_, mesh, point);
+  }
+  const std::vector<std::uint32_t>& lost() const { return lost_; }
   template <class Truth>
   bool same(std::size_t k, Truth&&) {
     return parts_[k + 1].same();
@@ -78,6 +87,8 @@ class DecodingChannel {
 
  private:
   const SplitStreamHead& head_;
+  SplitFill fill_;
+  std::vector<std::uint32_t> lost_;
   BitDecoder connectivity_;
   std::vector<PartDecoder> parts_;
 };
@@ -127,10 +138,10 @@ std::array<std::int32_t, 4> split_mean(const SplitAttribute& attribute, std::siz
 }
 
 struct SplitStreamReader::State {
-  State(SplitStreamHead h, SplitLimits limits)
+  State(SplitStreamHead h, SplitLimits limits, SplitFill fill)
       : head(std::move(h)),
         mesh(components_of(head)),
-        channel(head),
+        channel(head, fill),
         codec(mesh, channel, head.groups.size(), checked_limits(head, limits)) {}
   SplitStreamHead head;
   SplitMesh mesh;
@@ -140,8 +151,8 @@ struct SplitStreamReader::State {
   bool complete = true;  // no part of positions was left out
 };
 
-SplitStreamReader::SplitStreamReader(SplitStreamHead head, SplitLimits limits)
-    : state_(std::make_unique<State>(std::move(head), limits)) {}
+SplitStreamReader::SplitStreamReader(SplitStreamHead head, SplitLimits limits, SplitFill fill)
+    : state_(std::make_unique<State>(std::move(head), limits, fill)) {}
 SplitStreamReader::~SplitStreamReader() = default;
 SplitStreamReader::SplitStreamReader(SplitStreamReader&&) noexcept = default;
 SplitStreamReader& SplitStreamReader::operator=(SplitStreamReader&&) noexcept = default;
@@ -201,6 +212,12 @@ void SplitStreamReader::add_parts(std::span<const Bytes> parts) {
   require("wedges", scale.wedges, s.mesh.wedge_point().size());
   require("faces", scale.faces, s.mesh.faces().size());
   if (s.complete) require("triangles", scale.triangles, s.mesh.visible_faces().size());
+}
+
+const std::vector<std::uint32_t>& SplitStreamReader::lost_points() const { return state_->channel.lost(); }
+
+void SplitStreamReader::fill_again() {
+  for (const std::uint32_t point : state_->channel.lost()) fill_lost_point(state_->head, state_->mesh, point);
 }
 
 void SplitStreamReader::read_to_scale(std::size_t index, Bytes stream) {

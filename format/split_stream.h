@@ -125,10 +125,17 @@ struct SplitLimits {
   std::uint32_t points = 1u << 27, faces = 1u << 28;
 };
 
+/// Where a point goes whose part of positions was lost (thesis ch. 10). kNeighbours: to the mean of its
+/// neighbours. kTexture: to where its texture coordinates lie among those of its neighbours, by a weighted
+/// affine fit; where it has none, or they say nothing, to the mean. The affine fit takes 32-bit places in
+/// double arithmetic, the same bits everywhere.
+enum class SplitFill : std::uint8_t { kNeighbours, kTexture };
+
 /// Builds the mesh, block by block. Memory grows with what has been decoded: about 60 bytes per face.
 class SplitStreamReader {
  public:
-  explicit SplitStreamReader(SplitStreamHead head, SplitLimits limits = {});
+  explicit SplitStreamReader(SplitStreamHead head, SplitLimits limits = {},
+                             SplitFill fill = SplitFill::kNeighbours);
   ~SplitStreamReader();
   SplitStreamReader(SplitStreamReader&&) noexcept;
   SplitStreamReader& operator=(SplitStreamReader&&) noexcept;
@@ -144,6 +151,12 @@ class SplitStreamReader {
   void add_parts(std::span<const std::span<const std::uint8_t>> parts);
   /// Blocks up to and including a scale's last one, from the bytes of the whole stream.
   void read_to_scale(std::size_t index, std::span<const std::uint8_t> stream);
+  /// Points whose part of positions was lost.
+  const std::vector<std::uint32_t>& lost_points() const;
+  /// Moves them anew, now that finer neighbours are known, in the order in which they were made. Only after
+  /// a scale's last block, and nothing may be added afterwards: the positions of later blocks count from what
+  /// was there when they were written.
+  void fill_again();
 
  private:
   struct State;

@@ -274,6 +274,7 @@ class EncodingChannel {
     point = truth(truth_);
     put(0, point.data(), guess.data(), 3, source_.position.bits);
   }
+  void made(SplitMesh&, std::uint32_t) {}
   template <class Truth>
   bool same(std::size_t k, Truth&& truth) {
     const bool same = truth(truth_);

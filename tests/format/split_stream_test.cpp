@@ -191,6 +191,57 @@ TEST(SplitStream, KeepsToTheReadersLimits) {
   EXPECT_THROW(SplitStreamReader(head, {last.points, last.faces - 1}), FormatError);
 }
 
+/// Sum of squared distances of the points from where they should be, with every third part of positions lost.
+double error_with(SplitFill fill, const SplitStreamHead& head, const Bytes& stream, const SplitMesh& whole,
+                  bool again) {
+  SplitStreamReader reader(head, {}, fill);
+  std::size_t lost = 0;
+  for (std::size_t i = 0; i < head.blocks.size(); ++i) {
+    auto parts = parts_of(head, stream, i);
+    if (i % 3 == 1 && !head.blocks[i].is_patch) {
+      parts[1] = {};
+      lost += head.blocks[i].count;
+    }
+    reader.add_parts(parts);
+  }
+  EXPECT_EQ(reader.lost_points().size(), lost);
+  EXPECT_GT(lost, 0u);
+  if (again) reader.fill_again();
+  EXPECT_EQ(reader.mesh().faces(), whole.faces());
+  double sum = 0;
+  for (std::size_t p = 0; p < whole.points().size(); ++p)
+    for (std::size_t k = 0; k < 3; ++k)
+      sum += std::pow(static_cast<double>(whole.points()[p][k]) - reader.mesh().points()[p][k], 2);
+  return sum;
+}
+
+TEST(SplitStream, LostPositionsAreFoundByTheirTextureCoordinates) {
+  const SplitFixture fixture = split_fixture(17);
+  const Bytes stream = write_split_stream(fixture.source);
+  const SplitStreamHead head = read_split_head(stream);
+  ASSERT_EQ(head.attributes[0].kind, SplitKind::kUv0);
+  SplitStreamReader whole(head, {}, SplitFill::kTexture);  // nothing is lost: nothing changes
+  whole.read_to_scale(head.scales.size() - 1, stream);
+  EXPECT_EQ(corners_of(whole.mesh()), fixture.scales.back());
+  EXPECT_TRUE(whole.lost_points().empty());
+  const double neighbours = error_with(SplitFill::kNeighbours, head, stream, whole.mesh(), false);
+  const double texture = error_with(SplitFill::kTexture, head, stream, whole.mesh(), false);
+  EXPECT_LT(texture, 0.8 * neighbours);
+  EXPECT_LT(error_with(SplitFill::kTexture, head, stream, whole.mesh(), true), 0.8 * neighbours);
+}
+
+TEST(SplitStream, WithoutTextureCoordinatesLostPositionsAreTheNeighboursMean) {
+  const SplitFixture fixture = split_fixture(17);
+  const Bytes stream = write_split_stream(fixture.source);
+  SplitStreamHead head = read_split_head(stream);
+  for (SplitAttribute& a : head.attributes)
+    if (a.kind == SplitKind::kUv0) a.kind = SplitKind::kUv1;
+  SplitStreamReader whole(head);
+  whole.read_to_scale(head.scales.size() - 1, stream);
+  EXPECT_EQ(error_with(SplitFill::kTexture, head, stream, whole.mesh(), true),
+            error_with(SplitFill::kNeighbours, head, stream, whole.mesh(), false));
+}
+
 /// Few bytes cannot ask for much work: connectivity that only ever says "not this point" ends.
 TEST(SplitStream, EndlessRefusalsEnd) {
   const SplitFixture fixture = split_fixture(17);
