@@ -57,6 +57,10 @@ EntryName parse_any_spelling(std::string_view path) {
     if (take_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
   } else if (take(text, "preview/")) {
     if (take_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
+  } else if (take(text, "source/")) {
+    if (take_number(text, name.number) && take(text, "."))
+      for (const std::string_view extension : kSourceExtensions)
+        if (text == extension) name.kind = EntryKind::kSource, name.extension = extension;
   } else if (take(text, "texture/")) {
     return parse_texture_path(text);
   }
@@ -75,6 +79,8 @@ std::string spell(const EntryName& name) {
       return rung_path(name.number, name.rung);
     case EntryKind::kFragmentFile:
       return fragment_file_path(name.number, name.rung, name.fragment, name.extension);
+    case EntryKind::kSource:
+      return source_path(name.number, name.extension);
     default:
       return "";
   }
@@ -118,7 +124,8 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
     case EntryKind::kProvenance:
       return kLast;
     case EntryKind::kFragmentFile:
-    case EntryKind::kSplitStream:  // readers of 1.0 do not know it and expect it there
+    case EntryKind::kSource:  // readers of 1.0 know neither this nor the next and expect them there
+    case EntryKind::kSplitStream:
     case EntryKind::kOther:
       return kOthers;
   }
@@ -133,6 +140,9 @@ std::string table_streams_path(std::uint32_t plane) { return print("texture/%u/t
 std::string rung_path(std::uint32_t plane, std::uint32_t rung) {
   return print("texture/%u/r%02u.pack", plane, rung);
 }
+std::string source_path(std::uint32_t plane, std::string_view extension) {
+  return print("source/%03u.", plane).append(extension);
+}
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
                                std::string_view extension) {
   return print("texture/%u/r%02u/%04u.", plane, rung, fragment).append(extension);
@@ -142,7 +152,7 @@ EntryName parse_entry_path(const std::string& path) {
   const EntryName name = parse_any_spelling(path);
   const std::string canonical = spell(name);
   if (!canonical.empty()) return canonical == path ? name : EntryName{};
-  const bool numbered = name.kind >= EntryKind::kMesh && name.kind <= EntryKind::kFragmentFile;
+  const bool numbered = name.kind >= EntryKind::kMesh && name.kind <= EntryKind::kSource;
   return numbered ? EntryName{} : name;
 }
 

@@ -20,6 +20,10 @@ std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
 std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack
 std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r07.pack; 0 = lowest rung
+/// source/003.png: the source image of a full-size plane as it was (since 1.1; not every plane has one). Not
+/// beneath texture/, because readers of 1.0 take that folder's unknown files for faults of the index.
+inline constexpr std::string_view kSourceExtensions[] = {"jpg", "png", "tif", "webp", "exr"};
+std::string source_path(std::uint32_t plane, std::string_view extension);
 /// texture/3/r07/0123.jpg: one fragment as a complete file of its codec (CodecTraits::extension), in trees
 /// made with `unpack --fragments files` only.
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
@@ -37,6 +41,7 @@ enum class EntryKind : std::uint8_t {
   kTableStreams,
   kRung,
   kFragmentFile,
+  kSource,
   kSplitStream,
   kOther,
   kProvenance
@@ -45,7 +50,7 @@ struct EntryName {
   EntryKind kind = EntryKind::kOther;
   std::uint32_t number = 0;  // scale of a mesh; plane of everything that belongs to a texture
   std::uint32_t rung = 0, fragment = 0;
-  std::string_view extension = "jpg";  // of a fragment file
+  std::string_view extension = "jpg";  // of a fragment file or source
 };
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);

@@ -128,6 +128,11 @@ struct TextureInfo {
       tables;                   // texture/<plane>/tables.pack, all rungs' table streams in rung order
   std::vector<EntryRef> rungs;  // texture/<plane>/rNN.pack, rising quality: fragments in PlaneTables::order
   std::vector<int> rung_quality;
+  bool lossless = false;  // the last rung holds the coefficients of the source, a JPEG (since 1.1)
+  std::string
+      source_extension;  // jpg, png, tif, webp, exr: the package holds the source image; "" = it does not
+  bool source_colours = true;  // its numbers are the plane's; false: import has converted them
+  EntryRef source;             // source/NNN.<extension>
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;
 };
 /// The feature that packages with mips require.

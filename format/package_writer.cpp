@@ -121,6 +121,7 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
   for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
   for (std::uint32_t p = 0; p < textures.size(); ++p) {
     if (textures[p].mip == 0) needed.push_back(preview_path(p));
+    if (!textures[p].source_extension.empty()) needed.push_back(source_path(p, textures[p].source_extension));
     needed.push_back(table_streams_path(p));
     for (std::uint32_t r = 0; r < textures[p].rung_quality.size(); ++r) needed.push_back(rung_path(p, r));
   }

@@ -37,6 +37,11 @@ Json texture_json(const TextureInfo& t) {
   j["previewWidthPx"] = t.preview_width_px;
   j["previewHeightPx"] = t.preview_height_px;
   j["rungQuality"] = t.rung_quality;
+  if (t.lossless) j["lossless"] = true;
+  if (!t.source_extension.empty()) {
+    j["source"] = t.source_extension;
+    j["sourceColours"] = t.source_colours;
+  }
   return j;
 }
 
@@ -69,6 +74,19 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
 void read_mip(const JsonAt& at, TextureInfo& t) {
   if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
   if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPlanes);
+}
+
+void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
+  if (at.has("lossless")) t.lossless = at["lossless"].boolean();
+  if (t.lossless && (t.codec != Codec::kJpeg || t.mip > 0))
+    at["lossless"].fail("a full-size plane of codec jpeg", "another");
+  if (!at.has("source")) return;
+  t.source_extension = at["source"].text(100);
+  if (std::ranges::find(kSourceExtensions, t.source_extension) == std::end(kSourceExtensions))
+    at["source"].fail("jpg, png, tif, webp or exr", t.source_extension);
+  if (t.mip > 0) at["source"].fail("none, for a mip", t.source_extension);
+  t.source_colours = at["sourceColours"].boolean();
+  t.source.path = source_path(plane, t.source_extension);
 }
 
 /// Full-size planes first, then mips by (base, mip), each of its base's image and size.
@@ -116,6 +134,7 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
     t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(i));
   }
   read_mip(at, t);
+  read_source(at, plane, t);
   t.preview.path = preview_path(t.mip > 0 ? t.base : plane);
   t.tables.path = table_streams_path(plane);
   return t;
@@ -160,6 +179,7 @@ void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<Entr
     resolve(t.preview);
     resolve(t.tables);
     for (EntryRef& rung : t.rungs) resolve(rung);
+    if (!t.source_extension.empty()) resolve(t.source);
   }
 }
 

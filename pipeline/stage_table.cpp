@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stages/lossless_top.h"
+
 namespace texmesh {
 namespace {
 
@@ -83,8 +85,11 @@ StageOutputs run_zim(const StageInputs& in) {
 }
 
 StageOutputs run_ladder(const StageInputs& in) {
-  return with_notes(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
-                                  in.options.ladder, in.context));
+  const Fragments& fragments = in.get<Fragments>("fragmentation");
+  Ladder ladder = encode_ladder(fragments, in.get<Planes>("fill"), in.options.ladder, in.context);
+  if (in.options.ladder.lossless_top)
+    add_lossless_top(fragments, in.get<Images>("import.images"), ladder, in.context);
+  return with_notes(std::move(ladder));
 }
 
 StageOutputs run_lut(const StageInputs& in) {
@@ -203,7 +208,7 @@ std::vector<Stage> make_table() {
       {"ladder",
        kLadderVersion,
        "fragments -> rungs of streams in the chosen codec, previews",
-       {"fragmentation", "fill"},
+       {"fragmentation", "fill", "import.images"},
        {artefact<Ladder>("ladder")},
        {"ladder"},
        {"libjpeg-turbo", "libwebp"},

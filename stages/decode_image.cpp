@@ -333,6 +333,22 @@ const char* image_format_name(ImageFormat format) {
   return "";
 }
 
+const char* image_extension(ImageFormat format) {
+  switch (format) {
+    case ImageFormat::kJpeg:
+      return "jpg";
+    case ImageFormat::kPng:
+      return "png";
+    case ImageFormat::kTiff:
+      return "tif";
+    case ImageFormat::kWebp:
+      return "webp";
+    case ImageFormat::kExr:
+      return "exr";
+  }
+  return "";
+}
+
 std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> bytes) {
   auto has = [bytes](std::size_t at, std::string_view magic) {
     return bytes.size() >= at + magic.size() && !std::memcmp(bytes.data() + at, magic.data(), magic.size());
@@ -396,6 +412,11 @@ Pixels decode_image(const Image& image, FloatEncoding encoding) {
   Pixels pixels = decode_stored(image, encoding);
   if (profile && image.bits_per_channel <= 16) convert_to_srgb(*profile, pixels);
   return pixels;
+}
+
+bool changes_colours(const Image& image, FloatEncoding encoding) {
+  if (image.bits_per_channel > 16 || read_image_metadata(image.format, image.bytes).cmyk) return true;
+  return encoding == FloatEncoding::kSrgb && image.honour_profile && honoured_profile(image).has_value();
 }
 
 FloatPixels decode_float(const Image& image) {

@@ -43,6 +43,9 @@ std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> byte
 /// "JPEG", "PNG", "TIFF", "WebP", "EXR".
 const char* image_format_name(ImageFormat format);
 
+/// "jpg", "png", "tif", "webp", "exr".
+const char* image_extension(ImageFormat format);
+
 /// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and
 /// checks size and channels against the limits before any pixel is read. `name` is for messages. Throws
 /// InputError. Channels beyond the colour (depth, object ids in EXR and TIFF) are left out; CMYK becomes RGB,
@@ -56,6 +59,10 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
 /// run. Throws InputError when the file is truncated (with the row), lies about its size, or has a colour
 /// profile to be honoured that cannot be.
 Pixels decode_image(const Image& image, FloatEncoding encoding = FloatEncoding::kAsIs);
+
+/// Whether decode_image() gives other colours than the file's own numbers: CMYK, floats, or a profile that is
+/// honoured. Throws as decode_image.
+bool changes_colours(const Image& image, FloatEncoding encoding);
 
 /// Decodes without loss of range, for measured data such as range scans. Errors as decode_image.
 FloatPixels decode_float(const Image& image);

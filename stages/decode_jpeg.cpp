@@ -114,6 +114,18 @@ void cmyk_to_rgb(std::uint8_t* row, std::uint32_t width_px, bool inverted) {
   }
 }
 
+jvirt_barray_ptr* read_coefficients(Decoder& decoder) {
+  if (setjmp(decoder.escape)) return nullptr;
+  return jpeg_read_coefficients(&decoder.info);
+}
+
+/// Where a row of blocks is in memory; all of them are there at once.
+JBLOCKROW block_row(Decoder& decoder, jvirt_barray_ptr blocks, JDIMENSION row) {
+  if (setjmp(decoder.escape)) return nullptr;
+  auto* info = reinterpret_cast<j_common_ptr>(&decoder.info);
+  return *decoder.info.mem->access_virt_barray(info, blocks, row, 1, FALSE);
+}
+
 [[noreturn]] void fail(const std::string& name, const std::string& place, const Decoder& decoder) {
   throw InputError(name, place, "a JPEG that decodes", decoder.message[0] ? decoder.message : "no more data");
 }
@@ -148,6 +160,50 @@ void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
     row(buffer.data());
   }
   if (!finish(decoder)) fail(name, "end of the JPEG", decoder);
+}
+
+struct JpegCoefficients::State {
+  Decoder decoder;
+  jpeg_progress_mgr progress{};
+  std::vector<std::vector<JBLOCKROW>> rows;  // [component]
+};
+
+JpegCoefficients::JpegCoefficients(const std::string& name, std::span<const std::uint8_t> bytes)
+    : state_(std::make_unique<State>()) {
+  Decoder& decoder = state_->decoder;
+  open(decoder, state_->progress, bytes);
+  if (decoder.message[0]) fail(name, "JPEG header", decoder);
+  jvirt_barray_ptr* const blocks = read_coefficients(decoder);
+  if (!blocks) fail(name, "coefficients", decoder);
+  for (int c = 0; c < decoder.info.num_components; ++c) {
+    const jpeg_component_info& from = decoder.info.comp_info[c];
+    Component to;
+    to.across = static_cast<std::uint32_t>(from.h_samp_factor);
+    to.down = static_cast<std::uint32_t>(from.v_samp_factor);
+    to.blocks_across = from.width_in_blocks;
+    to.blocks_down = from.height_in_blocks;
+    if (!from.quant_table) fail(name, "quantisers", decoder);
+    for (std::size_t k = 0; k < 64; ++k) to.quantisers[k] = from.quant_table->quantval[k];
+    components_.push_back(to);
+    std::vector<JBLOCKROW>& rows = state_->rows.emplace_back();
+    for (JDIMENSION row = 0; row < from.height_in_blocks; ++row)
+      if (!rows.emplace_back(block_row(decoder, blocks[c], row))) fail(name, "coefficients", decoder);
+  }
+}
+
+JpegCoefficients::~JpegCoefficients() = default;
+
+std::uint32_t JpegCoefficients::width_px() const { return state_->decoder.info.image_width; }
+std::uint32_t JpegCoefficients::height_px() const { return state_->decoder.info.image_height; }
+bool JpegCoefficients::is_rgb() const { return state_->decoder.info.jpeg_color_space == JCS_RGB; }
+bool JpegCoefficients::is_plain() const {
+  const J_COLOR_SPACE space = state_->decoder.info.jpeg_color_space;
+  return space == JCS_GRAYSCALE || space == JCS_YCbCr || space == JCS_RGB;
+}
+
+const std::int16_t* JpegCoefficients::block(std::size_t component, std::uint32_t row,
+                                            std::uint32_t column) const {
+  return state_->rows[component][row][column];
 }
 
 }  // namespace texmesh

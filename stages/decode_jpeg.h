@@ -1,8 +1,11 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace texmesh {
 
@@ -21,5 +24,34 @@ JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_
 /// triangle-filter upsampling. Throws InputError when the data ends early or is corrupt.
 void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
                  const std::function<void(const std::uint8_t* pixels)>& row);
+
+/// The quantised coefficients of a JPEG, baseline or progressive: all that decoding to pixels starts from.
+/// Takes two bytes for every sample. Throws as decode_jpeg.
+class JpegCoefficients {
+ public:
+  struct Component {
+    std::uint32_t across = 1, down = 1;                // sampling factors
+    std::uint32_t blocks_across = 0, blocks_down = 0;  // that show something of the image
+    std::array<std::uint16_t, 64> quantisers{};        // row by row, as the coefficients of a block
+  };
+  JpegCoefficients(const std::string& name, std::span<const std::uint8_t> bytes);
+  ~JpegCoefficients();
+  JpegCoefficients(const JpegCoefficients&) = delete;
+  JpegCoefficients& operator=(const JpegCoefficients&) = delete;
+
+  std::uint32_t width_px() const;
+  std::uint32_t height_px() const;
+  bool is_rgb() const;  // three components that are not YCbCr
+  /// Grey, YCbCr or RGB: what a baseline JPEG without further markers can hold.
+  bool is_plain() const;
+  const std::vector<Component>& components() const { return components_; }
+  /// 64 coefficients, row by row. May be called by several threads.
+  const std::int16_t* block(std::size_t component, std::uint32_t row, std::uint32_t column) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+  std::vector<Component> components_;
+};
 
 }  // namespace texmesh

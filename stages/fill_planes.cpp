@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstring>
-#include <span>
 #include <string>
 
 #include "stages/fill_blocks.h"
@@ -257,10 +256,60 @@ std::size_t check_planes(const std::vector<TexturePlane>& planes, std::size_t im
   return full;
 }
 
-void decode_and_fill(std::span<const TexturePlane> planes, const std::vector<Image>& images, Fill fill,
-                     const RunContext& context, std::vector<Pixels>& out) {
+void check_coverage(const Pixels& pixels, const std::vector<std::uint8_t>& coverage) {
+  const std::size_t bytes = (std::size_t{pixels.width_px} + 7) / 8 * pixels.height_px;
+  if (coverage.size() != bytes || bytes == 0)
+    throw StageError("fragmentation", "coverage", std::to_string(bytes) + " bytes",
+                     std::to_string(coverage.size()));
+  if (pixels.channels != 1 && pixels.channels != 3)
+    throw StageError("fragmentation", "channels", "1 or 3", std::to_string(pixels.channels));
+}
+
+void push_pull(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
+  check_coverage(pixels, coverage);
+  if (pixels.channels == 1)
+    PushPull<1>(pixels, coverage, context).run();
+  else
+    PushPull<3>(pixels, coverage, context).run();
+}
+
+void flatten_where_covered(Pixels& pixels, const std::vector<std::uint8_t>& coverage,
+                           const RunContext& context) {
+  check_coverage(pixels, coverage);
+  if (std::ranges::any_of(coverage, [](std::uint8_t bits) { return bits != 0; }))
+    flatten_unseen(pixels, coverage, context);
+}
+
+/// A full-size plane and its mips. Each size is halved before its blocks are made flat, which would show as
+/// squares in the next one.
+void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::size_t first_mip,
+                Pixels pixels, Fill fill, const RunContext& context, std::vector<Pixels>& out) {
+  if (fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
+  for (std::size_t p = base, next = first_mip;; p = next++) {
+    const bool more = next < planes.size() && planes[next].mip > 0 && planes[next].base == base;
+    Pixels half =
+        more ? halved(pixels, planes[p].width_px, planes[p].height_px, halving_of(planes[next])) : Pixels{};
+    if (fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, context);
+    out[p] = padded(std::move(pixels), planes[p]);
+    if (!more) return;
+    pixels = std::move(half);
+  }
+}
+
+/// Where the mips of each full-size plane begin; the number of planes where it has none.
+std::vector<std::size_t> first_mips(const std::vector<TexturePlane>& planes, std::size_t full) {
+  std::vector<std::size_t> out(full, planes.size());
+  for (std::size_t p = full; p < planes.size(); ++p)
+    if (planes[p].mip == 1) out[planes[p].base] = p;
+  return out;
+}
+
+void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
+                     const std::vector<Image>& images, Fill fill, const RunContext& context,
+                     std::vector<Pixels>& out) {
+  const std::vector<std::size_t> mips = first_mips(planes, full);
   std::vector<std::size_t> starts;  // planes of one image stand together; each image is decoded once
-  for (std::size_t p = 0; p < planes.size(); ++p)
+  for (std::size_t p = 0; p < full; ++p)
     if (p == 0 || planes[p].image != planes[p - 1].image) starts.push_back(p);
   RunContext inner = context;
   inner.progress = nullptr;
@@ -269,14 +318,13 @@ void decode_and_fill(std::span<const TexturePlane> planes, const std::vector<Ima
     for (std::size_t s = begin; s < end; ++s) {
       const Image& image = images[planes[starts[s]].image];
       Pixels decoded = decode_for(image, planes[starts[s]]);
-      for (std::size_t p = starts[s]; p < planes.size() && planes[p].image == planes[starts[s]].image; ++p) {
+      for (std::size_t p = starts[s]; p < full && planes[p].image == planes[starts[s]].image; ++p) {
         if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
           throw StageError("fragmentation", image.name, "an alpha channel", "none");
-        const bool last = p + 1 == planes.size() || planes[p + 1].image != planes[p].image;
+        const bool last = p + 1 == full || planes[p + 1].image != planes[p].image;
         Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
                                                                       : channels_of(decoded, planes[p]);
-        if (fill == Fill::kPushPull) fill_uncovered(plane, planes[p].coverage, inner);
-        out[p] = padded(std::move(plane), planes[p]);
+        fill_chain(planes, p, mips[p], std::move(plane), fill, inner, out);
       }
     }
   });
@@ -285,18 +333,8 @@ void decode_and_fill(std::span<const TexturePlane> planes, const std::vector<Ima
 }  // namespace
 
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
-  const std::size_t bytes = (std::size_t{pixels.width_px} + 7) / 8 * pixels.height_px;
-  if (coverage.size() != bytes || bytes == 0)
-    throw StageError("fragmentation", "coverage", std::to_string(bytes) + " bytes",
-                     std::to_string(coverage.size()));
-  if (pixels.channels == 1)
-    PushPull<1>(pixels, coverage, context).run();
-  else if (pixels.channels == 3)
-    PushPull<3>(pixels, coverage, context).run();
-  else
-    throw StageError("fragmentation", "channels", "1 or 3", std::to_string(pixels.channels));
-  if (std::ranges::any_of(coverage, [](std::uint8_t bits) { return bits != 0; }))
-    flatten_unseen(pixels, coverage, context);
+  push_pull(pixels, coverage, context);
+  flatten_where_covered(pixels, coverage, context);
 }
 
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
@@ -304,19 +342,7 @@ std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Im
   const std::vector<TexturePlane>& planes = fragments.planes;
   const std::size_t full = check_planes(planes, images.size());
   std::vector<Pixels> out(planes.size());
-  decode_and_fill(std::span(planes).first(full), images, fill, context, out);
-  std::vector<std::size_t> chains;  // the first mip of each
-  for (std::size_t p = full; p < planes.size(); ++p)
-    if (planes[p].mip == 1) chains.push_back(p);
-  parallel_for(context, chains.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c) {
-      std::size_t finer = planes[chains[c]].base;
-      for (std::size_t p = chains[c]; p < planes.size() && (p == chains[c] || planes[p].mip > 1); finer = p++)
-        out[p] =
-            padded(halved(out[finer], planes[finer].width_px, planes[finer].height_px, halving_of(planes[p])),
-                   planes[p]);
-    }
-  });
+  decode_and_fill(planes, full, images, fill, context, out);
   return out;
 }
 

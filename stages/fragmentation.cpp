@@ -140,8 +140,8 @@ std::uint32_t mip_side(std::uint32_t side_px, std::uint32_t mip) {
 
 /// Appends the mips of all planes there are, and their uses.
 void list_mips(const std::vector<Image>& images, Fragments& out, std::vector<std::vector<Use>>& uses) {
-  constexpr std::uint32_t kMaxMip = 3, kLeastSidePx = 256;
-  constexpr std::uint64_t kPreviewTexels = 65536;  // of 1/8: about what 16 KB hold at quality 60
+  constexpr std::uint32_t kMaxMip = 3, kLeastSidePx = 128;
+  constexpr std::uint64_t kPreviewTexels = 32768;  // of 1/8: what 16 KB hold at quality 60, whatever it shows
   const std::size_t full = out.planes.size();
   for (std::size_t base = 0; base < full; ++base) {
     const Image& image = images[out.planes[base].image];

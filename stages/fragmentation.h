@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFragmentationVersion = 3;
+inline constexpr int kFragmentationVersion = 4;
 
 enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>
@@ -99,10 +99,10 @@ struct Fragments {
 /// Cuts the images that materials use into planes and fragments (thesis 3.2):
 /// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a
 /// note.
-/// - Mips: halves down to, and without, the size of the preview: 1/2 and 1/4, and 1/8 where the image has
-/// more
-///   than 2048 x 2048 texels (its preview is 1/16), each while its longer side has at least 256 texels. Below
-///   that a mip's tables cost more than it saves.
+/// - Mips: halves down to, and without, the size of the preview: 1/2 and 1/4, and 1/8 where that has more
+/// than
+///   32768 texels (the preview may be 1/16 then), each while its longer side has at least 128 texels. Below
+///   that all of a mip's finest rung is no more than its tables.
 /// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the
 /// image allows.
 /// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the
@@ -121,9 +121,9 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
 
 /// The pixels of every plane: decoded, uncovered texels filled, and extended to columns x fragment_width by
 /// rows x fragment_height: edges repeated to the end of their 16 x 16 block, flat blocks beyond (never seen,
-/// nearly free). A mip is the next finer plane, filled, halved (stages/halve_pixels.h). Derived data, never
-/// stored: zim, ladder and lut share one copy. Throws InputError for an image that does not decode,
-/// StageError for planes that do not fit the images or each other.
+/// nearly free). A mip is the next finer plane, filled smoothly, halved (stages/halve_pixels.h), its blocks
+/// made cheap in turn. Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for
+/// an image that does not decode, StageError for planes that do not fit the images or each other.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
                                 const RunContext& context);
 

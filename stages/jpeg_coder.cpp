@@ -92,11 +92,7 @@ constexpr std::size_t kBlockCoefficients = 64;
 
 /// No coefficient of 8-bit samples is larger than 1024 (DC; AC stay under 930) before it is quantised.
 unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
-  static constexpr std::array<std::uint8_t, kBlockCoefficients> kNatural{
-      0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,  12, 19, 26, 33, 40, 48,
-      41, 34, 27, 20, 13, 6,  7,  14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23,
-      30, 37, 44, 51, 58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
-  const unsigned q = quantisers.quantval[kNatural[zigzag]];
+  const unsigned q = quantisers.quantval[kNaturalOfZigzag[zigzag]];
   return (1024 + q / 2) / q;
 }
 

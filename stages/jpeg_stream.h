@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -7,6 +8,12 @@
 #include "stages/huffman_table.h"
 
 namespace texmesh {
+
+/// The place in an 8 x 8 block, row by row, of the k-th coefficient of a JPEG's order.
+inline constexpr std::array<std::uint8_t, 64> kNaturalOfZigzag{
+    0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,  12, 19, 26, 33, 40, 48,
+    41, 34, 27, 20, 13, 6,  7,  14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23,
+    30, 37, 44, 51, 58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
 
 /// Adds the symbols of `blocks` 8 x 8 blocks of entropy-coded baseline data without restart markers. Block b
 /// is coded with the DC table 2 t and the AC table 2 t + 1, t = mcu[b % mcu.size()]. FormatError when the

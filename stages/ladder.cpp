@@ -18,7 +18,7 @@ namespace {
 // Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (16
 // rungs gain 0.1 dB over 10).
 constexpr std::size_t kMaxRungs = 16;
-constexpr std::size_t kFragmentsPerTask = 4;
+constexpr std::size_t kFragmentsPerTask = 2;
 constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
 // Below that, scans' headers and tables cost more than refinement saves.
 constexpr std::uint32_t kLeastProgressiveSide = 256;
@@ -134,11 +134,11 @@ struct BoxSums {
   std::vector<std::uint16_t> sum, count;  // [box * channels + channel], [box]; 256 texels of 255 fit
 };
 
-BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height) {
-  BoxSums out{(width + 7) / 8, (height + 7) / 8, from.channels, {}, {}};
-  out.count.resize(std::size_t{out.width} * out.height);
-  out.sum.resize(out.count.size() * out.channels);
-  for (std::uint32_t y = 0; y < height; ++y) {
+/// The rows of boxes first .. last - 1.
+void add_rows_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height, std::size_t first,
+                       std::size_t last, BoxSums& out) {
+  const auto end = static_cast<std::uint32_t>(std::min<std::size_t>(8 * last, height));
+  for (auto y = static_cast<std::uint32_t>(8 * first); y < end; ++y) {
     const std::uint8_t* p = from.at(0, y);
     std::uint16_t* sum = out.sum.data() + std::size_t{y / 8} * out.width * out.channels;
     std::uint16_t* count = out.count.data() + std::size_t{y / 8} * out.width;
@@ -158,6 +158,16 @@ BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t hei
       }
     }
   }
+}
+
+BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height,
+                      const RunContext& context) {
+  BoxSums out{(width + 7) / 8, (height + 7) / 8, from.channels, {}, {}};
+  out.count.resize(std::size_t{out.width} * out.height);
+  out.sum.resize(out.count.size() * out.channels);
+  parallel_for(context, out.height, 8, [&](std::size_t begin, std::size_t end) {
+    add_rows_of_eight(from, width, height, begin, end, out);
+  });
   return out;
 }
 
@@ -188,7 +198,7 @@ Pixels means_of(const BoxSums& boxes) {
 }
 
 void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
-                    PlaneLadder& out) {
+                    const RunContext& context, PlaneLadder& out) {
   if (plane.mip > 0) return;  // its full-size plane's preview serves
   const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
   const auto encode = [&](const BoxSums& boxes) {
@@ -196,7 +206,7 @@ void encode_preview(const TexturePlane& plane, const Pixels& pixels, const Ladde
     out.preview_width_px = boxes.width;
     out.preview_height_px = boxes.height;
   };
-  const BoxSums eighth = sums_of_eight(pixels, plane.width_px, plane.height_px);
+  const BoxSums eighth = sums_of_eight(pixels, plane.width_px, plane.height_px, context);
   encode(eighth);
   if (out.preview.size() >= kPreviewLimitBytes) encode(sums_of_twice(eighth));
 }
@@ -326,13 +336,15 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
       out.rungs.push_back({rung.quality, std::move(rung.tables), {}, {0}});
     context.report(0.15 * static_cast<double>(p + 1) / static_cast<double>(planes));
   }
+  RunContext inner = context;
+  inner.progress = nullptr;
   parallel_for(context, planes, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p)
-      encode_preview(fragments.planes[p], pixels[p], options, ladder.planes[p]);
+      encode_preview(fragments.planes[p], pixels[p], options, inner, ladder.planes[p]);
   });
   context.report(0.2);
   encode_planes(fragments, pixels, codecs, ladder.planes, context);
-  drop_rungs_off_hull(fragments, pixels, options.hull_tolerance, ladder, context);
+  drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
   return ladder;
 }
 

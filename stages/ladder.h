@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 3;
+inline constexpr int kLadderVersion = 4;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>
@@ -31,7 +31,8 @@ struct LadderOptions {
   Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
   int training_fragments = 64;
   int preview_quality = 60;
-  double hull_tolerance = 0.1;
+  double hull_gain = 0.05;
+  bool lossless_top = false;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
@@ -47,10 +48,12 @@ struct LadderOptions {
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
-    v("hull_tolerance", s.hull_tolerance, Range{0.0, 1e9},
-      "a mip's rung is stored when its 1 - SSIM against the full size is at most 1 + this times the least "
+    v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
+      "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
       "that "
-      "all rungs and mips give for its bytes");
+      "rises by more than this share without it; -1 = store all");
+    v("lossless_top", s.lossless_top,
+      "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }
 };
 
@@ -65,15 +68,20 @@ struct LadderRung {
     a(s.quality, s.tables, s.data, s.offset);
   }
 };
+/// Whether the package holds the plane's source image as a file, and whether its colours are the plane's.
+enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
+
 struct PlaneLadder {
   Codec codec = Codec::kJpeg;
+  bool lossless = false;  // the last rung holds the coefficients of the source, see stages/lossless_top.h
+  SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
   std::vector<std::uint8_t>
       preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB; mips have none
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.codec, s.rungs, s.preview, s.preview_width_px, s.preview_height_px);
+    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px);
   }
 };
 struct Ladder {

@@ -5,6 +5,7 @@
 
 #include "format/layout.h"
 #include "format/viewing.h"
+#include "stages/decode_image.h"
 
 namespace texmesh {
 namespace {
@@ -170,6 +171,9 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.preview_width_px = base.preview_width_px;
   t.preview_height_px = base.preview_height_px;
   for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
+  t.lossless = ladder.lossless;
+  if (ladder.source != SourceFile::kNone) t.source_extension = image_extension(images[plane.image].format);
+  t.source_colours = ladder.source != SourceFile::kOtherColours;
   return t;
 }
 
@@ -239,6 +243,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
     const std::size_t base = plane.mip > 0 ? plane.base : p;
     textures.push_back(describe_texture(plane, ladder.planes[p], ladder.planes[base], images));
     add_texture_entries(ladder.planes[p], tables.planes[p], p, entries);
+    if (const std::string& extension = textures.back().source_extension; !extension.empty())
+      entries.push_back({source_path(static_cast<std::uint32_t>(p), extension), images[plane.image].bytes});
   }
   context.check_cancelled();
   std::vector<std::uint8_t> package = write_package(manifest, std::move(textures), entries);

@@ -191,31 +191,58 @@ void keep_rungs(const std::vector<RungPair>& pairs, const std::vector<std::uint8
   plane.rungs = std::move(rungs);
 }
 
+/// Takes mips' vertices off the hull as long as it hardly rises without them.
+void thin_hull(const std::vector<RungPair>& pairs, double gain, std::vector<std::size_t>& hull) {
+  for (;;) {
+    std::size_t least = 0;
+    double least_rise = gain;
+    for (std::size_t k = 1; k + 1 < hull.size(); ++k) {
+      const RungPair& pair = pairs[hull[k]];
+      if (pair.level == 0 || pair.loss <= 0) continue;
+      const double rise = hull_loss(pairs, {hull[k - 1], hull[k + 1]}, pair.bytes) / pair.loss - 1;
+      if (rise < least_rise || (rise == least_rise && least == 0)) least = k, least_rise = rise;
+    }
+    if (least == 0) return;
+    hull.erase(hull.begin() + static_cast<std::ptrdiff_t>(least));
+  }
+}
+
+/// The level's pair whose loss is the least multiple of the hull's.
+std::size_t nearest_of_level(const std::vector<RungPair>& pairs, const std::vector<std::size_t>& hull,
+                             std::size_t level) {
+  std::size_t nearest = pairs.size();
+  double least = 0;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (pairs[k].level != level) continue;
+    const double best = hull_loss(pairs, hull, pairs[k].bytes);
+    const double excess = pairs[k].loss <= best ? 1
+                          : best > 0            ? pairs[k].loss / best
+                                                : std::numeric_limits<double>::infinity();
+    if (nearest == pairs.size() || excess < least) nearest = k, least = excess;
+  }
+  return nearest;
+}
+
 }  // namespace
 
-std::vector<std::uint8_t> near_hull(const std::vector<RungPair>& pairs, double tolerance) {
-  std::vector<std::uint8_t> keep(pairs.size());
-  if (pairs.empty()) return keep;
+std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, double gain) {
+  std::vector<std::uint8_t> keep(pairs.size(), gain < 0);
+  if (pairs.empty() || gain < 0) return keep;
   const std::vector<std::size_t> hull = hull_of(pairs);
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  std::vector<double> excess(pairs.size());
+  std::vector<std::size_t> thinned = hull;
+  thin_hull(pairs, gain, thinned);
+  for (const std::size_t k : thinned) keep[k] = 1;
   std::size_t levels = 0;
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const double best = hull_loss(pairs, hull, pairs[k].bytes);
-    excess[k] = pairs[k].loss <= best ? 1 : best > 0 ? pairs[k].loss / best : kNever;
-    keep[k] = excess[k] <= 1 + tolerance;
-    levels = std::max(levels, pairs[k].level + 1);
-  }
+  for (const RungPair& pair : pairs) levels = std::max(levels, pair.level + 1);
   for (std::size_t level = 0; level < levels; ++level) {
-    std::size_t nearest = pairs.size();
     bool any = false;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       if (pairs[k].level != level) continue;
       if (level == 0) keep[k] = 1;
       any = any || keep[k];
-      if (nearest == pairs.size() || excess[k] < excess[nearest]) nearest = k;
     }
-    if (!any && nearest < pairs.size()) keep[nearest] = 1;
+    const std::size_t nearest = any ? pairs.size() : nearest_of_level(pairs, hull, level);
+    if (nearest < pairs.size()) keep[nearest] = 1;
   }
   return keep;
 }
@@ -260,7 +287,7 @@ std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vecto
   return pairs;
 }
 
-void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double tolerance,
+void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double gain,
                          Ladder& ladder, const RunContext& context) {
   RunContext inner = context;
   inner.progress = nullptr;
@@ -269,7 +296,7 @@ void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& 
     const std::vector<std::size_t> chain = chain_of(fragments, base);
     if (chain.size() == 1) continue;
     const std::vector<RungPair> pairs = measure_pairs(fragments, pixels, ladder, base, inner);
-    const std::vector<std::uint8_t> keep = near_hull(pairs, tolerance);
+    const std::vector<std::uint8_t> keep = worth_storing(pairs, gain);
     for (std::size_t level = 0; level < chain.size(); ++level)
       keep_rungs(pairs, keep, level, ladder.planes[chain[level]]);
   }

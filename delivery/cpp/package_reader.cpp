@@ -183,6 +183,13 @@ const TextureInfo& PackageReader::texture(std::uint32_t plane) {
 
 Bytes PackageReader::preview(std::uint32_t plane) { return read_all(texture(plane).preview); }
 
+Bytes PackageReader::source(std::uint32_t plane) {
+  const TextureInfo& info = texture(plane);
+  if (info.source_extension.empty())
+    throw FormatError(store_->name(), plane_place(plane), "a source image in the package", "none");
+  return read_all(info.source);
+}
+
 Bytes PackageReader::table_stream(std::uint32_t plane, std::uint32_t rung) {
   const TextureInfo& info = texture(plane);
   const PlaneTables& t = tables().planes[plane];

@@ -64,6 +64,8 @@ class PackageReader {
   /// with store() or entry(kSplitStreamPath).
   SplitStreamHead split_stream_head();
   std::vector<std::uint8_t> preview(std::uint32_t plane);
+  /// The plane's source image as it was; FormatError when the package does not keep it as a file.
+  std::vector<std::uint8_t> source(std::uint32_t plane);
   std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);
   /// Where a fragment's stream stands within its rung's entry; bytes 0 = not stored.
   ByteRange fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);

@@ -19,12 +19,17 @@ namespace texmesh {
 namespace {
 
 /// Shorter names of options that people type often.
-const std::map<std::string, std::string> kShortNames{
-    {"ladder.rungs", "--rungs"},        {"ladder.subsampling", "--subsampling"},
-    {"ladder.mode", "--ladder"},        {"scales.mesh_codec", "--mesh-codec"},
-    {"fragmentation.fill", "--fill"},   {"lut.allocate", "--allocate"},
-    {"perceptual_values.jnd", "--jnd"}, {"simplification.order", "--order"},
-    {"package.title", "--title"},       {"import.up", "--up"}};
+const std::map<std::string, std::string> kShortNames{{"ladder.rungs", "--rungs"},
+                                                     {"ladder.subsampling", "--subsampling"},
+                                                     {"ladder.mode", "--ladder"},
+                                                     {"scales.mesh_codec", "--mesh-codec"},
+                                                     {"fragmentation.fill", "--fill"},
+                                                     {"lut.allocate", "--allocate"},
+                                                     {"perceptual_values.jnd", "--jnd"},
+                                                     {"simplification.order", "--order"},
+                                                     {"package.title", "--title"},
+                                                     {"import.up", "--up"},
+                                                     {"ladder.lossless_top", "--lossless-top"}};
 
 struct CompileArguments {
   std::vector<std::string> inputs, layers;
@@ -52,7 +57,14 @@ void add_stage_options(CLI::App& app, CompileArguments& args) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
     std::string names = "--" + f.path();
-    if (const auto it = kShortNames.find(f.path()); it != kShortNames.end()) names += "," + it->second;
+    const auto it = kShortNames.find(f.path());
+    if (it != kShortNames.end() &&
+        std::holds_alternative<bool*>(f.value))  // a flag, and the long one with a value
+      app.add_flag_callback(
+             it->second, [&args, path = f.path()] { args.options[path] = "true"; }, f.help)
+          ->group("Stage " + f.stage);
+    else if (it != kShortNames.end())
+      names += "," + it->second;
     app.add_option_function<std::string>(
            names, [&args, path = f.path()](const std::string& v) { args.options[path] = v; }, help_of(f))
         ->group("Stage " + f.stage)

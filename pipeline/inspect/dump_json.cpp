@@ -50,6 +50,8 @@ Json summary_json(PackageReader& p) {
                         {"channels", t.channels},
                         {"fragments", stored_fragments(p.tables().planes[k])},
                         {"rungs", t.rungs.size()}});
+    if (t.lossless) textures.back()["lossless"] = true;
+    if (!t.source_extension.empty()) textures.back()["source"] = t.source.path;
   }
   Json stream = Json::array();
   if (m.stream)

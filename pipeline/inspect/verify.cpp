@@ -182,6 +182,8 @@ class Verifier {
       guarded("entry-read", e.path, [&] { check_texture_entry(e, name); });
     } else if (name.kind == EntryKind::kSplitStream) {
       guarded("split-stream", e.path, [&] { check_split_stream(manifest_, read(e), context_, findings_); });
+    } else if (name.kind == EntryKind::kSource) {
+      guarded("source", e.path, [&] { check_source_entry(e, name); });
     } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
       findings_.require(manifest_.minor > kFormatMinor, "entry-unknown", e.path, "",
                         "an entry that format " + std::to_string(kFormatMajor) + "." +
@@ -230,6 +232,15 @@ class Verifier {
         return;
       check_rung_entry(info, t, name, bytes);
     }
+  }
+
+  void check_source_entry(const EntryRef& e, const EntryName& name) {
+    Bytes bytes = read(e);
+    if (!textures_) return;
+    const bool named =
+        name.number < textures_->size() && (*textures_)[name.number].source_extension == name.extension;
+    if (findings_.require(named, "entry-set", e.path, "", "to be named by textures.json", "not there"))
+      check_source((*textures_)[name.number], std::move(bytes), findings_);
   }
 
   void check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name, Bytes bytes) {

@@ -54,6 +54,9 @@ void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> 
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 
+/// The source image that a plane keeps: of that format and the plane's size, and it decodes.
+void check_source(const TextureInfo& texture, std::vector<std::uint8_t> bytes, Findings& findings);
+
 /// The table streams of all rungs: each as the codec has it, of the size the tables say.
 void check_table_streams(const TextureInfo& texture, const PlaneTables& tables,
                          std::span<const std::uint8_t> pack, Findings& findings);

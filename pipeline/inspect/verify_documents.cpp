@@ -6,6 +6,7 @@
 #include "format/layout.h"
 #include "pipeline/inspect/text_table.h"
 #include "pipeline/inspect/verify_checks.h"
+#include "stages/lossless_top.h"
 
 namespace texmesh {
 namespace {
@@ -169,10 +170,13 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     const std::string name = rungs_option(textures[k]);
     const auto rungs = option("ladder", name.c_str());
     if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
-    for (const int q : textures[k].rung_quality)
+    for (const int q : textures[k].rung_quality) {
+      // No option asks for the rung without loss; one of 100 below it has made room.
+      if (textures[k].lossless && q >= kLosslessQuality - 1) continue;
       findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), "provenance", kProvenancePath,
                        "/options/ladder/" + name,
                        "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());
+    }
   }
 }
 

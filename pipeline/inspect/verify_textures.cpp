@@ -7,6 +7,7 @@
 #include "format/sha256.h"
 #include "pipeline/inspect/text_table.h"
 #include "pipeline/inspect/verify_checks.h"
+#include "stages/decode_image.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
 #include "stages/texture_codec.h"
@@ -172,6 +173,23 @@ void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpe
                          std::to_string(p.channels) + " channels");
   } catch (const Error& e) {
     findings.add("preview", texture.preview.path, e.place(), e.expected(), e.found());
+  }
+}
+
+void check_source(const TextureInfo& texture, std::vector<std::uint8_t> bytes, Findings& findings) {
+  try {
+    const Image image = probe_image(texture.source.path, std::move(bytes), {});
+    findings.require(image_extension(image.format) == texture.source_extension &&
+                         image.width_px == texture.width_px && image.height_px == texture.height_px &&
+                         image.channels >= texture.channels,
+                     "source", texture.source.path, "",
+                     texture.source_extension + " of " + std::to_string(texture.width_px) + " x " +
+                         std::to_string(texture.height_px) + " px",
+                     std::string(image_extension(image.format)) + " of " + std::to_string(image.width_px) +
+                         " x " + std::to_string(image.height_px) + " px");
+    decode_image(image);
+  } catch (const Error& e) {
+    findings.add("source", texture.source.path, e.place(), e.expected(), e.found());
   }
 }
 

@@ -3,7 +3,9 @@
 //   ladder_figures_bench --time PX                a made texture of PX by PX: time and memory
 // Without images: made textures. Sizes are percent: the ladder's rung, table stream included, over one
 // whole-image file with standard Huffman tables (aim: at most 100 at every rung) and over one with optimised
-// tables (aim: at most 102 with 256 px, 105 with 128 px from quality 20 on).
+// tables (aim: at most 102 with 256 px, 105 with 128 px from quality 20 on), and, as the third line, what
+// fragments of the same coefficients take of the latter with the best tables there can be: what is above 100
+// there is the price of cutting, mostly DC steps from the end of a row to the next one's begin.
 #include <malloc.h>
 #include <sys/resource.h>
 
@@ -20,6 +22,7 @@
 #include <jpeglib.h>
 
 #include "stages/ladder.h"
+#include "stages/lossless_top.h"
 
 namespace texmesh {
 namespace {
@@ -109,8 +112,14 @@ Scene make_scene(Pixels image, std::uint32_t side) {
   return scene;
 }
 
-/// Plain libjpeg as any program calls it: one file. Returns its bytes.
-std::size_t plain_encode(const Pixels& pixels, int quality, bool optimised) {
+RunContext threads(int count) {
+  RunContext context;
+  context.threads = count;
+  return context;
+}
+
+/// Plain libjpeg as any program calls it: one file.
+std::vector<std::uint8_t> plain_file(const Pixels& pixels, int quality, bool optimised) {
   jpeg_compress_struct info;
   jpeg_error_mgr errors;
   info.err = jpeg_std_error(&errors);
@@ -132,14 +141,20 @@ std::size_t plain_encode(const Pixels& pixels, int quality, bool optimised) {
   }
   jpeg_finish_compress(&info);
   jpeg_destroy_compress(&info);
+  std::vector<std::uint8_t> file(out, out + size);
   std::free(out);
-  return size;
+  return file;
 }
 
-RunContext threads(int count) {
-  RunContext context;
-  context.threads = count;
-  return context;
+std::size_t plain_encode(const Pixels& pixels, int quality, bool optimised) {
+  return plain_file(pixels, quality, optimised).size();
+}
+
+/// The least that any tables make of fragments with the file's coefficients: tables made for exactly them.
+std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlane& plane) {
+  std::string why_not;
+  const auto rung = cut_coefficients(plane, probe_image("whole", file, {}), why_not, threads(2));
+  return rung ? rung->data.size() + rung->tables.size() : 0;
 }
 
 double percent(std::size_t part, std::size_t whole) {
@@ -153,22 +168,25 @@ void print_sizes(const std::string& name, const Scene& scene) {
   std::printf("%s: %zu fragments of %u px\n  quality      ", name.c_str(), plane.fragment_count(),
               plane.fragment_width_px);
   std::string over_plain = "\n  % of standard ", over_optimised = "\n  % of optimised";
+  std::string least = "\n  least possible";
   std::size_t ours_sum = 0, plain_sum = 0;
   for (const LadderRung& rung : ladder.planes[0].rungs) {
     const std::size_t ours = rung.data.size() + rung.tables.size();
     const std::size_t plain = plain_encode(scene.pixels[0], rung.quality, false);
-    char text[2][16];
+    const std::vector<std::uint8_t> optimised = plain_file(scene.pixels[0], rung.quality, true);
+    char text[3][16];
     std::snprintf(text[0], sizeof text[0], "%7.2f", percent(ours, plain));
-    std::snprintf(text[1], sizeof text[1], "%7.2f",
-                  percent(ours, plain_encode(scene.pixels[0], rung.quality, true)));
+    std::snprintf(text[1], sizeof text[1], "%7.2f", percent(ours, optimised.size()));
+    std::snprintf(text[2], sizeof text[2], "%7.2f", percent(least_bytes(optimised, plane), optimised.size()));
     over_plain += text[0];
     over_optimised += text[1];
+    least += text[2];
     std::printf(" %6d", rung.quality);
     ours_sum += ours;
     plain_sum += plain;
   }
-  std::printf("%s%s\n  all rungs: %.2f %% of standard files\n", over_plain.c_str(), over_optimised.c_str(),
-              percent(ours_sum, plain_sum));
+  std::printf("%s%s%s\n  all rungs: %.2f %% of standard files\n", over_plain.c_str(), over_optimised.c_str(),
+              least.c_str(), percent(ours_sum, plain_sum));
 }
 
 void print_memory(const Scene& scene, int count) {

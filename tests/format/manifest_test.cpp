@@ -385,9 +385,13 @@ TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
   const EntryName file = parse_entry_path(fragment_file_path(1, 2, 33));
   EXPECT_EQ(file.kind, EntryKind::kFragmentFile);
   EXPECT_EQ(file.fragment, 33u);
-  for (const char* other :
-       {"mesh/s7.glb", "mesh/s007.glb", "mesh/s07.glbx", "preview/1.jpg", "texture/01/r00.pack",
-        "texture/0/r0.pack", "texture/0/rx.pack", "texture/99999999999/r00.pack", "a", ""})
+  const EntryName source = parse_entry_path(source_path(7, "webp"));
+  EXPECT_EQ(source.kind, EntryKind::kSource);
+  EXPECT_EQ(source.number, 7u);
+  EXPECT_EQ(source.extension, "webp");
+  for (const char* other : {"source/7.png", "source/007.gif", "source/007.", "mesh/s7.glb", "mesh/s007.glb",
+                            "mesh/s07.glbx", "preview/1.jpg", "texture/01/r00.pack", "texture/0/r0.pack",
+                            "texture/0/rx.pack", "texture/99999999999/r00.pack", "a", ""})
     EXPECT_EQ(parse_entry_path(other).kind, EntryKind::kOther) << other;
 }
 

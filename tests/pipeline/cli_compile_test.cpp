@@ -123,6 +123,28 @@ TEST_F(CompileCommand, FlagsAndProfileMeanTheSame) {
   EXPECT_NE(by_profile, package_);
 }
 
+TEST_F(CompileCommand, TheLosslessTopKeepsTheSource) {
+  const std::string kept = compile({"--no-cache", "--lossless-top"});
+  EXPECT_EQ(kept, compile({"--no-cache", "--ladder.lossless_top", "true", "--jobs", "1"}));
+  EXPECT_GT(kept.size(), package_.size());
+  write_text(folder_ / "kept.texmesh", kept);
+  const CommandResult verified = texmesh({"verify", folder_ / "kept.texmesh"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.output << verified.errors;
+  const CommandResult dumped = texmesh({"dump", folder_ / "kept.texmesh", "ladder"});
+  EXPECT_TRUE(dumped.output.find("lossless") != std::string::npos ||
+              dumped.output.find("the source as it was") != std::string::npos)
+      << dumped.output;
+  for (const std::string fragments : {"packs", "files"}) {
+    const std::string tree = folder_ / ("tree-" + fragments);
+    std::vector<std::string> unpack{"unpack", folder_ / "kept.texmesh", "-o", tree};
+    if (fragments == "files") unpack.insert(unpack.end(), {"--fragments", "files"});
+    EXPECT_EQ(texmesh(unpack).exit_code, 0);
+    EXPECT_EQ(texmesh({"verify", tree}).exit_code, 0);
+    EXPECT_EQ(texmesh({"pack", tree, "-o", folder_ / (fragments + ".texmesh")}).exit_code, 0);
+    EXPECT_EQ(read_text(folder_ / (fragments + ".texmesh")), kept);
+  }
+}
+
 TEST_F(CompileCommand, EventsAreJsonWithModelAndSummary) {
   const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--json", "--no-cache"});
   std::istringstream in(r.output);

@@ -7,6 +7,7 @@
 #include "format/layout.h"
 #include "pipeline/inspect/verify.h"
 #include "stages/jpeg.h"
+#include "tests/support/images.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {
@@ -205,6 +206,27 @@ TEST(Verify, Bootstrap) {
 TEST(Verify, EntryUnknown) {
   EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.streams["extra.bin"] = Bytes(5, 1); }),
                            "entry-unknown", "extra.bin"));
+}
+
+void keep_source(PackageParts& p, const Bytes& image) {
+  p.textures[0].source_extension = "png";
+  p.streams[source_path(0, "png")] = image;
+}
+
+TEST(Verify, Source) {
+  EXPECT_EQ(
+      all_of(verify(built_with([](PackageParts& p) { keep_source(p, testing::png_bytes(64, 48, 3)); }))), "");
+  const std::string path = source_path(0, "png");
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { keep_source(p, testing::png_bytes(64, 47, 3)); }),
+                           "source", path));
+  EXPECT_TRUE(catches_only(
+      built_with([](PackageParts& p) { keep_source(p, testing::jpeg_bytes(64, 48, 3)); }), "source", path));
+  Bytes cut = testing::png_bytes(64, 48, 3);
+  cut.resize(cut.size() / 2);
+  EXPECT_TRUE(catches_only(built_with([&](PackageParts& p) { keep_source(p, cut); }), "source", path));
+  EXPECT_TRUE(catches_only(
+      built_with([](PackageParts& p) { p.streams[source_path(0, "png")] = testing::png_bytes(64, 48, 3); }),
+      "entry-set", path));
 }
 
 TEST(Verify, References) {

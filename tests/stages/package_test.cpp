@@ -278,6 +278,33 @@ TEST(Package, HundredsOfPlanesWithMipsStillBootstrapInOneRead) {
   EXPECT_EQ(m.previews.size(), kMaxManifestPreviews);
 }
 
+TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {
+  Inputs inputs(2);
+  inputs.images[0].bytes = {1, 2, 3};
+  inputs.images[0].format = ImageFormat::kTiff;
+  inputs.ladder.planes[0].source = SourceFile::kOtherColours;
+  inputs.ladder.planes[1].lossless = true;
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  EXPECT_TRUE(m.required_features.empty());
+  auto textures = read_textures(part(package, m.textures));
+  const std::vector<EntryRef> index = read_index(part(package, m.index));
+  resolve_textures(textures, index);
+  EXPECT_EQ(textures[0].source.path, "source/000.tif");
+  EXPECT_FALSE(textures[0].source_colours);
+  EXPECT_FALSE(textures[0].lossless);
+  EXPECT_TRUE(textures[1].lossless);
+  EXPECT_EQ(textures[1].source_extension, "");
+  EXPECT_EQ(part(package, textures[0].source), (Bytes{1, 2, 3}));
+  EXPECT_EQ(index[index.size() - 2].path, "source/000.tif");
+  EXPECT_EQ(index.back().path, kProvenancePath);
+  // Where readers of 1.0 look for what they do not know: on the page that belongs to no plane.
+  const Bytes bytes = part(package, m.index);
+  const IndexHead head = read_index_head(bytes);
+  const auto page = read_index_page(head, 0, std::span(bytes).subspan(head.bytes, head.pages[0].bytes));
+  EXPECT_TRUE(std::ranges::any_of(page, [](const EntryRef& e) { return e.path == "source/000.tif"; }));
+}
+
 TEST(Package, NamesFromTheSourceAreMadeSafe) {
   Inputs inputs(1);
   inputs.images[0].name = "a\xff\x1b[2J\xc3\xa4\xed\xa0\x80" + std::string(300, 'x');

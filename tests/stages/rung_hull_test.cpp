@@ -13,38 +13,43 @@ namespace {
 
 using Keep = std::vector<std::uint8_t>;
 
-TEST(NearHull, NothingIsKeptOfNothing) { EXPECT_TRUE(near_hull({}, 0.1).empty()); }
+TEST(WorthStoring, NothingOfNothing) { EXPECT_TRUE(worth_storing({}, 0).empty()); }
 
-TEST(NearHull, KeepsWhatNoMixtureOfOthersBeats) {
+TEST(WorthStoring, WhatNoMixtureOfOthersBeats) {
   const std::vector<RungPair> pairs{{0, 0, 100, 0.8}, {0, 1, 400, 0.1}, {0, 2, 1000, 0.0},
                                     {1, 0, 50, 0.5},  {1, 1, 90, 0.3},  {1, 2, 300, 0.29}};
-  EXPECT_EQ(near_hull(pairs, 0), (Keep{1, 1, 1, 1, 1, 0}));
+  EXPECT_EQ(worth_storing(pairs, 0), (Keep{1, 1, 1, 1, 1, 0}));
+  EXPECT_EQ(worth_storing(pairs, -1), (Keep{1, 1, 1, 1, 1, 1}));
 }
 
-TEST(NearHull, ToleranceLetsNeighboursOfTheHullIn) {
-  // At 200 bytes the hull between (90, 0.3) and (400, 0.1) is 0.229: 1.1 times that is above 0.25, 1.05 times
-  // is below it.
-  const std::vector<RungPair> pairs{{0, 0, 400, 0.1}, {0, 1, 1000, 0}, {1, 0, 90, 0.3}, {1, 1, 200, 0.25}};
-  EXPECT_EQ(near_hull(pairs, 0.05), (Keep{1, 1, 1, 0}));
-  EXPECT_EQ(near_hull(pairs, 0.10), (Keep{1, 1, 1, 1}));
+TEST(WorthStoring, NotWhatTheHullHardlyRisesWithout) {
+  // At 200 bytes the hull between (100, 0.3) and (400, 0.1) is 0.2333: 1.0606 times 0.22.
+  const std::vector<RungPair> pairs{{0, 0, 400, 0.1}, {0, 1, 1000, 0}, {1, 0, 100, 0.3}, {1, 1, 200, 0.22}};
+  EXPECT_EQ(worth_storing(pairs, 0.06), (Keep{1, 1, 1, 1}));
+  EXPECT_EQ(worth_storing(pairs, 0.061), (Keep{1, 1, 1, 0}));
 }
 
-TEST(NearHull, FullSizeKeepsEveryRung) {
+TEST(WorthStoring, TheLeastGoesFirstAndMakesItsNeighboursWorthMore) {
+  // The pair of 300 bytes is worth 0.9 %, that of 200 bytes 10 %, but 16 % when the other is gone.
+  const std::vector<RungPair> pairs{
+      {0, 0, 500, 0.1}, {0, 1, 1000, 0}, {1, 0, 100, 0.4}, {1, 1, 200, 0.28}, {1, 2, 300, 0.218}};
+  EXPECT_EQ(worth_storing(pairs, 0), (Keep{1, 1, 1, 1, 1}));
+  EXPECT_EQ(worth_storing(pairs, 0.12), (Keep{1, 1, 1, 1, 0}));
+  EXPECT_EQ(worth_storing(pairs, 0.17), (Keep{1, 1, 1, 0, 0}));
+}
+
+TEST(WorthStoring, FullSizeKeepsEveryRung) {
   const std::vector<RungPair> pairs{{0, 0, 100, 0.9}, {0, 1, 200, 0.2}, {0, 2, 300, 0.199},
                                     {0, 3, 900, 0},   {1, 0, 50, 0.5},  {1, 1, 60, 0.49}};
-  EXPECT_EQ(near_hull(pairs, 0), (Keep{1, 1, 1, 1, 1, 0}));
+  EXPECT_EQ(worth_storing(pairs, 0), (Keep{1, 1, 1, 1, 1, 0}));
+  EXPECT_EQ(worth_storing(pairs, 1e9), (Keep{1, 1, 1, 1, 1, 0}));
 }
 
-TEST(NearHull, EveryPlaneKeepsARung) {
+TEST(WorthStoring, EveryPlaneKeepsARung) {
   const std::vector<RungPair> pairs{{0, 0, 10, 0.1}, {0, 1, 20, 0}, {1, 0, 15, 0.4}, {1, 1, 30, 0.3}};
-  const Keep keep = near_hull(pairs, 0);
+  const Keep keep = worth_storing(pairs, 0);
   EXPECT_EQ(keep[0] + keep[1], 2);
   EXPECT_EQ(keep[2] + keep[3], 1);
-}
-
-TEST(NearHull, PairsEqualToOneOnTheHullAreOnIt) {
-  const std::vector<RungPair> pairs{{0, 0, 10, 0.5}, {0, 1, 20, 0.1}, {1, 0, 10, 0.5}, {1, 1, 20, 0.1}};
-  EXPECT_EQ(near_hull(pairs, 0), (Keep{1, 1, 1, 1}));
 }
 
 /// A full-size plane of 512 x 384 px and its mip, in fragments of 64 px.
@@ -88,16 +93,16 @@ Chain make_chain(bool noise, bool with_mip = true) {
   return out;
 }
 
-Ladder encode(const Chain& chain, double tolerance, int threads = 1, LadderMode mode = LadderMode::kJpeg) {
+Ladder encode(const Chain& chain, double gain, int threads = 1, LadderMode mode = LadderMode::kJpeg) {
   LadderOptions options;
   options.mode = mode;
-  options.hull_tolerance = tolerance;
+  options.hull_gain = gain;
   RunContext context;
   context.threads = threads;
   return encode_ladder(chain.fragments, chain.pixels, options, context);
 }
 
-constexpr double kKeepAll = 1e9;
+constexpr double kKeepAll = -1;
 
 TEST(RungHull, LossFallsAlongTheFullSizeAndBytesAreWhatIsStored) {
   const Chain chain = make_chain(false);
@@ -146,7 +151,7 @@ TEST(RungHull, WithoutMipsNothingIsDropped) {
 
 TEST(RungHull, SameForAnyNumberOfThreads) {
   const Chain chain = make_chain(false);
-  const Ladder one = encode(chain, 0.1, 1), many = encode(chain, 0.1, 8);
+  const Ladder one = encode(chain, 0.01, 1), many = encode(chain, 0.01, 8);
   for (std::size_t p = 0; p < 2; ++p) {
     ASSERT_EQ(one.planes[p].rungs.size(), many.planes[p].rungs.size());
     for (std::size_t r = 0; r < one.planes[p].rungs.size(); ++r)
@@ -160,7 +165,7 @@ TEST(RungHull, APlaneWithoutCoveredFragmentsKeepsARung) {
     std::fill(plane.coverage.begin(), plane.coverage.end(), std::uint8_t{0});
     std::fill(plane.covered_texels.begin(), plane.covered_texels.end(), 0u);
   }
-  const Ladder ladder = encode(chain, 0.1);
+  const Ladder ladder = encode(chain, 0.01);
   for (const PlaneLadder& plane : ladder.planes) EXPECT_GE(plane.rungs.size(), 1u);
 }
 
