@@ -28,6 +28,7 @@ const common = {
   format: 'esm',
   target: 'es2022',
   minify: true,
+  mangleProps: /_$/, // private members, which nobody else names
   sourcemap: true,
   external: ['three', 'three/*'],
   logLevel: 'warning',

@@ -62,12 +62,14 @@ export interface LoadOptions {
 /** Phases of a load, in their order. */
 export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
 
-/** A decision of the plan for one fragment; sent when it is taken and again when its transfer has ended. */
+/** A decision of the plan for a fragment or some neighbours; sent when it is taken and again when its transfer has ended. */
 export interface DecisionEvent {
   /** k = 1 .. n */
   position: number;
   plane: number;
+  /** The first, and all: neighbours of one rung are fetched together where a request takes longer than its bytes. */
   fragment: number;
+  fragments: number[];
   eta: number;
   /** -1: skipped */
   rung: number;

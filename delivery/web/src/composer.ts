@@ -16,37 +16,69 @@ function glTextureOf(renderer: WebGLRenderer, texture: Texture): WebGLTexture {
 
 const gl2 = (renderer: WebGLRenderer): WebGL2RenderingContext => renderer.getContext() as WebGL2RenderingContext;
 
-/** Runs `draw` with `from` to be read and `to` to be drawn to, and leaves the renderer's state as it was. */
-function withFramebuffers(
-  renderer: WebGLRenderer,
-  from: WebGLTexture,
-  to: WebGLTexture | undefined,
-  draw: (gl: WebGL2RenderingContext) => void,
-): void {
-  const gl = gl2(renderer);
-  const targets = [gl.READ_FRAMEBUFFER, gl.DRAW_FRAMEBUFFER] as const;
-  const before = [gl.READ_FRAMEBUFFER_BINDING, gl.DRAW_FRAMEBUFFER_BINDING].map(
-    (name) => gl.getParameter(name) as WebGLFramebuffer | null,
-  );
-  const scissor = gl.isEnabled(gl.SCISSOR_TEST);
-  if (scissor) gl.disable(gl.SCISSOR_TEST);
-  const buffers = [from, to].map((texture, i) => {
-    if (!texture) return null;
-    const buffer = gl.createFramebuffer();
-    gl.bindFramebuffer(targets[i], buffer);
-    gl.framebufferTexture2D(targets[i], gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    return buffer;
-  });
-  try {
+/** A level of a GPU texture. */
+interface Level {
+  texture: WebGLTexture;
+  level: number;
+}
+/** x0, y0, x1, y1 */
+type Rect = readonly [number, number, number, number];
+interface Copy {
+  from: Level;
+  to: Level;
+  source: Rect;
+  target: Rect;
+}
+
+/** Copies between textures on the GPU, and leaves the renderer's state as it was. */
+export class Blitter {
+  private readonly buffers_: (WebGLFramebuffer | null)[];
+  constructor(readonly renderer: WebGLRenderer) {
+    const gl = gl2(renderer);
+    this.buffers_ = [gl.createFramebuffer(), gl.createFramebuffer()];
+  }
+  /** Runs `draw` with framebuffers of its own to attach textures to. */
+  private with_(draw: (gl: WebGL2RenderingContext) => void): void {
+    const gl = gl2(this.renderer);
+    const targets = [gl.READ_FRAMEBUFFER, gl.DRAW_FRAMEBUFFER] as const;
+    const before = [gl.READ_FRAMEBUFFER_BINDING, gl.DRAW_FRAMEBUFFER_BINDING].map(
+      (name) => gl.getParameter(name) as WebGLFramebuffer | null,
+    );
+    const scissor = gl.isEnabled(gl.SCISSOR_TEST);
+    if (scissor) gl.disable(gl.SCISSOR_TEST);
+    targets.forEach((target, i) => gl.bindFramebuffer(target, this.buffers_[i]));
     draw(gl);
-  } finally {
+    for (const target of targets) gl.framebufferTexture2D(target, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, null, 0);
     targets.forEach((target, i) => gl.bindFramebuffer(target, before[i]));
-    buffers.forEach((buffer) => gl.deleteFramebuffer(buffer));
     if (scissor) gl.enable(gl.SCISSOR_TEST);
+  }
+  /** Copies rectangles one after the other, each scaled bilinearly. */
+  copy(copies: readonly Copy[]): void {
+    this.with_((gl) => {
+      for (const { from, to, source, target } of copies) {
+        gl.framebufferTexture2D(gl.READ_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, from.texture, from.level);
+        gl.framebufferTexture2D(gl.DRAW_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, to.texture, to.level);
+        gl.blitFramebuffer(...source, ...target, gl.COLOR_BUFFER_BIT, gl.LINEAR);
+      }
+    });
+  }
+  read(texture: WebGLTexture, width: number, height: number): Uint8Array {
+    const pixels = new Uint8Array(4 * width * height);
+    this.with_((gl) => {
+      gl.framebufferTexture2D(gl.READ_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    });
+    return pixels;
+  }
+  dispose(): void {
+    for (const buffer of this.buffers_) gl2(this.renderer).deleteFramebuffer(buffer);
   }
 }
 
 const mipmapped = (texture: Texture): boolean => texture.minFilter > 1006; // behind NearestFilter 1003, LinearFilter 1006
+
+/** Levels that come with every fragment; the others, 1/256 of the whole and less, are made of the last of them. */
+export const ownLevels = 5;
 
 /**
  * One texture of the model: fragments are uploaded into it where they belong, and materials use views of it, which
@@ -58,12 +90,14 @@ export class PlaneComposer implements ComposedPlane {
   readonly role: string;
   readonly widthPx: number;
   readonly heightPx: number;
-  private readonly views: FramebufferTexture[] = [];
-  private readonly storages = new Set<WebGLTexture>();
-  private readonly stale = new Set<WebGLTexture>();
+  private readonly views_: FramebufferTexture[] = [];
+  private readonly storages_ = new Set<WebGLTexture>();
+  private readonly stale_ = new Set<WebGLTexture>();
+  /** Every pixel is something: fragments may come. */
+  filled = false;
 
   constructor(
-    private readonly renderer: WebGLRenderer,
+    private readonly blitter_: Blitter,
     readonly info: TextureInfo,
     readonly base: number,
     readonly plane: number,
@@ -76,13 +110,13 @@ export class PlaneComposer implements ComposedPlane {
   }
 
   get textures(): readonly Texture[] {
-    return this.views;
+    return this.views_;
   }
 
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture {
     const texture = new FramebufferTexture(this.widthPx, this.heightPx);
-    if (this.views.length > 0) texture.source = this.views[0].source;
+    if (this.views_.length > 0) texture.source = this.views_[0].source;
     for (const name of ['name', 'channel', 'wrapS', 'wrapT', 'magFilter', 'minFilter', 'anisotropy', 'rotation'] as const)
       (texture as unknown as Record<string, unknown>)[name] = old[name];
     texture.colorSpace = this.info.colourSpace === 'srgb' ? 'srgb' : '';
@@ -92,46 +126,40 @@ export class PlaneComposer implements ComposedPlane {
     texture.matrixAutoUpdate = old.matrixAutoUpdate;
     texture.matrix.copy(old.matrix);
     texture.flipY = false;
-    const storage = glTextureOf(this.renderer, texture);
-    const first = this.views[0];
-    this.views.push(texture);
-    if (!this.storages.has(storage)) {
-      this.storages.add(storage);
-      if (first) this.blit(glTextureOf(this.renderer, first), this.widthPx, this.heightPx, [storage]);
+    const storage = glTextureOf(this.renderer_, texture);
+    const [first] = this.storages_;
+    this.views_.push(texture);
+    if (this.storages_.has(storage)) return texture;
+    this.storages_.add(storage);
+    if (first && this.filled) {
+      this.fillFrom_(first, this.widthPx, this.heightPx, storage);
     }
     return texture;
   }
+  private get renderer_(): WebGLRenderer {
+    return this.blitter_.renderer;
+  }
 
-  /** Fills the whole of it with another picture of the same image, scaled bilinearly: a preview or a coarser plane. */
-  fillFrom(texture: Texture, widthPx: number, heightPx: number): void {
-    this.blit(glTextureOf(this.renderer, texture), widthPx, heightPx, [...this.storages]);
-    this.updateMips();
+  /** Fills the whole with a coarser plane of the same image, scaled bilinearly. */
+  fillFrom(coarser: PlaneComposer): void {
+    const [from] = coarser.storages_;
+    if (from) for (const to of this.storages_) this.fillFrom_(from, coarser.widthPx, coarser.heightPx, to);
+    this.filled = true;
   }
-  fillFromBitmap(bitmap: ImageBitmap): void {
-    const { state } = this.renderer;
-    const gl = gl2(this.renderer);
-    const texture = gl.createTexture();
-    state.bindTexture(gl.TEXTURE_2D, texture as WebGLTexture);
-    this.unpackAsIs(gl);
-    const format = this.info.colourSpace === 'srgb' ? gl.SRGB8_ALPHA8 : gl.RGBA8;
-    gl.texImage2D(gl.TEXTURE_2D, 0, format, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
-    this.blit(texture as WebGLTexture, bitmap.width, bitmap.height, [...this.storages]);
-    state.unbindTexture();
-    gl.deleteTexture(texture);
-    this.updateMips();
+  /** The same with a texture of three's. */
+  fillFromTexture(texture: Texture, widthPx: number, heightPx: number): void {
+    for (const to of this.storages_) this.fillFrom_(glTextureOf(this.renderer_, texture), widthPx, heightPx, to);
+    this.filled = true;
   }
-  private blit(from: WebGLTexture, widthPx: number, heightPx: number, to: WebGLTexture[]): void {
-    for (const storage of to) {
-      withFramebuffers(this.renderer, from, storage, (gl) =>
-        gl.blitFramebuffer(
-          0, 0, widthPx, heightPx, 0, 0, this.widthPx, this.heightPx, gl.COLOR_BUFFER_BIT, gl.LINEAR,
-        ),
-      );
-      this.stale.add(storage);
-    }
+  private fillFrom_(from: WebGLTexture, widthPx: number, heightPx: number, to: WebGLTexture): void {
+    const target: Rect = [0, 0, this.widthPx, this.heightPx];
+    this.blitter_.copy([
+      { from: { texture: from, level: 0 }, to: { texture: to, level: 0 }, source: [0, 0, widthPx, heightPx], target },
+    ]);
+    this.halve_(to, 0);
   }
-  private unpackAsIs(gl: WebGL2RenderingContext): void {
+
+  private unpackAsIs_(gl: WebGL2RenderingContext): void {
     gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
@@ -139,51 +167,67 @@ export class PlaneComposer implements ComposedPlane {
   }
 
   /** A fragment's pixels go where they belong; what reaches beyond the image is left out. */
-  upload(bitmap: ImageBitmap, fragment: number, rung: number): void {
+  uploadFragment(levels: readonly ImageBitmap[], fragment: number, rung: number): void {
     const { columns, fragmentWidthPx, fragmentHeightPx } = this.info;
     const x = (fragment % columns) * fragmentWidthPx;
     const y = Math.floor(fragment / columns) * fragmentHeightPx;
-    const width = Math.min(fragmentWidthPx, this.widthPx - x);
-    const height = Math.min(fragmentHeightPx, this.heightPx - y);
-    const gl = gl2(this.renderer);
-    for (const storage of this.storages) {
-      this.renderer.state.bindTexture(gl.TEXTURE_2D, storage);
-      this.unpackAsIs(gl);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-      this.stale.add(storage);
-    }
+    this.upload(levels, x, y);
     this.rungs[fragment] = rung;
   }
+  /** Pixels at a place of level 0 (multiples of 16), and the same in the levels below it. */
+  upload(levels: readonly ImageBitmap[], x: number, y: number): void {
+    const gl = gl2(this.renderer_);
+    for (const storage of this.storages_) {
+      this.renderer_.state.bindTexture(gl.TEXTURE_2D, storage);
+      this.unpackAsIs_(gl);
+      levels.forEach((bitmap, level) => {
+        if (level > 0 && (level >= this.levels_ || !this.views_.some(mipmapped))) return;
+        const [left, top] = [x >> level, y >> level];
+        const width = Math.min(bitmap.width, (this.widthPx >> level) - left);
+        const height = Math.min(bitmap.height, (this.heightPx >> level) - top);
+        if (width > 0 && height > 0)
+          gl.texSubImage2D(gl.TEXTURE_2D, level, left, top, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+      });
+      this.stale_.add(storage);
+    }
+  }
 
-  /** Smaller mip levels follow what has been uploaded. */
+  /** Makes the levels behind one, each of the one before. */
+  private halve_(storage: WebGLTexture, from: number): void {
+    const side = (px: number, level: number): number => Math.max(1, px >> level);
+    const rect = (level: number): Rect => [0, 0, side(this.widthPx, level), side(this.heightPx, level)];
+    const copies: Copy[] = [];
+    for (let level = from + 1; level < this.levels_; ++level)
+      copies.push({
+        from: { texture: storage, level: level - 1 },
+        to: { texture: storage, level },
+        source: rect(level - 1),
+        target: rect(level),
+      });
+    if (copies.length > 0 && this.views_.some(mipmapped)) this.blitter_.copy(copies);
+  }
+  private get levels_(): number {
+    return 32 - Math.clz32(Math.max(this.widthPx, this.heightPx));
+  }
+  /** The smallest levels follow what has been uploaded. */
   updateMips(): void {
-    const gl = gl2(this.renderer);
-    if (this.views.some(mipmapped))
-      for (const storage of this.stale) {
-        this.renderer.state.bindTexture(gl.TEXTURE_2D, storage);
-        gl.generateMipmap(gl.TEXTURE_2D);
-      }
-    this.stale.clear();
+    for (const storage of this.stale_) this.halve_(storage, ownLevels - 1);
+    this.stale_.clear();
   }
   get mipsAreStale(): boolean {
-    return this.stale.size > 0;
+    return this.stale_.size > 0;
   }
 
   /** RGBA bytes, row 0 at the top. */
   read(): Uint8Array {
-    const pixels = new Uint8Array(4 * this.widthPx * this.heightPx);
-    const [storage] = this.storages;
-    if (storage)
-      withFramebuffers(this.renderer, storage, undefined, (gl) =>
-        gl.readPixels(0, 0, this.widthPx, this.heightPx, gl.RGBA, gl.UNSIGNED_BYTE, pixels),
-      );
-    return pixels;
+    const [storage] = this.storages_;
+    return storage ? this.blitter_.read(storage, this.widthPx, this.heightPx) : new Uint8Array(0);
   }
 
   dispose(): void {
-    for (const view of this.views) view.dispose();
-    this.views.length = 0;
-    this.storages.clear();
-    this.stale.clear();
+    for (const view of this.views_) view.dispose();
+    this.views_.length = 0;
+    this.storages_.clear();
+    this.stale_.clear();
   }
 }

@@ -1,15 +1,15 @@
 /** Listeners by name; one that throws does not keep the others from hearing. */
 export class Emitter<Events> {
-  private readonly listeners = new Map<keyof Events, Set<(event: never) => void>>();
+  private readonly listeners_ = new Map<keyof Events, Set<(event: never) => void>>();
 
   on<K extends keyof Events>(name: K, listener: (event: Events[K]) => void): () => void {
-    const set = this.listeners.get(name) ?? new Set();
-    this.listeners.set(name, set.add(listener as (event: never) => void));
+    const set = this.listeners_.get(name) ?? new Set();
+    this.listeners_.set(name, set.add(listener as (event: never) => void));
     return () => set.delete(listener as (event: never) => void);
   }
   /** Every event gets the time. */
   emit<K extends keyof Events>(name: K, event: Omit<Events[K], 'at'>): void {
-    for (const listener of this.listeners.get(name) ?? []) {
+    for (const listener of this.listeners_.get(name) ?? []) {
       try {
         listener({ ...event, at: performance.now() } as never);
       } catch (error) {
@@ -18,6 +18,6 @@ export class Emitter<Events> {
     }
   }
   clear(): void {
-    this.listeners.clear();
+    this.listeners_.clear();
   }
 }

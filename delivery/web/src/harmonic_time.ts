@@ -132,66 +132,66 @@ const highest = (f: FragmentOffer): number => Math.min(f.highRung ?? anyRung, f.
 export class HarmonicTimePlan {
   /** Decisions so far, skipped fragments included. */
   readonly steps: HtcStep[] = [];
-  private readonly throughput: Throughput;
-  private readonly harmonic: number[];
-  private readonly credits: { value: number; issued: number }[] = [];
-  private readonly sorted: number[];
-  private readonly stepOfOffer: number[];
-  private readonly taken: boolean[];
-  private left = 0;
-  private right: number;
-  private readonly mean: number;
-  private plannedTotal = 0;
-  private plannedLeft = 0;
-  private smallestLeft = 0;
-  private price0 = 0;
-  private priceTotal = 0;
-  private priceDone = 0;
-  private readonly priceBytes: number[] = [];
-  private inFlight = 0;
-  private inFlightBytes = 0;
-  private lastDoneS = 0;
-  private unspent = 0;
+  private readonly throughput_: Throughput;
+  private readonly harmonic_: number[];
+  private readonly credits_: { value: number; issued: number }[] = [];
+  private readonly sorted_: number[];
+  private readonly stepOfOffer_: number[];
+  private readonly taken_: boolean[];
+  private left_ = 0;
+  private right_: number;
+  private readonly mean_: number;
+  private plannedTotal_ = 0;
+  private plannedLeft_ = 0;
+  private smallestLeft_ = 0;
+  private price0_ = 0;
+  private priceTotal_ = 0;
+  private priceDone_ = 0;
+  private readonly priceBytes_: number[] = [];
+  private inFlight_ = 0;
+  private inFlightBytes_ = 0;
+  private lastDoneS_ = 0;
+  private unspent_ = 0;
 
   /** The list is taken by falling eta (ties: index). RangeError for values out of range. */
   constructor(
     readonly offers: readonly FragmentOffer[],
-    private readonly options: HtcOptions,
+    private readonly options_: HtcOptions,
   ) {
-    check(offers, options);
+    check(offers, options_);
     const n = offers.length;
-    this.throughput = new Throughput(options.throughput);
-    this.harmonic = new Array<number>(n + 2).fill(0);
-    for (let i = 1; i < n + 2; ++i) this.harmonic[i] = this.harmonic[i - 1] + 1 / i;
-    this.sorted = offers.map((_, i) => i).sort((a, b) => offers[b].eta - offers[a].eta);
-    this.stepOfOffer = new Array<number>(n).fill(n);
-    this.taken = new Array<boolean>(n).fill(false);
-    this.right = n;
-    this.mean = meanFragment(offers);
+    this.throughput_ = new Throughput(options_.throughput);
+    this.harmonic_ = new Array<number>(n + 2).fill(0);
+    for (let i = 1; i < n + 2; ++i) this.harmonic_[i] = this.harmonic_[i - 1] + 1 / i;
+    this.sorted_ = offers.map((_, i) => i).sort((a, b) => offers[b].eta - offers[a].eta);
+    this.stepOfOffer_ = new Array<number>(n).fill(n);
+    this.taken_ = new Array<boolean>(n).fill(false);
+    this.right_ = n;
+    this.mean_ = meanFragment(offers);
     for (const f of offers) {
-      this.plannedTotal += f.plannedBytes;
-      this.smallestLeft += f.bytes[lowest(f, options.hardLimits)];
+      this.plannedTotal_ += f.plannedBytes;
+      this.smallestLeft_ += f.bytes[lowest(f, options_.hardLimits)];
     }
-    this.plannedLeft = this.plannedTotal;
-    if (options.policy === 'price') this.planPrices();
+    this.plannedLeft_ = this.plannedTotal_;
+    if (options_.policy === 'price') this.planPrices_();
   }
 
   get allIssued(): boolean {
     return this.steps.length === this.offers.length;
   }
   get finished(): boolean {
-    return this.allIssued && this.inFlight === 0;
+    return this.allIssued && this.inFlight_ === 0;
   }
   /** Pi: T_0 less the time taken. Once finished. */
   get surplusS(): number {
-    return this.options.timeLimitS - this.lastDoneS;
+    return this.options_.timeLimitS - this.lastDoneS_;
   }
   get unspentS(): number {
-    return this.unspent;
+    return this.unspent_;
   }
   /** A limit under 30 round trips cannot be met well. */
   get tooShortForRtt(): boolean {
-    return this.options.timeLimitS < 30 * this.options.rttS;
+    return this.options_.timeLimitS < 30 * this.options_.rttS;
   }
   /** Chosen rung by offer; -1 skipped or not decided. */
   rungs(): number[] {
@@ -201,10 +201,10 @@ export class HarmonicTimePlan {
   }
 
   // The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
-  private planPrices(): void {
-    const budget = this.options.timeLimitS * this.options.throughput.initialBytesS;
+  private planPrices_(): void {
+    const budget = this.options_.timeLimitS * this.options_.throughput.initialBytesS;
     const rungBytes = (f: FragmentOffer, price: number): number => {
-      const rung = this.cheapestRungOf(f, price, true, budget);
+      const rung = this.cheapestRungOf_(f, price, true, budget);
       return rung < 0 ? 0 : f.bytes[rung];
     };
     const bytesAt = (price: number): number => {
@@ -219,25 +219,25 @@ export class HarmonicTimePlan {
       if (bytesAt(exp(middle)) > budget) low = middle;
       else high = middle;
     }
-    this.price0 = exp(high);
+    this.price0_ = exp(high);
     for (const f of this.offers) {
-      this.priceBytes.push(rungBytes(f, this.price0));
-      this.priceTotal += this.priceBytes[this.priceBytes.length - 1];
+      this.priceBytes_.push(rungBytes(f, this.price0_));
+      this.priceTotal_ += this.priceBytes_[this.priceBytes_.length - 1];
     }
   }
 
   throughputBytesS(): number {
     // With several requests in flight completions come in bunches: only sums over some of them say anything.
-    if (this.options.window !== 1 && this.options.throughput.estimator === 'last')
-      return this.throughput.recentBytesS(windowSamples);
-    return this.throughput.bytesS();
+    if (this.options_.window !== 1 && this.options_.throughput.estimator === 'last')
+      return this.throughput_.recentBytesS(windowSamples);
+    return this.throughput_.bytesS();
   }
 
-  private windowOpen(): boolean {
-    if (this.options.window > 0) return this.inFlight < this.options.window;
-    if (this.inFlight < 2) return true;
-    if (this.inFlight >= this.options.maxInFlight) return false;
-    return this.inFlightBytes < windowFactor * this.throughput.recentBytesS(windowSamples) * this.options.rttS;
+  private windowOpen_(): boolean {
+    if (this.options_.window > 0) return this.inFlight_ < this.options_.window;
+    if (this.inFlight_ < 2) return true;
+    if (this.inFlight_ >= this.options_.maxInFlight) return false;
+    return this.inFlightBytes_ < windowFactor * this.throughput_.recentBytesS(windowSamples) * this.options_.rttS;
   }
 
   /**
@@ -245,119 +245,119 @@ export class HarmonicTimePlan {
    * issue now (wait for a completion) or at all. `nowS` >= 0 counts from the first request.
    */
   next(nowS: number): HtcStep | undefined {
-    while (!this.allIssued && this.windowOpen()) {
+    while (!this.allIssued && this.windowOpen_()) {
       const position = this.steps.length + 1;
-      const creditS = this.creditAt(position);
-      const offer = this.chooseOffer(creditS);
+      const creditS = this.creditAt_(position);
+      const offer = this.chooseOffer_(creditS);
       const f = this.offers[offer];
-      const thetaS = this.thetaOf(offer) + creditS;
+      const thetaS = this.thetaOf_(offer) + creditS;
       const throughputBytesS = this.throughputBytesS();
-      const targetBytes = this.targetOf(offer, thetaS, nowS);
-      const rung = this.rungOf(offer, targetBytes, nowS);
+      const targetBytes = this.targetOf_(offer, thetaS, nowS);
+      const rung = this.rungOf_(offer, targetBytes, nowS);
       const step: HtcStep = {
         position, offer, rung, bytes: rung < 0 ? 0 : f.bytes[rung], creditS, thetaS, targetBytes, throughputBytesS,
         issuedS: nowS, doneS: -1, spacingS: 0, residualS: 0,
       };
-      this.take(offer);
-      this.stepOfOffer[offer] = this.steps.length;
+      this.take_(offer);
+      this.stepOfOffer_[offer] = this.steps.length;
       this.steps.push(step);
       if (rung < 0) {
         // No transfer: it takes no time and says nothing of the link.
         step.doneS = nowS;
         step.residualS = step.thetaS;
-        this.spread(step.residualS);
+        this.spread_(step.residualS);
         continue;
       }
-      ++this.inFlight;
-      this.inFlightBytes += step.bytes;
+      ++this.inFlight_;
+      this.inFlightBytes_ += step.bytes;
       return step;
     }
     return undefined;
   }
 
-  private chooseOffer(credit: number): number {
-    const inOrder = this.options.policy === 'price';
-    if (this.steps.length === 0 && !inOrder) return this.mean;
+  private chooseOffer_(credit: number): number {
+    const inOrder = this.options_.policy === 'price';
+    if (this.steps.length === 0 && !inOrder) return this.mean_;
     let finest = true;
-    if (!inOrder && this.options.order === 'credit') finest = credit <= 0;
-    if (!inOrder && this.options.order === 'beta0')
-      finest = this.throughputBytesS() <= this.options.throughput.initialBytesS;
-    let { left, right } = this;
-    while (left < right && this.taken[this.sorted[left]]) ++left;
-    while (left < right && this.taken[this.sorted[right - 1]]) --right;
-    return this.sorted[finest ? left : right - 1];
+    if (!inOrder && this.options_.order === 'credit') finest = credit <= 0;
+    if (!inOrder && this.options_.order === 'beta0')
+      finest = this.throughputBytesS() <= this.options_.throughput.initialBytesS;
+    let { left_: left, right_: right } = this;
+    while (left < right && this.taken_[this.sorted_[left]]) ++left;
+    while (left < right && this.taken_[this.sorted_[right - 1]]) --right;
+    return this.sorted_[finest ? left : right - 1];
   }
 
-  private take(offer: number): void {
+  private take_(offer: number): void {
     const f = this.offers[offer];
-    this.taken[offer] = true;
-    while (this.left < this.right && this.taken[this.sorted[this.left]]) ++this.left;
-    while (this.left < this.right && this.taken[this.sorted[this.right - 1]]) --this.right;
-    this.plannedLeft -= f.plannedBytes;
-    this.smallestLeft -= f.bytes[lowest(f, this.options.hardLimits)];
-    if (this.priceBytes.length > 0) this.priceDone += this.priceBytes[offer];
+    this.taken_[offer] = true;
+    while (this.left_ < this.right_ && this.taken_[this.sorted_[this.left_]]) ++this.left_;
+    while (this.left_ < this.right_ && this.taken_[this.sorted_[this.right_ - 1]]) --this.right_;
+    this.plannedLeft_ -= f.plannedBytes;
+    this.smallestLeft_ -= f.bytes[lowest(f, this.options_.hardLimits)];
+    if (this.priceBytes_.length > 0) this.priceDone_ += this.priceBytes_[offer];
   }
 
-  private thetaOf(offer: number): number {
-    return this.options.timeLimitS * (this.offers[offer].plannedBytes / this.plannedTotal);
+  private thetaOf_(offer: number): number {
+    return this.options_.timeLimitS * (this.offers[offer].plannedBytes / this.plannedTotal_);
   }
 
   // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
-  private creditAt(position: number): number {
+  private creditAt_(position: number): number {
     let credit = 0;
-    for (const c of this.credits) credit += c.value / (position - c.issued + 1);
+    for (const c of this.credits_) credit += c.value / (position - c.issued + 1);
     return credit;
   }
 
-  private spread(residualS: number): void {
+  private spread_(residualS: number): void {
     const issued = this.steps.length;
     const left = this.offers.length - issued;
     if (left === 0) {
-      this.unspent += residualS;
+      this.unspent_ += residualS;
       return;
     }
-    const zeta = this.harmonic[left + 1] - 1; // 1/2 + ... + 1/(left + 1)
-    this.credits.push({ value: residualS / zeta, issued });
+    const zeta = this.harmonic_[left + 1] - 1; // 1/2 + ... + 1/(left + 1)
+    this.credits_.push({ value: residualS / zeta, issued });
   }
 
   /** What a plan in proportion to the planned sizes gives, as a factor of them. */
-  private proportionalShare(nowS: number, samples: number): number {
-    const beta = samples ? this.throughput.recentBytesS(samples) : this.throughputBytesS();
-    const room = beta * (this.options.timeLimitS - nowS) - this.inFlightBytes;
-    return Math.max(0, room) / Math.max(this.plannedLeft, 1);
+  private proportionalShare_(nowS: number, samples: number): number {
+    const beta = samples ? this.throughput_.recentBytesS(samples) : this.throughputBytesS();
+    const room = beta * (this.options_.timeLimitS - nowS) - this.inFlightBytes_;
+    return Math.max(0, room) / Math.max(this.plannedLeft_, 1);
   }
 
-  private targetOf(offer: number, thetaS: number, nowS: number): number {
+  private targetOf_(offer: number, thetaS: number, nowS: number): number {
     const f = this.offers[offer];
-    const { policy } = this.options;
+    const { policy } = this.options_;
     if (policy === 'static' || policy === 'price') return f.plannedBytes;
-    if (policy === 'proportional') return f.plannedBytes * this.proportionalShare(nowS, 0);
+    if (policy === 'proportional') return f.plannedBytes * this.proportionalShare_(nowS, 0);
     if (this.steps.length === 0) return f.plannedBytes; // F-bar has the quality Q_i
     // Alone in flight it has to wait for a round trip first.
-    const wait = this.options.window === 1 ? this.options.rttS : 0;
+    const wait = this.options_.window === 1 ? this.options_.rttS : 0;
     const target = this.throughputBytesS() * (thetaS - wait);
     if (policy === 'htc') return target;
-    const even = f.plannedBytes * this.proportionalShare(nowS, guardSamples);
-    return clamp(target, even / this.options.guard, even * this.options.guard);
+    const even = f.plannedBytes * this.proportionalShare_(nowS, guardSamples);
+    return clamp(target, even / this.options_.guard, even * this.options_.guard);
   }
 
-  private maySkip(nowS: number): boolean {
-    if (this.options.hardLimits) return false;
-    if (this.options.policy === 'htc' || this.options.policy === 'static') return true;
-    const room = this.throughput.recentBytesS(windowSamples) * (this.options.timeLimitS - nowS);
-    return this.smallestLeft > room - this.inFlightBytes;
+  private maySkip_(nowS: number): boolean {
+    if (this.options_.hardLimits) return false;
+    if (this.options_.policy === 'htc' || this.options_.policy === 'static') return true;
+    const room = this.throughput_.recentBytesS(windowSamples) * (this.options_.timeLimitS - nowS);
+    return this.smallestLeft_ > room - this.inFlightBytes_;
   }
 
-  private rungOf(offer: number, target: number, nowS: number): number {
+  private rungOf_(offer: number, target: number, nowS: number): number {
     const f = this.offers[offer];
-    const skip = this.maySkip(nowS);
-    if (this.options.policy !== 'price') return this.nearestRungOf(f, target, skip);
-    const room = this.throughput.recentBytesS(windowSamples) * (this.options.timeLimitS - nowS);
-    return this.cheapestRungOf(f, this.priceAt(nowS), skip, Math.max(0, lateFactor * room - this.inFlightBytes));
+    const skip = this.maySkip_(nowS);
+    if (this.options_.policy !== 'price') return this.nearestRungOf_(f, target, skip);
+    const room = this.throughput_.recentBytesS(windowSamples) * (this.options_.timeLimitS - nowS);
+    return this.cheapestRungOf_(f, this.priceAt_(nowS), skip, Math.max(0, lateFactor * room - this.inFlightBytes_));
   }
 
-  private nearestRungOf(f: FragmentOffer, target: number, maySkip: boolean): number {
-    const low = lowest(f, this.options.hardLimits);
+  private nearestRungOf_(f: FragmentOffer, target: number, maySkip: boolean): number {
+    const low = lowest(f, this.options_.hardLimits);
     let best = maySkip ? -1 : low;
     let distance = Math.abs(target - (best < 0 ? 0 : f.bytes[best]));
     for (let r = low; r <= highest(f); ++r) {
@@ -370,8 +370,8 @@ export class HarmonicTimePlan {
     return best;
   }
 
-  private cheapestRungOf(f: FragmentOffer, price: number, maySkip: boolean, mostBytes: number): number {
-    const low = lowest(f, this.options.hardLimits);
+  private cheapestRungOf_(f: FragmentOffer, price: number, maySkip: boolean, mostBytes: number): number {
+    const low = lowest(f, this.options_.hardLimits);
     let best = maySkip ? -1 : low;
     let cost = maySkip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
     for (let r = low; r <= highest(f); ++r) {
@@ -385,41 +385,41 @@ export class HarmonicTimePlan {
     return best;
   }
 
-  private priceAt(nowS: number): number {
-    const limit = this.options.timeLimitS;
-    const plannedS = this.priceTotal > 0 ? limit * (this.priceDone / this.priceTotal) : 0;
+  private priceAt_(nowS: number): number {
+    const limit = this.options_.timeLimitS;
+    const plannedS = this.priceTotal_ > 0 ? limit * (this.priceDone_ / this.priceTotal_) : 0;
     // What is in flight has been issued but not paid for yet.
-    const lag = nowS - (plannedS - this.inFlightBytes / this.throughputBytesS());
+    const lag = nowS - (plannedS - this.inFlightBytes_ / this.throughputBytesS());
     const left = Math.max(limit - nowS, 1e-3 * limit);
-    return this.price0 * exp(clamp((this.options.priceKappa * lag) / left, -largestExponent, largestExponent));
+    return this.price0_ * exp(clamp((this.options_.priceKappa * lag) / left, -largestExponent, largestExponent));
   }
 
   /** The request for this offer has ended. Completions may come in any order; times must not fall. */
   completed(offer: number, nowS: number): void {
-    this.finish(this.stepOf(offer), nowS, true);
+    this.finish_(this.stepOf_(offer), nowS, true);
   }
   /** The request failed and was given up: its time is spent, its fragment counts as skipped. */
   failed(offer: number, nowS: number): void {
-    const step = this.stepOf(offer);
-    this.finish(step, nowS, false);
+    const step = this.stepOf_(offer);
+    this.finish_(step, nowS, false);
     step.rung = -1;
   }
-  private stepOf(offer: number): HtcStep {
-    const step = this.steps[this.stepOfOffer[offer]];
+  private stepOf_(offer: number): HtcStep {
+    const step = this.steps[this.stepOfOffer_[offer]];
     require(step !== undefined, 'HarmonicTimePlan: not issued');
     return step;
   }
 
-  private finish(step: HtcStep, nowS: number, sample: boolean): void {
-    require(step.doneS < 0 && nowS >= this.lastDoneS, 'HarmonicTimePlan: completed twice, or time runs back');
+  private finish_(step: HtcStep, nowS: number, sample: boolean): void {
+    require(step.doneS < 0 && nowS >= this.lastDoneS_, 'HarmonicTimePlan: completed twice, or time runs back');
     step.doneS = nowS;
-    step.spacingS = nowS - this.lastDoneS;
+    step.spacingS = nowS - this.lastDoneS_;
     step.residualS = step.thetaS - step.spacingS;
-    if (sample) this.throughput.add(step.bytes, nowS - Math.max(this.lastDoneS, step.issuedS + this.options.rttS));
-    this.lastDoneS = nowS;
-    --this.inFlight;
-    this.inFlightBytes -= step.bytes;
-    this.spread(step.residualS);
+    if (sample) this.throughput_.add(step.bytes, nowS - Math.max(this.lastDoneS_, step.issuedS + this.options_.rttS));
+    this.lastDoneS_ = nowS;
+    --this.inFlight_;
+    this.inFlightBytes_ -= step.bytes;
+    this.spread_(step.residualS);
   }
 }
 

@@ -120,30 +120,30 @@ export class HttpClient {
   received = 0;
   requests = 0;
   onRequest?: (record: RequestRecord) => void;
-  private active = 0;
-  private readonly waiting: (() => void)[] = [];
-  private limit: number;
-  private capFreeS = 0;
+  private active_ = 0;
+  private readonly waiting_: (() => void)[] = [];
+  private limit_: number;
+  private capFreeS_ = 0;
 
   constructor(options: Partial<HttpOptions> = {}) {
     this.options = { ...defaultHttpOptions, ...options };
-    this.limit = this.options.connections;
+    this.limit_ = this.options.connections;
   }
 
-  private async enter(): Promise<void> {
-    if (this.active >= this.limit) await new Promise<void>((go) => this.waiting.push(go));
-    else ++this.active;
+  private async enter_(): Promise<void> {
+    if (this.active_ >= this.limit_) await new Promise<void>((go) => this.waiting_.push(go));
+    else ++this.active_;
   }
-  private leave(): void {
-    const next = this.waiting.shift();
+  private leave_(): void {
+    const next = this.waiting_.shift();
     if (next) next();
-    else --this.active;
+    else --this.active_;
   }
 
   /** One GET; network problems come back in the answer, only cancelling throws. */
   async get(url: string, get: GetOptions): Promise<Answer> {
     throwIfAborted(get.signal);
-    await this.enter();
+    await this.enter_();
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
     get.signal?.addEventListener('abort', cancel);
@@ -157,7 +157,7 @@ export class HttpClient {
     const stall = new StallTimer(get.stallTimeoutS ?? this.options.stallTimeoutS, () => abort.abort());
     try {
       throwIfAborted(get.signal);
-      await this.transfer(url, get, abort.signal, answer, record, stall);
+      await this.transfer_(url, get, abort.signal, answer, record, stall);
     } catch (error) {
       if (get.signal?.aborted) throw abortError();
       answer.problem = stall.fired ? `no byte for ${stall.seconds.toFixed(1)} s` : String((error as Error).message);
@@ -165,16 +165,16 @@ export class HttpClient {
       stall.stop();
       get.signal?.removeEventListener('abort', cancel);
       if (!answer.complete) abort.abort();
-      this.leave();
+      this.leave_();
       record.ended = nowS();
       record.status = answer.status;
       record.ok = answer.complete && (answer.status === 206 || (answer.status === 200 && !get.range));
-      this.note(url, record);
+      this.note_(url, record);
     }
     return answer;
   }
 
-  private async transfer(
+  private async transfer_(
     url: string,
     get: GetOptions,
     signal: AbortSignal,
@@ -199,13 +199,13 @@ export class HttpClient {
       answer.complete = response.status !== 206;
       return;
     }
-    await this.readBody(response, get, answer, record, stall);
+    await this.readBody_(response, get, answer, record, stall);
     const said = answer.range && response.status === 206 ? answer.range.last - answer.range.first + 1 : -1;
     const length = said >= 0 ? said : plainLength(response);
     answer.complete = !answer.tooLong && (length < 0 || length === answer.body.length);
   }
 
-  private async readBody(
+  private async readBody_(
     response: Response,
     get: GetOptions,
     answer: Answer,
@@ -226,7 +226,7 @@ export class HttpClient {
         this.received += value.length;
         if (total > get.maxBytes) answer.tooLong = true;
         else get.onBytes?.(total);
-        await this.holdBack(value.length, stall);
+        await this.holdBack_(value.length, stall);
       }
     } finally {
       // What came before a cut is worth keeping.
@@ -235,16 +235,16 @@ export class HttpClient {
   }
 
   /** Waits as long as the cap wants. */
-  private async holdBack(bytes: number, stall: StallTimer): Promise<void> {
+  private async holdBack_(bytes: number, stall: StallTimer): Promise<void> {
     if (!(this.options.capBytesS > 0)) return;
     const now = nowS();
-    this.capFreeS = Math.max(now, this.capFreeS) + bytes / this.options.capBytesS;
+    this.capFreeS_ = Math.max(now, this.capFreeS_) + bytes / this.options.capBytesS;
     stall.stop();
-    if (this.capFreeS > now) await sleepS(this.capFreeS - now);
+    if (this.capFreeS_ > now) await sleepS(this.capFreeS_ - now);
     stall.restart();
   }
 
-  private note(url: string, record: RequestRecord): void {
+  private note_(url: string, record: RequestRecord): void {
     if (record.ok && record.firstByte >= 0 && this.requests > 0) {
       const wait = record.firstByte - record.started;
       this.rttS = this.rttS > 0 ? Math.min(this.rttS, wait) : wait;
@@ -252,7 +252,7 @@ export class HttpClient {
     ++this.requests;
     if (this.requests === 1 && typeof performance.getEntriesByName === 'function') {
       const timing = performance.getEntriesByName(url, 'resource').at(-1) as PerformanceResourceTiming | undefined;
-      if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit = this.options.streams;
+      if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit_ = this.options.streams;
     }
     this.onRequest?.(record);
   }
@@ -277,24 +277,24 @@ export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array
 
 class StallTimer {
   fired = false;
-  private timer?: ReturnType<typeof setTimeout>;
+  private timer_?: ReturnType<typeof setTimeout>;
   constructor(
     readonly seconds: number,
-    private readonly onStall: () => void,
+    private readonly onStall_: () => void,
   ) {
     this.restart();
   }
   restart(): void {
     this.stop();
     if (this.fired) return;
-    this.timer = setTimeout(() => {
+    this.timer_ = setTimeout(() => {
       this.fired = true;
-      this.onStall();
+      this.onStall_();
     }, this.seconds * 1000);
   }
   stop(): void {
-    if (this.timer !== undefined) clearTimeout(this.timer);
-    this.timer = undefined;
+    if (this.timer_ !== undefined) clearTimeout(this.timer_);
+    this.timer_ = undefined;
   }
 }
 
@@ -310,17 +310,17 @@ export function whatCame(a: Answer): string {
 
 /** Waits longer from try to try; false when there have been enough. */
 export class Retries {
-  private left: number;
-  private delayS: number;
+  private left_: number;
+  private delayS_: number;
   constructor(options: HttpOptions) {
-    this.left = options.retries;
-    this.delayS = options.retryDelayS;
+    this.left_ = options.retries;
+    this.delayS_ = options.retryDelayS;
   }
   async wait(signal?: AbortSignal): Promise<boolean> {
-    if (this.left-- <= 0) return false;
-    await sleepS(this.delayS);
+    if (this.left_-- <= 0) return false;
+    await sleepS(this.delayS_);
     throwIfAborted(signal);
-    this.delayS *= 2;
+    this.delayS_ *= 2;
     return true;
   }
 }

@@ -9,24 +9,24 @@ export type * from './api';
 
 /** A package that can be shown in three.js scenes. */
 export class TexmeshPackage extends PackageReader {
-  private readonly loads = new Set<LoadedModel>();
-  private loaded = false;
+  private readonly loads_ = new Set<LoadedModel>();
+  private loaded_ = false;
 
   /**
    * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
    * counts from the package's first request for the first load, from this call for others.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
-    const load = new ModelLoad(this, scene, options, this.loaded ? nowS() : this.openedS);
-    this.loaded = true;
-    this.loads.add(load);
+    const load = new ModelLoad(this, scene, options, this.loaded_ ? nowS() : this.openedS);
+    this.loaded_ = true;
+    this.loads_.add(load);
     return load;
   }
 
   /** Disposes of all loads and forgets what was read. */
   override dispose(): void {
-    for (const load of this.loads) load.dispose();
-    this.loads.clear();
+    for (const load of this.loads_) load.dispose();
+    this.loads_.clear();
     super.dispose();
   }
 }

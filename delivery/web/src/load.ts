@@ -5,6 +5,7 @@ import { Emitter } from './events';
 import {
   FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay,
 } from './fragment_list';
+import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
 import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import type { PackageReader } from './package_reader';
@@ -18,6 +19,7 @@ import { upgradesInOrder } from './upgrades';
 import { selectScale, wholeObject } from './viewing';
 import { VisibleSurface } from './visibility';
 import { WorkerPool } from './worker_pool';
+import type { Levels } from './worker_protocol';
 
 /** A change of scale or plane has to be wanted by this factor of displayed height. */
 const hysteresis = 1.1;
@@ -41,293 +43,296 @@ export class ModelLoad implements LoadedModel {
   readonly object = new Group();
   readonly firstPicture: Promise<void>;
   readonly done: Promise<void>;
-  private readonly events = new Emitter<LoadEvents>();
-  private readonly abort = new AbortController();
-  private readonly pool: WorkerPool;
-  private readonly materialSet = new MaterialSet();
-  private readonly scales: ScaleSource;
-  private textureSet?: TextureSet;
-  private transfers?: Transfers;
-  private data?: PackageData;
-  private phase: LoadPhase = 'first-picture';
-  private override: { scale?: number; rung?: number };
-  private view: View;
-  private surface?: VisibleSurface;
-  private surfaceScale = -1;
-  private wantedScale = -1;
-  private shownScale = -1;
-  private scaleInTransit = -1;
-  private refining?: Promise<void>;
-  private refineAgain = false;
-  private readonly gaveUp = new Set<string>();
-  private readonly startS: number;
-  private beta0 = 0;
-  private expectedBytes = 0;
-  private disposed = false;
-  private plan?: HarmonicTimePlan;
-  private readonly offRequest: () => void;
+  private readonly events_ = new Emitter<LoadEvents>();
+  private readonly abort_ = new AbortController();
+  private readonly pool_: WorkerPool;
+  private readonly materialSet_ = new MaterialSet();
+  private readonly scales_: ScaleSource;
+  private textureSet_?: TextureSet;
+  private transfers_?: Transfers;
+  private data_?: PackageData;
+  private phase_: LoadPhase = 'first-picture';
+  private override_: { scale?: number; rung?: number };
+  private view_: View;
+  private surface_?: VisibleSurface;
+  private surfaceScale_ = -1;
+  private wantedScale_ = -1;
+  private shownScale_ = -1;
+  private scaleInTransit_ = -1;
+  private refining_?: Promise<void>;
+  private refineAgain_ = false;
+  private readonly gaveUp_ = new Set<string>();
+  private readonly startS_: number;
+  private beta0_ = 0;
+  private expectedBytes_ = 0;
+  private disposed_ = false;
+  private plan_?: HarmonicTimePlan;
+  private readonly offRequest_: () => void;
 
   constructor(
-    private readonly reader: PackageReader,
-    private readonly scene: Object3D,
-    private readonly options: LoadOptions,
+    private readonly reader_: PackageReader,
+    private readonly scene_: Object3D,
+    private readonly options_: LoadOptions,
     startS: number,
     poolOptions: ConstructorParameters<typeof WorkerPool>[0] = {},
   ) {
-    this.startS = startS;
-    this.override = { scale: options.scale, rung: options.rung };
-    this.pool = new WorkerPool({ workers: options.workers, workerUrl: options.workerUrl, ...poolOptions });
-    this.scales = new ScaleSource(reader, options, this.materialSet, this.pool, (slot) => this.adopt(slot));
-    this.object.name = reader.manifest.title || 'texmesh';
-    this.view = { display: this.readDisplay(options.camera), camera: options.camera };
-    options.signal?.addEventListener('abort', () => this.cancel());
-    this.offRequest = reader.onRequest((record) => {
-      this.events.emit('request', record);
-      this.progress();
+    this.startS_ = startS;
+    this.override_ = { scale: options_.scale, rung: options_.rung };
+    this.pool_ = new WorkerPool({ workers: options_.workers, workerUrl: options_.workerUrl, ...poolOptions });
+    this.scales_ = new ScaleSource(reader_, options_, this.materialSet_, this.pool_, (slot) => this.adopt_(slot));
+    this.object.name = reader_.manifest.title || 'texmesh';
+    this.view_ = { display: this.readDisplay_(options_.camera), camera: options_.camera };
+    options_.signal?.addEventListener('abort', () => this.cancel());
+    this.offRequest_ = reader_.onRequest((record) => {
+      this.events_.emit('request', record);
+      this.progress_();
     });
     let shown: () => void = () => undefined;
     let notShown: (error: unknown) => void = () => undefined;
     this.firstPicture = new Promise((done, failed) => ((shown = done), (notShown = failed)));
     this.firstPicture.catch(() => undefined);
-    this.done = this.run(shown).catch((error: unknown) => {
+    this.done = this.run_(shown).catch((error: unknown) => {
       notShown(error);
-      this.ended(error);
+      this.ended_(error);
       throw error;
     });
     this.done.catch(() => undefined);
   }
 
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void {
-    return this.events.on(name, listener);
+    return this.events_.on(name, listener);
   }
   get state(): LoadState {
     return {
-      phase: this.phase,
-      scale: this.shownScale,
-      wantedScale: this.wantedScale,
-      displayedPx: this.view.display.heightPx,
-      planes: [...(this.textureSet?.planes.values() ?? [])] as ComposedPlane[],
-      bytes: this.reader.client.received,
-      throughputBytesS: this.plan?.throughputBytesS() ?? this.beta0,
-      rttS: this.reader.client.rttS,
-      pending: (this.transfers?.pending ?? 0) + (this.textureSet?.pending ?? 0),
+      phase: this.phase_,
+      scale: this.shownScale_,
+      wantedScale: this.wantedScale_,
+      displayedPx: this.view_.display.heightPx,
+      planes: [...(this.textureSet_?.planes.values() ?? [])] as ComposedPlane[],
+      bytes: this.reader_.client.received,
+      throughputBytesS: this.plan_?.throughputBytesS() ?? this.beta0_,
+      rttS: this.reader_.client.rttS,
+      pending: (this.transfers_?.pending ?? 0) + (this.textureSet_?.pending ?? 0),
     };
   }
   get materials(): readonly Material[] {
-    return this.materialSet.all;
+    return this.materialSet_.all;
   }
 
-  private adopt(slot: Slot): void {
-    this.textureSet?.adopt(slot);
+  private adopt_(slot: Slot): void {
+    this.textureSet_?.adopt(slot);
   }
-  private ended(error: unknown): void {
-    const cancelled = isAbort(error) || this.abort.signal.aborted;
-    this.phase = cancelled ? 'cancelled' : 'failed';
-    if (!cancelled) this.fail(error, 'load', true);
-    this.abort.abort();
-    this.pool.dispose();
+  private ended_(error: unknown): void {
+    const cancelled = isAbort(error) || this.abort_.signal.aborted;
+    this.phase_ = cancelled ? 'cancelled' : 'failed';
+    if (!cancelled) this.fail_(error, 'load', true);
+    this.abort_.abort();
+    this.pool_.dispose();
   }
-  private fail(error: unknown, what: string, fatal = false): void {
-    if (isAbort(error) || this.disposed) return;
-    this.events.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
+  private fail_(error: unknown, what: string, fatal = false): void {
+    if (isAbort(error) || this.disposed_) return;
+    this.events_.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
   }
-  private progress(): void {
-    const bytes = this.reader.client.received;
-    this.events.emit('progress', { phase: this.phase, bytes, bytesExpected: Math.max(bytes, this.expectedBytes) });
+  private progress_(): void {
+    const bytes = this.reader_.client.received;
+    this.events_.emit('progress', { phase: this.phase_, bytes, bytesExpected: Math.max(bytes, this.expectedBytes_) });
   }
-  private enter(phase: LoadPhase): void {
-    throwIfAborted(this.abort.signal);
-    this.phase = phase;
-    this.progress();
+  private enter_(phase: LoadPhase): void {
+    throwIfAborted(this.abort_.signal);
+    this.phase_ = phase;
+    this.progress_();
   }
-  private get limitS(): number {
-    return this.options.time ?? 5;
+  private get limitS_(): number {
+    return this.options_.time ?? 5;
   }
-  private elapsedS(): number {
-    return nowS() - this.startS;
+  private elapsedS_(): number {
+    return nowS() - this.startS_;
   }
 
   // ---- the course of a load
 
-  private async run(shown: () => void): Promise<void> {
+  private async run_(shown: () => void): Promise<void> {
     await Promise.resolve(); // listeners are added after the constructor
-    const { manifest } = this.reader;
+    const { manifest } = this.reader_;
     const coarsest = manifest.scales[manifest.scales.length - 1];
-    this.expectedBytes = this.reader.client.received + coarsest.glb.bytes;
-    this.enter('first-picture');
-    const begin = { s: nowS(), bytes: this.reader.client.received };
+    this.expectedBytes_ = this.reader_.client.received + coarsest.glb.bytes;
+    this.enter_('first-picture');
     // On a slow link nothing shares it with the first picture; what comes next is asked for just before its end.
-    const first = this.scales.coarsest(this.abort.signal);
+    const first = this.scales_.coarsest(this.abort_.signal);
     await first.almostThere;
-    const documents = this.documents();
+    const documents = this.documents_();
     documents.catch(() => undefined);
     await first.bytes;
-    await this.showScale(coarsest.scale);
-    this.events.emit('first-picture', { scale: coarsest.scale, bytes: this.reader.client.received });
+    await this.showScale_(coarsest.scale);
+    this.events_.emit('first-picture', { scale: coarsest.scale, bytes: this.reader_.client.received });
     shown();
-    this.enter('tables');
+    this.enter_('tables');
     const data = await documents;
-    this.data = data;
-    const spent = Math.max(1e-3, nowS() - begin.s - this.reader.client.rttS);
-    this.beta0 = this.options.beta0BytesS || (this.reader.client.received - begin.bytes) / spent;
-    await this.timedPart(data);
-    this.phase = 'refining';
-    if (this.options.autoRefine ?? true) void this.refine();
+    this.data_ = data;
+    this.beta0_ = this.options_.beta0BytesS || throughputOf(this.reader_.requests, this.reader_.client.rttS);
+    await this.timedPart_(data);
+    this.phase_ = 'refining';
+    if (this.options_.autoRefine ?? true) void this.refine();
   }
 
-  private async documents(): Promise<PackageData> {
-    await this.reader.prefetchDocuments(this.abort.signal);
-    const textures = await this.reader.textures();
+  private async documents_(): Promise<PackageData> {
+    await this.reader_.prefetchDocuments(this.abort_.signal);
+    const textures = await this.reader_.textures();
     const base = Array.from({ length: fullSizePlanes(textures) }, (_, p) => p);
-    const data = await this.reader.data(base);
-    const planes = this.planesFor(data).map((p) => p.plane);
-    await this.reader.quality();
-    return this.reader.data([...base, ...planes]);
+    const data = await this.reader_.data(base);
+    const planes = this.planesFor_(data).map((p) => p.plane);
+    await this.reader_.quality();
+    return this.reader_.data([...base, ...planes]);
   }
-  private planesFor(data: PackageData, displayedPx = this.view.display.heightPx): PlaneChoice[] {
-    return this.options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
+  private planesFor_(data: PackageData, displayedPx = this.view_.display.heightPx): PlaneChoice[] {
+    return this.options_.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
   }
 
-  private async timedPart(data: PackageData): Promise<void> {
-    const choices = this.planesFor(data);
-    const transfers = this.startTextures(data);
-    const ready = Promise.all([transfers.prepare(choices.map((c) => c.plane)), this.showPlanes(choices)]);
+  private async timedPart_(data: PackageData): Promise<void> {
+    const choices = this.planesFor_(data);
+    const transfers = this.startTextures_(data);
+    const ready = Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
     ready.catch(() => undefined);
-    const scale = await this.scaleInTime(data, choices);
-    this.wantedScale = scale;
-    if (scale !== this.shownScale) {
-      this.enter('mesh');
-      await this.loadScale(scale);
+    const scale = await this.scaleInTime_(data, choices);
+    this.wantedScale_ = scale;
+    if (scale !== this.shownScale_) {
+      this.enter_('mesh');
+      await this.loadScale_(scale);
     }
-    await ready;
-    this.enter('textures');
-    const list = this.listOf(data, choices, scale);
-    for (const o of list.offers) this.expectedBytes += o.plannedBytes;
-    const leftS = this.limitS - this.elapsedS() - composeS;
-    if (this.override.rung !== undefined || !Number.isFinite(leftS)) await this.fetchAll(list);
-    else if (leftS > 0 && list.offers.length > 0) await this.fetchInTime(list, leftS);
-    await this.composed();
-    const skipped = [...(this.textureSet?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf(p), 0);
-    this.events.emit('deadline', { limit: this.limitS, actual: this.elapsedS(), skipped });
+    const [{ shown }] = await ready;
+    this.enter_('textures');
+    const list = this.listOf_(data, choices, scale);
+    for (const o of list.offers) this.expectedBytes_ += o.plannedBytes;
+    const leftS = this.limitS_ - this.elapsedS_() - composeS;
+    if (this.override_.rung !== undefined || !Number.isFinite(leftS)) await this.fetchAll_(list);
+    else if (leftS > 0 && list.offers.length > 0) await this.fetchInTime_(list, leftS);
+    await shown;
+    await this.composed_();
+    const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
+    this.events_.emit('deadline', { limit: this.limitS_, actual: this.elapsedS_(), skipped });
   }
-  private skippedOf(plane: ComposedPlane): number {
-    const order = this.data?.tables[plane.plane]?.order ?? [];
+  private skippedOf_(plane: ComposedPlane): number {
+    const order = this.data_?.tables[plane.plane]?.order ?? [];
     return [...order].filter((f) => plane.rungs[f] < 0).length;
   }
-  private async composed(): Promise<void> {
-    while ((this.transfers?.pending ?? 0) > 0 || (this.textureSet?.pending ?? 0) > 0) {
-      throwIfAborted(this.abort.signal);
-      await this.textureSet?.settled();
+  private async composed_(): Promise<void> {
+    while ((this.transfers_?.pending ?? 0) > 0 || (this.textureSet_?.pending ?? 0) > 0) {
+      throwIfAborted(this.abort_.signal);
+      await this.textureSet_?.settled();
       await sleepS(0.004);
     }
-    this.textureSet?.finish();
+    this.textureSet_?.finish();
   }
 
-  private startTextures(data: PackageData): Transfers {
-    this.textureSet = new TextureSet(this.options.renderer, data.textures, this.materialSet);
-    this.transfers = new Transfers(this.reader, data.textures, this.pool, {
-      decoded: (wish, bitmap) => this.upload(wish, bitmap),
-      lost: (wish, error) => this.lost(wish, error),
+  private startTextures_(data: PackageData): Transfers {
+    this.textureSet_ = new TextureSet(this.options_.renderer, data.textures, this.materialSet_, this.pool_);
+    this.transfers_ = new Transfers(this.reader_, data.textures, this.pool_, {
+      decoded: (wish, levels) => this.upload_(wish, levels),
+      lost: (wish, error) => this.lost_(wish, error),
     });
-    return this.transfers;
+    return this.transfers_;
   }
-  private upload(wish: Wish, bitmap: ImageBitmap): void {
-    const { base, mip } = this.data!.textures[wish.plane];
-    const plane = this.textureSet?.planes.get(mip > 0 ? base : wish.plane);
-    if (this.disposed || !plane || plane.plane !== wish.plane) return bitmap.close();
+  private upload_(wish: Wish, levels: Levels): void {
+    const { base, mip } = this.data_!.textures[wish.plane];
+    const plane = this.textureSet_?.planes.get(mip > 0 ? base : wish.plane);
+    if (this.disposed_ || !plane || plane.plane !== wish.plane) return levels.forEach((b) => b.close());
     const { fragment, rung } = wish;
-    this.textureSet!.upload(plane, bitmap, fragment, rung, () =>
-      this.events.emit('fragment', { plane: wish.plane, fragment, rung }),
+    this.textureSet_!.upload(plane, levels, fragment, rung, () =>
+      this.events_.emit('fragment', { plane: wish.plane, fragment, rung }),
     );
   }
-  private lost(wish: Wish, error: unknown): void {
+  private lost_(wish: Wish, error: unknown): void {
     if (isAbort(error)) return;
-    this.gaveUp.add(`${wish.plane}/${wish.fragment}/${wish.rung}`);
-    this.fail(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
+    this.gaveUp_.add(`${wish.plane}/${wish.fragment}/${wish.rung}`);
+    this.fail_(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
   }
 
-  /** Shows textures by these planes; alpha planes, which no GLB has, begin with their preview. */
-  private async showPlanes(choices: readonly PlaneChoice[]): Promise<void> {
+  /**
+   * Shows textures by these planes; alpha planes, which no GLB has, begin with their preview. Fragments may come from
+   * then on; `shown` resolves when the scene has changed.
+   */
+  private async showPlanes_(choices: readonly PlaneChoice[]): Promise<{ shown: Promise<unknown> }> {
+    const shown: Promise<void>[] = [];
     for (const choice of choices) {
       const { base, plane } = choice;
-      const shown = this.textureSet!.planes.get(base);
-      if (shown?.plane === plane) continue;
-      const info = this.data!.textures[plane];
+      const before = this.textureSet_!.planes.get(base);
+      if (before?.plane === plane) continue;
+      const info = this.data_!.textures[plane];
       let preview: ImageBitmap | undefined;
-      if (!shown && info.role === 'alpha') {
-        const file = await this.reader.preview(base, this.abort.signal);
+      if (!before && info.role === 'alpha') {
+        const file = await this.reader_.preview(base, this.abort_.signal);
         const none = new Uint8Array(0);
-        preview = await this.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true });
+        const decoded = this.pool_.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
+        [preview] = await decoded;
       }
-      throwIfAborted(this.abort.signal);
-      this.textureSet!.show(choice, preview);
-      preview?.close();
-      this.events.emit('plane', { base, plane, widthPx: info.widthPx, heightPx: info.heightPx });
+      throwIfAborted(this.abort_.signal);
+      shown.push(
+        this.textureSet_!.show(choice, preview).then(() => {
+          preview?.close();
+          this.events_.emit('plane', { base, plane, widthPx: info.widthPx, heightPx: info.heightPx });
+        }),
+      );
     }
+    return { shown: Promise.all(shown) };
   }
 
-  private async scaleInTime(data: PackageData, choices: readonly PlaneChoice[]): Promise<number> {
-    const { heightPx, part } = this.view.display;
-    const wanted = this.override.scale ?? selectScale(data.manifest, heightPx, part, this.options.rule);
-    if (this.override.scale !== undefined || !Number.isFinite(this.limitS)) return wanted;
-    const quality = await this.reader.quality();
+  private async scaleInTime_(data: PackageData, choices: readonly PlaneChoice[]): Promise<number> {
+    const { heightPx, part } = this.view_.display;
+    const wanted = this.override_.scale ?? selectScale(data.manifest, heightPx, part, this.options_.rule);
+    if (this.override_.scale !== undefined || !Number.isFinite(this.limitS_)) return wanted;
+    const quality = await this.reader_.quality();
     const list = fragmentList(data, choices, { scale: wanted });
     return chooseScale(data, quality, list, choices, wanted, (scale) => {
-      const meshS = scale === this.shownScale ? 0 : this.scales.bytesOf(scale) / this.beta0 + this.reader.client.rttS;
-      return (this.limitS - this.elapsedS() - composeS - meshS) * this.beta0;
+      const meshS = scale === this.shownScale_ ? 0 : this.scales_.bytesOf(scale) / this.beta0_ + this.reader_.client.rttS;
+      return (this.limitS_ - this.elapsedS_() - composeS - meshS) * this.beta0_;
     });
   }
 
-  /** The list of what may be fetched; of a tree without files of fragments, whole rungs. */
-  private listOf(data: PackageData, choices: readonly PlaneChoice[], scale: number): FragmentList {
+  /** The list of what may be fetched, with the bytes that fetching takes. */
+  private listOf_(data: PackageData, choices: readonly PlaneChoice[], scale: number): FragmentList {
     const list = fragmentList(data, choices, { scale });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
-      offer.bytes = offer.bytes.map((b, r) => this.transfers!.bytesOf(plane, r, fragment) || b);
+      offer.bytes = offer.bytes.map((b, r) => this.transfers_!.bytesOf(plane, r, fragment) || b);
     });
-    return this.wholeRungs ? packedList(list) : list;
+    return list;
   }
-  /** A rung comes as a whole, whatever is asked for. */
-  private get wholeRungs(): boolean {
-    const [first] = this.textureSet?.planes.values() ?? [];
-    return this.reader.form === 'files' && first !== undefined && !this.transfers!.filesOf(first.plane).complete;
-  }
-  private wishesOf(list: FragmentList, offer: number, rung: number): Wish[] {
-    const { plane, fragment } = list.fragments[offer];
-    if (fragment >= 0) return [{ plane, fragment, rung, offer }];
-    const order = this.data!.tables[plane]!.order;
-    return [...order].map((f) => ({ plane, fragment: f, rung, offer }));
+  /** A rung comes as a whole, whatever is asked for: a tree without files of fragments. */
+  private get wholeRungs_(): boolean {
+    const [first] = this.textureSet_?.planes.values() ?? [];
+    return this.reader_.form === 'files' && first !== undefined && !this.transfers_!.filesOf(first.plane).complete;
   }
 
   /** Every fragment at its override's rung, or the highest. */
-  private async fetchAll(list: FragmentList): Promise<void> {
+  private async fetchAll_(list: FragmentList): Promise<void> {
     const wishes = list.offers.flatMap((o, i) => {
-      const rung = Math.min(this.override.rung ?? Infinity, o.bytes.length - 1);
-      return rung < 0 ? [] : this.wishesOf(list, i, rung);
+      const rung = Math.min(this.override_.rung ?? Infinity, o.bytes.length - 1);
+      return rung < 0 ? [] : [{ ...list.fragments[i], rung, offer: i }];
     });
-    const missing = wishes.filter((w) => this.rungOf(w) !== w.rung);
-    await this.fetchWishes(missing);
+    const missing = wishes.filter((w) => this.rungOf_(w) !== w.rung);
+    await this.fetchWishes_(missing);
   }
-  private rungOf(wish: { plane: number; fragment: number }): number {
-    for (const p of this.textureSet?.planes.values() ?? []) if (p.plane === wish.plane) return p.rungs[wish.fragment];
+  private rungOf_(wish: { plane: number; fragment: number }): number {
+    for (const p of this.textureSet_?.planes.values() ?? []) if (p.plane === wish.plane) return p.rungs[wish.fragment];
     return -1;
   }
-  private async fetchWishes(wishes: readonly Wish[], signal = this.abort.signal): Promise<void> {
-    await this.transfers!.fetch(
+  private async fetchWishes_(wishes: readonly Wish[], signal = this.abort_.signal): Promise<void> {
+    await this.transfers_!.fetch(
       wishes,
       { gapBytes, mostBytes: refineBytes, signal },
       () => undefined,
-      (wish, error) => this.lost(wish, error),
+      (wish, error) => this.lost_(wish, error),
     );
-    throwIfAborted(this.abort.signal);
+    throwIfAborted(this.abort_.signal);
   }
 
   /** Harmonic Time Compensation: fragment by fragment, so that the last one comes at the limit. */
-  private async fetchInTime(list: FragmentList, limitS: number): Promise<void> {
-    const { policy, order, beta0BytesS } = this.options;
-    const { client } = this.reader;
+  private async fetchInTime_(fragments: FragmentList, limitS: number): Promise<void> {
+    const { policy, order, beta0BytesS } = this.options_;
+    const { client } = this.reader_;
     const defaults = defaultHtcOptions();
-    const beta0 = beta0BytesS || this.beta0;
+    const beta0 = beta0BytesS || this.beta0_;
+    const list = groupedList(fragments, this.wholeRungs_ ? Infinity : groupBytes(beta0, client.rttS, limitS), beta0 * limitS);
     const plan = new HarmonicTimePlan(list.offers, {
       ...defaults,
       policy: policy ?? 'guard',
@@ -336,13 +341,13 @@ export class ModelLoad implements LoadedModel {
       rttS: client.rttS,
       throughput: { ...defaults.throughput, initialBytesS: Math.max(1, beta0) },
     });
-    this.plan = plan;
+    this.plan_ = plan;
     const t0 = nowS();
     const waiting = new Map<number, number>(); // by offer: fragments of it that have not ended
     const tooLate = new AbortController();
     const stop = (): void => tooLate.abort();
-    this.abort.signal.addEventListener('abort', stop);
-    const timer = setTimeout(stop, (limitS + mostLate * this.limitS) * 1000);
+    this.abort_.signal.addEventListener('abort', stop);
+    const timer = setTimeout(stop, (limitS + mostLate * this.limitS_) * 1000);
     let told = 0;
     try {
       await new Promise<void>((finished, failed) => {
@@ -354,25 +359,26 @@ export class ModelLoad implements LoadedModel {
           if (well) plan.completed(wish.offer, at);
           else plan.failed(wish.offer, at);
           const step = plan.steps.find((s) => s.offer === wish.offer);
-          if (step) this.tell(list, step);
+          if (step) this.tell_(list, step);
           queueMicrotask(pump);
         };
         const pump = (): void => {
-          if (this.abort.signal.aborted) return failed(new DOMException('The load was cancelled', 'AbortError'));
+          if (this.abort_.signal.aborted) return failed(new DOMException('The load was cancelled', 'AbortError'));
           const wishes: Wish[] = [];
           for (let step = plan.next(nowS() - t0); step; step = plan.next(nowS() - t0)) {
-            const own = this.wishesOf(list, step.offer, step.rung);
+            const { offer, rung } = step;
+            const own = list.groups[offer].map((f) => ({ ...f, rung, offer }));
             waiting.set(step.offer, own.length);
             wishes.push(...own);
           }
-          while (told < plan.steps.length) this.tell(list, plan.steps[told++]);
+          while (told < plan.steps.length) this.tell_(list, plan.steps[told++]);
           if (wishes.length > 0)
-            void this.transfers!.fetch(
+            void this.transfers_!.fetch(
               wishes,
               { gapBytes: 0, mostBytes: Infinity, signal: tooLate.signal },
               (w) => end(w, true),
               (w, error) => {
-                this.lost(w, error);
+                this.lost_(w, error);
                 end(w, false);
               },
             );
@@ -382,13 +388,14 @@ export class ModelLoad implements LoadedModel {
       });
     } finally {
       clearTimeout(timer);
-      this.abort.signal.removeEventListener('abort', stop);
+      this.abort_.signal.removeEventListener('abort', stop);
     }
   }
-  private tell(list: FragmentList, s: HtcStep): void {
-    this.events.emit('decision', {
+  private tell_(list: GroupedList, s: HtcStep): void {
+    this.events_.emit('decision', {
       position: s.position,
-      ...list.fragments[s.offer],
+      ...list.groups[s.offer][0],
+      fragments: list.groups[s.offer].map((f) => f.fragment),
       eta: list.offers[s.offer].eta,
       rung: s.rung,
       bytes: s.bytes,
@@ -404,130 +411,130 @@ export class ModelLoad implements LoadedModel {
   // ---- scales
 
   /** Loads a scale and puts it into the scene, in one turn of the page. */
-  private async loadScale(scale: number): Promise<void> {
-    this.scaleInTransit = scale;
+  private async loadScale_(scale: number): Promise<void> {
+    this.scaleInTransit_ = scale;
     try {
-      await this.scales.prepare(scale, this.abort.signal);
-      if (this.scaleInTransit === scale) await this.showScale(scale);
+      await this.scales_.prepare(scale, this.abort_.signal);
+      if (this.scaleInTransit_ === scale) await this.showScale_(scale);
     } finally {
-      if (this.scaleInTransit === scale) this.scaleInTransit = -1;
+      if (this.scaleInTransit_ === scale) this.scaleInTransit_ = -1;
     }
   }
-  private async showScale(scale: number): Promise<void> {
-    const shape = await this.scales.get(scale);
-    throwIfAborted(this.abort.signal);
+  private async showScale_(scale: number): Promise<void> {
+    const shape = await this.scales_.get(scale);
+    throwIfAborted(this.abort_.signal);
     const [before] = this.object.children;
     if (before && before !== shape) this.object.remove(before);
     if (before !== shape) this.object.add(shape);
-    if (!this.object.parent) this.scene.add(this.object);
-    this.shownScale = scale;
-    const triangles = this.reader.manifest.scales.find((s) => s.scale === scale)?.triangles ?? 0;
-    this.events.emit('scale', { scale, triangles });
+    if (!this.object.parent) this.scene_.add(this.object);
+    this.shownScale_ = scale;
+    const triangles = this.reader_.manifest.scales.find((s) => s.scale === scale)?.triangles ?? 0;
+    this.events_.emit('scale', { scale, triangles });
   }
 
   // ---- following the view
 
-  private readDisplay(camera?: Camera): Display {
-    const { display } = this.options;
+  private readDisplay_(camera?: Camera): Display {
+    const { display } = this.options_;
     const said = typeof display === 'function' ? display() : display;
     if (typeof said === 'number') return { heightPx: said, part: wholeObject };
     if (said) return said;
-    if (camera) return displayOf(this.reader.manifest, this.object, camera, this.options.renderer);
+    if (camera) return displayOf(this.reader_.manifest, this.object, camera, this.options_.renderer);
     return { heightPx: 1000, part: wholeObject };
   }
 
-  private lastView = '';
-  update(camera: Camera | undefined = this.options.camera): void {
-    if (this.disposed || this.abort.signal.aborted) return;
+  private lastView_ = '';
+  update(camera: Camera | undefined = this.options_.camera): void {
+    if (this.disposed_ || this.abort_.signal.aborted) return;
     if (camera) camera.updateMatrixWorld();
-    const display = this.readDisplay(camera);
+    const display = this.readDisplay_(camera);
     const matrix = camera ? camera.matrixWorld.elements.map((v) => v.toPrecision(4)).join() : '';
     const key = `${display.heightPx.toPrecision(4)}/${matrix}`;
-    if (key === this.lastView) return;
-    this.lastView = key;
-    this.view = { display, camera };
-    if (this.phase === 'refining' || this.phase === 'done') this.follow();
+    if (key === this.lastView_) return;
+    this.lastView_ = key;
+    this.view_ = { display, camera };
+    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
   }
   setOverride(override: { scale?: number; rung?: number }): void {
-    this.override = { ...override };
-    if (this.phase === 'refining' || this.phase === 'done') this.follow();
+    this.override_ = { ...override };
+    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
   }
 
-  private follow(): void {
-    const scale = this.scaleForView();
-    if (scale !== this.wantedScale) {
-      this.wantedScale = scale;
-      this.loadScale(scale).catch((error: unknown) => this.fail(error, `scale ${scale}`));
+  private follow_(): void {
+    const scale = this.scaleForView_();
+    if (scale !== this.wantedScale_) {
+      this.wantedScale_ = scale;
+      this.loadScale_(scale).catch((error: unknown) => this.fail_(error, `scale ${scale}`));
     }
-    if (this.options.autoRefine ?? true) void this.refine();
+    if (this.options_.autoRefine ?? true) void this.refine();
   }
   /** The scale that the view asks for, by a little more than the last time. */
-  private scaleForView(): number {
-    if (this.override.scale !== undefined) return this.override.scale;
-    const { heightPx, part } = this.view.display;
-    const at = (px: number): number => selectScale(this.reader.manifest, px, part, this.options.rule);
+  private scaleForView_(): number {
+    if (this.override_.scale !== undefined) return this.override_.scale;
+    const { heightPx, part } = this.view_.display;
+    const at = (px: number): number => selectScale(this.reader_.manifest, px, part, this.options_.rule);
     const now = at(heightPx);
-    if (this.wantedScale < 0) return now;
+    if (this.wantedScale_ < 0) return now;
     const finer = at(heightPx / hysteresis);
     const coarser = at(heightPx * hysteresis);
-    if (finer < this.wantedScale) return now;
-    return coarser > this.wantedScale ? coarser : this.wantedScale;
+    if (finer < this.wantedScale_) return now;
+    return coarser > this.wantedScale_ ? coarser : this.wantedScale_;
   }
 
   refine(): Promise<void> {
-    this.refineAgain = true;
-    return (this.refining ??= this.refineAll().finally(() => (this.refining = undefined)));
+    this.refineAgain_ = true;
+    return (this.refining_ ??= this.refineAll_().finally(() => (this.refining_ = undefined)));
   }
-  private async refineAll(): Promise<void> {
-    if (this.phase !== 'refining' && this.phase !== 'done') await this.done;
-    this.phase = 'refining';
+  private async refineAll_(): Promise<void> {
+    if (this.phase_ !== 'refining' && this.phase_ !== 'done') await this.done;
+    this.phase_ = 'refining';
     try {
-      while (this.refineAgain) {
-        this.refineAgain = false;
-        await this.finerPlanes();
-        while (!this.refineAgain && (await this.refineSome()));
+      while (this.refineAgain_) {
+        this.refineAgain_ = false;
+        await this.finerPlanes_();
+        while (!this.refineAgain_ && (await this.refineSome_()));
       }
-      await this.composed();
-      this.phase = 'done';
-      this.events.emit('done', {});
-      this.progress();
+      await this.composed_();
+      this.phase_ = 'done';
+      this.events_.emit('done', {});
+      this.progress_();
     } catch (error) {
       if (!isAbort(error)) {
-        this.fail(error, 'refining');
-        this.phase = 'done';
+        this.fail_(error, 'refining');
+        this.phase_ = 'done';
       }
     }
   }
 
   /** Planes with more texels where the view has come nearer; never back, as what is there is there. */
-  private async finerPlanes(): Promise<void> {
-    const base = this.data!;
-    const wanted = this.planesFor(base, this.view.display.heightPx / hysteresis);
+  private async finerPlanes_(): Promise<void> {
+    const base = this.data_!;
+    const wanted = this.planesFor_(base, this.view_.display.heightPx / hysteresis);
     const finer = wanted.filter((c) => {
-      const shown = this.textureSet!.planes.get(c.base);
+      const shown = this.textureSet_!.planes.get(c.base);
       return !shown || shown.widthPx < base.textures[c.plane].widthPx;
     });
     if (finer.length === 0) return;
-    const planes = [...this.textureSet!.planes.values()].map((p) => p.plane);
-    this.data = await this.reader.data([...planes, ...finer.map((c) => c.plane)]);
-    await this.transfers!.prepare(finer.map((c) => c.plane));
-    await this.showPlanes(finer);
+    const planes = [...this.textureSet_!.planes.values()].map((p) => p.plane);
+    this.data_ = await this.reader_.data([...planes, ...finer.map((c) => c.plane)]);
+    await this.transfers_!.prepare(finer.map((c) => c.plane));
+    await (await this.showPlanes_(finer)).shown;
   }
 
   /** Fetches what saves most of what the camera sees; false when there is nothing left. */
-  private async refineSome(): Promise<boolean> {
-    const data = this.data!;
-    const choices = [...this.textureSet!.planes.values()].map(({ base, plane }) => ({ base, plane }));
-    const list = this.listOf(data, choices, Math.max(this.shownScale, 0));
-    if (this.override.rung !== undefined) {
-      await this.fetchAll(list);
+  private async refineSome_(): Promise<boolean> {
+    const data = this.data_!;
+    const choices = [...this.textureSet_!.planes.values()].map(({ base, plane }) => ({ base, plane }));
+    const list = this.listOf_(data, choices, Math.max(this.shownScale_, 0));
+    if (this.override_.rung !== undefined) {
+      await this.fetchAll_(list);
       return false;
     }
-    if (this.wholeRungs) return this.refineRung(list);
-    const seen = this.seen(choices);
+    if (this.wholeRungs_) return this.refineRung_(list);
+    const seen = this.seen_(choices);
     const wishes: Wish[] = [];
     let bytes = 0;
-    const rungs = list.fragments.map((f) => this.rungOf(f));
+    const rungs = list.fragments.map((f) => this.rungOf_(f));
     list.offers.forEach((o, i) => {
       const { plane, fragment } = list.fragments[i];
       const weight = seen?.get(plane)?.[fragment] ?? 1;
@@ -537,50 +544,49 @@ export class ModelLoad implements LoadedModel {
     const taken = new Map<number, number>();
     for (const u of upgradesInOrder(list.offers, rungs)) {
       const { plane, fragment } = list.fragments[u.offer];
-      if (this.gaveUp.has(`${plane}/${fragment}/${u.rung}`)) continue;
+      if (this.gaveUp_.has(`${plane}/${fragment}/${u.rung}`)) continue;
       if (bytes > 0 && bytes + u.bytes > refineBytes * refineRequests) break;
       bytes += u.bytes;
       taken.set(u.offer, u.rung);
     }
     for (const [offer, rung] of taken) wishes.push({ ...list.fragments[offer], rung, offer });
     if (wishes.length === 0) return false;
-    await this.fetchWishes(wishes);
-    await this.composed();
+    await this.fetchWishes_(wishes);
+    await this.composed_();
     return true;
   }
-  private async refineRung(list: FragmentList): Promise<boolean> {
-    for (let i = 0; i < list.offers.length; ++i) {
-      const shown = this.wishesOf(list, i, 0).reduce((least, w) => Math.min(least, this.rungOf(w)), Infinity);
-      const rung = shown + 1;
-      const wishes = this.wishesOf(list, i, rung).filter(
-        (w) => rung < list.offers[i].bytes.length && !this.gaveUp.has(`${w.plane}/${w.fragment}/${rung}`),
-      );
-      if (wishes.length === 0) continue;
-      await this.fetchWishes(wishes);
-      await this.composed();
-      return true;
-    }
-    return false;
+  /** The next rung of the first plane that lacks some. */
+  private async refineRung_(list: FragmentList): Promise<boolean> {
+    const lacking = list.fragments.map((f, i) => ({ ...f, rung: this.rungOf_(f) + 1, offer: i }));
+    const open = lacking.filter(
+      (w) => w.rung < list.offers[w.offer].bytes.length && !this.gaveUp_.has(`${w.plane}/${w.fragment}/${w.rung}`),
+    );
+    const least = open.reduce((rung, w) => Math.min(rung, w.rung), Infinity);
+    const wishes = open.filter((w) => w.rung === least && w.plane === open.find((o) => o.rung === least)!.plane);
+    if (wishes.length === 0) return false;
+    await this.fetchWishes_(wishes);
+    await this.composed_();
+    return true;
   }
 
   /** Share of each fragment that the camera sees, by plane; undefined without a camera. */
-  private seen(choices: readonly PlaneChoice[]): Map<number, Float32Array> | undefined {
-    const { camera } = this.view;
+  private seen_(choices: readonly PlaneChoice[]): Map<number, Float32Array> | undefined {
+    const { camera } = this.view_;
     const [shape] = this.object.children;
     if (!camera || !shape) return undefined;
-    if (this.surfaceScale !== this.shownScale) {
-      const slots = this.materialSet.slots;
-      this.surface = new VisibleSurface(this.object, meshesOf(shape), (mesh: Mesh) => {
+    if (this.surfaceScale_ !== this.shownScale_) {
+      const slots = this.materialSet_.slots;
+      this.surface_ = new VisibleSurface(this.object, meshesOf(shape), (mesh: Mesh) => {
         const own = Array.isArray(mesh.material) ? mesh.material : [mesh.material];
         return new Set(slots.filter((s) => own.includes(s.material)).map((s) => s.image));
       });
-      this.surfaceScale = this.shownScale;
+      this.surfaceScale_ = this.shownScale_;
     }
     const seen = new Map<number, Float32Array>();
     for (const { plane } of choices) {
-      const t = this.data!.textures[plane];
+      const t = this.data_!.textures[plane];
       const cell: [number, number] = [t.fragmentWidthPx / t.widthPx, t.fragmentHeightPx / t.heightPx];
-      seen.set(plane, this.surface!.ofImage(t.image, t.columns, t.rows, camera, this.object, cell));
+      seen.set(plane, this.surface_!.ofImage(t.image, t.columns, t.rows, camera, this.object, cell));
     }
     return seen;
   }
@@ -588,47 +594,25 @@ export class ModelLoad implements LoadedModel {
   // ---- end
 
   readPlane(base: number): Uint8Array {
-    return this.textureSet?.planes.get(base)?.read() ?? new Uint8Array(0);
+    return this.textureSet_?.planes.get(base)?.read() ?? new Uint8Array(0);
   }
   cancel(): void {
-    this.abort.abort();
-    if (this.phase !== 'failed') this.phase = 'cancelled';
+    this.abort_.abort();
+    if (this.phase_ !== 'failed') this.phase_ = 'cancelled';
   }
   dispose(): void {
-    if (this.disposed) return;
-    this.disposed = true;
+    if (this.disposed_) return;
+    this.disposed_ = true;
     this.cancel();
-    this.offRequest();
+    this.offRequest_();
     this.object.removeFromParent();
-    for (const shape of this.scales.dispose()) disposeGeometries(shape);
+    for (const shape of this.scales_.dispose()) disposeGeometries(shape);
     this.object.clear();
-    this.textureSet?.dispose();
-    this.materialSet.dispose();
-    this.transfers?.dispose();
-    this.pool.dispose();
-    this.surface = undefined;
-    this.events.clear();
+    this.textureSet_?.dispose();
+    this.materialSet_.dispose();
+    this.transfers_?.dispose();
+    this.pool_.dispose();
+    this.surface_ = undefined;
+    this.events_.clear();
   }
 }
-
-/** One offer per plane: its whole rungs. */
-function packedList(list: FragmentList): FragmentList {
-  const packed: FragmentList = { offers: [], fragments: [], totalWeight: list.totalWeight };
-  const at = new Map<number, number>();
-  list.offers.forEach((o, i) => {
-    const { plane } = list.fragments[i];
-    const known = at.get(plane);
-    if (known === undefined) {
-      at.set(plane, packed.offers.push({ ...o, bytes: [...o.bytes], loss: [...o.loss] }) - 1);
-      packed.fragments.push({ plane, fragment: -1 });
-      return;
-    }
-    const p = packed.offers[known];
-    o.bytes.forEach((b, r) => (p.bytes[r] += b));
-    o.loss.forEach((l, r) => (p.loss[r] += l));
-    p.plannedBytes += o.plannedBytes;
-    p.eta += o.eta;
-  });
-  return packed;
-}
-

@@ -64,18 +64,18 @@ export class PackageReader {
   readonly openedS: number;
   /** Bytes received by kind. */
   readonly bytesByKind: Partial<Record<RequestKind, number>> = {};
-  private readonly listeners = new Set<(record: RequestRecord) => void>();
-  private indexPages = new Map<number, Promise<Map<string, EntryRef>>>();
-  private indexHead?: Promise<IndexHead>;
-  private texturesOnce?: Promise<TextureInfo[]>;
-  private tablesHead?: Promise<TablesHead>;
-  private wholeTables?: Promise<Uint8Array>;
-  private readonly tablesOnce = new Map<number, Promise<PlaneTables>>();
-  private qualityOnce?: Promise<QualityTable>;
-  private firstPictureOnce?: Promise<void>;
-  private fragmentFilesOnce?: Promise<FragmentFiles | undefined>;
-  private readonly tableStreams = new Map<number, Promise<Uint8Array>>();
-  private readonly offsets = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
+  private readonly listeners_ = new Set<(record: RequestRecord) => void>();
+  private indexPages_ = new Map<number, Promise<Map<string, EntryRef>>>();
+  private indexHead_?: Promise<IndexHead>;
+  private texturesOnce_?: Promise<TextureInfo[]>;
+  private tablesHead_?: Promise<TablesHead>;
+  private wholeTables_?: Promise<Uint8Array>;
+  private readonly tablesOnce_ = new Map<number, Promise<PlaneTables>>();
+  private qualityOnce_?: Promise<QualityTable>;
+  private firstPictureOnce_?: Promise<void>;
+  private fragmentFilesOnce_?: Promise<FragmentFiles | undefined>;
+  private readonly tableStreams_ = new Map<number, Promise<Uint8Array>>();
+  private readonly offsets_ = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
 
   constructor(
     readonly store: PackageStore,
@@ -108,7 +108,7 @@ export class PackageReader {
     const reader = new this(store, client, url, { parsed: readManifest(manifest), id }, openedS);
     Object.assign(reader.bytesByKind, bytes);
     reader.requests = early;
-    client.onRequest = (record) => reader.noteRequest(record);
+    client.onRequest = (record) => reader.noteRequest_(record);
     return reader;
   }
 
@@ -128,13 +128,13 @@ export class PackageReader {
   requests: RequestRecord[] = [];
   /** Calls back for every finished request; gives a function that ends it. */
   onRequest(listener: (record: RequestRecord) => void): () => void {
-    this.listeners.add(listener);
-    return () => this.listeners.delete(listener);
+    this.listeners_.add(listener);
+    return () => this.listeners_.delete(listener);
   }
-  private noteRequest(record: RequestRecord): void {
+  private noteRequest_(record: RequestRecord): void {
     this.requests.push(record);
     this.bytesByKind[record.kind] = (this.bytesByKind[record.kind] ?? 0) + record.received;
-    for (const listener of this.listeners) listener(record);
+    for (const listener of this.listeners_) listener(record);
   }
 
   /** How the bytes come: ranges of the container, files of a tree, or one whole container. */
@@ -144,134 +144,134 @@ export class PackageReader {
   /** Forgets what was read. Loads of this package must be disposed of on their own. */
   dispose(): void {
     this.store.dispose();
-    this.indexPages.clear();
-    this.tablesOnce.clear();
-    this.tableStreams.clear();
-    this.offsets.clear();
-    this.wholeTables = undefined;
+    this.indexPages_.clear();
+    this.tablesOnce_.clear();
+    this.tableStreams_.clear();
+    this.offsets_.clear();
+    this.wholeTables_ = undefined;
   }
 
-  private fail(place: string, expected: string, found: string): never {
+  private fail_(place: string, expected: string, found: string): never {
     throw new FormatError(this.store.name, place, expected, found);
   }
-  private digestCheck(place: string, digest: Uint8Array): (bytes: Uint8Array) => Promise<void> {
+  private digestCheck_(place: string, digest: Uint8Array): (bytes: Uint8Array) => Promise<void> {
     return async (bytes) => {
       const found = await sha256(bytes);
-      if (!samePrefix(found, digest)) this.fail(place, `SHA-256 ${toHex(digest)}`, toHex(found.subarray(0, digest.length)));
+      if (!samePrefix(found, digest)) this.fail_(place, `SHA-256 ${toHex(digest)}`, toHex(found.subarray(0, digest.length)));
     };
   }
-  private readAll(ref: EntryRef, how: ReadOptions): Promise<Uint8Array> {
-    return this.store.read(ref, 0, ref.bytes, { ...how, verify: this.digestCheck(`entry ${ref.path}`, ref.sha256) });
+  private readAll_(ref: EntryRef, how: ReadOptions): Promise<Uint8Array> {
+    return this.store.read(ref, 0, ref.bytes, { ...how, verify: this.digestCheck_(`entry ${ref.path}`, ref.sha256) });
   }
-  private async readPaged(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
-    const bytes = await this.readAll(ref, how);
-    await this.digestCheck(`head of ${ref.path}`, ref.headSha256)(bytes.subarray(0, ref.headBytes));
+  private async readPaged_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
+    const bytes = await this.readAll_(ref, how);
+    await this.digestCheck_(`head of ${ref.path}`, ref.headSha256)(bytes.subarray(0, ref.headBytes));
     return bytes;
   }
-  private readHead(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
-    const verify = this.digestCheck(`head of ${ref.path}`, ref.headSha256);
+  private readHead_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
+    const verify = this.digestCheck_(`head of ${ref.path}`, ref.headSha256);
     return this.store.read(ref, 0, ref.headBytes, { ...how, verify });
   }
-  private requireHead(ref: PagedRef, headBytes: number): void {
-    if (ref.headBytes !== headBytes) this.fail(`head of ${ref.path}`, `${ref.headBytes} bytes`, `${headBytes}`);
+  private requireHead_(ref: PagedRef, headBytes: number): void {
+    if (ref.headBytes !== headBytes) this.fail_(`head of ${ref.path}`, `${ref.headBytes} bytes`, `${headBytes}`);
   }
 
   // ---- index
 
   /** Every entry but manifest.json and index.bin, in container order. */
   async index(): Promise<EntryRef[]> {
-    const bytes = await this.readPaged(this.manifest.index, { kind: 'index' });
+    const bytes = await this.readPaged_(this.manifest.index, { kind: 'index' });
     return readIndex(bytes);
   }
 
-  private async loadIndexHead(): Promise<IndexHead> {
+  private async loadIndexHead_(): Promise<IndexHead> {
     const ref = this.manifest.index;
     const small = ref.bytes <= wholeDocumentBytes || this.form !== 'range';
-    const bytes = small ? await this.readPaged(ref, { kind: 'index' }) : await this.readHead(ref, { kind: 'index' });
+    const bytes = small ? await this.readPaged_(ref, { kind: 'index' }) : await this.readHead_(ref, { kind: 'index' });
     const head = readIndexHead(bytes);
-    this.requireHead(ref, head.bytes);
+    this.requireHead_(ref, head.bytes);
     return head;
   }
-  private async loadIndexPage(plane: number): Promise<Map<string, EntryRef>> {
-    const head = await (this.indexHead ??= this.loadIndexHead());
+  private async loadIndexPage_(plane: number): Promise<Map<string, EntryRef>> {
+    const head = await (this.indexHead_ ??= this.loadIndexHead_());
     const page = head.pages.findIndex((p) => p.plane === plane);
     const entries = new Map<string, EntryRef>();
     if (page < 0) return entries;
     const { offset, bytes } = head.pages[page];
     const got = await this.store.read(this.manifest.index, offset, bytes, { kind: 'index' });
     for (const e of await readIndexPage(head, page, got)) entries.set(e.path, e);
-    if (plane < 0) this.checkManifestRefs(entries);
+    if (plane < 0) this.checkManifestRefs_(entries);
     return entries;
   }
-  private checkManifestRefs(entries: Map<string, EntryRef>): void {
+  private checkManifestRefs_(entries: Map<string, EntryRef>): void {
     const m = this.manifest;
     for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
       const e = entries.get(ref.path);
       if (!e || e.offset !== ref.offset || e.bytes !== ref.bytes || !samePrefix(e.sha256, ref.sha256))
-        this.fail(`index entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+        this.fail_(`index entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
     }
   }
   /** An entry of the index, of which only the page that has it is read. */
   async find(path: string): Promise<EntryRef> {
     const plane = layout.planeOfPath(path);
-    let page = this.indexPages.get(plane);
+    let page = this.indexPages_.get(plane);
     if (!page) {
-      page = this.loadIndexPage(plane);
-      this.indexPages.set(plane, page);
-      page.catch(() => this.indexPages.delete(plane));
+      page = this.loadIndexPage_(plane);
+      this.indexPages_.set(plane, page);
+      page.catch(() => this.indexPages_.delete(plane));
     }
     const entry = (await page).get(path);
-    if (!entry) return this.fail(`entry ${path}`, 'an entry of the index', 'none');
+    if (!entry) return this.fail_(`entry ${path}`, 'an entry of the index', 'none');
     return entry;
   }
   /** The bytes of an entry. */
   async entry(path: string, kind: RequestKind = 'other', signal?: AbortSignal): Promise<Uint8Array> {
-    return this.readAll(await this.find(path), { kind, signal });
+    return this.readAll_(await this.find(path), { kind, signal });
   }
 
   // ---- documents
 
   /** The texture planes: full-size ones first, then mips. */
   textures(): Promise<TextureInfo[]> {
-    return (this.texturesOnce ??= this.loadTextures());
+    return (this.texturesOnce_ ??= this.loadTextures_());
   }
-  private async loadTextures(): Promise<TextureInfo[]> {
+  private async loadTextures_(): Promise<TextureInfo[]> {
     const m = this.manifest;
-    const textures = readTextures(await this.readAll(m.textures, { kind: 'textures' }));
-    if (textures.length !== m.planeCount) this.fail(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
+    const textures = readTextures(await this.readAll_(m.textures, { kind: 'textures' }));
+    if (textures.length !== m.planeCount) this.fail_(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
     const feature = missingFeature(textures, m.requiredFeatures);
-    if (feature !== '') this.fail('/requiredFeatures', feature, 'a codec without it');
+    if (feature !== '') this.fail_('/requiredFeatures', feature, 'a codec without it');
     const full = fullSizePlanes(textures);
     const mips = m.requiredFeatures.includes('mips');
     if (mips !== full < textures.length)
-      this.fail(layout.texturesPath, mips ? 'mips, as the manifest requires' : 'no mips', `${textures.length - full}`);
+      this.fail_(layout.texturesPath, mips ? 'mips, as the manifest requires' : 'no mips', `${textures.length - full}`);
     if (m.previews.length !== Math.min(full, mostManifestPreviews))
-      this.fail(layout.manifestPath, 'previews of the full-size planes', `${m.previews.length}`);
+      this.fail_(layout.manifestPath, 'previews of the full-size planes', `${m.previews.length}`);
     return textures;
   }
 
   /** Measured quality of scales and rungs. */
   quality(): Promise<QualityTable> {
-    return (this.qualityOnce ??= this.readAll(this.manifest.quality, { kind: 'quality' }).then(readQuality));
+    return (this.qualityOnce_ ??= this.readAll_(this.manifest.quality, { kind: 'quality' }).then(readQuality));
   }
 
   /** What the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
-    const bytes = await this.readAll(this.manifest.provenance, { kind: 'other' });
+    const bytes = await this.readAll_(this.manifest.provenance, { kind: 'other' });
     return JSON.parse(new TextDecoder().decode(bytes));
   }
 
-  private async loadTablesHead(): Promise<TablesHead> {
+  private async loadTablesHead_(): Promise<TablesHead> {
     const ref = this.manifest.tables;
     if (ref.bytes <= wholeDocumentBytes || this.form !== 'range')
-      this.wholeTables = this.readPaged(ref, { kind: 'tables' });
-    const head = readTablesHead(await (this.wholeTables ?? this.readHead(ref, { kind: 'tables' })));
-    this.requireHead(ref, head.bytes);
+      this.wholeTables_ = this.readPaged_(ref, { kind: 'tables' });
+    const head = readTablesHead(await (this.wholeTables_ ?? this.readHead_(ref, { kind: 'tables' })));
+    this.requireHead_(ref, head.bytes);
     if (head.planes.length !== this.manifest.planeCount)
-      this.fail(layout.tablesPath, `${this.manifest.planeCount} planes`, `${head.planes.length}`);
+      this.fail_(layout.tablesPath, `${this.manifest.planeCount} planes`, `${head.planes.length}`);
     const last = head.planes[head.planes.length - 1];
     const end = last ? last.offset + last.bytes : head.bytes;
-    if (end !== ref.bytes) this.fail(layout.tablesPath, `${end} bytes`, `${ref.bytes}`);
+    if (end !== ref.bytes) this.fail_(layout.tablesPath, `${end} bytes`, `${ref.bytes}`);
     return head;
   }
 
@@ -285,33 +285,33 @@ export class PackageReader {
    * read by one request.
    */
   async tables(planes?: readonly number[]): Promise<(PlaneTables | undefined)[]> {
-    const head = await (this.tablesHead ??= this.loadTablesHead());
+    const head = await (this.tablesHead_ ??= this.loadTablesHead_());
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
       if (!(p >= 0 && p < head.planes.length))
         throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
-    const missing = wanted.filter((p) => !this.tablesOnce.has(p));
-    for (const run of this.runsOf(head, missing)) {
+    const missing = wanted.filter((p) => !this.tablesOnce_.has(p));
+    for (const run of this.runsOf_(head, missing)) {
       const begin = head.planes[run[0]].offset;
       const last = head.planes[run[run.length - 1]];
       const bytes = (async () =>
-        this.wholeTables
-          ? (await this.wholeTables).subarray(begin)
+        this.wholeTables_
+          ? (await this.wholeTables_).subarray(begin)
           : this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true }))();
       for (const p of run) {
         const { offset, bytes: size } = head.planes[p];
         const table = bytes
           .then((b) => readTablesSection(head, p, b.subarray(offset - begin, offset - begin + size)))
-          .then(async (t) => (await this.checkPlane(p, t), t));
-        this.tablesOnce.set(p, table);
-        table.catch(() => this.tablesOnce.delete(p));
+          .then(async (t) => (await this.checkPlane_(p, t), t));
+        this.tablesOnce_.set(p, table);
+        table.catch(() => this.tablesOnce_.delete(p));
       }
     }
     const all: (PlaneTables | undefined)[] = new Array<undefined>(head.planes.length).fill(undefined);
-    await Promise.all([...this.tablesOnce].map(async ([p, t]) => (all[p] = await t)));
+    await Promise.all([...this.tablesOnce_].map(async ([p, t]) => (all[p] = await t)));
     return all;
   }
-  private runsOf(head: TablesHead, planes: readonly number[]): number[][] {
+  private runsOf_(head: TablesHead, planes: readonly number[]): number[][] {
     const runs: number[][] = [];
     for (const p of planes) {
       const last = runs[runs.length - 1];
@@ -322,18 +322,18 @@ export class PackageReader {
     return runs;
   }
   /** Tables, textures.json and index speak of the same fragments and bytes. */
-  private async checkPlane(plane: number, t: PlaneTables): Promise<void> {
+  private async checkPlane_(plane: number, t: PlaneTables): Promise<void> {
     const info = (await this.textures())[plane];
     const place = `texture plane ${plane}`;
     const sameRungs =
       t.rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === t.rungQuality[r]);
     if (t.columns !== info.columns || t.rows !== info.rows || !sameRungs)
-      this.fail(place, 'the grid and rungs of textures.json in tables.bin', 'others');
+      this.fail_(place, 'the grid and rungs of textures.json in tables.bin', 'others');
     if (t.incremental !== codecTraits(info.codec).incremental)
-      this.fail(place, 'tables of the codec in textures.json', 'others');
+      this.fail_(place, 'tables of the codec in textures.json', 'others');
     const requireSum = async (path: string, bytes: number): Promise<void> => {
       const entry = await this.find(path);
-      if (entry.bytes !== bytes) this.fail(`entry ${path}`, `${bytes} bytes, as tables.bin adds up`, `${entry.bytes}`);
+      if (entry.bytes !== bytes) this.fail_(`entry ${path}`, `${bytes} bytes, as tables.bin adds up`, `${entry.bytes}`);
     };
     await requireSum(layout.tableStreamsPath(plane), sum(t.tableBytes));
     const n = fragmentCount(t);
@@ -346,7 +346,7 @@ export class PackageReader {
         at += t.sizeBytes[r * n + f];
       }
     }
-    this.offsets.set(plane, offsets);
+    this.offsets_.set(plane, offsets);
   }
 
   /** What decisions about textures are made from, with the tables of these planes. */
@@ -359,27 +359,27 @@ export class PackageReader {
 
   /** Reads the range of the first picture, so that what it holds needs no further request. */
   firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
-    return (this.firstPictureOnce ??= this.loadFirstPicture(how));
+    return (this.firstPictureOnce_ ??= this.loadFirstPicture_(how));
   }
-  private async loadFirstPicture(how: Partial<ReadOptions>): Promise<void> {
+  private async loadFirstPicture_(how: Partial<ReadOptions>): Promise<void> {
     if (this.form !== 'range') return;
     const { offset, bytes, sha256: digest } = this.manifest.firstPicture;
-    const verify = this.digestCheck('first picture', digest);
+    const verify = this.digestCheck_('first picture', digest);
     await this.store.read({ path: 'first picture', offset, bytes }, 0, bytes, { kind: 'first-picture', ...how, verify });
   }
   /** The GLB of a scale; needs no index. */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
-    return this.readAll(s.glb, { kind: 'mesh', once: true, ...how });
+    return this.readAll_(s.glb, { kind: 'mesh', once: true, ...how });
   }
   /** preview/PPP.jpg of a full-size plane. */
   async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
     const range = this.manifest.previews[plane];
     const path = layout.previewPath(plane);
     // The first picture's digest covers its parts.
-    if (range && this.form === 'range' && this.firstPictureOnce) {
-      await this.firstPictureOnce;
+    if (range && this.form === 'range' && this.firstPictureOnce_) {
+      await this.firstPictureOnce_;
       return this.store.read({ path, ...range }, 0, range.bytes, { kind: 'preview', signal });
     }
     return this.entry(path, 'preview', signal);
@@ -389,11 +389,11 @@ export class PackageReader {
     const t = await this.planeTables(plane);
     if (!(rung >= 0 && rung < rungCount(t)))
       throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${rungCount(t)}`, `${rung}`);
-    let streams = this.tableStreams.get(plane);
+    let streams = this.tableStreams_.get(plane);
     if (!streams) {
       streams = this.entry(layout.tableStreamsPath(plane), 'texture');
-      this.tableStreams.set(plane, streams);
-      streams.catch(() => this.tableStreams.delete(plane));
+      this.tableStreams_.set(plane, streams);
+      streams.catch(() => this.tableStreams_.delete(plane));
     }
     const begin = sum(t.tableBytes, 0, rung);
     return (await streams).subarray(begin, begin + t.tableBytes[rung]);
@@ -405,7 +405,7 @@ export class PackageReader {
     if (!(rung >= 0 && rung < rungCount(t) && fragment >= 0 && fragment < fragmentCount(t)))
       throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it', `${rung}, ${fragment}`);
     const at = rung * fragmentCount(t) + fragment;
-    return { offset: this.offsets.get(plane)![at], bytes: t.sizeBytes[at] };
+    return { offset: this.offsets_.get(plane)![at], bytes: t.sizeBytes[at] };
   }
   /** The first 8 bytes of the SHA-256 of a fragment's stream. */
   async fragmentDigest(plane: number, rung: number, fragment: number): Promise<Uint8Array> {
@@ -419,13 +419,13 @@ export class PackageReader {
     const paths = Array.from({ length: rungCount(tables) }, (_, r) => layout.rungPath(plane, r));
     const packs = await Promise.all(paths.map((path) => this.find(path)));
     const complete = (await this.fragmentFiles())?.[plane];
-    return { tables, packs, offsets: this.offsets.get(plane)!, complete };
+    return { tables, packs, offsets: this.offsets_.get(plane)!, complete };
   }
   /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
   fragmentFiles(): Promise<FragmentFiles | undefined> {
-    return (this.fragmentFilesOnce ??= this.loadFragmentFiles());
+    return (this.fragmentFilesOnce_ ??= this.loadFragmentFiles_());
   }
-  private async loadFragmentFiles(): Promise<FragmentFiles | undefined> {
+  private async loadFragmentFiles_(): Promise<FragmentFiles | undefined> {
     const { store } = this;
     if (!store.extraFile) return undefined;
     const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' });
@@ -437,7 +437,7 @@ export class PackageReader {
     const path = layout.fragmentFilePath(plane, rung, fragment, extension);
     const bytes = (await this.planeFiles(plane)).complete?.[rung]?.get(fragment)?.bytes ?? 0;
     const got = await this.store.extraFile?.(path, bytes, { kind: 'texture', signal, once: true });
-    return got ?? this.fail(path, 'a file', 'none');
+    return got ?? this.fail_(path, 'a file', 'none');
   }
 
   /** Reads index, tables, textures.json and quality.json by one request, where they are small. */
@@ -453,8 +453,8 @@ export class PackageReader {
     const range = await this.fragmentRange(plane, rung, fragment);
     const pack = await this.find(layout.rungPath(plane, rung));
     const place = `fragment ${fragment} of ${pack.path}`;
-    if (range.bytes === 0) this.fail(place, 'a stored fragment', 'none');
-    const verify = this.digestCheck(place, await this.fragmentDigest(plane, rung, fragment));
+    if (range.bytes === 0) this.fail_(place, 'a stored fragment', 'none');
+    const verify = this.digestCheck_(place, await this.fragmentDigest(plane, rung, fragment));
     return this.store.read(pack, range.offset, range.bytes, { kind: 'texture', once: true, signal, verify });
   }
   /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
@@ -470,13 +470,13 @@ export class PackageReader {
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const ref = this.manifest.stream;
     if (!ref) return undefined;
-    const verify = this.digestCheck(`head of ${layout.splitStreamPath}`, ref.headSha256);
+    const verify = this.digestCheck_(`head of ${layout.splitStreamPath}`, ref.headSha256);
     return this.store.read({ path: layout.splitStreamPath, ...ref }, 0, ref.headBytes, { kind: 'stream', signal, verify });
   }
   /** Bytes of the vertex-split stream; whoever takes blocks of it checks them by its head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const ref = this.manifest.stream;
-    if (!ref) return this.fail(layout.splitStreamPath, 'a stream of vertex splits', 'none');
+    if (!ref) return this.fail_(layout.splitStreamPath, 'a stream of vertex splits', 'none');
     return this.store.read({ path: layout.splitStreamPath, ...ref }, offset, bytes, { kind: 'stream', once: true, ...how });
   }
 }

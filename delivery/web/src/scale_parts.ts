@@ -78,22 +78,22 @@ export function meshesOf(object: Object3D): Mesh[] {
 /** Materials of all scales: those of the first one that has them. */
 export class MaterialSet {
   readonly slots: Slot[] = [];
-  private readonly byKey = new Map<string, Material>();
+  private readonly byKey_ = new Map<string, Material>();
 
   get all(): Material[] {
-    return [...this.byKey.values()];
+    return [...this.byKey_.values()];
   }
 
   /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
   adopt(gltf: ParsedGltf, added: (slot: Slot) => void): void {
-    for (const mesh of meshesOf(gltf.scene)) mesh.material = this.shared(gltf, mesh.material as Material, added);
+    for (const mesh of meshesOf(gltf.scene)) mesh.material = this.shared_(gltf, mesh.material as Material, added);
   }
-  private shared(gltf: ParsedGltf, material: Material, added: (slot: Slot) => void): Material {
+  private shared_(gltf: ParsedGltf, material: Material, added: (slot: Slot) => void): Material {
     const { parser } = gltf;
     const index = parser.associations.get(material)?.materials ?? -1;
     const m = material as Material & { flatShading?: boolean; normalScale?: { y: number } };
     const key = [index, m.vertexColors, m.flatShading ?? false, (m.normalScale?.y ?? 0) < 0, m.type].join();
-    const known = this.byKey.get(key);
+    const known = this.byKey_.get(key);
     if (known) {
       if (known !== material) {
         for (const [, texture] of texturesOf(material)) texture.dispose();
@@ -101,7 +101,7 @@ export class MaterialSet {
       }
       return known;
     }
-    this.byKey.set(key, material);
+    this.byKey_.set(key, material);
     for (const [name, texture] of texturesOf(material)) {
       const match = imageName.exec(texture.name);
       const image = match ? Number(match[1]) : imageOfTexture(parser.json, parser.associations.get(texture)?.textures);
@@ -122,11 +122,11 @@ export class MaterialSet {
   }
 
   dispose(): void {
-    for (const material of this.byKey.values()) {
+    for (const material of this.byKey_.values()) {
       for (const [, texture] of texturesOf(material)) texture.dispose();
       material.dispose();
     }
-    this.byKey.clear();
+    this.byKey_.clear();
     this.slots.length = 0;
   }
 }

@@ -17,33 +17,33 @@ const weights = /* @__PURE__ */ Uint32Array.from({ length: 256 }, (_, seen) => M
 
 /** Reads zeros behind the end. */
 export class BitDecoder {
-  private at = 0;
-  private range = 0xffffffff;
-  private code = 0;
-  constructor(private readonly bytes: Uint8Array) {
-    for (let i = 0; i < 4; ++i) this.code = ((this.code << 8) | this.next()) >>> 0;
+  private at_ = 0;
+  private range_ = 0xffffffff;
+  private code_ = 0;
+  constructor(private readonly bytes_: Uint8Array) {
+    for (let i = 0; i < 4; ++i) this.code_ = ((this.code_ << 8) | this.next_()) >>> 0;
   }
-  private next(): number {
-    return this.at < this.bytes.length ? this.bytes[this.at++] : 0;
+  private next_(): number {
+    return this.at_ < this.bytes_.length ? this.bytes_[this.at_++] : 0;
   }
-  private take(odds: number): boolean {
-    const bound = (this.range >>> 12) * odds;
-    const bit = this.code < bound;
-    if (bit) this.range = bound;
+  private take_(odds: number): boolean {
+    const bound = (this.range_ >>> 12) * odds;
+    const bit = this.code_ < bound;
+    if (bit) this.range_ = bound;
     else {
-      this.code -= bound;
-      this.range -= bound;
+      this.code_ -= bound;
+      this.range_ -= bound;
     }
-    while (this.range < 0x1000000) {
-      this.range = (this.range << 8) >>> 0;
-      this.code = ((this.code << 8) | this.next()) >>> 0;
+    while (this.range_ < 0x1000000) {
+      this.range_ = (this.range_ << 8) >>> 0;
+      this.code_ = ((this.code_ << 8) | this.next_()) >>> 0;
     }
     return bit;
   }
   bit(models: BitModels, i: number): boolean {
     const p = models.p[i];
     const odds = p >> 4;
-    const bit = this.take(odds < 1 ? 1 : odds);
+    const bit = this.take_(odds < 1 ? 1 : odds);
     const seen = models.seen[i];
     const weight = weights[seen];
     models.p[i] = bit ? p + (((65535 - p) * weight) >>> 16) : p - ((p * weight) >>> 16);
@@ -53,7 +53,7 @@ export class BitDecoder {
   /** `count` bits at even odds, highest first. */
   raw(count: number): number {
     let value = 0;
-    for (let i = 0; i < count; ++i) value = value * 2 + (this.take(2048) ? 1 : 0);
+    for (let i = 0; i < count; ++i) value = value * 2 + (this.take_(2048) ? 1 : 0);
     return value;
   }
 }
@@ -68,22 +68,22 @@ const valueLimit = 60;
 
 /** Decodes the values of one part. Where the part was left out every residual is 0. */
 export class ValueDecoder {
-  private present = false;
-  private bits = new BitDecoder(new Uint8Array(0));
-  private readonly models = new BitModels(valueModelCount, valueLimit);
-  private readonly mean = new Int32Array(4);
+  private present_ = false;
+  private bits_ = new BitDecoder(new Uint8Array(0));
+  private readonly models_ = new BitModels(valueModelCount, valueLimit);
+  private readonly mean_ = new Int32Array(4);
 
   start(bytes: Uint8Array, models: Uint8Array): void {
-    this.present = bytes.length > 0;
-    if (!this.present) return;
-    for (let i = 0; i < models.length; ++i) this.models.p[i] = models[i] << 8;
-    this.models.seen.fill(prior);
-    this.mean.fill(bytes[0] * 2);
-    this.bits = new BitDecoder(bytes.subarray(1));
+    this.present_ = bytes.length > 0;
+    if (!this.present_) return;
+    for (let i = 0; i < models.length; ++i) this.models_.p[i] = models[i] << 8;
+    this.models_.seen.fill(prior);
+    this.mean_.fill(bytes[0] * 2);
+    this.bits_ = new BitDecoder(bytes.subarray(1));
   }
   /** Another wedge of the point has the same value. */
   same(): boolean {
-    return this.present && this.bits.bit(this.models, valueModelCount - 1);
+    return this.present_ && this.bits_.bit(this.models_, valueModelCount - 1);
   }
   /** Writes `components` numbers at out[at]: prediction and residual. */
   values(out: Int32Array, at: number, guess: ArrayLike<number>, components: number, bits: number): void {
@@ -91,14 +91,14 @@ export class ValueDecoder {
     for (let i = 0; i < components; ++i) {
       const g = guess[i];
       const clipped = g < 0 ? 0 : g > largest ? largest : g;
-      out[at + i] = (clipped + (this.present ? this.residual(i) : 0)) & largest;
+      out[at + i] = (clipped + (this.present_ ? this.residual_(i) : 0)) & largest;
     }
   }
-  private residual(component: number): number {
-    const length = this.length(this.mean[component]);
-    this.mean[component] += (length * 16 - this.mean[component]) >> 3;
+  private residual_(component: number): number {
+    const length = this.length_(this.mean_[component]);
+    this.mean_[component] += (length * 16 - this.mean_[component]) >> 3;
     if (length === 0) return 0;
-    const { bits, models } = this;
+    const { bits_: bits, models_: models } = this;
     const row = Math.min(length, below - 1);
     let coded = 1;
     let left = length - 1;
@@ -113,12 +113,12 @@ export class ValueDecoder {
     if (left > 0) coded = coded * 2 ** left + bits.raw(left);
     return bits.raw(1) ? -coded : coded;
   }
-  private length(mean: number): number {
+  private length_(mean: number): number {
     const middle = mean >> 4;
     const row = ((mean >> 2) & 3) * steps;
     const longer = (than: number): boolean => {
       const step = Math.min(Math.max(than - middle + 10, 0), steps - 1);
-      return this.bits.bit(this.models, row + step);
+      return this.bits_.bit(this.models_, row + step);
     };
     let at = Math.min(Math.max(middle - 2, 0), longest - 1);
     if (longer(at)) {

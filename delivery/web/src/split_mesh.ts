@@ -62,12 +62,12 @@ export class SplitMesh {
   readonly values: Growing[];
   readonly head = new Growing(); // per point: its first corner
   readonly degree = new Growing();
-  private readonly next = new Growing(768); // per corner: the next at its point
-  private readonly firstA = new Growing();
-  private readonly countB = new Growing();
-  private readonly loose = new Corners();
-  private readonly chain: number[] = [];
-  private readonly taken: boolean[] = [];
+  private readonly next_ = new Growing(768); // per corner: the next at its point
+  private readonly firstA_ = new Growing();
+  private readonly countB_ = new Growing();
+  private readonly loose_ = new Corners();
+  private readonly chain_: number[] = [];
+  private readonly taken_: boolean[] = [];
 
   /** `components`: per attribute, how many numbers each wedge has. */
   constructor(readonly components: readonly number[]) {
@@ -87,8 +87,8 @@ export class SplitMesh {
     this.places.extend(3);
     this.head.push(-1);
     this.degree.push(0);
-    this.firstA.push(-1);
-    this.countB.push(0);
+    this.firstA_.push(-1);
+    this.countB_.push(0);
     return this.head.length - 1;
   }
   addWedge(point: number): number {
@@ -110,7 +110,7 @@ export class SplitMesh {
     this.faceGroup.push(group);
     for (let k = 0; k < 3; ++k) {
       const p = this.wedgePoint.data[this.faces.data[3 * face + k]];
-      this.next.push(this.head.data[p]);
+      this.next_.push(this.head.data[p]);
       this.head.data[p] = 3 * face + k;
       ++this.degree.data[p];
     }
@@ -123,16 +123,16 @@ export class SplitMesh {
     return this.wedgePoint.data[this.faces.data[3 * face + after[corner]]];
   }
   nextCorner(corner: number): number {
-    return this.next.data[corner];
+    return this.next_.data[corner];
   }
 
   /** The corners at a point, sorted into fans: open ones first, each in the order of its first corner. */
   gather(point: number, corners: Corners, fans: Fan[]): void {
-    const { loose, chain, taken } = this;
+    const { loose_: loose, chain_: chain, taken_: taken } = this;
     corners.count = 0;
     fans.length = 0;
     let n = 0;
-    for (let c = this.head.data[point]; c >= 0; c = this.next.data[c], ++n) {
+    for (let c = this.head.data[point]; c >= 0; c = this.next_.data[c], ++n) {
       const face = Math.floor(c / 3);
       const corner = c - 3 * face;
       loose.face[n] = face;
@@ -142,24 +142,24 @@ export class SplitMesh {
       loose.wedge[n] = this.faces.data[c];
       taken[n] = false;
     }
-    const firstA = this.firstA.data;
-    const countB = this.countB.data;
+    const firstA = this.firstA_.data;
+    const countB = this.countB_.data;
     for (let i = n - 1; i >= 0; --i) {
       chain[i] = firstA[loose.a[i]];
       firstA[loose.a[i]] = i;
       ++countB[loose.b[i]];
     }
-    for (let i = 0; i < n; ++i) if (!taken[i] && countB[loose.a[i]] === 0) this.walk(i, corners, fans);
-    for (let i = 0; i < n; ++i) if (!taken[i]) this.walk(i, corners, fans);
+    for (let i = 0; i < n; ++i) if (!taken[i] && countB[loose.a[i]] === 0) this.walk_(i, corners, fans);
+    for (let i = 0; i < n; ++i) if (!taken[i]) this.walk_(i, corners, fans);
     for (let i = 0; i < n; ++i) {
       firstA[loose.a[i]] = -1;
       countB[loose.b[i]] = 0;
     }
   }
   /** Appends the fan that begins with a loose corner. */
-  private walk(start: number, corners: Corners, fans: Fan[]): void {
-    const { loose, chain, taken } = this;
-    const firstA = this.firstA.data;
+  private walk_(start: number, corners: Corners, fans: Fan[]): void {
+    const { loose_: loose, chain_: chain, taken_: taken } = this;
+    const firstA = this.firstA_.data;
     const begin = corners.count;
     for (let at = start; at >= 0; ) {
       taken[at] = true;
@@ -181,7 +181,7 @@ export class SplitMesh {
       const id = 3 * corners.face[i] + corners.corner[i];
       const p = corners.moves[i] ? to : from;
       if (corners.moves[i]) this.faces.data[id] = corners.target[i];
-      this.next.data[id] = head[p];
+      this.next_.data[id] = head[p];
       head[p] = id;
       ++degree[p];
     }
@@ -191,9 +191,9 @@ export class SplitMesh {
     const a = this.pointAt(face, 0);
     const b = this.pointAt(face, 1);
     const c = this.pointAt(face, 2);
-    return !this.samePlace(a, b) && !this.samePlace(b, c) && !this.samePlace(c, a);
+    return !this.samePlace_(a, b) && !this.samePlace_(b, c) && !this.samePlace_(c, a);
   }
-  private samePlace(a: number, b: number): boolean {
+  private samePlace_(a: number, b: number): boolean {
     const p = this.places.data;
     return p[3 * a] === p[3 * b] && p[3 * a + 1] === p[3 * b + 1] && p[3 * a + 2] === p[3 * b + 2];
   }

@@ -173,11 +173,11 @@ export function readSplitHead(bytes: Uint8Array): SplitStreamHead {
 export class SplitStreamReader {
   readonly head: SplitStreamHead;
   readonly mesh: SplitMesh;
-  private readonly codec: SplitCodec;
-  private readonly positions = new ValueDecoder();
-  private readonly values: ValueDecoder[];
-  private block = 0;
-  private scale = 0;
+  private readonly codec_: SplitCodec;
+  private readonly positions_ = new ValueDecoder();
+  private readonly values_: ValueDecoder[];
+  private block_ = 0;
+  private scale_ = 0;
 
   constructor(head: Uint8Array) {
     this.head = readSplitHead(head);
@@ -186,47 +186,47 @@ export class SplitStreamReader {
     if (last.points > mostPoints || last.faces > mostFaces || last.wedges > 3 * mostFaces)
       throw new FormatError(file, 'head', `at most ${mostPoints} points and ${mostFaces} faces`, 'more');
     this.mesh = new SplitMesh(attributes.map((a) => a.components));
-    this.values = attributes.map(() => new ValueDecoder());
+    this.values_ = attributes.map(() => new ValueDecoder());
     const coded = attributes.map((a) => ({ normal: a.kind === 'normal', components: a.components, bits: a.grid.bits }));
-    this.codec = new SplitCodec(this.mesh, coded, position.bits, groups.length, last, this.positions, this.values);
+    this.codec_ = new SplitCodec(this.mesh, coded, position.bits, groups.length, last, this.positions_, this.values_);
   }
 
   /** Number of blocks decoded so far. */
   get nextBlock(): number {
-    return this.block;
+    return this.block_;
   }
 
   /** Decodes whole blocks that stand one after the other, digests checked. */
   async addBlocks(bytes: Uint8Array): Promise<void> {
     for (let at = 0; at < bytes.length; ) {
-      const b = this.head.blocks[this.block];
-      if (!b) throw new FormatError(file, `block ${this.block}`, 'no more blocks', 'one');
+      const b = this.head.blocks[this.block_];
+      if (!b) throw new FormatError(file, `block ${this.block_}`, 'no more blocks', 'one');
       const block = bytes.subarray(at, at + b.bytes);
       if (block.length !== b.bytes)
-        throw new FormatError(file, `block ${this.block}`, `${b.bytes} bytes`, `${block.length}`);
+        throw new FormatError(file, `block ${this.block_}`, `${b.bytes} bytes`, `${block.length}`);
       if (!samePrefix(await sha256(block), b.digest))
-        throw new FormatError(file, `block ${this.block}`, 'bytes of the digest in the head', 'others');
-      this.decode(b, block);
+        throw new FormatError(file, `block ${this.block_}`, 'bytes of the digest in the head', 'others');
+      this.decode_(b, block);
       at += b.bytes;
     }
   }
-  private decode(b: SplitBlock, bytes: Uint8Array): void {
+  private decode_(b: SplitBlock, bytes: Uint8Array): void {
     const { scales } = this.head;
-    if (this.block === 0 || this.block === scales[this.scale].blocks) {
-      if (this.block > 0) ++this.scale;
-      this.codec.beginChapter();
+    if (this.block_ === 0 || this.block_ === scales[this.scale_].blocks) {
+      if (this.block_ > 0) ++this.scale_;
+      this.codec_.beginChapter();
     }
     let at = 0;
     const parts = b.parts.map((n) => bytes.subarray(at, (at += n)));
-    this.codec.start(parts[0]);
-    [this.positions, ...this.values].forEach((v, i) => v.start(parts[i + 1], this.head.models[i]));
-    if (b.isPatch) this.codec.patch(b.count);
-    else this.codec.splits(b.count);
-    ++this.block;
-    const scale = scales[this.scale];
-    if (this.block === scale.blocks) this.checkScale(scale);
+    this.codec_.start(parts[0]);
+    [this.positions_, ...this.values_].forEach((v, i) => v.start(parts[i + 1], this.head.models[i]));
+    if (b.isPatch) this.codec_.patch(b.count);
+    else this.codec_.splits(b.count);
+    ++this.block_;
+    const scale = scales[this.scale_];
+    if (this.block_ === scale.blocks) this.checkScale_(scale);
   }
-  private checkScale(scale: SplitScale): void {
+  private checkScale_(scale: SplitScale): void {
     const found = { points: this.mesh.points, wedges: this.mesh.wedges, faces: this.mesh.faceCount };
     for (const name of ['points', 'wedges', 'faces'] as const)
       if (scale[name] !== found[name])

@@ -124,91 +124,91 @@ async function fromMirrors<T>(
 /** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
 class RangeStore implements PackageStore {
   readonly form = 'range';
-  private readonly parts: { begin: number; bytes: Uint8Array }[] = []; // by begin, not overlapping
-  private readonly mirrors: Mirrors;
+  private readonly parts_: { begin: number; bytes: Uint8Array }[] = []; // by begin, not overlapping
+  private readonly mirrors_: Mirrors;
 
   constructor(
     urls: readonly string[],
-    private readonly client: HttpClient,
+    private readonly client_: HttpClient,
   ) {
-    this.mirrors = new Mirrors(urls);
+    this.mirrors_ = new Mirrors(urls);
   }
   get name(): string {
-    return shownUrl(this.mirrors.all[0].url);
+    return shownUrl(this.mirrors_.all[0].url);
   }
 
   async manifest(): Promise<Uint8Array> {
-    const bytes = await this.fetchRange(0, bootstrapBytes, { kind: 'manifest' });
-    this.keep(0, bytes);
+    const bytes = await this.fetchRange_(0, bootstrapBytes, { kind: 'manifest' });
+    this.keep_(0, bytes);
     return manifestOfContainer(bytes, this.name);
   }
 
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     const begin = place.offset + offset;
     if (bytes === 0) return new Uint8Array(0);
-    const missing = this.missing(begin, begin + bytes);
+    const missing = this.missing_(begin, begin + bytes);
     if (missing) {
-      const got = await this.fetchRange(missing.begin, missing.end - missing.begin, how, (part) =>
-        how.verify ? how.verify(this.assemble(begin, bytes, missing.begin, part)) : Promise.resolve(),
+      const got = await this.fetchRange_(missing.begin, missing.end - missing.begin, how, (part) =>
+        how.verify ? how.verify(this.assemble_(begin, bytes, missing.begin, part)) : Promise.resolve(),
       );
-      if (how.once) return this.assemble(begin, bytes, missing.begin, got);
-      const whole = this.assemble(begin, bytes, missing.begin, got);
-      this.keep(missing.begin, got);
+      if (how.once) return this.assemble_(begin, bytes, missing.begin, got);
+      const whole = this.assemble_(begin, bytes, missing.begin, got);
+      this.keep_(missing.begin, got);
       return whole;
     }
-    const whole = this.assemble(begin, bytes, 0, new Uint8Array(0));
+    const whole = this.assemble_(begin, bytes, 0, new Uint8Array(0));
     await how.verify?.(whole);
     return whole;
   }
 
   /** The range from the first to the last byte that is not known; known gaps inside are asked for again. */
-  private missing(begin: number, end: number): { begin: number; end: number } | undefined {
+  private missing_(begin: number, end: number): { begin: number; end: number } | undefined {
     let from = begin;
     let to = end;
-    for (const p of this.parts) if (p.begin <= from && p.begin + p.bytes.length > from) from = p.begin + p.bytes.length;
-    for (let i = this.parts.length - 1; i >= 0; --i) {
-      const p = this.parts[i];
+    for (const p of this.parts_) if (p.begin <= from && p.begin + p.bytes.length > from) from = p.begin + p.bytes.length;
+    for (let i = this.parts_.length - 1; i >= 0; --i) {
+      const p = this.parts_[i];
       if (p.begin < to && p.begin + p.bytes.length >= to) to = Math.max(from, p.begin);
     }
     return from < to ? { begin: from, end: to } : undefined;
   }
-  private assemble(begin: number, bytes: number, gotAt: number, got: Uint8Array): Uint8Array {
+  private assemble_(begin: number, bytes: number, gotAt: number, got: Uint8Array): Uint8Array {
     if (gotAt === begin && got.length === bytes) return got;
     const out = new Uint8Array(bytes);
-    for (const p of [...this.parts, { begin: gotAt, bytes: got }]) {
+    for (const p of [...this.parts_, { begin: gotAt, bytes: got }]) {
       const from = Math.max(begin, p.begin);
       const to = Math.min(begin + bytes, p.begin + p.bytes.length);
       if (from < to) out.set(p.bytes.subarray(from - p.begin, to - p.begin), from - begin);
     }
     return out;
   }
-  private keep(begin: number, bytes: Uint8Array): void {
-    this.parts.push({ begin, bytes });
-    this.parts.sort((a, b) => a.begin - b.begin);
+  private keep_(begin: number, bytes: Uint8Array): void {
+    this.parts_.push({ begin, bytes });
+    this.parts_.sort((a, b) => a.begin - b.begin);
   }
 
-  private fetchRange(
+  private fetchRange_(
     offset: number,
     bytes: number,
     how: ReadOptions,
     verify?: (got: Uint8Array) => Promise<void>,
   ): Promise<Uint8Array> {
-    return fromMirrors(this.mirrors, this.client, bytes, async (m, patience) => {
-      const got = await this.fetchFrom(m, offset, bytes, how, patience, false);
+    return fromMirrors(this.mirrors_, this.client_, bytes, async (m, patience) => {
+      const got = await this.fetchFrom_(m, offset, bytes, how, patience, false);
       try {
         await verify?.(got);
         return got;
       } catch (error) {
-        if (this.mirrors.alive > 1) throw error;
+        if (this.mirrors_.alive > 1) throw error;
         // A cache on the way may hold something bad; the server itself is asked once.
-        const fresh = await this.fetchFrom(m, offset, bytes, how, patience, true);
+        const fresh = await this.fetchFrom_(m, offset, bytes, how, patience, true);
         await verify?.(fresh);
         return fresh;
       }
     });
   }
 
-  private async fetchFrom(
+  private async fetchFrom_(
     m: Mirror,
     offset: number,
     bytes: number,
@@ -218,10 +218,10 @@ class RangeStore implements PackageStore {
   ): Promise<Uint8Array> {
     let got: Uint8Array[] = [];
     let have = 0;
-    const retries = new Retries(this.client.options);
+    const retries = new Retries(this.client_.options);
     for (;;) {
       const before = have;
-      const a = await this.client.get(m.url, {
+      const a = await this.client_.get(m.url, {
         range: { offset: offset + have, bytes: bytes - have },
         ifRange: sameOrigin(m.url) ? m.etag : '',
         maxBytes: bytes - have,
@@ -231,7 +231,7 @@ class RangeStore implements PackageStore {
         onBytes: how.onBytes && ((n) => how.onBytes!(before + n)),
         reload,
       } satisfies GetOptions);
-      if (a.status === 206) this.checkRange(m, a, offset + have, bytes - have);
+      if (a.status === 206) this.checkRange_(m, a, offset + have, bytes - have);
       if (a.status === 206) {
         got.push(a.body);
         have += a.body.length;
@@ -241,15 +241,15 @@ class RangeStore implements PackageStore {
         if (have === wanted || (m.total < 0 && offset === 0)) return got.length === 1 ? got[0] : concat(got, have);
         throw new FormatError(this.name, `byte ${offset}`, `${wanted} bytes`, `${have}`);
       }
-      this.refuse(m, a, offset, bytes);
-      if (!mayRetry(a) || (this.mirrors.alive > 1 && have === before) || !(await retries.wait(how.signal)))
+      this.refuse_(m, a, offset, bytes);
+      if (!mayRetry(a) || (this.mirrors_.alive > 1 && have === before) || !(await retries.wait(how.signal)))
         throw new InputError(shownUrl(m.url), `byte ${offset + have}`, 'an answer with status 206', whatCame(a));
       if (have === 0) got = [];
     }
   }
 
   /** Answers after which there is no use in trying again. */
-  private refuse(m: Mirror, a: Answer, offset: number, bytes: number): void {
+  private refuse_(m: Mirror, a: Answer, offset: number, bytes: number): void {
     const file = shownUrl(m.url);
     if (a.status === 200) {
       if (m.total < 0) throw new NoRanges();
@@ -262,7 +262,7 @@ class RangeStore implements PackageStore {
     if (a.tooLong) throw new FormatError(file, `byte ${offset}`, `${bytes} bytes`, 'more');
   }
 
-  private checkRange(m: Mirror, a: Answer, offset: number, bytes: number): void {
+  private checkRange_(m: Mirror, a: Answer, offset: number, bytes: number): void {
     const fail = (expected: string, found: string): never => {
       throw new FormatError(shownUrl(m.url), `byte ${offset}`, expected, found);
     };
@@ -282,7 +282,7 @@ class RangeStore implements PackageStore {
   }
 
   dispose(): void {
-    this.parts.length = 0;
+    this.parts_.length = 0;
   }
 }
 
@@ -295,17 +295,17 @@ function sameOrigin(url: string): boolean {
 /** Whole files of a tree, beside the container or by itself: for servers without ranges. */
 class TreeStore implements PackageStore {
   readonly form = 'files';
-  private readonly files = new Map<string, Promise<Uint8Array>>();
-  private readonly mirrors: Mirrors;
+  private readonly files_ = new Map<string, Promise<Uint8Array>>();
+  private readonly mirrors_: Mirrors;
 
   constructor(
     roots: readonly string[],
-    private readonly client: HttpClient,
+    private readonly client_: HttpClient,
   ) {
-    this.mirrors = new Mirrors(roots);
+    this.mirrors_ = new Mirrors(roots);
   }
   get name(): string {
-    return shownUrl(this.mirrors.all[0].url);
+    return shownUrl(this.mirrors_.all[0].url);
   }
   manifest(): Promise<Uint8Array> {
     return this.file(manifestPath, bootstrapBytes, { kind: 'manifest' });
@@ -320,29 +320,29 @@ class TreeStore implements PackageStore {
   }
   /** A file of the tree; a failed one may be asked for again. */
   file(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const known = this.files.get(path);
+    const known = this.files_.get(path);
     if (known) return known;
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
-    const wanted = fromMirrors(this.mirrors, this.client, maxBytes, (m) => {
+    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
       const { kind, signal, onBytes } = how;
-      return getWhole(this.client, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes });
+      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes });
     });
     if (how.once) return wanted;
-    this.files.set(path, wanted);
-    wanted.catch(() => this.files.delete(path));
+    this.files_.set(path, wanted);
+    wanted.catch(() => this.files_.delete(path));
     return wanted;
   }
   async extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
     const { kind, signal } = how;
     try {
-      return await getWhole(this.client, joinUrl(this.mirrors.choose(0).url, path), maxBytes, { kind, signal });
+      return await getWhole(this.client_, joinUrl(this.mirrors_.choose(0).url, path), maxBytes, { kind, signal });
     } catch (error) {
       if (error instanceof InputError) return undefined;
       throw error;
     }
   }
   dispose(): void {
-    this.files.clear();
+    this.files_.clear();
   }
 }
 
@@ -362,22 +362,22 @@ export function treeUrl(url: string): string {
 class WholeStore implements PackageStore {
   readonly form = 'whole';
   constructor(
-    private bytes: Uint8Array,
+    private bytes_: Uint8Array,
     readonly name: string,
   ) {}
   manifest(): Promise<Uint8Array> {
-    return Promise.resolve(manifestOfContainer(this.bytes.subarray(0, bootstrapBytes), this.name));
+    return Promise.resolve(manifestOfContainer(this.bytes_.subarray(0, bootstrapBytes), this.name));
   }
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     const begin = place.offset + offset;
-    if (begin + bytes > this.bytes.length)
-      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes.length}`);
-    const part = this.bytes.subarray(begin, begin + bytes);
+    if (begin + bytes > this.bytes_.length)
+      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes_.length}`);
+    const part = this.bytes_.subarray(begin, begin + bytes);
     await how.verify?.(part);
     return part;
   }
   dispose(): void {
-    this.bytes = new Uint8Array(0);
+    this.bytes_ = new Uint8Array(0);
   }
 }
 

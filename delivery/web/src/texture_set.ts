@@ -1,135 +1,233 @@
 import type { Texture, WebGLRenderer } from 'three';
-import { PlaneComposer } from './composer';
+import { Blitter, PlaneComposer, ownLevels } from './composer';
 import type { PlaneChoice } from './fragment_list';
 import { MaterialSet, Slot } from './scale_parts';
 import type { TextureInfo } from './textures';
+import type { WorkerPool } from './worker_pool';
+import type { Levels } from './worker_protocol';
 
-/** Milliseconds of uploads between two turns of the page. */
+/** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
-/** Smaller mip levels are made anew this often while fragments come. */
-const mipsEveryMs = 250;
+const slicePx = 1 << 20;
+/** The GPU gets no more than it has done, but is not waited for longer. */
+const longestFenceMs = 400;
+/** The smallest mip levels follow this often while fragments come. */
+const mipsEveryMs = 200;
 
-interface Upload {
-  plane: PlaneComposer;
-  bitmap: ImageBitmap;
-  fragment: number;
-  rung: number;
-  done: () => void;
+/** Something for the GPU to do, and how many pixels it is. */
+interface Work {
+  pixels: number;
+  run(): void;
+  drop?(): void;
 }
 
 /** The composed textures of a model, one per image (and one for its alpha), and the uploads to them. */
 export class TextureSet {
   readonly planes = new Map<number, PlaneComposer>(); // by full-size plane
-  private readonly queue: Upload[] = [];
-  private pumping = false;
-  private mipsAt = 0;
-  private idle: (() => void)[] = [];
-  private disposed = false;
+  private readonly blitter_: Blitter;
+  private readonly queue_: Work[] = [];
+  private readonly waiting_ = new Map<PlaneComposer, Work[]>(); // until their plane is filled
+  private pumping_ = false;
+  private mipsAt_ = 0;
+  private idle_: (() => void)[] = [];
+  private fence_: WebGLSync | null = null;
+  private fencedAt_ = 0;
+  private disposed_ = false;
 
   constructor(
-    private readonly renderer: WebGLRenderer,
-    private readonly textures: readonly TextureInfo[],
-    private readonly materials: MaterialSet,
-  ) {}
+    private readonly renderer_: WebGLRenderer,
+    private readonly textures_: readonly TextureInfo[],
+    private readonly materials_: MaterialSet,
+    private readonly pool_: WorkerPool,
+  ) {
+    this.blitter_ = new Blitter(renderer_);
+  }
 
-  /** Shows a texture by this plane from now on: filled with what was shown so far, materials changed at once. */
-  show(choice: PlaneChoice, preview: ImageBitmap | undefined): PlaneComposer {
+  /**
+   * Shows a texture by this plane from now on: filled with what was shown so far (or the preview) in small steps, then
+   * the materials are changed at once. Resolves when they have been.
+   */
+  async show(choice: PlaneChoice, preview?: ImageBitmap): Promise<void> {
     const { base } = choice;
     const before = this.planes.get(base);
-    const next = new PlaneComposer(this.renderer, this.textures[choice.plane], base, choice.plane);
-    const slots = this.slotsOf(base);
-    const old = slots.map((slot) => this.oldTexture(slot, base));
+    const next = new PlaneComposer(this.blitter_, this.textures_[choice.plane], base, choice.plane);
+    const slots = this.slotsOf_(base);
+    const old = slots.map((slot) => this.oldTexture_(slot, base));
     const views = old.map((texture) => texture && next.view(texture));
-    const first = old.find((texture) => texture && imageSize(texture));
-    if (preview) next.fillFromBitmap(preview);
-    else if (before?.textures[0]) next.fillFrom(before.textures[0], before.widthPx, before.heightPx);
-    else if (first) next.fillFrom(first, ...imageSize(first)!);
-    views.forEach((view, i) => view && this.put(slots[i], base, view));
     this.planes.set(base, next);
+    await this.fill_(next, before, preview, old);
+    if (this.disposed_) return;
+    next.updateMips();
+    if (this.planes.get(base) !== next) return; // another has taken its place meanwhile
+    views.forEach((view, i) => view && this.put_(slots[i], base, view));
     if (before) before.dispose();
-    else if (this.textures[base].role !== 'alpha') new Set(old).forEach((texture) => texture?.dispose());
-    return next;
+    else if (this.textures_[base].role !== 'alpha') new Set(old).forEach((texture) => texture?.dispose());
+    for (const work of this.waiting_.get(next) ?? []) this.enqueue_(work);
+    this.waiting_.delete(next);
   }
-  private slotsOf(base: number): Slot[] {
-    const { image, role } = this.textures[base];
-    if (role !== 'alpha') return this.materials.slots.filter((s) => s.image === image);
+  private async fill_(
+    next: PlaneComposer,
+    before: PlaneComposer | undefined,
+    preview: ImageBitmap | undefined,
+    old: readonly (Texture | null)[],
+  ): Promise<void> {
+    if (before?.filled) return next.fillFrom(before);
+    const shown = old.find((texture) => pictureOf(texture));
+    const image = preview ?? pictureOf(shown);
+    if (!image) return void (next.filled = true);
+    try {
+      await this.enlarge_(next, image);
+    } catch (error) {
+      // A browser whose workers cannot draw leaves it to the GPU.
+      if (!shown || this.disposed_) throw error;
+      next.fillFromTexture(shown, image.width, image.height);
+    }
+  }
+  /** Enlarged off the main thread, strip by strip: GPUs that are none take seconds for a large texture. */
+  private async enlarge_(next: PlaneComposer, image: ImageBitmap | HTMLImageElement): Promise<void> {
+    const { widthPx: width, heightPx: height } = next;
+    const rows = Math.max(16, Math.floor(slicePx / width) & ~15);
+    const strips: Promise<void>[] = [];
+    for (let y0 = 0; y0 < height; y0 += rows) {
+      const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
+      const y1 = Math.min(height, y0 + rows);
+      const levels = this.pool_.enlarge({ picture, width, height, y0, y1, levels: ownLevels });
+      strips.push(
+        levels.then(
+          (bitmaps) =>
+            new Promise((done) => {
+              const end = (): void => {
+                bitmaps.forEach((b) => b.close());
+                done();
+              };
+              const run = (): void => {
+                next.upload(bitmaps, 0, y0);
+                end();
+              };
+              this.enqueue_({ pixels: width * (y1 - y0), run, drop: end });
+            }),
+        ),
+      );
+    }
+    await Promise.all(strips);
+    next.filled = true;
+  }
+  private slotsOf_(base: number): Slot[] {
+    const { image, role } = this.textures_[base];
+    if (role !== 'alpha') return this.materials_.slots.filter((s) => s.image === image);
     // Coverage stands beside the colours that it belongs to, where the material asks for it.
-    return this.materials.slots.filter(
+    return this.materials_.slots.filter(
       (s) => s.image === image && s.name === 'map' && (s.material.transparent || s.material.alphaTest > 0),
     );
   }
-  private oldTexture(slot: Slot, base: number): Texture | null {
-    const alpha = this.textures[base].role === 'alpha' ? { ...slot, name: 'alphaMap' } : slot;
-    return this.materials.textureAt(alpha) ?? this.materials.textureAt(slot);
+  private oldTexture_(slot: Slot, base: number): Texture | null {
+    const alpha = this.textures_[base].role === 'alpha' ? { ...slot, name: 'alphaMap' } : slot;
+    return this.materials_.textureAt(alpha) ?? this.materials_.textureAt(slot);
   }
-  private put(slot: Slot, base: number, view: Texture): void {
-    this.materials.setTexture(this.textures[base].role === 'alpha' ? { ...slot, name: 'alphaMap' } : slot, view);
+  private put_(slot: Slot, base: number, view: Texture): void {
+    this.materials_.setTexture(this.textures_[base].role === 'alpha' ? { ...slot, name: 'alphaMap' } : slot, view);
   }
   /** A material that came with a later scale gets the textures that there are. */
   adopt(slot: Slot): void {
     for (const [base, plane] of this.planes) {
-      if (!this.slotsOf(base).includes(slot)) continue;
-      const old = this.materials.textureAt(slot);
-      if (!old) continue;
-      this.put(slot, base, plane.view(old));
+      if (!this.slotsOf_(base).includes(slot)) continue;
+      const old = this.materials_.textureAt(slot);
+      if (old) this.put_(slot, base, plane.view(old));
     }
   }
 
   /** Queues a fragment; `done` when it is in its texture. */
-  upload(plane: PlaneComposer, bitmap: ImageBitmap, fragment: number, rung: number, done: () => void): void {
-    this.queue.push({ plane, bitmap, fragment, rung, done });
-    if (!this.pumping) {
-      this.pumping = true;
-      setTimeout(() => this.pump(), 0);
-    }
+  upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, done: () => void): void {
+    const close = (): void => levels.forEach((b) => b.close());
+    const work: Work = {
+      pixels: levels[0].width * levels[0].height,
+      run: () => {
+        const current = this.planes.get(plane.base) === plane;
+        if (current && rung > plane.rungs[fragment]) plane.uploadFragment(levels, fragment, rung);
+        close();
+        done();
+      },
+      drop: close,
+    };
+    if (plane.filled && !this.waiting_.has(plane)) return this.enqueue_(work);
+    this.waiting_.set(plane, [...(this.waiting_.get(plane) ?? []), work]);
   }
-  private pump(): void {
+
+  private enqueue_(work: Work): void {
+    if (this.disposed_) return work.drop?.();
+    this.queue_.push(work);
+    if (this.pumping_) return;
+    this.pumping_ = true;
+    setTimeout(() => this.pump_(), 0);
+  }
+  private pump_(): void {
+    if (this.disposed_) return;
     const start = performance.now();
-    while (this.queue.length > 0 && performance.now() - start < sliceMs) {
-      const u = this.queue.shift()!;
-      const current = this.planes.get(u.plane.base) === u.plane;
-      if (current && !this.disposed && u.rung > u.plane.rungs[u.fragment]) u.plane.upload(u.bitmap, u.fragment, u.rung);
-      u.bitmap.close();
-      u.done();
+    if (this.gpuIsBusy_(start)) return void setTimeout(() => this.pump_(), 4);
+    let pixels = 0;
+    while (this.queue_.length > 0 && pixels < slicePx && performance.now() - start < sliceMs) {
+      const work = this.queue_.shift()!;
+      pixels += work.pixels;
+      work.run();
     }
-    if (this.disposed) return;
-    const due = start - this.mipsAt > mipsEveryMs;
-    if (due || this.queue.length === 0) this.updateMips(due);
-    if (this.queue.length > 0 || this.stale) setTimeout(() => this.pump(), this.queue.length > 0 ? 0 : mipsEveryMs);
-    else this.pumping = false;
-    if (this.queue.length === 0) this.idle.splice(0).forEach((done) => done());
+    if (start - this.mipsAt_ > mipsEveryMs || this.queue_.length === 0) this.finish();
+    if (pixels > 0) this.putFence_();
+    if (this.queue_.length > 0) setTimeout(() => this.pump_(), 0);
+    else {
+      this.pumping_ = false;
+      this.idle_.splice(0).forEach((done) => done());
+    }
   }
-  private get stale(): boolean {
-    return [...this.planes.values()].some((p) => p.mipsAreStale);
+  private putFence_(): void {
+    const gl = this.renderer_.getContext() as WebGL2RenderingContext;
+    this.fence_ = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.fencedAt_ = performance.now();
+    gl.flush();
   }
-  private updateMips(due: boolean): void {
-    if (!due) return;
-    this.mipsAt = performance.now();
-    for (const p of this.planes.values()) p.updateMips();
+  private gpuIsBusy_(now: number): boolean {
+    if (!this.fence_) return false;
+    const gl = this.renderer_.getContext() as WebGL2RenderingContext;
+    const done = gl.getSyncParameter(this.fence_, gl.SYNC_STATUS) === gl.SIGNALED;
+    if (!done && now - this.fencedAt_ < longestFenceMs) return true;
+    gl.deleteSync(this.fence_);
+    this.fence_ = null;
+    return false;
   }
-  /** Mip levels of everything, at once. */
+
+  /** All mip levels of everything, at once. */
   finish(): void {
-    if (!this.disposed) for (const p of this.planes.values()) p.updateMips();
+    if (this.disposed_) return;
+    this.mipsAt_ = performance.now();
+    for (const p of this.planes.values()) if (p.mipsAreStale) p.updateMips();
   }
   /** Resolves when nothing waits to be uploaded. */
   settled(): Promise<void> {
-    if (this.queue.length === 0 || this.disposed) return Promise.resolve();
-    return new Promise((done) => this.idle.push(done));
+    if (this.queue_.length === 0 || this.disposed_) return Promise.resolve();
+    return new Promise((done) => this.idle_.push(done));
   }
   get pending(): number {
-    return this.queue.length;
+    let waiting = this.queue_.length;
+    for (const works of this.waiting_.values()) waiting += works.length;
+    return waiting;
   }
 
   dispose(): void {
-    this.disposed = true;
-    for (const u of this.queue.splice(0)) u.bitmap.close();
-    this.idle.splice(0).forEach((done) => done());
+    this.disposed_ = true;
+    for (const work of [...this.queue_.splice(0), ...[...this.waiting_.values()].flat()]) work.drop?.();
+    this.waiting_.clear();
+    this.idle_.splice(0).forEach((done) => done());
     for (const p of this.planes.values()) p.dispose();
     this.planes.clear();
+    this.blitter_.dispose();
+    if (this.fence_) (this.renderer_.getContext() as WebGL2RenderingContext).deleteSync(this.fence_);
+    this.fence_ = null;
   }
 }
 
-function imageSize(texture: Texture): [number, number] | undefined {
-  const image = texture.image as { width?: number; height?: number } | undefined;
-  return image?.width && image.height ? [image.width, image.height] : undefined;
+/** The picture of a texture that three has loaded. */
+function pictureOf(texture: Texture | null | undefined): ImageBitmap | HTMLImageElement | undefined {
+  const image = texture?.image as ImageBitmap | HTMLImageElement | undefined;
+  const is = (name: 'ImageBitmap' | 'HTMLImageElement'): boolean =>
+    typeof globalThis[name] === 'function' && image instanceof globalThis[name];
+  return is('ImageBitmap') || is('HTMLImageElement') ? image : undefined;
 }

@@ -28,38 +28,38 @@ const leastSeconds = 1e-9;
 
 /** Throughput of a connection or a group of them: delivery/cpp/throughput.h. */
 export class Throughput {
-  private readonly ring: { bytes: number; seconds: number }[] = [];
-  private count = 0;
-  private mean: number;
+  private readonly ring_: { bytes: number; seconds: number }[] = [];
+  private count_ = 0;
+  private mean_: number;
 
-  constructor(private readonly options: ThroughputOptions = defaultThroughput) {
-    this.mean = options.initialBytesS;
+  constructor(private readonly options_: ThroughputOptions = defaultThroughput) {
+    this.mean_ = options_.initialBytesS;
   }
 
   /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
   add(bytes: number, seconds: number): void {
     const sample = { bytes, seconds: Math.max(seconds, leastSeconds) };
-    this.ring[this.count++ % ringSize] = sample;
-    const weight = this.options.ewma * Math.min(1, bytes / this.options.smallBytes);
-    this.mean += weight * (sample.bytes / sample.seconds - this.mean);
+    this.ring_[this.count_++ % ringSize] = sample;
+    const weight = this.options_.ewma * Math.min(1, bytes / this.options_.smallBytes);
+    this.mean_ += weight * (sample.bytes / sample.seconds - this.mean_);
   }
 
   /** Bytes per second by the estimator chosen. */
   bytesS(): number {
-    if (this.count === 0) return this.options.initialBytesS;
-    if (this.options.estimator === 'last') return this.recentBytesS(1);
-    if (this.options.estimator === 'harmonic') return this.recentBytesS(Math.max(this.options.samples, 1));
-    return this.mean;
+    if (this.count_ === 0) return this.options_.initialBytesS;
+    if (this.options_.estimator === 'last') return this.recentBytesS(1);
+    if (this.options_.estimator === 'harmonic') return this.recentBytesS(Math.max(this.options_.samples, 1));
+    return this.mean_;
   }
 
   /** Bytes over seconds of at most so many samples. */
   recentBytesS(samples: number): number {
-    const n = Math.min(samples, this.count, ringSize);
-    if (n === 0) return this.options.initialBytesS;
+    const n = Math.min(samples, this.count_, ringSize);
+    if (n === 0) return this.options_.initialBytesS;
     let bytes = 0;
     let seconds = 0;
     for (let i = 1; i <= n; ++i) {
-      const s = this.ring[(this.count - i) % ringSize];
+      const s = this.ring_[(this.count_ - i) % ringSize];
       bytes += s.bytes;
       seconds += s.seconds;
     }

@@ -4,7 +4,9 @@ import { PackageReader, PlaneFiles } from './package_reader';
 import { bytesToShow } from './allocation';
 import { fragmentCount } from './tables';
 import type { TextureInfo } from './textures';
+import { ownLevels } from './composer';
 import type { WorkerPool } from './worker_pool';
+import type { Levels } from './worker_protocol';
 
 /** A fragment to be had at a rung. */
 export interface Wish {
@@ -16,7 +18,7 @@ export interface Wish {
 }
 /** What becomes of wishes. Bytes arrive first; the picture follows when it is decoded. */
 export interface TransferHooks {
-  decoded(wish: Wish, bitmap: ImageBitmap): void;
+  decoded(wish: Wish, levels: Levels): void;
   /** It cannot be had, or not decoded; the preview stays. */
   lost(wish: Wish, error: unknown): void;
 }
@@ -54,34 +56,34 @@ export interface GroupOptions {
  * only, decoding off the main thread.
  */
 export class Transfers {
-  private readonly planes = new Map<number, PlaneFiles>();
-  private readonly held = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
-  private decoding = 0;
+  private readonly planes_ = new Map<number, PlaneFiles>();
+  private readonly held_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
+  private decoding_ = 0;
 
   constructor(
-    private readonly reader: PackageReader,
-    private readonly textures: readonly TextureInfo[],
-    private readonly pool: WorkerPool,
-    private readonly hooks: TransferHooks,
+    private readonly reader_: PackageReader,
+    private readonly textures_: readonly TextureInfo[],
+    private readonly pool_: WorkerPool,
+    private readonly hooks_: TransferHooks,
   ) {}
 
   /** Fragments being decoded. */
   get pending(): number {
-    return this.decoding;
+    return this.decoding_;
   }
   /** Must have been called for the planes of all wishes. */
   async prepare(planes: readonly number[]): Promise<void> {
     await Promise.all(
       planes.map(async (p) => {
-        if (!this.planes.has(p)) this.planes.set(p, await this.reader.planeFiles(p));
+        if (!this.planes_.has(p)) this.planes_.set(p, await this.reader_.planeFiles(p));
       }),
     );
   }
   filesOf(plane: number): PlaneFiles {
-    return this.planes.get(plane)!;
+    return this.planes_.get(plane)!;
   }
-  private incremental(plane: number): boolean {
-    return codecTraits(this.textures[plane].codec).incremental && !this.filesOf(plane).complete;
+  private incremental_(plane: number): boolean {
+    return codecTraits(this.textures_[plane].codec).incremental && !this.filesOf(plane).complete;
   }
   /** Bytes of a fragment at a rung: of what has to be fetched at most. */
   bytesOf(plane: number, rung: number, fragment: number): number {
@@ -100,18 +102,18 @@ export class Transfers {
     failed: (wish: Wish, error: unknown) => void,
   ): Promise<void> {
     const files = wishes.filter((w) => this.filesOf(w.plane).complete);
-    const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf(w, arrived));
+    const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, arrived));
     await Promise.all([
-      ...files.map((w) => this.fetchFile(w, options, arrived, failed)),
-      ...groupsOf(parts, options).map((g) => this.fetchGroup(g, options, arrived, failed)),
+      ...files.map((w) => this.fetchFile_(w, options, arrived, failed)),
+      ...groupsOf(parts, options).map((g) => this.fetchGroup_(g, options, arrived, failed)),
     ]);
   }
 
-  private partsOf(wish: Wish, arrived: (wish: Wish) => void): Part[] {
+  private partsOf_(wish: Wish, arrived: (wish: Wish) => void): Part[] {
     const { tables, offsets } = this.filesOf(wish.plane);
     const n = fragmentCount(tables);
-    const incremental = this.incremental(wish.plane);
-    const held = incremental ? (this.held.get(`${wish.plane}/${wish.fragment}`) ?? []) : [];
+    const incremental = this.incremental_(wish.plane);
+    const held = incremental ? (this.held_.get(`${wish.plane}/${wish.fragment}`) ?? []) : [];
     const first = incremental ? 0 : wish.rung;
     const job: Job = { wish, first, streams: [], missing: 0, failed: false };
     const parts: Part[] = [];
@@ -124,12 +126,12 @@ export class Transfers {
     }
     if (parts.length === 0) {
       arrived(wish);
-      void this.decode(job);
+      void this.decode_(job);
     }
     return parts;
   }
 
-  private async fetchGroup(
+  private async fetchGroup_(
     group: Group,
     options: GroupOptions,
     arrived: (wish: Wish) => void,
@@ -146,8 +148,8 @@ export class Transfers {
         }
     };
     try {
-      const got = await this.reader.store.read(pack, group.offset, group.bytes, {
-        kind: 'texture', once: this.reader.form !== 'files', signal: options.signal, onBytes: say,
+      const got = await this.reader_.store.read(pack, group.offset, group.bytes, {
+        kind: 'texture', once: this.reader_.form !== 'files', signal: options.signal, onBytes: say,
       });
       for (const p of group.parts) {
         const at = p.offset - group.offset;
@@ -155,77 +157,77 @@ export class Transfers {
       }
       say(Infinity);
       for (const p of group.parts)
-        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode(p.job);
+        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job);
     } catch (error) {
       for (const p of group.parts) {
         if (p.job.failed) continue;
         p.job.failed = true;
-        if (said.has(p) && p.job.missing === 0) this.hooks.lost(p.wish, error);
+        if (said.has(p) && p.job.missing === 0) this.hooks_.lost(p.wish, error);
         else failed(p.wish, error);
       }
     }
   }
 
-  private async fetchFile(
+  private async fetchFile_(
     wish: Wish,
     options: GroupOptions,
     arrived: (wish: Wish) => void,
     failed: (wish: Wish, error: unknown) => void,
   ): Promise<void> {
     try {
-      const file = await this.reader.fragmentFile(wish.plane, wish.rung, wish.fragment, options.signal);
+      const file = await this.reader_.fragmentFile(wish.plane, wish.rung, wish.fragment, options.signal);
       arrived(wish);
-      void this.decode({ wish, first: wish.rung, streams: [file], missing: 0, failed: false });
+      void this.decode_({ wish, first: wish.rung, streams: [file], missing: 0, failed: false });
     } catch (error) {
       failed(wish, error);
     }
   }
 
-  private async decode(job: Job): Promise<void> {
+  private async decode_(job: Job): Promise<void> {
     const { plane, fragment } = job.wish;
-    ++this.decoding;
+    ++this.decoding_;
     try {
       try {
-        this.hooks.decoded(job.wish, await this.decodeStreams(job));
+        this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       } catch (error) {
         if (isAbort(error) || job.failed) throw error;
         // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
-        this.held.delete(`${plane}/${fragment}`);
+        this.held_.delete(`${plane}/${fragment}`);
         for (let rung = job.first; rung <= job.wish.rung; ++rung)
           job.streams[rung - job.first] = this.filesOf(plane).complete
-            ? await this.reader.fragmentFile(plane, rung, fragment)
-            : await this.reader.fragment(plane, rung, fragment);
-        this.hooks.decoded(job.wish, await this.decodeStreams(job));
+            ? await this.reader_.fragmentFile(plane, rung, fragment)
+            : await this.reader_.fragment(plane, rung, fragment);
+        this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       }
     } catch (error) {
-      this.hooks.lost(job.wish, error);
+      this.hooks_.lost(job.wish, error);
     } finally {
-      --this.decoding;
+      --this.decoding_;
     }
   }
-  private async decodeStreams(job: Job): Promise<ImageBitmap> {
+  private async decodeStreams_(job: Job): Promise<Levels> {
     const { plane, fragment, rung } = job.wish;
     const { tables, complete } = this.filesOf(plane);
     const streams = job.streams as Uint8Array[];
-    const { codec } = this.textures[plane];
+    const { codec } = this.textures_[plane];
     if (complete) {
       const digests = [complete[rung].get(fragment)!.sha256];
-      return this.pool.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true });
+      return this.pool_.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true, levels: ownLevels });
     }
     const digests = streams.map((_, i) => {
       const at = 8 * ((job.first + i) * fragmentCount(tables) + fragment);
       return tables.digest.slice(at, at + 8);
     });
-    const bitmap = await this.pool.decode({
-      codec, tables: await this.reader.tableStream(plane, job.first), streams, digests, complete: false,
+    const levels = await this.pool_.decode({
+      codec, tables: await this.reader_.tableStream(plane, job.first), streams, digests, complete: false, levels: ownLevels,
     });
-    if (this.incremental(plane)) this.held.set(`${plane}/${fragment}`, streams);
-    return bitmap;
+    if (this.incremental_(plane)) this.held_.set(`${plane}/${fragment}`, streams);
+    return levels;
   }
 
   dispose(): void {
-    this.held.clear();
-    this.planes.clear();
+    this.held_.clear();
+    this.planes_.clear();
   }
 }
 

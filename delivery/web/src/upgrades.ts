@@ -25,33 +25,33 @@ const before = (a: Upgrade, b: Upgrade): boolean =>
 
 /** A binary heap; no two of its elements are equal in order, so that what comes out is determined. */
 class Heap {
-  private readonly items: Upgrade[] = [];
+  private readonly items_: Upgrade[] = [];
   get size(): number {
-    return this.items.length;
+    return this.items_.length;
   }
   push(item: Upgrade): void {
-    let at = this.items.push(item) - 1;
+    let at = this.items_.push(item) - 1;
     while (at > 0) {
       const parent = (at - 1) >> 1;
-      if (!before(item, this.items[parent])) break;
-      this.items[at] = this.items[parent];
+      if (!before(item, this.items_[parent])) break;
+      this.items_[at] = this.items_[parent];
       at = parent;
     }
-    this.items[at] = item;
+    this.items_[at] = item;
   }
   pop(): Upgrade {
-    const top = this.items[0];
-    const last = this.items.pop()!;
-    const n = this.items.length;
+    const top = this.items_[0];
+    const last = this.items_.pop()!;
+    const n = this.items_.length;
     if (n === 0) return top;
     let at = 0;
     for (let child = 1; child < n; child = 2 * at + 1) {
-      if (child + 1 < n && before(this.items[child + 1], this.items[child])) ++child;
-      if (!before(this.items[child], last)) break;
-      this.items[at] = this.items[child];
+      if (child + 1 < n && before(this.items_[child + 1], this.items_[child])) ++child;
+      if (!before(this.items_[child], last)) break;
+      this.items_[at] = this.items_[child];
       at = child;
     }
-    this.items[at] = last;
+    this.items_[at] = last;
     return top;
   }
 }

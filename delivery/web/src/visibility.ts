@@ -41,7 +41,7 @@ function sampleGeometry(geometry: BufferGeometry, world: Matrix4, share: number)
 
 /** Which texture coordinates a camera sees, from a sample of the mesh's triangles; in the object's own frame. */
 export class VisibleSurface {
-  private samples: { sample: Sample; images: Set<number> }[] = [];
+  private samples_: { sample: Sample; images: Set<number> }[] = [];
 
   /** `imagesOf`: the images that a mesh's materials show. */
   constructor(root: Object3D, meshes: Mesh[], imagesOf: (mesh: Mesh) => Set<number>) {
@@ -52,7 +52,7 @@ export class VisibleSurface {
     const share = Math.min(1, mostSamples / Math.max(triangles, 1));
     for (const m of meshes) {
       const world = toRoot.clone().multiply(m.matrixWorld);
-      this.samples.push({ sample: sampleGeometry(m.geometry, world, share), images: imagesOf(m) });
+      this.samples_.push({ sample: sampleGeometry(m.geometry, world, share), images: imagesOf(m) });
     }
   }
 
@@ -64,7 +64,7 @@ export class VisibleSurface {
     const clip = new Matrix4().copy(camera.projectionMatrix).multiply(view);
     const eye = new Vector3().setFromMatrixPosition(view.clone().invert());
     const p = new Vector3();
-    for (const { sample, images } of this.samples) {
+    for (const { sample, images } of this.samples_) {
       if (!images.has(image)) continue;
       const v = sample.values;
       for (let s = 0; s < sample.count; ++s) {

@@ -4,12 +4,14 @@ import { FormatError, TexmeshError } from './errors';
 import { sha256 } from './sha256';
 import { SplitStreamReader } from './split_stream';
 import { splitUpdate } from './split_update';
-import type { DecodeRequest, WorkerAnswer, WorkerRequest } from './worker_protocol';
+import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest } from './worker_protocol';
 
 // What happens off the main thread: digests, images, vertex splits. `handle` works on the main thread, too, where no
 // worker can be had.
 
-async function decode(request: DecodeRequest): Promise<ImageBitmap> {
+const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
+
+async function decode(request: DecodeRequest): Promise<Levels> {
   for (const [i, digest] of request.digests.entries())
     if (!samePrefix(await sha256(request.streams[i]), digest))
       throw new FormatError('fragment', '', 'bytes of the digest in tables.bin', 'others');
@@ -17,11 +19,31 @@ async function decode(request: DecodeRequest): Promise<ImageBitmap> {
     ? request.streams[0]
     : joinFragment(request.codec, request.tables, request.streams);
   const blob = new Blob([file as BlobPart], { type: codecTraits(request.codec).mediaType });
-  return createImageBitmap(blob, {
-    premultiplyAlpha: 'none',
-    colorSpaceConversion: 'none',
-    imageOrientation: 'none',
-  } as ImageBitmapOptions);
+  const levels: Levels = [await createImageBitmap(blob, asItIs)];
+  while (levels.length < request.levels) {
+    const last = levels[levels.length - 1];
+    const [resizeWidth, resizeHeight] = [last.width >> 1, last.height >> 1];
+    if (resizeWidth < 1 || resizeHeight < 1) break;
+    levels.push(await createImageBitmap(last, { ...asItIs, resizeWidth, resizeHeight, resizeQuality: 'low' }));
+  }
+  return levels;
+}
+
+/** Every strip is drawn as a part of the whole, so that strips meet without a seam. */
+function enlarge({ picture, width, height, y0, y1, levels }: EnlargeRequest): Levels {
+  const out: Levels = [];
+  for (let level = 0; level < levels; ++level) {
+    const [w, h, top] = [width >> level, height >> level, y0 >> level];
+    const rows = Math.min(h, y1 >= height ? h : y1 >> level) - top;
+    if (w < 1 || rows < 1) break;
+    const canvas = new OffscreenCanvas(w, rows);
+    const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true })!;
+    context.imageSmoothingQuality = 'low';
+    context.drawImage(picture, 0, -top, w, h);
+    out.push(canvas.transferToImageBitmap());
+  }
+  picture.close();
+  return out;
 }
 
 const streams = new Map<number, { reader: SplitStreamReader; wedges: number }>();
@@ -30,8 +52,12 @@ const streams = new Map<number, { reader: SplitStreamReader; wedges: number }>()
 export async function handle(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   switch (request.op) {
     case 'decode': {
-      const bitmap = await decode(request);
-      return [bitmap, [bitmap]];
+      const levels = await decode(request);
+      return [levels, levels];
+    }
+    case 'enlarge': {
+      const levels = enlarge(request);
+      return [levels, levels];
     }
     case 'split-open':
       streams.set(request.key, { reader: new SplitStreamReader(request.head), wedges: 0 });

@@ -1,5 +1,5 @@
 import { FormatError } from './errors';
-import type { SplitUpdate, WorkerAnswer, WorkerRequest } from './worker_protocol';
+import type { DecodeRequest, EnlargeRequest, Levels, SplitUpdate, WorkerAnswer, WorkerRequest } from './worker_protocol';
 
 /** Images decoded at once, over all workers. */
 const mostAtOnce = 8;
@@ -61,99 +61,102 @@ export interface PoolOptions {
 
 /** Workers that decode images and vertex splits. */
 export class WorkerPool {
-  private readonly helpers: Helper[] = [];
-  private readonly queue: Job[] = [];
-  private readonly running = new Map<number, { job: Job; worker: number }>();
-  private readonly load: number[] = [];
-  private nextId = 1;
-  private ended = false;
+  private readonly helpers_: Helper[] = [];
+  private readonly queue_: Job[] = [];
+  private readonly running_ = new Map<number, { job: Job; worker: number }>();
+  private readonly load_: number[] = [];
+  private nextId_ = 1;
+  private ended_ = false;
 
-  constructor(private readonly options: PoolOptions = {}) {
+  constructor(private readonly options_: PoolOptions = {}) {
     const cores = globalThis.navigator?.hardwareConcurrency ?? 2;
-    const count = Math.max(1, options.workers ?? Math.min(4, Math.max(2, cores - 1)));
-    const here = options.handle !== undefined || options.workerUrl === '' || typeof Worker === 'undefined';
+    const count = Math.max(1, options_.workers ?? Math.min(4, Math.max(2, cores - 1)));
+    const here = options_.handle !== undefined || options_.workerUrl === '' || typeof Worker === 'undefined';
     for (let i = 0; i < (here ? 1 : count); ++i) {
-      this.helpers.push(here ? this.startMain() : this.start(i));
-      this.load.push(0);
+      this.helpers_.push(here ? this.startMain_() : this.start_(i));
+      this.load_.push(0);
     }
   }
 
-  private start(index: number): Helper {
-    const url = this.options.workerUrl;
+  private start_(index: number): Helper {
+    const url = this.options_.workerUrl;
     try {
-      return startWorker(url === '' ? undefined : url, (a) => this.answered(a), () => this.replace(index));
+      return startWorker(url === '' ? undefined : url, (a) => this.answered_(a), () => this.replace_(index));
     } catch {
-      return this.startMain(); // a page whose policy forbids workers
+      return this.startMain_(); // a page whose policy forbids workers
     }
   }
-  private startMain(): Helper {
-    const url = this.options.workerUrl || new URL('./worker.js', import.meta.url).href;
-    const handle = this.options.handle
-      ? Promise.resolve(this.options.handle)
+  private startMain_(): Helper {
+    const url = this.options_.workerUrl || new URL('./worker.js', import.meta.url).href;
+    const handle = this.options_.handle
+      ? Promise.resolve(this.options_.handle)
       : (import(/* @vite-ignore */ String(url)) as Promise<{ handle: Handle }>).then((m) => m.handle);
-    return startHere(handle, (a) => this.answered(a));
+    return startHere(handle, (a) => this.answered_(a));
   }
   /** A worker that cannot be loaded gives its jobs to the main thread. */
-  private replace(index: number): void {
-    if (this.ended) return;
-    this.helpers[index].end();
-    this.helpers[index] = this.startMain();
-    for (const [id, r] of this.running)
-      if (r.worker === index) this.helpers[index].post(id, r.job.request, []);
+  private replace_(index: number): void {
+    if (this.ended_) return;
+    this.helpers_[index].end();
+    this.helpers_[index] = this.startMain_();
+    for (const [id, r] of this.running_)
+      if (r.worker === index) this.helpers_[index].post(id, r.job.request, []);
   }
 
-  private answered(answer: WorkerAnswer): void {
-    const entry = this.running.get(answer.id);
+  private answered_(answer: WorkerAnswer): void {
+    const entry = this.running_.get(answer.id);
     if (!entry) return;
-    this.running.delete(answer.id);
-    --this.load[entry.worker];
+    this.running_.delete(answer.id);
+    --this.load_[entry.worker];
     const { error } = answer;
     if (!error) entry.job.done(answer.result);
     else if (error.parts) entry.job.failed(new FormatError(...error.parts));
     else entry.job.failed(Object.assign(new Error(error.message), { name: error.name }));
-    this.pump();
+    this.pump_();
   }
 
-  private pump(): void {
-    while (this.queue.length > 0 && this.running.size < mostAtOnce) {
-      const job = this.queue.shift()!;
+  private pump_(): void {
+    while (this.queue_.length > 0 && this.running_.size < mostAtOnce) {
+      const job = this.queue_.shift()!;
       let worker = job.worker ?? 0;
-      if (job.worker === undefined) this.load.forEach((n, i) => (worker = n < this.load[worker] ? i : worker));
-      ++this.load[worker];
-      this.running.set(this.nextId, { job, worker });
+      if (job.worker === undefined) this.load_.forEach((n, i) => (worker = n < this.load_[worker] ? i : worker));
+      ++this.load_[worker];
+      this.running_.set(this.nextId_, { job, worker });
       // Copied, not handed over: a worker that breaks gives its requests back.
-      this.helpers[worker].post(this.nextId++, job.request, job.transfer);
+      this.helpers_[worker].post(this.nextId_++, job.request, job.transfer);
     }
   }
 
-  private ask(request: WorkerRequest, worker?: number): Promise<unknown> {
+  private ask_(request: WorkerRequest, worker?: number): Promise<unknown> {
     return new Promise((done, failed) => {
-      if (this.ended) return failed(new DOMException('The load was cancelled', 'AbortError'));
-      this.queue.push({ request, transfer: [], worker, done, failed });
-      this.pump();
+      if (this.ended_) return failed(new DOMException('The load was cancelled', 'AbortError'));
+      this.queue_.push({ request, transfer: [], worker, done, failed });
+      this.pump_();
     });
   }
 
-  decode(request: Omit<Extract<WorkerRequest, { op: 'decode' }>, 'op'>): Promise<ImageBitmap> {
-    return this.ask({ op: 'decode', ...request }) as Promise<ImageBitmap>;
+  decode(request: Omit<DecodeRequest, 'op'>): Promise<Levels> {
+    return this.ask_({ op: 'decode', ...request }) as Promise<Levels>;
+  }
+  enlarge(request: Omit<EnlargeRequest, 'op'>): Promise<Levels> {
+    return this.ask_({ op: 'enlarge', ...request }) as Promise<Levels>;
   }
   async openSplits(key: number, head: Uint8Array): Promise<void> {
-    await this.ask({ op: 'split-open', key, head }, 0);
+    await this.ask_({ op: 'split-open', key, head }, 0);
   }
   addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
-    return this.ask({ op: 'split-add', key, blocks }, 0) as Promise<SplitUpdate>;
+    return this.ask_({ op: 'split-add', key, blocks }, 0) as Promise<SplitUpdate>;
   }
   /** Requests under way or waiting. */
   get pending(): number {
-    return this.queue.length + this.running.size;
+    return this.queue_.length + this.running_.size;
   }
   dispose(): void {
-    this.ended = true;
-    for (const h of this.helpers) h.end();
+    this.ended_ = true;
+    for (const h of this.helpers_) h.end();
     const error = new DOMException('The load was cancelled', 'AbortError');
-    for (const { job } of this.running.values()) job.failed(error);
-    for (const job of this.queue) job.failed(error);
-    this.running.clear();
-    this.queue.length = 0;
+    for (const { job } of this.running_.values()) job.failed(error);
+    for (const job of this.queue_) job.failed(error);
+    this.running_.clear();
+    this.queue_.length = 0;
   }
 }

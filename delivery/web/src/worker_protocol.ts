@@ -1,6 +1,6 @@
 import type { CodecId } from './codec';
 
-/** Decode one fragment (or preview): streams are joined with their tables, digests checked first. */
+/** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
 export interface DecodeRequest {
   op: 'decode';
   codec: CodecId;
@@ -10,7 +10,21 @@ export interface DecodeRequest {
   digests: Uint8Array[];
   /** The stream is a complete file. */
   complete: boolean;
+  /** Mip levels to make, itself included. */
+  levels: number;
 }
+/** Rows y0 .. y1 (multiples of 16) of a picture enlarged to width x height, bilinearly. Gives Levels. */
+export interface EnlargeRequest {
+  op: 'enlarge';
+  picture: ImageBitmap;
+  width: number;
+  height: number;
+  y0: number;
+  y1: number;
+  levels: number;
+}
+/** A picture and its halves, one after the other. */
+export type Levels = ImageBitmap[];
 /** Start a vertex-split stream under a number of the caller's. */
 export interface SplitOpenRequest {
   op: 'split-open';
@@ -27,7 +41,7 @@ export interface SplitCloseRequest {
   op: 'split-close';
   key: number;
 }
-export type WorkerRequest = DecodeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
 
 /** What has been added to a split mesh, and its triangles now. */
 export interface SplitUpdate {
@@ -47,7 +61,7 @@ export interface SplitUpdate {
 
 export interface WorkerAnswer {
   id: number;
-  /** ImageBitmap of decode, SplitUpdate of split-add. */
+  /** Levels of decode and enlarge, SplitUpdate of split-add. */
   result?: unknown;
   error?: { name: string; message: string; parts?: [string, string, string, string] };
 }
