@@ -48,7 +48,7 @@ export interface LoadOptions {
   rung?: number;
   /** Full-size textures, whatever the display can show. */
   fullSize?: boolean;
-  /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default glb. */
+  /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default auto. */
   meshes?: 'glb' | 'stream' | 'auto';
   /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
   autoRefine?: boolean;

@@ -1,7 +1,8 @@
-import { bytesToShow, etaOf, interpolatedBytes, meanEta, qualityOf, surfaceWeights } from './allocation';
+import { bytesToShow, etaOf, interpolatedBytes, meanEta, qualityOf, spendBytes, surfaceWeights } from './allocation';
 import { InputError } from './errors';
 import type { FragmentOffer } from './harmonic_time';
 import type { Manifest } from './manifest';
+import { log, pow } from './portable_math';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
 import { TextureInfo, fullSizePlanes } from './textures';
 
@@ -37,6 +38,13 @@ export interface ListOptions {
   qualityHigh: number;
 }
 export const defaultListOptions: ListOptions = { scale: 0, gamma: -1, qualityLow: 5, qualityHigh: 97 };
+
+const ln2 = 0.693147180559945309417;
+const mipExponent = 1.45;
+/** Levels below the display's that are tried. */
+const mostCoarser = 4;
+/** Losses as spendBytes counts them. */
+const lossUnit = 2 ** 40;
 
 /** What a role counts for in the list and in losses. */
 export function roleWeight(role: string): number {
@@ -107,10 +115,56 @@ export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
   return Array.from({ length: fullSizePlanes(textures) }, (_, p) => ({ base: p, plane: p }));
 }
 
-/** Surface of the bounding box, what a closed object of that size shows at most. */
-function surfaceEstimate(m: Manifest): number {
+/** Covered texels of a plane and the share of the surface that it has. */
+function coverOf(t: PlaneTables): { texels: number; surface: number } {
+  let texels = 0;
+  let surface = 0;
+  for (let f = 0; f < fragmentCount(t); ++f) {
+    texels += t.coveredTexels[f];
+    surface += t.surfaceFraction[f];
+  }
+  return { texels, surface };
+}
+
+/** Area of the object; where the package does not say it that of the bounding box. */
+function surfaceOf(m: Manifest): number {
+  if (m.surfaceArea > 0) return m.surfaceArea;
   const [x, y, z] = m.boundsMin.map((least, i) => m.boundsMax[i] - least);
   return 2 * (x * y + y * z + z * x);
+}
+
+/** How often the texels of a full-size plane may be halved until one stands for a pixel. */
+function displayLevel(data: PackageData, base: number, displayedPx: number): number {
+  const cover = coverOf(tablesOf(data, base));
+  const surface = surfaceOf(data.manifest);
+  if (!(cover.surface > 0) || !(surface > 0) || !(cover.texels > 0)) return 0;
+  const texelsPerUnit = Math.sqrt(cover.texels / (cover.surface * surface));
+  return log(texelsPerUnit / (displayedPx / data.manifest.objectHeight)) / ln2;
+}
+
+/** The plane of a texture with the largest mip that is at most `level`. */
+function planeAt(textures: readonly TextureInfo[], base: number, level: number): number {
+  let best = base;
+  let bestMip = 0;
+  textures.forEach((t, p) => {
+    if (t.mip === 0 || t.base !== base || t.mip <= bestMip || t.mip > level) return;
+    bestMip = t.mip;
+    best = p;
+  });
+  return best;
+}
+
+/** Levels below the display's: of base colours and of everything else, which often costs more and shows less. */
+interface Coarser {
+  colour: number;
+  other: number;
+}
+function planesAt(data: PackageData, displayedPx: number, coarser: Coarser): PlaneChoice[] {
+  return fullSize(data.textures).map(({ base }) => {
+    const colour = roleWeight(data.textures[base].role) === 1;
+    const level = Math.max(0, displayLevel(data, base, displayedPx)) + (colour ? coarser.colour : coarser.other);
+    return { base, plane: planeAt(data.textures, base, level) };
+  });
 }
 
 /**
@@ -118,27 +172,119 @@ function surfaceEstimate(m: Manifest): number {
  * px). Needs the tables of the full-size planes.
  */
 export function planesForDisplay(data: PackageData, displayedPx: number): PlaneChoice[] {
-  const planes = fullSize(data.textures);
-  const pxPerUnit = displayedPx / data.manifest.objectHeight;
-  const surface = surfaceEstimate(data.manifest);
+  return planesAt(data, displayedPx, { colour: 0, other: 0 });
+}
+
+/** Surface-weighted mean of what the previews lose. */
+function previewLoss(t: PlaneTables): number {
+  if (t.skipDssim.length === 0) return 1;
+  const weights = surfaceWeights(t);
+  let sum = 0;
+  let weight = 0;
+  for (const f of t.order) {
+    sum += weights[f] * t.skipDssim[f];
+    weight += weights[f];
+  }
+  return weight > 0 ? sum / weight : 0;
+}
+
+/** What the picture loses, as 1 - SSIM over the surface, because mips stand for textures that have more texels. */
+export function mipLoss(data: PackageData, planes: readonly PlaneChoice[], displayedPx: number): number {
+  let loss = 0;
+  let weight = 0;
   for (const choice of planes) {
+    const base = data.textures[choice.base];
+    const shown = data.textures[choice.plane];
     const t = tablesOf(data, choice.base);
-    let texels = 0;
-    let share = 0;
-    for (let f = 0; f < fragmentCount(t); ++f) {
-      texels += t.coveredTexels[f];
-      share += t.surfaceFraction[f];
-    }
-    if (!(share > 0) || !(surface > 0)) continue;
-    const texelsPerUnit = Math.sqrt(texels / (share * surface));
-    let bestMip = 0;
-    for (let p = planes.length; p < data.textures.length; ++p) {
-      const info = data.textures[p];
-      if (info.base !== choice.base || info.mip <= bestMip) continue;
-      if (texelsPerUnit / 2 ** Math.min(info.mip, 30) < pxPerUnit) continue;
-      bestMip = info.mip;
-      choice.plane = p;
+    const w = roleWeight(base.role) * coverOf(t).surface;
+    weight += w;
+    if (shown.mip === 0) continue;
+    const display = Math.max(0, displayLevel(data, choice.base, displayedPx));
+    const preview = log(base.widthPx / base.previewWidthPx) / ln2;
+    const missing = shown.mip - display;
+    const all = preview - display;
+    if (missing <= 0) continue;
+    loss += w * previewLoss(t) * (missing < all ? pow(missing / all, mipExponent) : 1);
+  }
+  return weight > 0 ? Math.min(1, loss / weight) : 0;
+}
+
+/** The best texture that so many bytes can show. */
+export interface TextureBudget {
+  planes: PlaneChoice[];
+  list: FragmentList;
+  /** By offer; -1 = skipped. */
+  rungs: number[];
+  /** Of fragments, at most the budget. */
+  bytes: number;
+  /** Predicted 1 - SSIM over the surface, loss by mips included. */
+  dssim: number;
+}
+
+function spendOn(
+  data: PackageData,
+  planes: PlaneChoice[],
+  displayedPx: number,
+  options: Partial<ListOptions>,
+  budget: number,
+): TextureBudget {
+  const list = fragmentList(data, planes, options);
+  const total = Math.max(list.totalWeight, 1e-300);
+  const curves = list.offers.map((f) => ({
+    bytes: [0, ...f.bytes],
+    loss: f.loss.map((l) => Math.floor((l / total) * lossUnit)),
+  }));
+  const ways = spendBytes(curves, budget);
+  let loss = 0;
+  let bytes = 0;
+  ways.forEach((way, i) => {
+    bytes += curves[i].bytes[way];
+    loss += list.offers[i].loss[way];
+  });
+  const dssim = 1 - (1 - loss / total) * (1 - mipLoss(data, planes, displayedPx));
+  return { planes, list, rungs: ways.map((way) => way - 1), bytes, dssim };
+}
+
+/** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
+export function* budgetSteps(
+  data: PackageData,
+  displayedPx: number,
+  options: Partial<ListOptions>,
+  bytes: number,
+): Generator<TextureBudget> {
+  const spend = (c: Coarser): TextureBudget =>
+    spendOn(data, planesAt(data, displayedPx, c), displayedPx, options, bytes);
+  let at: Coarser = { colour: 0, other: 0 };
+  let best = spend(at);
+  for (let better = true; better; ) {
+    // Downhill; every step makes something coarser.
+    better = false;
+    const from = at;
+    for (const step of [{ colour: 1, other: 1 }, { colour: 0, other: 1 }, { colour: 1, other: 0 }]) {
+      const to = { colour: from.colour + step.colour, other: from.other + step.other };
+      if (Math.max(to.colour, to.other) > mostCoarser) continue;
+      yield best;
+      const now = spend(to);
+      if (now.dssim >= best.dssim) continue;
+      best = now;
+      at = to;
+      better = true;
     }
   }
-  return planes;
+  yield best;
+}
+
+/**
+ * Chooses between the planes for the display and their mips, so that few bytes are not spread over texels that they
+ * cannot make good; fragments share the bytes by rate and distortion. Needs the tables of all planes.
+ */
+export function textureForBudget(
+  data: PackageData,
+  displayedPx: number,
+  options: Partial<ListOptions>,
+  bytes: number,
+): TextureBudget {
+  let best: TextureBudget | undefined;
+  for (const step of budgetSteps(data, displayedPx, options, bytes)) best = step;
+  return best!;
 }

@@ -3,14 +3,14 @@ import type { ComposedPlane, Display, LoadEvents, LoadOptions, LoadPhase, LoadSt
 import { displayOf } from './camera';
 import { Emitter } from './events';
 import {
-  FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay,
+  FragmentList, PackageData, PlaneChoice, TextureBudget, budgetSteps, fragmentList, fullSize, planesForDisplay,
 } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
 import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import type { PackageReader } from './package_reader';
 import { chooseScale } from './scale_choice';
-import { MaterialSet, Slot, disposeGeometries, meshesOf } from './scale_parts';
+import { MaterialSet, Slot, meshesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import { TextureSet } from './texture_set';
 import { fullSizePlanes } from './textures';
@@ -79,7 +79,14 @@ export class ModelLoad implements LoadedModel {
     this.startS_ = startS;
     this.override_ = { scale: options_.scale, rung: options_.rung };
     this.pool_ = new WorkerPool({ workers: options_.workers, workerUrl: options_.workerUrl, ...poolOptions });
-    this.scales_ = new ScaleSource(reader_, options_, this.materialSet_, this.pool_, (slot) => this.adopt_(slot));
+    this.scales_ = new ScaleSource(
+      reader_,
+      options_,
+      this.materialSet_,
+      this.pool_,
+      (slot) => this.adopt_(slot),
+      (error, what) => this.fail_(error, what),
+    );
     this.object.name = reader_.manifest.title || 'texmesh';
     this.view_ = { display: this.readDisplay_(options_.camera), camera: options_.camera };
     options_.signal?.addEventListener('abort', () => this.cancel());
@@ -163,7 +170,7 @@ export class ModelLoad implements LoadedModel {
     const documents = this.documents_();
     documents.catch(() => undefined);
     await first.bytes;
-    await this.showScale_(coarsest.scale);
+    await this.loadScale_(coarsest.scale).shown;
     this.events_.emit('first-picture', { scale: coarsest.scale, bytes: this.reader_.client.received });
     shown();
     this.enter_('tables');
@@ -176,12 +183,14 @@ export class ModelLoad implements LoadedModel {
   }
 
   private async documents_(): Promise<PackageData> {
-    await this.reader_.prefetchDocuments(this.abort_.signal);
+    const [whole] = await Promise.all([
+      this.reader_.prefetchDocuments(this.abort_.signal),
+      this.scales_.openStream(this.abort_.signal),
+    ]);
+    if (whole) return this.reader_.data();
     const textures = await this.reader_.textures();
     const base = Array.from({ length: fullSizePlanes(textures) }, (_, p) => p);
-    const data = await this.reader_.data(base);
-    const planes = this.planesFor_(data).map((p) => p.plane);
-    await this.reader_.quality();
+    const planes = this.planesFor_(await this.reader_.data(base)).map((p) => p.plane);
     return this.reader_.data([...base, ...planes]);
   }
   private planesFor_(data: PackageData, displayedPx = this.view_.display.heightPx): PlaneChoice[] {
@@ -189,17 +198,15 @@ export class ModelLoad implements LoadedModel {
   }
 
   private async timedPart_(data: PackageData): Promise<void> {
-    const choices = this.planesFor_(data);
     const transfers = this.startTextures_(data);
-    const ready = Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
-    ready.catch(() => undefined);
-    const scale = await this.scaleInTime_(data, choices);
+    const scale = await this.scaleInTime_(data);
     this.wantedScale_ = scale;
-    if (scale !== this.shownScale_) {
-      this.enter_('mesh');
-      await this.loadScale_(scale);
-    }
-    const [{ shown }] = await ready;
+    if (scale !== this.shownScale_) this.enter_('mesh');
+    const mesh = this.loadScale_(scale);
+    mesh.shown.catch(() => undefined);
+    const choices = await this.planesInTime_(data, scale);
+    const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
+    await mesh.arrived;
     this.enter_('textures');
     const list = this.listOf_(data, choices, scale);
     for (const o of list.offers) this.expectedBytes_ += o.plannedBytes;
@@ -209,7 +216,24 @@ export class ModelLoad implements LoadedModel {
     await shown;
     await this.composed_();
     const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
+    await mesh.shown;
     this.events_.emit('deadline', { limit: this.limitS_, actual: this.elapsedS_(), skipped });
+  }
+  /** Planes for the display, or coarser ones where the time left buys too few bytes for them. */
+  private async planesInTime_(data: PackageData, scale: number): Promise<PlaneChoice[]> {
+    const all = data.tables.every((t) => t !== undefined);
+    if (this.options_.fullSize || !Number.isFinite(this.limitS_) || this.override_.rung !== undefined || !all)
+      return this.planesFor_(data);
+    const bytes = this.textureBytes_(scale);
+    let best: TextureBudget | undefined;
+    for (best of budgetSteps(data, this.view_.display.heightPx, { scale }, bytes)) await sleepS(0);
+    return best!.planes;
+  }
+  /** Bytes that the time leaves for textures when this scale is loaded. */
+  private textureBytes_(scale: number): number {
+    const mesh = this.scales_.bytesOf(scale);
+    const meshS = mesh > 0 ? mesh / this.beta0_ + this.reader_.client.rttS : 0;
+    return (this.limitS_ - this.elapsedS_() - composeS - meshS) * this.beta0_;
   }
   private skippedOf_(plane: ComposedPlane): number {
     const order = this.data_?.tables[plane.plane]?.order ?? [];
@@ -276,16 +300,14 @@ export class ModelLoad implements LoadedModel {
     return { shown: Promise.all(shown) };
   }
 
-  private async scaleInTime_(data: PackageData, choices: readonly PlaneChoice[]): Promise<number> {
+  private async scaleInTime_(data: PackageData): Promise<number> {
     const { heightPx, part } = this.view_.display;
     const wanted = this.override_.scale ?? selectScale(data.manifest, heightPx, part, this.options_.rule);
     if (this.override_.scale !== undefined || !Number.isFinite(this.limitS_)) return wanted;
     const quality = await this.reader_.quality();
-    const list = fragmentList(data, choices, { scale: wanted });
-    return chooseScale(data, quality, list, choices, wanted, (scale) => {
-      const meshS = scale === this.shownScale_ ? 0 : this.scales_.bytesOf(scale) / this.beta0_ + this.reader_.client.rttS;
-      return (this.limitS_ - this.elapsedS_() - composeS - meshS) * this.beta0_;
-    });
+    const planes = this.planesFor_(data);
+    const list = fragmentList(data, planes, { scale: wanted });
+    return chooseScale(data, quality, list, planes, wanted, (scale) => this.textureBytes_(scale));
   }
 
   /** The list of what may be fetched, with the bytes that fetching takes. */
@@ -410,19 +432,20 @@ export class ModelLoad implements LoadedModel {
 
   // ---- scales
 
-  /** Loads a scale and puts it into the scene, in one turn of the page. */
-  private async loadScale_(scale: number): Promise<void> {
+  /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
+  private loadScale_(scale: number): { arrived: Promise<void>; shown: Promise<void> } {
     this.scaleInTransit_ = scale;
-    try {
-      await this.scales_.prepare(scale, this.abort_.signal);
-      if (this.scaleInTransit_ === scale) await this.showScale_(scale);
-    } finally {
-      if (this.scaleInTransit_ === scale) this.scaleInTransit_ = -1;
-    }
+    const show = (k: number): void => {
+      // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
+      if (this.scaleInTransit_ === scale && (k === scale || k < this.shownScale_)) this.showScale_(k);
+    };
+    const load = this.scales_.load(scale, this.abort_.signal, show);
+    return { arrived: load.arrived, shown: load.shape.then(() => show(scale)) };
   }
-  private async showScale_(scale: number): Promise<void> {
-    const shape = await this.scales_.get(scale);
+  /** In one turn of the page: what is drawn next is the new scale, whole. */
+  private showScale_(scale: number): void {
     throwIfAborted(this.abort_.signal);
+    const shape = this.scales_.shape(scale)!;
     const [before] = this.object.children;
     if (before && before !== shape) this.object.remove(before);
     if (before !== shape) this.object.add(shape);
@@ -464,7 +487,7 @@ export class ModelLoad implements LoadedModel {
     const scale = this.scaleForView_();
     if (scale !== this.wantedScale_) {
       this.wantedScale_ = scale;
-      this.loadScale_(scale).catch((error: unknown) => this.fail_(error, `scale ${scale}`));
+      this.loadScale_(scale).shown.catch((error: unknown) => this.fail_(error, `scale ${scale}`));
     }
     if (this.options_.autoRefine ?? true) void this.refine();
   }
@@ -606,8 +629,8 @@ export class ModelLoad implements LoadedModel {
     this.cancel();
     this.offRequest_();
     this.object.removeFromParent();
-    for (const shape of this.scales_.dispose()) disposeGeometries(shape);
     this.object.clear();
+    this.scales_.dispose();
     this.textureSet_?.dispose();
     this.materialSet_.dispose();
     this.transfers_?.dispose();

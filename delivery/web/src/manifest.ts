@@ -72,6 +72,8 @@ export interface Manifest {
   boundsMax: Vector3;
   /** O_V: largest extent of the bounds. */
   objectHeight: number;
+  /** Area of S_0; 0 = not said. */
+  surfaceArea: number;
   jnd: number;
   /** S_0 first. */
   scales: ManifestScale[];
@@ -247,6 +249,7 @@ export function readManifest(json: Uint8Array): Manifest {
     boundsMin,
     boundsMax,
     objectHeight: at.at('objectHeight').number(0, largest),
+    surfaceArea: at.has('surfaceArea') ? at.at('surfaceArea').number(0, largest) : 0,
     jnd: at.at('jnd').number(0, 1),
     scales,
     steps: readSteps(at.at('steps'), scales),

@@ -440,12 +440,14 @@ export class PackageReader {
     return got ?? this.fail_(path, 'a file', 'none');
   }
 
-  /** Reads index, tables, textures.json and quality.json by one request, where they are small. */
-  async prefetchDocuments(signal?: AbortSignal): Promise<void> {
+  /** Reads index, tables, textures.json and quality.json by one request, where they are small; false where not. */
+  async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
     const { index, quality } = this.manifest;
     const bytes = quality.offset + quality.bytes - index.offset;
-    if (this.form !== 'range' || bytes > wholeDocumentBytes || bytes <= 0) return;
+    if (bytes > wholeDocumentBytes || bytes <= 0) return false;
+    if (this.form !== 'range') return true;
     await this.store.read({ path: 'documents', offset: index.offset, bytes }, 0, bytes, { kind: 'tables', signal });
+    return true;
   }
 
   /** A fragment's stream at a rung, digest checked. */

@@ -85,8 +85,8 @@ export class MaterialSet {
   }
 
   /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
-  adopt(gltf: ParsedGltf, added: (slot: Slot) => void): void {
-    for (const mesh of meshesOf(gltf.scene)) mesh.material = this.shared_(gltf, mesh.material as Material, added);
+  adopt(gltf: ParsedGltf, meshes: readonly Mesh[], added: (slot: Slot) => void): void {
+    for (const mesh of meshes) mesh.material = this.shared_(gltf, mesh.material as Material, added);
   }
   private shared_(gltf: ParsedGltf, material: Material, added: (slot: Slot) => void): Material {
     const { parser } = gltf;

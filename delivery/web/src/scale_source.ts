@@ -1,8 +1,9 @@
-import type { Object3D } from 'three';
+import type { Mesh, Object3D } from 'three';
 import type { LoadOptions } from './api';
-import { nowS } from './http';
+import { isAbort, nowS } from './http';
 import type { PackageReader } from './package_reader';
-import { MaterialSet, ParsedGltf, Slot, parseScale } from './scale_parts';
+import { MaterialSet, ParsedGltf, Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
+import { SplitShapes } from './split_shape';
 import type { WorkerPool } from './worker_pool';
 
 /** A download that tells when it is nearly complete. */
@@ -11,12 +12,19 @@ interface Coarsest {
   almostThere: Promise<void>;
   bytes: Promise<Uint8Array>;
 }
+/** A scale on its way. */
+export interface ScaleLoad {
+  /** All bytes are there. */
+  arrived: Promise<void>;
+  shape: Promise<Object3D>;
+}
 
-/** The scales of a model as objects, each loaded once. */
+/** The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. */
 export class ScaleSource {
-  private readonly shapes_ = new Map<number, Promise<Object3D>>();
-  private readonly files_ = new Map<number, Promise<Uint8Array>>();
-  private readonly made_: Object3D[] = [];
+  private readonly shapes_ = new Map<number, Object3D>();
+  private readonly splits_?: SplitShapes;
+  private splitsOpen_ = false;
+  private coarsestFile_?: Promise<Uint8Array>;
   /** That of the coarsest scale: it has the materials and their textures. */
   private firstGltf_?: ParsedGltf;
 
@@ -24,16 +32,21 @@ export class ScaleSource {
     private readonly reader_: PackageReader,
     private readonly options_: LoadOptions,
     private readonly materials_: MaterialSet,
-    private readonly pool_: WorkerPool,
+    pool: WorkerPool,
     private readonly added_: (slot: Slot) => void,
+    private readonly problem_: (error: unknown, what: string) => void,
   ) {
-    void this.pool_;
+    const { stream, scales } = reader_.manifest;
+    // A tree's stream comes as a whole file.
+    const cheap = options_.meshes === 'stream' || (options_.meshes !== 'glb' && reader_.form !== 'files');
+    if (stream && scales.length > 1 && cheap)
+      this.splits_ = new SplitShapes(reader_, pool, materials_, added_);
   }
 
   coarsest(signal: AbortSignal): Coarsest {
-    const { scale, glb } = this.reader_.manifest.scales[this.reader_.manifest.scales.length - 1];
+    const { scale, glb } = this.coarsestScale_;
     let near: () => void = () => undefined;
-    const almost = new Promise<void>((done) => (near = done));
+    const almostThere = new Promise<void>((done) => (near = done));
     let first = 0;
     const bytes = this.reader_.scaleGlb(scale, {
       signal,
@@ -45,48 +58,88 @@ export class ScaleSource {
       },
     });
     bytes.then(near, near);
-    this.files_.set(scale, bytes);
-    return { almostThere: almost, bytes };
+    this.coarsestFile_ = bytes;
+    return { almostThere, bytes };
+  }
+  private get coarsestScale_() {
+    const { scales } = this.reader_.manifest;
+    return scales[scales.length - 1];
   }
 
-  /** Bytes that a scale costs. */
-  bytesOf(scale: number): number {
+  /** Reads the head of the vertex-split stream, where it is to be used. */
+  async openStream(signal: AbortSignal): Promise<void> {
+    if (!this.splits_) return;
+    try {
+      await this.splits_.open(signal);
+      this.splitsOpen_ = true;
+    } catch (error) {
+      if (isAbort(error)) throw error;
+      this.problem_(error, 'vertex splits'); // GLB files do, too
+    }
+  }
+  private glbBytes_(scale: number): number {
     return this.reader_.manifest.scales.find((s) => s.scale === scale)?.glb.bytes ?? 0;
   }
-
-  /** Fetches and decodes a scale, so that get() gives it at once. */
-  async prepare(scale: number, signal: AbortSignal): Promise<void> {
-    if (!this.files_.has(scale)) {
-      const file = this.reader_.scaleGlb(scale, { signal });
-      this.files_.set(scale, file);
-      file.catch(() => this.files_.delete(scale));
-    }
-    await this.get(scale);
+  private usesStream_(scale: number): boolean {
+    if (!this.splits_ || !this.splitsOpen_) return false;
+    const bytes = this.splits_.bytesOf(scale);
+    return Number.isFinite(bytes) && (this.options_.meshes === 'stream' || bytes <= this.glbBytes_(scale));
+  }
+  /** Bytes that a scale still costs. */
+  bytesOf(scale: number): number {
+    if (this.shapes_.has(scale)) return 0;
+    return this.usesStream_(scale) ? this.splits_!.bytesOf(scale) : this.glbBytes_(scale);
   }
 
-  get(scale: number): Promise<Object3D> {
-    let shape = this.shapes_.get(scale);
-    if (!shape) {
-      shape = this.make_(scale);
-      this.shapes_.set(scale, shape);
-      shape.catch(() => this.shapes_.delete(scale));
-    }
-    return shape;
+  /** Loads a scale; `passed` hears of coarser ones that are complete on the way. */
+  load(scale: number, signal: AbortSignal, passed: (scale: number) => void): ScaleLoad {
+    const known = this.shapes_.get(scale);
+    if (known) return { arrived: Promise.resolve(), shape: Promise.resolve(known) };
+    let arrive: () => void = () => undefined;
+    const arrived = new Promise<void>((done) => (arrive = done));
+    const shape = this.load_(scale, signal, arrive, passed);
+    shape.then(arrive, arrive);
+    return { arrived, shape };
   }
-  private async make_(scale: number): Promise<Object3D> {
-    const glb = await this.files_.get(scale)!;
+  private async load_(
+    scale: number,
+    signal: AbortSignal,
+    arrived: () => void,
+    passed: (scale: number) => void,
+  ): Promise<Object3D> {
+    if (this.usesStream_(scale) && this.firstGltf_) {
+      try {
+        return await this.splits_!.load(scale, this.firstGltf_, signal, arrived, (s, mesh: Mesh) => {
+          if (this.shapes_.has(s) && s !== this.coarsestScale_.scale) return;
+          this.shapes_.set(s, mesh);
+          if (s !== scale) passed(s);
+        });
+      } catch (error) {
+        if (isAbort(error)) throw error;
+        this.splitsOpen_ = false;
+        this.problem_(error, 'vertex splits');
+      }
+    }
+    const coarsest = scale === this.coarsestScale_.scale && this.coarsestFile_;
+    const glb = await (coarsest || this.reader_.scaleGlb(scale, { signal }));
+    arrived();
     const gltf = await parseScale(this.options_.gltfLoader(), glb, this.firstGltf_ !== undefined);
     this.firstGltf_ ??= gltf;
-    this.materials_.adopt(gltf, this.added_);
-    this.made_.push(gltf.scene);
-    this.files_.set(scale, Promise.resolve(new Uint8Array(0))); // the object stands for it
+    this.materials_.adopt(gltf, meshesOf(gltf.scene), this.added_);
+    this.shapes_.set(scale, gltf.scene);
     return gltf.scene;
   }
+  /** A scale that is there. */
+  shape(scale: number): Object3D | undefined {
+    return this.shapes_.get(scale);
+  }
 
-  /** Gives all objects that were made, for their geometries to be disposed of. */
-  dispose(): Object3D[] {
+  dispose(): void {
+    for (const shape of this.shapes_.values()) disposeGeometries(shape);
+    for (const mesh of this.firstGltf_ ? meshesOf(this.firstGltf_.scene) : []) mesh.geometry.dispose();
+    this.splits_?.dispose();
     this.shapes_.clear();
-    this.files_.clear();
-    return this.made_.splice(0);
+    this.coarsestFile_ = undefined;
+    this.firstGltf_ = undefined;
   }
 }

@@ -1,8 +1,21 @@
 import { octahedralVector } from './split_codec';
-import type { SplitGrid, SplitStreamReader } from './split_stream';
-import type { SplitUpdate } from './worker_protocol';
+import type { SplitGrid, SplitStreamHead, SplitStreamReader } from './split_stream';
+import type { SplitInfo, SplitUpdate } from './worker_protocol';
 
 const f = Math.fround;
+
+export function splitInfo(head: SplitStreamHead): SplitInfo {
+  const scales = head.scales.map(({ scale, blocks, wedges }) => {
+    const last = head.blocks[blocks - 1];
+    return { scale, blocks, wedges, end: last.offset + last.bytes };
+  });
+  // Normals leave the worker as vectors.
+  const attributes = head.attributes.map(({ kind, components }) => ({
+    kind,
+    components: kind === 'normal' ? 3 : components,
+  }));
+  return { headBytes: head.bytes, scales, attributes, groups: head.groups };
+}
 
 function gridValues(
   places: Int32Array,

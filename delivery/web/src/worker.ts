@@ -3,7 +3,7 @@ import { codecTraits, joinFragment } from './codec';
 import { FormatError, TexmeshError } from './errors';
 import { sha256 } from './sha256';
 import { SplitStreamReader } from './split_stream';
-import { splitUpdate } from './split_update';
+import { splitInfo, splitUpdate } from './split_update';
 import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest } from './worker_protocol';
 
 // What happens off the main thread: digests, images, vertex splits. `handle` works on the main thread, too, where no
@@ -59,9 +59,11 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
       const levels = enlarge(request);
       return [levels, levels];
     }
-    case 'split-open':
-      streams.set(request.key, { reader: new SplitStreamReader(request.head), wedges: 0 });
-      return [undefined, []];
+    case 'split-open': {
+      const reader = new SplitStreamReader(request.head);
+      streams.set(request.key, { reader, wedges: 0 });
+      return [splitInfo(reader.head), []];
+    }
     case 'split-add': {
       const stream = streams.get(request.key);
       if (!stream) throw new FormatError('mesh/stream.bin', '', 'a stream that was opened', 'none');

@@ -1,5 +1,5 @@
 import { FormatError } from './errors';
-import type { DecodeRequest, EnlargeRequest, Levels, SplitUpdate, WorkerAnswer, WorkerRequest } from './worker_protocol';
+import type { DecodeRequest, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest } from './worker_protocol';
 
 /** Images decoded at once, over all workers. */
 const mostAtOnce = 8;
@@ -140,8 +140,8 @@ export class WorkerPool {
   enlarge(request: Omit<EnlargeRequest, 'op'>): Promise<Levels> {
     return this.ask_({ op: 'enlarge', ...request }) as Promise<Levels>;
   }
-  async openSplits(key: number, head: Uint8Array): Promise<void> {
-    await this.ask_({ op: 'split-open', key, head }, 0);
+  openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
+    return this.ask_({ op: 'split-open', key, head }, 0) as Promise<SplitInfo>;
   }
   addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
     return this.ask_({ op: 'split-add', key, blocks }, 0) as Promise<SplitUpdate>;

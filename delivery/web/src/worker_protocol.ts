@@ -1,4 +1,5 @@
 import type { CodecId } from './codec';
+import type { SplitKind } from './split_stream';
 
 /** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
 export interface DecodeRequest {
@@ -25,7 +26,7 @@ export interface EnlargeRequest {
 }
 /** A picture and its halves, one after the other. */
 export type Levels = ImageBitmap[];
-/** Start a vertex-split stream under a number of the caller's. */
+/** Start a vertex-split stream under a number of the caller's. Gives SplitInfo. */
 export interface SplitOpenRequest {
   op: 'split-open';
   key: number;
@@ -42,6 +43,16 @@ export interface SplitCloseRequest {
   key: number;
 }
 export type WorkerRequest = DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
+
+/** What the head of a stream says of it. */
+export interface SplitInfo {
+  /** Of the head; blocks follow. */
+  headBytes: number;
+  /** Coarsest first; complete with the byte before `end`. */
+  scales: { scale: number; blocks: number; wedges: number; end: number }[];
+  attributes: { kind: SplitKind; components: number }[];
+  groups: { material: number; part: number }[];
+}
 
 /** What has been added to a split mesh, and its triangles now. */
 export interface SplitUpdate {

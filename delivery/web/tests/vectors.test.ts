@@ -24,7 +24,11 @@ function expectBits(found: ArrayLike<number>, expected: ArrayLike<number>, what:
 }
 
 function runMath(cases: Json[]): void {
-  const functions: Record<string, (x: number) => number> = { ...t.portable, log_quantiser: t.logQuantiser } as never;
+  const functions: Record<string, (x: number) => number> = {
+    ...t.portable,
+    log_quantiser: t.logQuantiser,
+    'pow of 0.37': (y: number) => t.portable.pow(0.37, y),
+  } as never;
   for (const c of cases)
     it(c.name, () => {
       for (const [x, y] of c.x_y) expectBits([functions[c.name](x)], [y], `${c.name}(${x})`);
@@ -134,6 +138,13 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
       expectBits([(list.offers[i] as Json)[name]].flat(), [o[name]].flat(), `offer ${i}: ${name}`);
   });
   expectBits([list.totalWeight], [v.total_weight], 'weight');
+  for (const b of v.budgets) {
+    const budget = t.textureForBudget(data, v.displayed_px, { scale: v.scale }, b.budget_bytes);
+    expect(budget.planes.map((p) => [p.base, p.plane])).toEqual(b.planes);
+    expectBits(budget.rungs, b.rungs, `rungs for ${b.budget_bytes}`);
+    const numbers = [t.mipLoss(data, budget.planes, v.displayed_px), budget.bytes, budget.dssim];
+    expectBits(numbers, [b.mip_loss, b.bytes, b.dssim], `budget of ${b.budget_bytes}`);
+  }
   const quality = await reader.quality();
   for (const [dssim, equivalent, ssim] of v.dssim_quality_ssim) {
     const q = t.equivalentQuality(data, planes, dssim);
