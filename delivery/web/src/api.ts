@@ -2,6 +2,7 @@ import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
 import type { HtcOrder, Policy } from './harmonic_time';
 import type { RequestRecord } from './http';
 import type { StepRule, VisiblePart } from './viewing';
+import type { DecodeHere } from './worker_pool';
 
 /** How the object is looked at; lengths in device pixels. */
 export interface Display {
@@ -42,7 +43,7 @@ export interface LoadOptions {
   beta0BytesS?: number;
   /** Which rule says what scale is enough. */
   rule?: StepRule;
-  /** This scale instead of what the display asks for. */
+  /** This scale (or the nearest one that the package has) instead of what the display asks for. */
   scale?: number;
   /** This rung of every fragment (clipped to those there are) instead of what fits the time. */
   rung?: number;
@@ -52,8 +53,10 @@ export interface LoadOptions {
   meshes?: 'glb' | 'stream' | 'auto';
   /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
   autoRefine?: boolean;
-  /** Where worker.js is, when not beside the library; '' = decode on the main thread. */
+  /** Where worker.js is, when not beside the library. */
   workerUrl?: string | URL;
+  /** Where pages may have no workers: `handle` of texmesh/worker, which then works on the main thread. */
+  decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
   signal?: AbortSignal;

@@ -13,12 +13,15 @@ export class TexmeshError extends Error {
     if (expected !== '') text += `${text && ': '}expected ${expected}`;
     if (found !== '') text += `${text && (expected === '' ? ': ' : ', ')}found ${found}`;
     super(text);
-    this.name = new.target.name;
   }
 }
 
 /** A server or a caller does not give what it must: no answer, no such file, an option out of range. */
-export class InputError extends TexmeshError {}
+export class InputError extends TexmeshError {
+  override readonly name = 'InputError'; // in letters: bundlers rename classes
+}
 
 /** The bytes of a package do not follow the format, or are not those that their digests promise. */
-export class FormatError extends TexmeshError {}
+export class FormatError extends TexmeshError {
+  override readonly name = 'FormatError';
+}

@@ -330,14 +330,14 @@ export async function getWhole(
   client: HttpClient,
   url: string,
   maxBytes: number,
-  how: { kind: RequestKind; signal?: AbortSignal; onBytes?: (n: number) => void; retries?: boolean },
+  how: { kind: RequestKind; signal?: AbortSignal; onBytes?: (n: number) => void; reload?: boolean },
 ): Promise<Uint8Array> {
   const retries = new Retries(client.options);
   for (;;) {
     const a = await client.get(url, { maxBytes, ...how });
     if (a.status === 200 && a.complete) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${maxBytes} bytes`, 'more');
-    if (how.retries === false || !mayRetry(a) || !(await retries.wait(how.signal)))
+    if (!mayRetry(a) || !(await retries.wait(how.signal)))
       throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
   }
 }

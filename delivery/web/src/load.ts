@@ -74,11 +74,10 @@ export class ModelLoad implements LoadedModel {
     private readonly scene_: Object3D,
     private readonly options_: LoadOptions,
     startS: number,
-    poolOptions: ConstructorParameters<typeof WorkerPool>[0] = {},
   ) {
     this.startS_ = startS;
-    this.override_ = { scale: options_.scale, rung: options_.rung };
-    this.pool_ = new WorkerPool({ workers: options_.workers, workerUrl: options_.workerUrl, ...poolOptions });
+    this.override_ = this.snapped_(options_);
+    this.pool_ = new WorkerPool(options_);
     this.scales_ = new ScaleSource(
       reader_,
       options_,
@@ -479,8 +478,16 @@ export class ModelLoad implements LoadedModel {
     if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
   }
   setOverride(override: { scale?: number; rung?: number }): void {
-    this.override_ = { ...override };
+    this.override_ = this.snapped_(override);
     if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
+  }
+
+  /** A scale that the package has, as near as possible. */
+  private snapped_({ scale, rung }: { scale?: number; rung?: number }): { scale?: number; rung?: number } {
+    if (scale === undefined) return { rung };
+    const away = (k: number): number => Math.abs(k - scale);
+    const scales = this.reader_.manifest.scales.map((s) => s.scale);
+    return { scale: scales.reduce((best, k) => (away(k) < away(best) ? k : best)), rung };
   }
 
   private follow_(): void {

@@ -457,7 +457,7 @@ export class PackageReader {
     const place = `fragment ${fragment} of ${pack.path}`;
     if (range.bytes === 0) this.fail_(place, 'a stored fragment', 'none');
     const verify = this.digestCheck_(place, await this.fragmentDigest(plane, rung, fragment));
-    return this.store.read(pack, range.offset, range.bytes, { kind: 'texture', once: true, signal, verify });
+    return this.store.read(pack, range.offset, range.bytes, { kind: 'texture', once: this.form !== 'files', signal, verify });
   }
   /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
   async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {

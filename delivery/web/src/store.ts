@@ -88,12 +88,11 @@ class Mirrors {
     m.lastS = atS;
     m.owedBytes -= bytes;
   }
-  /** A mirror that fails is not asked again, as long as there are others. */
+  /** A mirror that fails is not asked again, as long as there are others. Says whether there are. */
   failed(m: Mirror, bytes: number): boolean {
     m.owedBytes -= bytes;
-    if (this.alive <= 1) return false;
-    m.alive = false;
-    return true;
+    if (m.alive && this.alive > 1) m.alive = false;
+    return !m.alive;
   }
 }
 
@@ -308,24 +307,33 @@ class TreeStore implements PackageStore {
     return shownUrl(this.mirrors_.all[0].url);
   }
   manifest(): Promise<Uint8Array> {
-    return this.file(manifestPath, bootstrapBytes, { kind: 'manifest' });
+    return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest' });
   }
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const whole = await this.file(place.path, place.bytes, how);
-    if (whole.length !== place.bytes)
-      throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
-    const part = whole.subarray(offset, offset + bytes);
-    await how.verify?.(part);
-    return part;
+    const take = async (reload: boolean): Promise<Uint8Array> => {
+      const whole = await this.file_(place.path, place.bytes, how, reload);
+      if (whole.length !== place.bytes)
+        throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
+      const part = whole.subarray(offset, offset + bytes);
+      await how.verify?.(part);
+      return part;
+    };
+    try {
+      return await take(false);
+    } catch (error) {
+      if (!(error instanceof FormatError)) throw error;
+      this.files_.delete(place.path);
+      return take(true); // damaged on the way, perhaps: once more, past caches
+    }
   }
   /** A file of the tree; a failed one may be asked for again. */
-  file(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array> {
+  private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
     const known = this.files_.get(path);
     if (known) return known;
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
     const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
       const { kind, signal, onBytes } = how;
-      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes });
+      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload });
     });
     if (how.once) return wanted;
     this.files_.set(path, wanted);

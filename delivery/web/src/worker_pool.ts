@@ -19,7 +19,8 @@ interface Helper {
   end(): void;
 }
 type OnAnswer = (answer: WorkerAnswer) => void;
-type Handle = (request: WorkerRequest) => Promise<[unknown, Transferable[]]>;
+/** What workers do, on the page's own thread: `handle` of texmesh/worker. */
+export type DecodeHere = (request: WorkerRequest) => Promise<[unknown, Transferable[]]>;
 
 function startWorker(url: string | URL | undefined, onAnswer: OnAnswer, onBroken: () => void): Helper {
   // Written so that bundlers see it.
@@ -37,14 +38,17 @@ function startWorker(url: string | URL | undefined, onAnswer: OnAnswer, onBroken
   };
 }
 
-function startHere(handle: Promise<Handle>, onAnswer: OnAnswer): Helper {
+function startHere(handle: DecodeHere | undefined, onAnswer: OnAnswer): Helper {
+  const missing = (): never => {
+    throw new Error('workers cannot be had here: give `decode`, the `handle` of texmesh/worker');
+  };
   return {
     post: (id, request) => {
-      handle
-        .then((answer) => answer(request))
+      Promise.resolve(request)
+        .then(handle ?? missing)
         .then(
           ([result]) => onAnswer({ id, result }),
-          (error: unknown) => onAnswer({ id, error: { name: 'Error', message: String((error as Error).message) } }),
+          (error: unknown) => onAnswer({ id, failed: error }),
         );
     },
     end: () => undefined,
@@ -53,10 +57,9 @@ function startHere(handle: Promise<Handle>, onAnswer: OnAnswer): Helper {
 
 export interface PoolOptions {
   workers?: number;
-  /** '' = no workers. */
   workerUrl?: string | URL;
-  /** Instead of workers, for tests. */
-  handle?: Handle;
+  /** Instead of workers. */
+  decode?: DecodeHere;
 }
 
 /** Workers that decode images and vertex splits. */
@@ -71,7 +74,7 @@ export class WorkerPool {
   constructor(private readonly options_: PoolOptions = {}) {
     const cores = globalThis.navigator?.hardwareConcurrency ?? 2;
     const count = Math.max(1, options_.workers ?? Math.min(4, Math.max(2, cores - 1)));
-    const here = options_.handle !== undefined || options_.workerUrl === '' || typeof Worker === 'undefined';
+    const here = options_.decode !== undefined || typeof Worker === 'undefined';
     for (let i = 0; i < (here ? 1 : count); ++i) {
       this.helpers_.push(here ? this.startMain_() : this.start_(i));
       this.load_.push(0);
@@ -79,19 +82,14 @@ export class WorkerPool {
   }
 
   private start_(index: number): Helper {
-    const url = this.options_.workerUrl;
     try {
-      return startWorker(url === '' ? undefined : url, (a) => this.answered_(a), () => this.replace_(index));
+      return startWorker(this.options_.workerUrl, (a) => this.answered_(a), () => this.replace_(index));
     } catch {
       return this.startMain_(); // a page whose policy forbids workers
     }
   }
   private startMain_(): Helper {
-    const url = this.options_.workerUrl || new URL('./worker.js', import.meta.url).href;
-    const handle = this.options_.handle
-      ? Promise.resolve(this.options_.handle)
-      : (import(/* @vite-ignore */ String(url)) as Promise<{ handle: Handle }>).then((m) => m.handle);
-    return startHere(handle, (a) => this.answered_(a));
+    return startHere(this.options_.decode, (a) => this.answered_(a));
   }
   /** A worker that cannot be loaded gives its jobs to the main thread. */
   private replace_(index: number): void {
@@ -108,7 +106,8 @@ export class WorkerPool {
     this.running_.delete(answer.id);
     --this.load_[entry.worker];
     const { error } = answer;
-    if (!error) entry.job.done(answer.result);
+    if (answer.failed !== undefined) entry.job.failed(answer.failed);
+    else if (!error) entry.job.done(answer.result);
     else if (error.parts) entry.job.failed(new FormatError(...error.parts));
     else entry.job.failed(Object.assign(new Error(error.message), { name: error.name }));
     this.pump_();

@@ -74,5 +74,7 @@ export interface WorkerAnswer {
   id: number;
   /** Levels of decode and enlarge, SplitUpdate of split-add. */
   result?: unknown;
+  /** The error itself, where no thread lies between. */
+  failed?: unknown;
   error?: { name: string; message: string; parts?: [string, string, string, string] };
 }

@@ -1,0 +1,146 @@
+import { describe, expect, it } from 'vitest';
+import { FormatError, FragmentList, PackageReader, fragmentList, fullSize } from '../src/reader';
+import { chooseScale } from '../src/scale_choice';
+import { groupBytes, groupedList, throughputOf } from '../src/groups';
+import { Transfers, Wish } from '../src/transfers';
+import { WorkerPool } from '../src/worker_pool';
+import { packError } from '../src/worker';
+import { samePrefix } from '../src/bytes';
+import { sha256 } from '../src/sha256';
+import type { WorkerRequest } from '../src/worker_protocol';
+import { Fault, bytesAskedTwice, fakeServer } from './fake_server';
+import { golden } from './support';
+
+const url = 'http://host/scan.texmesh';
+
+/** Instead of a worker: checks digests, decodes nothing. */
+async function decode(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
+  if (request.op !== 'decode') throw new Error('not asked for here');
+  for (const [i, digest] of request.digests.entries())
+    if (!samePrefix(await sha256(request.streams[i]), digest)) throw new FormatError('fragment', '', 'a digest', 'another');
+  return [[{ streams: request.streams.length }], []];
+}
+
+async function setUp(fault?: Fault) {
+  const server = fakeServer({ '/scan.texmesh': golden('v1.1-scan') }, { fault });
+  const reader = await PackageReader.openUrl(url, { fetch: server.fetch, retryDelayS: 0.001, retries: 1 });
+  await reader.prefetchDocuments();
+  const data = await reader.data();
+  const decoded: Wish[] = [];
+  const lost: Wish[] = [];
+  const transfers = new Transfers(reader, data.textures, new WorkerPool({ decode }), {
+    decoded: (wish) => decoded.push(wish),
+    lost: (wish) => lost.push(wish),
+  });
+  await transfers.prepare(data.textures.map((_, p) => p));
+  await reader.tableStream(0, 0);
+  const list = fragmentList(data, fullSize(data.textures), { scale: 0 });
+  const settled = async (): Promise<void> => {
+    while (transfers.pending > 0) await new Promise((go) => setTimeout(go, 1));
+  };
+  return { server, reader, data, transfers, decoded, lost, list, settled };
+}
+const wishesOf = (list: FragmentList, rung: number): Wish[] =>
+  list.fragments.map((f, offer) => ({ ...f, rung: Math.min(rung, list.offers[offer].bytes.length - 1), offer }));
+
+describe('transfers', () => {
+  it('neighbours of a rung share a request, nothing comes twice', async () => {
+    const s = await setUp();
+    const before = s.server.log.length;
+    const arrived: Wish[] = [];
+    const wishes = wishesOf(s.list, 0);
+    await s.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, (w) => arrived.push(w), () => undefined);
+    await s.settled();
+    expect(arrived.length).toBe(wishes.length);
+    expect(s.decoded.length).toBe(wishes.length);
+    const packs = s.server.log.length - before;
+    expect(packs).toBeLessThanOrEqual(2 * 3); // a rung of three planes, and what decodes them
+    expect(bytesAskedTwice(s.server.log, url)).toBe(0);
+  });
+  it('requests are no longer than asked for', async () => {
+    const s = await setUp();
+    const before = s.server.log.length;
+    await s.transfers.fetch(wishesOf(s.list, 0), { gapBytes: 0, mostBytes: 2000 }, () => undefined, () => undefined);
+    for (const { range } of s.server.log.slice(before)) if (range) expect(range[1] - range[0]).toBeLessThan(5000);
+  });
+  it('a damaged fragment is asked for once more, by itself', async () => {
+    let first = true;
+    const s = await setUp(({ range }) => {
+      if (!range || range[0] < 40000 || !first) return false;
+      first = false;
+      return 'flip';
+    });
+    const wishes = wishesOf(s.list, 0).slice(0, 8);
+    await s.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, () => undefined, () => undefined);
+    await s.settled();
+    expect(s.decoded.length).toBe(8);
+    expect(s.lost.length).toBe(0);
+  });
+  it('a request that fails for good fails its fragments only', async () => {
+    const s = await setUp();
+    const [pack] = s.transfers.filesOf(0).packs;
+    const t = await setUp(({ range }) => range !== undefined && range[0] >= pack.offset && range[0] < pack.offset + pack.bytes && 'status-404');
+    const failed: Wish[] = [];
+    const wishes = wishesOf(t.list, 0);
+    await t.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, () => undefined, (w) => failed.push(w));
+    await t.settled();
+    expect(failed.length).toBeGreaterThan(0);
+    expect(failed.every((w) => w.plane === 0)).toBe(true);
+    expect(t.decoded.length).toBe(wishes.length - failed.length);
+  });
+  it('cancelling fails what is under way', async () => {
+    const s = await setUp();
+    const abort = new AbortController();
+    const failed: Wish[] = [];
+    const done = s.transfers.fetch(
+      wishesOf(s.list, 2), { gapBytes: 0, mostBytes: 3000, signal: abort.signal }, () => undefined, (w) => failed.push(w),
+    );
+    abort.abort();
+    await done;
+    expect(failed.length).toBe(s.list.offers.length);
+  });
+});
+
+describe('groups', () => {
+  it('keep all bytes and losses, and the order of packs', async () => {
+    const { list } = await setUp();
+    const grouped = groupedList(list, 3000, 40000);
+    expect(grouped.offers.length).toBeLessThan(list.offers.length);
+    expect(grouped.groups.flat()).toEqual(list.fragments);
+    const sum = (offers: { bytes: number[] }[]): number => offers.reduce((n, o) => n + o.bytes[0], 0);
+    expect(sum(grouped.offers)).toBe(sum(list.offers));
+    for (const g of grouped.groups) expect(new Set(g.map((f) => f.plane)).size).toBe(1);
+  });
+  it('one each where requests cost nothing, one per plane where only whole rungs come', async () => {
+    const { list } = await setUp();
+    expect(groupedList(list, 0, 1e5).offers.length).toBe(list.offers.length);
+    expect(groupedList(list, Infinity, 1e5).offers.length).toBe(new Set(list.fragments.map((f) => f.plane)).size);
+  });
+  it('grow with the round trip, but leave enough decisions', () => {
+    expect(groupBytes(250e3, 0.04, 4)).toBeCloseTo(6000);
+    expect(groupBytes(250e3, 1, 4)).toBeCloseTo((250e3 * 4) / 48);
+  });
+  it('throughput is bytes over the time in which bytes came', () => {
+    const record = { url, offset: 0, bytes: 0, kind: 'mesh', firstByte: 0.1, status: 206, ok: true } as const;
+    const requests = [
+      { ...record, started: 0, ended: 1.1, received: 100e3 },
+      { ...record, started: 0.5, firstByte: 0.6, ended: 1.1, received: 100e3 },
+    ];
+    expect(throughputOf(requests, 0.1)).toBeCloseTo(200e3);
+  });
+});
+
+describe('the scale', () => {
+  it('is the wanted one when time is plenty, the coarsest when there is none', async () => {
+    const { reader, data, list } = await setUp();
+    const quality = await reader.quality();
+    const planes = fullSize(data.textures);
+    expect(chooseScale(data, quality, list, planes, 0, () => 1e9)).toBe(0);
+    expect(chooseScale(data, quality, list, planes, 0, (scale) => (scale === 0 ? -1 : 1000))).toBe(1);
+  });
+});
+
+it('errors keep their parts on the way from a worker', () => {
+  expect(packError(new FormatError('f', 'p', 'e', 'x'))?.parts).toEqual(['f', 'p', 'e', 'x']);
+  expect(packError(new Error('other'))?.message).toBe('other');
+});
