@@ -4,3 +4,6 @@ if(TARGET texmesh AND TARGET make_scan)
     $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>)
   set_tests_properties(gltf_validator PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS pipeline)
 endif()
+# The web client: types, Vitest (delivery/vectors among it), build, size.
+add_test(NAME delivery_web COMMAND ${PROJECT_SOURCE_DIR}/delivery/web/run-tests ${CMAKE_CURRENT_BINARY_DIR}/delivery_web)
+set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web)

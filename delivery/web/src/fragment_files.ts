@@ -11,8 +11,6 @@ export interface FragmentFile {
 export type FragmentFiles = Map<number, FragmentFile>[][];
 
 const file = 'fragments.json';
-export const fragmentFilesPath = file;
-
 export function readFragmentFiles(json: Uint8Array): FragmentFiles {
   const at = parseJson(json, file, 256 << 20);
   at.at('version').integer(1, 1);

@@ -1,21 +1,25 @@
 import { samePrefix, toHex } from './bytes';
 import { CodecId, codecTraits, joinFragment } from './codec';
 import { FormatError, InputError } from './errors';
-import { PackageData } from './fragment_list';
-import { FragmentFiles, fragmentFilesPath, readFragmentFiles } from './fragment_files';
+import type { PackageData } from './fragment_list';
+import type { FragmentFiles } from './fragment_files';
 import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS } from './http';
-import { IndexHead, readIndex, readIndexHead, readIndexPage } from './index_table';
+import type { IndexHead } from './index_table';
 import * as layout from './layout';
 import {
   ByteRange, EntryRef, Manifest, PagedRef, mostManifestPreviews, readManifest,
 } from './manifest';
-import { QualityTable, readQuality } from './quality_table';
+import type { QualityTable } from './quality_table';
 import { sha256 } from './sha256';
-import { PackageForm, PackageStore, ReadOptions, StoreMode, openBytes, openStore } from './store';
-import {
-  PlaneTables, TablesHead, fragmentCount, readTablesHead, readTablesSection, rungCount,
-} from './tables';
-import { TextureInfo, fullSizePlanes, missingFeature, readTextures } from './textures';
+import { PackageForm, PackageStore, ReadOptions, StoreMode, openStore } from './store';
+import type { PlaneTables, TablesHead } from './tables';
+import type { TextureInfo } from './textures';
+
+const documents = () => import('./documents');
+
+const fragmentFilesPath = 'fragments.json';
+const fragmentCount = (t: PlaneTables): number => t.columns * t.rows;
+const rungCount = (t: PlaneTables): number => t.rungQuality.length;
 
 /** Of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {
@@ -118,7 +122,7 @@ export class PackageReader {
     bytes: Uint8Array,
     name = 'package',
   ): Promise<T> {
-    const store = openBytes(bytes, name);
+    const store = (await import('./store_files')).openBytes(bytes, name);
     const manifest = await store.manifest();
     const id = toHex(await sha256(manifest));
     return new this(store, new HttpClient(), name, { parsed: readManifest(manifest), id }, nowS());
@@ -181,14 +185,14 @@ export class PackageReader {
   /** Every entry but manifest.json and index.bin, in container order. */
   async index(): Promise<EntryRef[]> {
     const bytes = await this.readPaged_(this.manifest.index, { kind: 'index' });
-    return readIndex(bytes);
+    return (await documents()).readIndex(bytes);
   }
 
   private async loadIndexHead_(): Promise<IndexHead> {
     const ref = this.manifest.index;
     const small = ref.bytes <= wholeDocumentBytes || this.form !== 'range';
     const bytes = small ? await this.readPaged_(ref, { kind: 'index' }) : await this.readHead_(ref, { kind: 'index' });
-    const head = readIndexHead(bytes);
+    const head = (await documents()).readIndexHead(bytes);
     this.requireHead_(ref, head.bytes);
     return head;
   }
@@ -199,6 +203,7 @@ export class PackageReader {
     if (page < 0) return entries;
     const { offset, bytes } = head.pages[page];
     const got = await this.store.read(this.manifest.index, offset, bytes, { kind: 'index' });
+    const { readIndexPage } = await documents();
     for (const e of await readIndexPage(head, page, got)) entries.set(e.path, e);
     if (plane < 0) this.checkManifestRefs_(entries);
     return entries;
@@ -237,6 +242,7 @@ export class PackageReader {
   }
   private async loadTextures_(): Promise<TextureInfo[]> {
     const m = this.manifest;
+    const { fullSizePlanes, missingFeature, readTextures } = await documents();
     const textures = readTextures(await this.readAll_(m.textures, { kind: 'textures' }));
     if (textures.length !== m.planeCount) this.fail_(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
     const feature = missingFeature(textures, m.requiredFeatures);
@@ -252,7 +258,9 @@ export class PackageReader {
 
   /** Measured quality of scales and rungs. */
   quality(): Promise<QualityTable> {
-    return (this.qualityOnce_ ??= this.readAll_(this.manifest.quality, { kind: 'quality' }).then(readQuality));
+    return (this.qualityOnce_ ??= this.readAll_(this.manifest.quality, { kind: 'quality' }).then(async (bytes) =>
+      (await documents()).readQuality(bytes),
+    ));
   }
 
   /** What the package was made from and with, as JSON. */
@@ -265,6 +273,7 @@ export class PackageReader {
     const ref = this.manifest.tables;
     if (ref.bytes <= wholeDocumentBytes || this.form !== 'range')
       this.wholeTables_ = this.readPaged_(ref, { kind: 'tables' });
+    const { readTablesHead } = await documents();
     const head = readTablesHead(await (this.wholeTables_ ?? this.readHead_(ref, { kind: 'tables' })));
     this.requireHead_(ref, head.bytes);
     if (head.planes.length !== this.manifest.planeCount)
@@ -286,6 +295,7 @@ export class PackageReader {
    */
   async tables(planes?: readonly number[]): Promise<(PlaneTables | undefined)[]> {
     const head = await (this.tablesHead_ ??= this.loadTablesHead_());
+    const { readTablesSection } = await documents();
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
       if (!(p >= 0 && p < head.planes.length))
@@ -429,7 +439,7 @@ export class PackageReader {
     const { store } = this;
     if (!store.extraFile) return undefined;
     const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' });
-    return bytes && readFragmentFiles(bytes);
+    return bytes && (await documents()).readFragmentFiles(bytes);
   }
   /** A fragment's complete file of such a tree; its digest is the caller's to check. */
   async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {

@@ -3,7 +3,7 @@ import type { LoadOptions } from './api';
 import { isAbort, nowS } from './http';
 import type { PackageReader } from './package_reader';
 import { MaterialSet, ParsedGltf, Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
-import { SplitShapes } from './split_shape';
+import type { SplitShapes } from './split_shape';
 import type { WorkerPool } from './worker_pool';
 
 /** A download that tells when it is nearly complete. */
@@ -22,7 +22,7 @@ export interface ScaleLoad {
 /** The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
-  private readonly splits_?: SplitShapes;
+  private splits_?: SplitShapes;
   private splitsOpen_ = false;
   private coarsestFile_?: Promise<Uint8Array>;
   /** That of the coarsest scale: it has the materials and their textures. */
@@ -32,16 +32,10 @@ export class ScaleSource {
     private readonly reader_: PackageReader,
     private readonly options_: LoadOptions,
     private readonly materials_: MaterialSet,
-    pool: WorkerPool,
+    private readonly pool_: WorkerPool,
     private readonly added_: (slot: Slot) => void,
     private readonly problem_: (error: unknown, what: string) => void,
-  ) {
-    const { stream, scales } = reader_.manifest;
-    // A tree's stream comes as a whole file.
-    const cheap = options_.meshes === 'stream' || (options_.meshes !== 'glb' && reader_.form !== 'files');
-    if (stream && scales.length > 1 && cheap)
-      this.splits_ = new SplitShapes(reader_, pool, materials_, added_);
-  }
+  ) {}
 
   coarsest(signal: AbortSignal): Coarsest {
     const { scale, glb } = this.coarsestScale_;
@@ -68,8 +62,14 @@ export class ScaleSource {
 
   /** Reads the head of the vertex-split stream, where it is to be used. */
   async openStream(signal: AbortSignal): Promise<void> {
-    if (!this.splits_) return;
+    const { manifest, form } = this.reader_;
+    const { meshes } = this.options_;
+    // A tree's stream comes as a whole file.
+    const cheap = meshes === 'stream' || (meshes !== 'glb' && form !== 'files');
+    if (!manifest.stream || manifest.scales.length < 2 || !cheap) return;
     try {
+      const { SplitShapes } = await import('./split_shape');
+      this.splits_ = new SplitShapes(this.reader_, this.pool_, this.materials_, this.added_);
       await this.splits_.open(signal);
       this.splitsOpen_ = true;
     } catch (error) {

@@ -2,7 +2,6 @@ import { FormatError, InputError, TexmeshError } from './errors';
 import {
   Answer, GetOptions, HttpClient, RequestKind, Retries, concat, getWhole, isAbort, mayRetry, nowS, shownUrl, whatCame,
 } from './http';
-import { isValidEntryPath, manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
 import { Throughput, defaultThroughput } from './throughput';
 
@@ -40,14 +39,14 @@ export interface PackageStore {
 }
 
 /** The server answers whole files only. */
-class NoRanges extends Error {}
+export class NoRanges extends Error {}
 
 const silenceFactor = 4;
 const leastPatienceRtts = 8;
 const leastPatienceS = 0.5;
 
 /** A URL that a package can be had from, and what it has shown so far. */
-class Mirror {
+export class Mirror {
   alive = true;
   etag = '';
   total = -1;
@@ -58,7 +57,7 @@ class Mirror {
 }
 
 /** Which mirror delivers first, by what each has delivered so far and has to deliver yet. */
-class Mirrors {
+export class Mirrors {
   readonly all: Mirror[];
   constructor(urls: readonly string[]) {
     this.all = urls.map((url) => new Mirror(url));
@@ -97,7 +96,7 @@ class Mirrors {
 }
 
 /** Tries mirror after mirror; a failure of the last one is everybody's. */
-async function fromMirrors<T>(
+export async function fromMirrors<T>(
   mirrors: Mirrors,
   client: HttpClient,
   bytes: number,
@@ -291,107 +290,10 @@ function sameOrigin(url: string): boolean {
   return !here || new URL(url, here.href).origin === here.origin;
 }
 
-/** Whole files of a tree, beside the container or by itself: for servers without ranges. */
-class TreeStore implements PackageStore {
-  readonly form = 'files';
-  private readonly files_ = new Map<string, Promise<Uint8Array>>();
-  private readonly mirrors_: Mirrors;
-
-  constructor(
-    roots: readonly string[],
-    private readonly client_: HttpClient,
-  ) {
-    this.mirrors_ = new Mirrors(roots);
-  }
-  get name(): string {
-    return shownUrl(this.mirrors_.all[0].url);
-  }
-  manifest(): Promise<Uint8Array> {
-    return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest' });
-  }
-  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const take = async (reload: boolean): Promise<Uint8Array> => {
-      const whole = await this.file_(place.path, place.bytes, how, reload);
-      if (whole.length !== place.bytes)
-        throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
-      const part = whole.subarray(offset, offset + bytes);
-      await how.verify?.(part);
-      return part;
-    };
-    try {
-      return await take(false);
-    } catch (error) {
-      if (!(error instanceof FormatError)) throw error;
-      this.files_.delete(place.path);
-      return take(true); // damaged on the way, perhaps: once more, past caches
-    }
-  }
-  /** A file of the tree; a failed one may be asked for again. */
-  private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
-    const known = this.files_.get(path);
-    if (known) return known;
-    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
-    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
-      const { kind, signal, onBytes } = how;
-      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload });
-    });
-    if (how.once) return wanted;
-    this.files_.set(path, wanted);
-    wanted.catch(() => this.files_.delete(path));
-    return wanted;
-  }
-  async extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
-    const { kind, signal } = how;
-    try {
-      return await getWhole(this.client_, joinUrl(this.mirrors_.choose(0).url, path), maxBytes, { kind, signal });
-    } catch (error) {
-      if (error instanceof InputError) return undefined;
-      throw error;
-    }
-  }
-  dispose(): void {
-    this.files_.clear();
-  }
-}
-
-/** https://host/a/NAME/?query and a path beneath it; query and fragment stay behind the path. */
-function joinUrl(root: string, path: string): string {
-  const end = root.search(/[?#]/);
-  return end < 0 ? root + path : root.slice(0, end) + path + root.slice(end);
-}
-
 /** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
 export function treeUrl(url: string): string {
   const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
   return m ? `${m[1]}/${m[2] ?? ''}` : '';
-}
-
-/** A container in memory. */
-class WholeStore implements PackageStore {
-  readonly form = 'whole';
-  constructor(
-    private bytes_: Uint8Array,
-    readonly name: string,
-  ) {}
-  manifest(): Promise<Uint8Array> {
-    return Promise.resolve(manifestOfContainer(this.bytes_.subarray(0, bootstrapBytes), this.name));
-  }
-  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const begin = place.offset + offset;
-    if (begin + bytes > this.bytes_.length)
-      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes_.length}`);
-    const part = this.bytes_.subarray(begin, begin + bytes);
-    await how.verify?.(part);
-    return part;
-  }
-  dispose(): void {
-    this.bytes_ = new Uint8Array(0);
-  }
-}
-
-/** A container that is in memory already. */
-export function openBytes(bytes: Uint8Array, name: string): PackageStore {
-  return new WholeStore(bytes, name);
 }
 
 export type StoreMode = 'auto' | 'range' | 'files';
@@ -413,9 +315,10 @@ export async function openStore(
     manifest: await store.manifest(),
   });
   const path = url.replace(/[?#].*$/, '');
-  if (path.endsWith('/')) return use(new TreeStore(urls, client));
+  const files = () => import('./store_files');
+  if (path.endsWith('/')) return use(new (await files()).TreeStore(urls, client));
   const roots = urls.map(treeUrl).filter((root) => root !== '');
-  if (mode === 'files') return use(new TreeStore(roots, client));
+  if (mode === 'files') return use(new (await files()).TreeStore(roots, client));
   try {
     return await use(new RangeStore(urls, client));
   } catch (error) {
@@ -424,11 +327,11 @@ export async function openStore(
   }
   if (roots.length > 0) {
     try {
-      return await use(new TreeStore(roots, client));
+      return await use(new (await files()).TreeStore(roots, client));
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
     }
   }
   const bytes = await getWhole(client, url, client.options.maxWholeBytes, { kind: 'other', signal });
-  return use(openBytes(bytes, shownUrl(url)));
+  return use((await files()).openBytes(bytes, shownUrl(url)));
 }

@@ -1,0 +1,41 @@
+import type { Object3D } from 'three';
+import type { LoadOptions, LoadedModel } from './api';
+import { nowS } from './http';
+import { ModelLoad } from './load';
+import { OpenOptions, PackageReader } from './package_reader';
+
+export { FormatError, InputError, TexmeshError } from './errors';
+export type * from './reader';
+export type * from './api';
+
+/** A package that can be shown in three.js scenes. */
+export class TexmeshPackage extends PackageReader {
+  private readonly loads_ = new Set<LoadedModel>();
+  private loaded_ = false;
+
+  /**
+   * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
+   * counts from the package's first request for the first load, from this call for others.
+   */
+  load(scene: Object3D, options: LoadOptions): LoadedModel {
+    const load = new ModelLoad(this, scene, options, this.loaded_ ? nowS() : this.openedS);
+    this.loaded_ = true;
+    this.loads_.add(load);
+    return load;
+  }
+
+  /** Disposes of all loads and forgets what was read. */
+  override dispose(): void {
+    for (const load of this.loads_) load.dispose();
+    this.loads_.clear();
+    super.dispose();
+  }
+}
+
+/**
+ * Opens a package: one request of 16 KiB. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
+ * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
+ */
+export function open(url: string, options: OpenOptions = {}): Promise<TexmeshPackage> {
+  return TexmeshPackage.openUrl(url, options);
+}

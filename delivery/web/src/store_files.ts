@@ -1,0 +1,104 @@
+import { FormatError, InputError } from './errors';
+import { HttpClient, getWhole, shownUrl } from './http';
+import { isValidEntryPath, manifestPath } from './layout';
+import { bootstrapBytes, manifestOfContainer } from './manifest';
+import { Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
+
+// For servers that know no ranges; loaded when one is met.
+
+/** Whole files of a tree, beside the container or by itself: for servers without ranges. */
+export class TreeStore implements PackageStore {
+  readonly form = 'files';
+  private readonly files_ = new Map<string, Promise<Uint8Array>>();
+  private readonly mirrors_: Mirrors;
+
+  constructor(
+    roots: readonly string[],
+    private readonly client_: HttpClient,
+  ) {
+    this.mirrors_ = new Mirrors(roots);
+  }
+  get name(): string {
+    return shownUrl(this.mirrors_.all[0].url);
+  }
+  manifest(): Promise<Uint8Array> {
+    return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest' });
+  }
+  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const take = async (reload: boolean): Promise<Uint8Array> => {
+      const whole = await this.file_(place.path, place.bytes, how, reload);
+      if (whole.length !== place.bytes)
+        throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
+      const part = whole.subarray(offset, offset + bytes);
+      await how.verify?.(part);
+      return part;
+    };
+    try {
+      return await take(false);
+    } catch (error) {
+      if (!(error instanceof FormatError)) throw error;
+      this.files_.delete(place.path);
+      return take(true); // damaged on the way, perhaps: once more, past caches
+    }
+  }
+  /** A file of the tree; a failed one may be asked for again. */
+  private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
+    const known = this.files_.get(path);
+    if (known) return known;
+    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
+    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
+      const { kind, signal, onBytes } = how;
+      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload });
+    });
+    if (how.once) return wanted;
+    this.files_.set(path, wanted);
+    wanted.catch(() => this.files_.delete(path));
+    return wanted;
+  }
+  async extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
+    const { kind, signal } = how;
+    try {
+      return await getWhole(this.client_, joinUrl(this.mirrors_.choose(0).url, path), maxBytes, { kind, signal });
+    } catch (error) {
+      if (error instanceof InputError) return undefined;
+      throw error;
+    }
+  }
+  dispose(): void {
+    this.files_.clear();
+  }
+}
+
+/** https://host/a/NAME/?query and a path beneath it; query and fragment stay behind the path. */
+function joinUrl(root: string, path: string): string {
+  const end = root.search(/[?#]/);
+  return end < 0 ? root + path : root.slice(0, end) + path + root.slice(end);
+}
+
+/** A container in memory. */
+class WholeStore implements PackageStore {
+  readonly form = 'whole';
+  constructor(
+    private bytes_: Uint8Array,
+    readonly name: string,
+  ) {}
+  manifest(): Promise<Uint8Array> {
+    return Promise.resolve(manifestOfContainer(this.bytes_.subarray(0, bootstrapBytes), this.name));
+  }
+  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    const begin = place.offset + offset;
+    if (begin + bytes > this.bytes_.length)
+      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes_.length}`);
+    const part = this.bytes_.subarray(begin, begin + bytes);
+    await how.verify?.(part);
+    return part;
+  }
+  dispose(): void {
+    this.bytes_ = new Uint8Array(0);
+  }
+}
+
+/** A container that is in memory already. */
+export function openBytes(bytes: Uint8Array, name: string): PackageStore {
+  return new WholeStore(bytes, name);
+}

@@ -1,0 +1,403 @@
+import type { Mesh } from 'three';
+import type { ComposedPlane } from './api';
+import { fullSizePlanes } from './documents';
+import {
+  FragmentList, PackageData, PlaneChoice, TextureBudget, budgetSteps, fragmentList, fullSize, planesForDisplay,
+} from './fragment_list';
+import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
+import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
+import { isAbort, nowS, sleepS, throwIfAborted } from './http';
+import { LoadContext, hysteresis } from './load_context';
+import { chooseScale } from './scale_choice';
+import { Slot, meshesOf } from './scale_parts';
+import { TextureSet } from './texture_set';
+import { Transfers, Wish } from './transfers';
+import { upgradesInOrder } from './upgrades';
+import { selectScale } from './viewing';
+import { VisibleSurface } from './visibility';
+import type { Levels } from './worker_protocol';
+
+/** What decoding and uploading take after the last byte, of the time limit. */
+const composeS = 0.04;
+/** Fragments that are this late, of the limit, are given up. */
+const mostLate = 0.03;
+const refineBytes = 256 << 10;
+const refineRequests = 4;
+const gapBytes = 1024;
+/** What the camera does not see is worth this much of what it sees. */
+const unseen = 1e-3;
+
+/**
+ * What a load does once the first picture stands: decides what to fetch, fetches it in time, refines. In a part of its
+ * own that is loaded while the first picture comes, so that nobody waits for it.
+ */
+export class TextureLoad {
+  private textureSet_?: TextureSet;
+  private transfers_?: Transfers;
+  private data_?: PackageData;
+  private plan_?: HarmonicTimePlan;
+  private surface_?: VisibleSurface;
+  private surfaceScale_ = -1;
+  private readonly gaveUp_ = new Set<string>();
+
+  constructor(private readonly load_: LoadContext) {}
+
+  get planes(): readonly ComposedPlane[] {
+    return [...(this.textureSet_?.planes.values() ?? [])];
+  }
+  get throughputBytesS(): number | undefined {
+    return this.plan_?.throughputBytesS();
+  }
+  /** Fragments whose decoding or upload is under way. */
+  get pending(): number {
+    return (this.transfers_?.pending ?? 0) + (this.textureSet_?.pending ?? 0);
+  }
+  adopt(slot: Slot): void {
+    this.textureSet_?.adopt(slot);
+  }
+  readPlane(base: number): Uint8Array {
+    return this.textureSet_?.planes.get(base)?.read() ?? new Uint8Array(0);
+  }
+  dispose(): void {
+    this.textureSet_?.dispose();
+    this.transfers_?.dispose();
+    this.surface_ = undefined;
+  }
+
+  /** Reads what decisions are made from. */
+  async documents(): Promise<PackageData> {
+    const [whole] = await Promise.all([
+      this.load_.reader.prefetchDocuments(this.load_.signal),
+      this.load_.scales.openStream(this.load_.signal),
+    ]);
+    if (whole) return this.load_.reader.data();
+    const textures = await this.load_.reader.textures();
+    const base = Array.from({ length: fullSizePlanes(textures) }, (_, p) => p);
+    const planes = this.planesFor_(await this.load_.reader.data(base)).map((p) => p.plane);
+    return this.load_.reader.data([...base, ...planes]);
+  }
+  private planesFor_(data: PackageData, displayedPx = this.load_.view.display.heightPx): PlaneChoice[] {
+    return this.load_.options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
+  }
+
+  /** Scale and textures within the time. */
+  async timedPart(data: PackageData): Promise<void> {
+    this.data_ = data;
+    this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.rttS);
+    const transfers = this.startTextures_(data);
+    const scale = await this.scaleInTime_(data);
+    this.load_.wantedScale = scale;
+    if (scale !== this.load_.shownScale) this.load_.enter('mesh');
+    const mesh = this.load_.showScale(scale);
+    mesh.shown.catch(() => undefined);
+    const choices = await this.planesInTime_(data, scale);
+    const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
+    await mesh.arrived;
+    this.load_.enter('textures');
+    const list = this.listOf_(data, choices, scale);
+    for (const o of list.offers) this.load_.expectedBytes += o.plannedBytes;
+    const leftS = this.load_.limitS - this.load_.elapsedS() - composeS;
+    if (this.load_.override.rung !== undefined || !Number.isFinite(leftS)) await this.fetchAll_(list);
+    else if (leftS > 0 && list.offers.length > 0) await this.fetchInTime_(list, leftS);
+    await shown;
+    await this.composed();
+    const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
+    await mesh.shown;
+    this.load_.emit('deadline', { limit: this.load_.limitS, actual: this.load_.elapsedS(), skipped });
+  }
+  /** Planes for the display, or coarser ones where the time left buys too few bytes for them. */
+  private async planesInTime_(data: PackageData, scale: number): Promise<PlaneChoice[]> {
+    const all = data.tables.every((t) => t !== undefined);
+    if (this.load_.options.fullSize || !Number.isFinite(this.load_.limitS) || this.load_.override.rung !== undefined || !all)
+      return this.planesFor_(data);
+    const bytes = this.textureBytes_(scale);
+    let best: TextureBudget | undefined;
+    for (best of budgetSteps(data, this.load_.view.display.heightPx, { scale }, bytes)) await sleepS(0);
+    return best!.planes;
+  }
+  /** Bytes that the time leaves for textures when this scale is loaded. */
+  private textureBytes_(scale: number): number {
+    const mesh = this.load_.scales.bytesOf(scale);
+    const meshS = mesh > 0 ? mesh / this.load_.beta0 + this.load_.reader.client.rttS : 0;
+    return (this.load_.limitS - this.load_.elapsedS() - composeS - meshS) * this.load_.beta0;
+  }
+  private skippedOf_(plane: ComposedPlane): number {
+    const order = this.data_?.tables[plane.plane]?.order ?? [];
+    return [...order].filter((f) => plane.rungs[f] < 0).length;
+  }
+  async composed(): Promise<void> {
+    while ((this.transfers_?.pending ?? 0) > 0 || (this.textureSet_?.pending ?? 0) > 0) {
+      throwIfAborted(this.load_.signal);
+      await this.textureSet_?.settled();
+      await sleepS(0.004);
+    }
+    this.textureSet_?.finish();
+  }
+
+  private startTextures_(data: PackageData): Transfers {
+    this.textureSet_ = new TextureSet(this.load_.options.renderer, data.textures, this.load_.materials, this.load_.pool);
+    this.transfers_ = new Transfers(this.load_.reader, data.textures, this.load_.pool, {
+      decoded: (wish, levels) => this.upload_(wish, levels),
+      lost: (wish, error) => this.lost_(wish, error),
+    });
+    return this.transfers_;
+  }
+  private upload_(wish: Wish, levels: Levels): void {
+    const { base, mip } = this.data_!.textures[wish.plane];
+    const plane = this.textureSet_?.planes.get(mip > 0 ? base : wish.plane);
+    if (this.load_.signal.aborted || !plane || plane.plane !== wish.plane) return levels.forEach((b) => b.close());
+    const { fragment, rung } = wish;
+    this.textureSet_!.upload(plane, levels, fragment, rung, () =>
+      this.load_.emit('fragment', { plane: wish.plane, fragment, rung }),
+    );
+  }
+  private lost_(wish: Wish, error: unknown): void {
+    if (isAbort(error)) return;
+    this.gaveUp_.add(`${wish.plane}/${wish.fragment}/${wish.rung}`);
+    this.load_.fail(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
+  }
+
+  /**
+   * Shows textures by these planes; alpha planes, which no GLB has, begin with their preview. Fragments may come from
+   * then on; `shown` resolves when the scene has changed.
+   */
+  private async showPlanes_(choices: readonly PlaneChoice[]): Promise<{ shown: Promise<unknown> }> {
+    const shown: Promise<void>[] = [];
+    for (const choice of choices) {
+      const { base, plane } = choice;
+      const before = this.textureSet_!.planes.get(base);
+      if (before?.plane === plane) continue;
+      const info = this.data_!.textures[plane];
+      let preview: ImageBitmap | undefined;
+      if (!before && info.role === 'alpha') {
+        const file = await this.load_.reader.preview(base, this.load_.signal);
+        const none = new Uint8Array(0);
+        const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
+        [preview] = await decoded;
+      }
+      throwIfAborted(this.load_.signal);
+      shown.push(
+        this.textureSet_!.show(choice, preview).then(() => {
+          preview?.close();
+          this.load_.emit('plane', { base, plane, widthPx: info.widthPx, heightPx: info.heightPx });
+        }),
+      );
+    }
+    return { shown: Promise.all(shown) };
+  }
+
+  private async scaleInTime_(data: PackageData): Promise<number> {
+    const { heightPx, part } = this.load_.view.display;
+    const wanted = this.load_.override.scale ?? selectScale(data.manifest, heightPx, part, this.load_.options.rule);
+    if (this.load_.override.scale !== undefined || !Number.isFinite(this.load_.limitS)) return wanted;
+    const quality = await this.load_.reader.quality();
+    const planes = this.planesFor_(data);
+    const list = fragmentList(data, planes, { scale: wanted });
+    return chooseScale(data, quality, list, planes, wanted, (scale) => this.textureBytes_(scale));
+  }
+
+  /** The list of what may be fetched, with the bytes that fetching takes. */
+  private listOf_(data: PackageData, choices: readonly PlaneChoice[], scale: number): FragmentList {
+    const list = fragmentList(data, choices, { scale });
+    list.offers.forEach((offer, i) => {
+      const { plane, fragment } = list.fragments[i];
+      offer.bytes = offer.bytes.map((b, r) => this.transfers_!.bytesOf(plane, r, fragment) || b);
+    });
+    return list;
+  }
+  /** A rung comes as a whole, whatever is asked for: a tree without files of fragments. */
+  private get wholeRungs_(): boolean {
+    const [first] = this.textureSet_?.planes.values() ?? [];
+    return this.load_.reader.form === 'files' && first !== undefined && !this.transfers_!.filesOf(first.plane).complete;
+  }
+
+  /** Every fragment at its override's rung, or the highest. */
+  private async fetchAll_(list: FragmentList): Promise<void> {
+    const wishes = list.offers.flatMap((o, i) => {
+      const rung = Math.min(this.load_.override.rung ?? Infinity, o.bytes.length - 1);
+      return rung < 0 ? [] : [{ ...list.fragments[i], rung, offer: i }];
+    });
+    const missing = wishes.filter((w) => this.rungOf_(w) !== w.rung);
+    await this.fetchWishes_(missing);
+  }
+  private rungOf_(wish: { plane: number; fragment: number }): number {
+    for (const p of this.textureSet_?.planes.values() ?? []) if (p.plane === wish.plane) return p.rungs[wish.fragment];
+    return -1;
+  }
+  private async fetchWishes_(wishes: readonly Wish[], signal = this.load_.signal): Promise<void> {
+    await this.transfers_!.fetch(
+      wishes,
+      { gapBytes, mostBytes: refineBytes, signal },
+      () => undefined,
+      (wish, error) => this.lost_(wish, error),
+    );
+    throwIfAborted(this.load_.signal);
+  }
+
+  /** Harmonic Time Compensation: fragment by fragment, so that the last one comes at the limit. */
+  private async fetchInTime_(fragments: FragmentList, limitS: number): Promise<void> {
+    const { policy, order, beta0BytesS } = this.load_.options;
+    const { client } = this.load_.reader;
+    const defaults = defaultHtcOptions();
+    const beta0 = beta0BytesS || this.load_.beta0;
+    const list = groupedList(fragments, this.wholeRungs_ ? Infinity : groupBytes(beta0, client.rttS, limitS), beta0 * limitS);
+    const plan = new HarmonicTimePlan(list.offers, {
+      ...defaults,
+      policy: policy ?? 'guard',
+      order: order ?? 'credit',
+      timeLimitS: limitS,
+      rttS: client.rttS,
+      throughput: { ...defaults.throughput, initialBytesS: Math.max(1, beta0) },
+    });
+    this.plan_ = plan;
+    const t0 = nowS();
+    const waiting = new Map<number, number>(); // by offer: fragments of it that have not ended
+    const tooLate = new AbortController();
+    const stop = (): void => tooLate.abort();
+    this.load_.signal.addEventListener('abort', stop);
+    const timer = setTimeout(stop, (limitS + mostLate * this.load_.limitS) * 1000);
+    let told = 0;
+    try {
+      await new Promise<void>((finished, failed) => {
+        const end = (wish: Wish, well: boolean): void => {
+          const left = (waiting.get(wish.offer) ?? 1) - 1;
+          waiting.set(wish.offer, left);
+          if (left > 0) return;
+          const at = nowS() - t0;
+          if (well) plan.completed(wish.offer, at);
+          else plan.failed(wish.offer, at);
+          const step = plan.steps.find((s) => s.offer === wish.offer);
+          if (step) this.tell_(list, step);
+          queueMicrotask(pump);
+        };
+        const pump = (): void => {
+          if (this.load_.signal.aborted) return failed(new DOMException('The load was cancelled', 'AbortError'));
+          const wishes: Wish[] = [];
+          for (let step = plan.next(nowS() - t0); step; step = plan.next(nowS() - t0)) {
+            const { offer, rung } = step;
+            const own = list.groups[offer].map((f) => ({ ...f, rung, offer }));
+            waiting.set(step.offer, own.length);
+            wishes.push(...own);
+          }
+          while (told < plan.steps.length) this.tell_(list, plan.steps[told++]);
+          if (wishes.length > 0)
+            void this.transfers_!.fetch(
+              wishes,
+              { gapBytes: 0, mostBytes: Infinity, signal: tooLate.signal },
+              (w) => end(w, true),
+              (w, error) => {
+                this.lost_(w, error);
+                end(w, false);
+              },
+            );
+          if (plan.finished) finished();
+        };
+        pump();
+      });
+    } finally {
+      clearTimeout(timer);
+      this.load_.signal.removeEventListener('abort', stop);
+    }
+  }
+  private tell_(list: GroupedList, s: HtcStep): void {
+    this.load_.emit('decision', {
+      position: s.position,
+      ...list.groups[s.offer][0],
+      fragments: list.groups[s.offer].map((f) => f.fragment),
+      eta: list.offers[s.offer].eta,
+      rung: s.rung,
+      bytes: s.bytes,
+      plannedSeconds: s.thetaS,
+      ...(s.doneS >= 0 && s.rung >= 0 ? { actualSeconds: s.spacingS, done: s.doneS } : {}),
+      creditSeconds: s.creditS,
+      bytesPerSecond: s.throughputBytesS,
+      issued: s.issuedS,
+      skipped: s.rung < 0,
+    });
+  }
+
+  /** Planes with more texels where the view has come nearer; never back, as what is there is there. */
+  async finerPlanes(): Promise<void> {
+    const base = this.data_!;
+    const wanted = this.planesFor_(base, this.load_.view.display.heightPx / hysteresis);
+    const finer = wanted.filter((c) => {
+      const shown = this.textureSet_!.planes.get(c.base);
+      return !shown || shown.widthPx < base.textures[c.plane].widthPx;
+    });
+    if (finer.length === 0) return;
+    const planes = [...this.textureSet_!.planes.values()].map((p) => p.plane);
+    this.data_ = await this.load_.reader.data([...planes, ...finer.map((c) => c.plane)]);
+    await this.transfers_!.prepare(finer.map((c) => c.plane));
+    await (await this.showPlanes_(finer)).shown;
+  }
+
+  /** Fetches what saves most of what the camera sees; false when there is nothing left. */
+  async refineSome(): Promise<boolean> {
+    const data = this.data_!;
+    const choices = [...this.textureSet_!.planes.values()].map(({ base, plane }) => ({ base, plane }));
+    const list = this.listOf_(data, choices, Math.max(this.load_.shownScale, 0));
+    if (this.load_.override.rung !== undefined) {
+      await this.fetchAll_(list);
+      return false;
+    }
+    if (this.wholeRungs_) return this.refineRung_(list);
+    const seen = this.seen_(choices);
+    const wishes: Wish[] = [];
+    let bytes = 0;
+    const rungs = list.fragments.map((f) => this.rungOf_(f));
+    list.offers.forEach((o, i) => {
+      const { plane, fragment } = list.fragments[i];
+      const weight = seen?.get(plane)?.[fragment] ?? 1;
+      o.loss = o.loss.map((l) => l * (weight > 0 ? weight : unseen));
+      if (weight === 0) rungs[i] = Math.max(rungs[i], o.bytes.length - 1); // not to be seen: not to be fetched
+    });
+    const taken = new Map<number, number>();
+    for (const u of upgradesInOrder(list.offers, rungs)) {
+      const { plane, fragment } = list.fragments[u.offer];
+      if (this.gaveUp_.has(`${plane}/${fragment}/${u.rung}`)) continue;
+      if (bytes > 0 && bytes + u.bytes > refineBytes * refineRequests) break;
+      bytes += u.bytes;
+      taken.set(u.offer, u.rung);
+    }
+    for (const [offer, rung] of taken) wishes.push({ ...list.fragments[offer], rung, offer });
+    if (wishes.length === 0) return false;
+    await this.fetchWishes_(wishes);
+    await this.composed();
+    return true;
+  }
+  /** The next rung of the first plane that lacks some. */
+  private async refineRung_(list: FragmentList): Promise<boolean> {
+    const lacking = list.fragments.map((f, i) => ({ ...f, rung: this.rungOf_(f) + 1, offer: i }));
+    const open = lacking.filter(
+      (w) => w.rung < list.offers[w.offer].bytes.length && !this.gaveUp_.has(`${w.plane}/${w.fragment}/${w.rung}`),
+    );
+    const least = open.reduce((rung, w) => Math.min(rung, w.rung), Infinity);
+    const wishes = open.filter((w) => w.rung === least && w.plane === open.find((o) => o.rung === least)!.plane);
+    if (wishes.length === 0) return false;
+    await this.fetchWishes_(wishes);
+    await this.composed();
+    return true;
+  }
+
+  /** Share of each fragment that the camera sees, by plane; undefined without a camera. */
+  private seen_(choices: readonly PlaneChoice[]): Map<number, Float32Array> | undefined {
+    const { camera } = this.load_.view;
+    const [shape] = this.load_.object.children;
+    if (!camera || !shape) return undefined;
+    if (this.surfaceScale_ !== this.load_.shownScale) {
+      const slots = this.load_.materials.slots;
+      this.surface_ = new VisibleSurface(this.load_.object, meshesOf(shape), (mesh: Mesh) => {
+        const own = Array.isArray(mesh.material) ? mesh.material : [mesh.material];
+        return new Set(slots.filter((s) => own.includes(s.material)).map((s) => s.image));
+      });
+      this.surfaceScale_ = this.load_.shownScale;
+    }
+    const seen = new Map<number, Float32Array>();
+    for (const { plane } of choices) {
+      const t = this.data_!.textures[plane];
+      const cell: [number, number] = [t.fragmentWidthPx / t.widthPx, t.fragmentHeightPx / t.heightPx];
+      seen.set(plane, this.surface_!.ofImage(t.image, t.columns, t.rows, camera, this.load_.object, cell));
+    }
+    return seen;
+  }
+}
