@@ -86,6 +86,9 @@ export interface GetOptions {
   reload?: boolean;
 }
 
+/** Answers that latency is the median of. */
+const latencySamples = 7;
+
 export const nowS = (): number => performance.now() / 1000;
 export const sleepS = (seconds: number): Promise<void> => new Promise((done) => setTimeout(done, seconds * 1000));
 
@@ -117,6 +120,7 @@ export class HttpClient {
   readonly options: HttpOptions;
   /** Least time from asking to the answer's head, without the first request, which opens the connection. */
   rttS = 0;
+  private readonly waits_: number[] = []; // of the last requests
   received = 0;
   requests = 0;
   onRequest?: (record: RequestRecord) => void;
@@ -128,6 +132,12 @@ export class HttpClient {
   constructor(options: Partial<HttpOptions> = {}) {
     this.options = { ...defaultHttpOptions, ...options };
     this.limit_ = this.options.connections;
+  }
+
+  /** What a request takes to be answered, in the middle of the last ones: servers and busy pages add to the round trip. */
+  get latencyS(): number {
+    const sorted = [...this.waits_].sort((a, b) => a - b);
+    return sorted.length > 0 ? sorted[sorted.length >> 1] : this.rttS;
   }
 
   private async enter_(): Promise<void> {
@@ -248,6 +258,7 @@ export class HttpClient {
     if (record.ok && record.firstByte >= 0 && this.requests > 0) {
       const wait = record.firstByte - record.started;
       this.rttS = this.rttS > 0 ? Math.min(this.rttS, wait) : wait;
+      if (this.waits_.push(wait) > latencySamples) this.waits_.shift();
     }
     ++this.requests;
     if (this.requests === 1 && typeof performance.getEntriesByName === 'function') {

@@ -83,16 +83,18 @@ export class TextureLoad {
   /** Scale and textures within the time. */
   async timedPart(data: PackageData): Promise<void> {
     this.data_ = data;
-    this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.rttS);
+    this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.latencyS);
     const transfers = this.startTextures_(data);
     const scale = await this.scaleInTime_(data);
     this.load_.wantedScale = scale;
     if (scale !== this.load_.shownScale) this.load_.enter('mesh');
+    const meshBytes = this.load_.scales.bytesOf(scale);
     const mesh = this.load_.showScale(scale);
     mesh.shown.catch(() => undefined);
     const choices = await this.planesInTime_(data, scale);
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
-    await mesh.arrived;
+    // A mesh that is only waited for leaves the link to the textures.
+    if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS) await mesh.arrived;
     this.load_.enter('textures');
     const list = this.listOf_(data, choices, scale);
     for (const o of list.offers) this.load_.expectedBytes += o.plannedBytes;
@@ -118,7 +120,7 @@ export class TextureLoad {
   /** Bytes that the time leaves for textures when this scale is loaded. */
   private textureBytes_(scale: number): number {
     const mesh = this.load_.scales.bytesOf(scale);
-    const meshS = mesh > 0 ? mesh / this.load_.beta0 + this.load_.reader.client.rttS : 0;
+    const meshS = mesh > 0 ? mesh / this.load_.beta0 + this.load_.reader.client.latencyS : 0;
     return (this.load_.limitS - this.load_.elapsedS() - composeS - meshS) * this.load_.beta0;
   }
   private skippedOf_(plane: ComposedPlane): number {
@@ -240,13 +242,13 @@ export class TextureLoad {
     const { client } = this.load_.reader;
     const defaults = defaultHtcOptions();
     const beta0 = beta0BytesS || this.load_.beta0;
-    const list = groupedList(fragments, this.wholeRungs_ ? Infinity : groupBytes(beta0, client.rttS, limitS), beta0 * limitS);
+    const list = groupedList(fragments, this.wholeRungs_ ? Infinity : groupBytes(beta0, client.latencyS, limitS), beta0 * limitS);
     const plan = new HarmonicTimePlan(list.offers, {
       ...defaults,
       policy: policy ?? 'guard',
       order: order ?? 'credit',
       timeLimitS: limitS,
-      rttS: client.rttS,
+      rttS: client.latencyS,
       throughput: { ...defaults.throughput, initialBytesS: Math.max(1, beta0) },
     });
     this.plan_ = plan;
