@@ -53,6 +53,8 @@ export interface LoadOptions {
   meshes?: 'glb' | 'stream' | 'auto';
   /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
   autoRefine?: boolean;
+  /** Refining ends where a fragment's 1 - SSIM is no more than this: what is beyond cannot be told apart. Default 0.003. */
+  refineTo?: number;
   /** Where worker.js is, when not beside the library. */
   workerUrl?: string | URL;
   /** Where pages may have no workers: `handle` of texmesh/worker, which then works on the main thread. */

@@ -24,6 +24,7 @@ const mostLate = 0.03;
 const refineBytes = 256 << 10;
 const refineRequests = 4;
 const gapBytes = 1024;
+const tellsApart = 0.003;
 /** What the camera does not see is worth this much of what it sees. */
 const unseen = 1e-3;
 
@@ -350,8 +351,11 @@ export class TextureLoad {
     list.offers.forEach((o, i) => {
       const { plane, fragment } = list.fragments[i];
       const weight = seen?.get(plane)?.[fragment] ?? 1;
+      const enough = this.goodEnough_(plane, fragment);
+      o.bytes.length = Math.min(o.bytes.length, enough + 1);
+      o.loss.length = o.bytes.length + 1;
       o.loss = o.loss.map((l) => l * (weight > 0 ? weight : unseen));
-      if (weight === 0) rungs[i] = Math.max(rungs[i], o.bytes.length - 1); // not to be seen: not to be fetched
+      if (weight === 0) rungs[i] = o.bytes.length - 1; // not to be seen: not to be fetched
     });
     const taken = new Map<number, number>();
     for (const u of upgradesInOrder(list.offers, rungs)) {
@@ -379,6 +383,15 @@ export class TextureLoad {
     await this.fetchWishes_(wishes);
     await this.composed();
     return true;
+  }
+
+  /** The lowest rung of a fragment that nobody can tell from the source. */
+  private goodEnough_(plane: number, fragment: number): number {
+    const t = this.data_!.tables[plane]!;
+    const limit = this.load_.options.refineTo ?? tellsApart;
+    const rungs = t.rungQuality.length;
+    for (let r = 0; r < rungs; ++r) if (t.dssim[r * t.columns * t.rows + fragment] <= limit) return r;
+    return rungs - 1;
   }
 
   /** Share of each fragment that the camera sees, by plane; undefined without a camera. */

@@ -9,8 +9,9 @@ import type { Levels } from './worker_protocol';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
 const slicePx = 1 << 20;
-/** The GPU gets no more than it has done, but is not waited for longer. */
-const longestFenceMs = 400;
+/** Pixels that the GPU may be behind; it is not waited for longer than this. */
+const mostBehindPx = 4 << 20;
+const longestFenceMs = 250;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
 
@@ -30,8 +31,7 @@ export class TextureSet {
   private pumping_ = false;
   private mipsAt_ = 0;
   private idle_: (() => void)[] = [];
-  private fence_: WebGLSync | null = null;
-  private fencedAt_ = 0;
+  private fences_: { sync: WebGLSync; pixels: number; at: number }[] = [];
   private disposed_ = false;
 
   constructor(
@@ -171,27 +171,28 @@ export class TextureSet {
       work.run();
     }
     if (start - this.mipsAt_ > mipsEveryMs || this.queue_.length === 0) this.finish();
-    if (pixels > 0) this.putFence_();
+    if (pixels > 0) this.putFence_(pixels);
     if (this.queue_.length > 0) setTimeout(() => this.pump_(), 0);
     else {
       this.pumping_ = false;
       this.idle_.splice(0).forEach((done) => done());
     }
   }
-  private putFence_(): void {
+  private putFence_(pixels: number): void {
     const gl = this.renderer_.getContext() as WebGL2RenderingContext;
-    this.fence_ = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    this.fencedAt_ = performance.now();
+    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (sync) this.fences_.push({ sync, pixels, at: performance.now() });
     gl.flush();
   }
+  /** More behind than it may be: further uploads would have to wait for it in the middle of a page's turn. */
   private gpuIsBusy_(now: number): boolean {
-    if (!this.fence_) return false;
     const gl = this.renderer_.getContext() as WebGL2RenderingContext;
-    const done = gl.getSyncParameter(this.fence_, gl.SYNC_STATUS) === gl.SIGNALED;
-    if (!done && now - this.fencedAt_ < longestFenceMs) return true;
-    gl.deleteSync(this.fence_);
-    this.fence_ = null;
-    return false;
+    this.fences_ = this.fences_.filter(({ sync, at }) => {
+      if (now - at < longestFenceMs && gl.getSyncParameter(sync, gl.SYNC_STATUS) !== gl.SIGNALED) return true;
+      gl.deleteSync(sync);
+      return false;
+    });
+    return this.fences_.reduce((sum, f) => sum + f.pixels, 0) > mostBehindPx;
   }
 
   /** All mip levels of everything, at once. */
@@ -219,8 +220,8 @@ export class TextureSet {
     for (const p of this.planes.values()) p.dispose();
     this.planes.clear();
     this.blitter_.dispose();
-    if (this.fence_) (this.renderer_.getContext() as WebGL2RenderingContext).deleteSync(this.fence_);
-    this.fence_ = null;
+    for (const { sync } of this.fences_) (this.renderer_.getContext() as WebGL2RenderingContext).deleteSync(sync);
+    this.fences_ = [];
   }
 }
 
