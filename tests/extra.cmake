@@ -1,4 +1,5 @@
-# Tests that need more than a C++ library: the Khronos glTF validator (Node.js) over the meshes of real packages.
+# Tests that need more than a C++ library: the Khronos glTF validator (Node.js) over the meshes of real packages, and the
+# browser client and the viewer in headless Chromium.
 if(TARGET texmesh AND TARGET make_scan)
   add_test(NAME gltf_validator COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/node/run ${CMAKE_CURRENT_BINARY_DIR}/gltf_validator
     $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>)
@@ -7,3 +8,11 @@ endif()
 # The web client: types, Vitest (delivery/vectors among it), build, size.
 add_test(NAME delivery_web COMMAND ${PROJECT_SOURCE_DIR}/delivery/web/run-tests ${CMAKE_CURRENT_BINARY_DIR}/delivery_web)
 set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LABELS web)
+if(TARGET texmesh AND TARGET make_scan)
+  add_executable(compose_plane browser/compose_plane.cpp)
+  target_link_libraries(compose_plane PRIVATE texmesh_stages texmesh_delivery)
+  add_test(NAME web_browser COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/browser/run ${CMAKE_CURRENT_BINARY_DIR}/browser
+    $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan> $<TARGET_FILE:compose_plane>)
+  # A browser that draws without a GPU takes both cores, and its deadlines are kept only when it has them.
+  set_tests_properties(web_browser PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 3600 LABELS web RUN_SERIAL ON)
+endif()

@@ -1,0 +1,35 @@
+/** Numbers as people read them. */
+
+export function bytes(n: number): string {
+  if (!Number.isFinite(n)) return '–';
+  if (n < 1000) return `${n.toFixed(0)} B`;
+  const units = ['kB', 'MB', 'GB', 'TB'];
+  let value = n / 1000;
+  let unit = 0;
+  while (value >= 999.5 && unit < units.length - 1) {
+    value /= 1000;
+    unit++;
+  }
+  return `${value < 10 ? value.toFixed(1) : value.toFixed(0)} ${units[unit]}`;
+}
+
+export function seconds(s: number): string {
+  if (!Number.isFinite(s)) return 'no limit';
+  if (s < 0.9995) return `${(s * 1000).toFixed(0)} ms`;
+  return `${s < 10 ? s.toFixed(2) : s.toFixed(1)} s`;
+}
+
+/** Bytes per second as bits, which is how links are sold. */
+export function rate(bytesPerSecond: number): string {
+  if (!Number.isFinite(bytesPerSecond) || bytesPerSecond <= 0) return '–';
+  const mbit = (bytesPerSecond * 8) / 1e6;
+  return mbit >= 0.1 ? `${mbit < 10 ? mbit.toFixed(1) : mbit.toFixed(0)} Mbit/s` : `${(mbit * 1000).toFixed(0)} kbit/s`;
+}
+
+export function count(n: number): string {
+  return n.toLocaleString('en').replaceAll(',', '\u202f');
+}
+
+export function px(n: number): string {
+  return n >= 1e8 ? 'any size' : `${count(Math.round(n))} px`;
+}

@@ -1,0 +1,75 @@
+import type { Manifest, PlaneTables, TextureInfo } from 'texmesh';
+
+/** One fragment's turn in the plan, as the time line shows it. Times in seconds since the load began. */
+export interface Turn {
+  at: number;
+  plannedS: number;
+  actualS: number;
+  creditS: number;
+  bytesPerSecond: number;
+  bytes: number;
+  skipped: boolean;
+}
+
+/** A request that has ended. */
+export interface Transfer {
+  kind: string;
+  bytes: number;
+  start: number;
+  end: number;
+}
+
+/** All that the panel shows of a load. */
+export interface Live {
+  manifest: Manifest | null;
+  textures: TextureInfo[];
+  tables: PlaneTables[];
+  packageBytes: number;
+  title: string;
+  phase: string;
+  scale: number | null;
+  displayedPx: number;
+  startedAt: number;
+  firstPictureS: number;
+  doneS: number;
+  limitS: number;
+  predictedSsim: number;
+  bytes: number;
+  expected: number;
+  requests: number;
+  /** Plane that is being shown of each image, and per plane the rung in the texture: -1 preview. */
+  shownPlane: Map<number, number>;
+  rungs: Map<number, Int16Array>;
+  skipped: Map<number, Set<number>>;
+  turns: Turn[];
+  transfers: Transfer[];
+}
+
+export function emptyLive(): Live {
+  return {
+    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
+    firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedSsim: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
+    rungs: new Map(), skipped: new Map(), turns: [], transfers: [],
+  };
+}
+
+export const kKinds = ['start', 'mesh', 'preview', 'tables', 'texture'] as const;
+
+/** Which of kKinds a request of the library belongs to. */
+export function kindOf(kind: string): (typeof kKinds)[number] {
+  if (/mesh|stream|scale/.test(kind)) return 'mesh';
+  if (/first|preview|picture/.test(kind)) return 'preview';
+  if (/table|index|textures|quality/.test(kind)) return 'tables';
+  if (/fragment|texture|rung/.test(kind)) return 'texture';
+  return 'start';
+}
+
+/** Bytes received by kKinds. */
+export function bytesByKind(transfers: readonly Transfer[]): number[] {
+  const sums = kKinds.map(() => 0);
+  for (const t of transfers) {
+    const k = kKinds.indexOf(kindOf(t.kind));
+    sums[k] = (sums[k] ?? 0) + t.bytes;
+  }
+  return sums;
+}

@@ -1,0 +1,60 @@
+import { FormatError } from 'texmesh';
+import { byId, make } from './dom';
+
+/** What stands in the middle of the picture when there is no object: an error, or a choice of packages. */
+const box = (): HTMLElement => byId('message');
+
+export function hideMessage(): void {
+  box().hidden = true;
+}
+
+/** An error in words, with what may be done about it. */
+export function showError(error: unknown, url: string): void {
+  const text = error instanceof Error ? error.message : String(error);
+  box().replaceChildren(
+    make('h2', {}, headline(error, text)),
+    make('p', {}, make('code', {}, text)),
+    make('p', {}, advice(error, text, url)));
+  box().hidden = false;
+}
+
+function headline(error: unknown, text: string): string {
+  if (error instanceof FormatError) return 'This is not a package that can be shown';
+  if (/404|not found/i.test(text)) return 'There is no package here';
+  return 'The package could not be loaded';
+}
+
+function advice(error: unknown, text: string, url: string): string {
+  const elsewhere = new URL(url, document.baseURI).origin !== location.origin;
+  if (error instanceof FormatError) return 'The file may be damaged, or is of a later version. texmesh verify says more.';
+  if (/404|not found/i.test(text)) return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
+  if (elsewhere) return 'It stands on another server, which must be reachable and allow this page to read (CORS: Access-Control-Allow-Origin).';
+  return 'The server may be down, or the connection broken. Loading again may help.';
+}
+
+interface Listed {
+  url: string;
+  name?: string;
+}
+
+/** Offers the packages that packages.json beside the page lists; false when there is none. */
+export async function offerPackages(): Promise<boolean> {
+  let list: Listed[] = [];
+  try {
+    const answer = await fetch('packages.json', { cache: 'no-cache' });
+    if (answer.ok) list = ((await answer.json()) as { packages?: Listed[] }).packages ?? [];
+  } catch {
+    // no list, or none that can be read: the address has to say
+  }
+  const items = list.filter((p) => typeof p.url === 'string').map((p) => {
+    const name = p.name ?? decodeURIComponent(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
+    return make('li', {}, make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, name));
+  });
+  if (items.length) box().replaceChildren(make('h2', {}, 'Packages'), make('ul', {}, ...items));
+  else {
+    box().replaceChildren(make('h2', {}, 'No package'),
+      make('p', {}, 'Name one in the address: ', make('code', {}, '?pkg=URL-of.texmesh'), ', or put a ', make('code', {}, 'packages.json'), ' beside this page.'));
+  }
+  box().hidden = false;
+  return items.length > 0;
+}

@@ -1,0 +1,255 @@
+import { equivalentQuality, open, predictedSsim, surfaceWeights } from 'texmesh';
+import type { DecisionEvent, LoadedModel, LoadOptions, Policy, TexmeshPackage } from 'texmesh';
+import { gltfLoader } from './decoders';
+import { emptyLive } from './live';
+import type { Live } from './live';
+import type { Choices } from './panel';
+import type { Stage } from './stage';
+
+/** One package on the stage: opens it, loads it as chosen, and keeps in `live` what the panel shows. */
+export class Session {
+  live: Live = emptyLive();
+  /** Something in `live` has changed. */
+  onChange: () => void = () => {};
+  onError: (error: unknown) => void = () => {};
+
+  private pkg: TexmeshPackage | null = null;
+  private model: LoadedModel | null = null;
+  private original: { pkg: TexmeshPackage; model: LoadedModel } | null = null;
+  private abort = new AbortController();
+  /** Loads that were overtaken by a newer one say nothing any more. */
+  private turn = 0;
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly url: string,
+  ) {
+    stage.onFrame = () => {
+      this.model?.update(stage.camera);
+      this.original?.model.update(stage.camera);
+    };
+  }
+
+  /** Opens the package anew and loads it: what a first visitor would see. */
+  async start(choices: Choices): Promise<void> {
+    this.stop();
+    const turn = ++this.turn;
+    const first = this.live.manifest === null;
+    this.live = { ...emptyLive(), startedAt: performance.now(), limitS: choices.timeS };
+    this.changed('opening');
+    try {
+      const cap = Number.isFinite(choices.capBytesPerSecond) ? choices.capBytesPerSecond : 0;
+      const pkg = await open(this.url, { signal: this.abort.signal, capBytesS: cap });
+      if (turn !== this.turn) return pkg.dispose();
+      this.pkg = pkg;
+      this.opened(pkg, first);
+      const model = pkg.load(this.stage.current, this.options(choices));
+      this.model = model;
+      this.listen(model, turn);
+      this.readTables(pkg, turn);
+      await model.done;
+      if (turn === this.turn) await this.predict(pkg, model, turn);
+    } catch (error) {
+      if (turn === this.turn && !this.abort.signal.aborted) this.failed(error);
+    }
+  }
+
+  /** Scale and rung of what is shown, without loading anew. */
+  override(choices: Choices): void {
+    this.model?.setOverride({ scale: this.scaleThatIs(choices.scale), rung: choices.rung ?? undefined });
+    this.stage.draw();
+  }
+
+  async refine(): Promise<void> {
+    try {
+      this.changed('refining');
+      await this.model?.refine();
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  /** S_0 with the highest rungs of full-size textures, into the second scene. */
+  async showOriginal(on: boolean): Promise<void> {
+    if (!on || this.original) return;
+    const turn = this.turn;
+    const pkg = await open(this.url, { signal: this.abort.signal });
+    const model = pkg.load(this.stage.original, {
+      ...this.common(), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,
+    });
+    this.original = { pkg, model };
+    const draw = (): void => this.stage.draw();
+    for (const name of ['first-picture', 'scale', 'fragment', 'done'] as const) model.on(name, draw);
+    try {
+      await model.done;
+    } catch (error) {
+      if (turn === this.turn && !this.abort.signal.aborted) this.onError(error);
+    }
+  }
+
+  stop(): void {
+    this.abort.abort();
+    this.abort = new AbortController();
+    this.model?.dispose();
+    this.pkg?.dispose();
+    this.original?.model.dispose();
+    this.original?.pkg.dispose();
+    this.model = this.pkg = this.original = null;
+  }
+
+  /** For tests and the console. */
+  get inner(): { pkg: TexmeshPackage | null; model: LoadedModel | null } {
+    return { pkg: this.pkg, model: this.model };
+  }
+
+  private common(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'camera' | 'signal'> {
+    return { renderer: this.stage.renderer, gltfLoader, camera: this.stage.camera, signal: this.abort.signal };
+  }
+
+  private options(c: Choices): LoadOptions {
+    return {
+      ...this.common(), time: c.timeS, policy: c.policy as Policy, meshes: 'auto',
+      scale: this.scaleThatIs(c.scale), rung: c.rung ?? undefined,
+    };
+  }
+
+  /** The package's scale nearest to a number, which may come from an address written for another package. */
+  private scaleThatIs(wanted: number | null): number | undefined {
+    const scales = this.live.manifest?.scales.map((s) => s.scale) ?? [];
+    if (wanted === null || scales.length === 0) return undefined;
+    return scales.reduce((best, s) => (Math.abs(s - wanted) < Math.abs(best - wanted) ? s : best));
+  }
+
+  private opened(pkg: TexmeshPackage, first: boolean): void {
+    const m = pkg.manifest;
+    this.live.manifest = m;
+    this.live.title = m.title;
+    this.live.packageBytes = m.provenance.offset + m.provenance.bytes;
+    if (first) this.stage.frame(m.boundsMin, m.boundsMax);
+    for (const record of pkg.requests) this.transfer(record);
+    pkg.onRequest((record) => {
+      this.transfer(record);
+      this.changed();
+    });
+    this.changed('first-picture');
+  }
+
+  private transfer(r: { kind: string; received: number; started: number; ended: number }): void {
+    const start = this.live.startedAt / 1000;
+    this.live.transfers.push({ kind: r.kind, bytes: r.received, start: r.started - start, end: r.ended - start });
+    this.live.bytes += r.received;
+    this.live.requests++;
+  }
+
+  /** The panel's tables: the library reads what it needs itself, and nothing is read twice. */
+  private readTables(pkg: TexmeshPackage, turn: number): void {
+    const model = this.model;
+    const wait = model ? model.done.catch(() => {}) : Promise.resolve();
+    void wait.then(async () => {
+      if (turn !== this.turn) return;
+      const [textures, tables] = [await pkg.textures(), await pkg.tables()];
+      if (turn !== this.turn) return;
+      this.live.textures = textures;
+      this.live.tables = tables.map((t) => t!);
+      this.changed();
+    }).catch(() => {});
+  }
+
+  private listen(model: LoadedModel, turn: number): void {
+    const l = this.live;
+    const since = (at: number): number => (at - l.startedAt) / 1000;
+    let origin = NaN; // of the plan's own clock
+    const on: LoadedModel['on'] = (name, f) => model.on(name, (e) => {
+      if (turn !== this.turn) return;
+      f(e);
+      l.displayedPx = model.state.displayedPx;
+      this.changed();
+    });
+    on('first-picture', (e) => {
+      l.firstPictureS = since(e.at);
+      l.scale = e.scale;
+      this.stage.draw();
+    });
+    on('scale', (e) => {
+      l.scale = e.scale;
+      this.stage.draw();
+    });
+    on('plane', (e) => {
+      l.shownPlane.set(e.base, e.plane);
+      this.stage.draw();
+    });
+    on('fragment', (e) => {
+      this.rungsOf(model, e.plane);
+      this.stage.draw();
+    });
+    on('decision', (e) => {
+      if (Number.isNaN(origin)) origin = since(e.at) - e.issued;
+      this.decision(e, origin);
+    });
+    on('progress', (e) => {
+      l.phase = e.phase;
+      l.expected = e.bytesExpected;
+    });
+    on('deadline', (e) => {
+      l.doneS = e.actual;
+      l.limitS = e.limit;
+    });
+    on('done', () => { l.phase = 'done'; });
+    on('error', (e) => { if (e.fatal) this.failed(e.error); });
+  }
+
+  private decision(e: DecisionEvent, origin: number): void {
+    const l = this.live;
+    if (e.skipped) {
+      let set = l.skipped.get(e.plane);
+      if (!set) l.skipped.set(e.plane, (set = new Set()));
+      set.add(e.fragment);
+      return;
+    }
+    if (e.done === undefined) return;
+    l.turns.push({
+      at: origin + e.done, plannedS: e.plannedSeconds, actualS: e.actualSeconds ?? 0, creditS: e.creditSeconds,
+      bytesPerSecond: e.bytesPerSecond, bytes: e.bytes, skipped: false,
+    });
+  }
+
+  private rungsOf(model: LoadedModel, plane: number): void {
+    const shown = model.state.planes.find((p) => p.plane === plane);
+    if (shown) this.live.rungs.set(plane, shown.rungs);
+  }
+
+  /** What the package's measured table says of the picture that stands now. */
+  private async predict(pkg: TexmeshPackage, model: LoadedModel, turn: number): Promise<void> {
+    const planes = model.state.planes.map((p) => ({ base: p.base, plane: p.plane }));
+    const data = await pkg.data(planes.map((p) => p.plane));
+    const table = await pkg.quality();
+    if (turn !== this.turn) return;
+    let [loss, weight] = [0, 0];
+    for (const p of model.state.planes) {
+      const t = data.tables[p.plane];
+      if (!t || !/base-colour|emissive|colour/.test(p.role)) continue;
+      const weights = surfaceWeights(t);
+      const n = t.columns * t.rows;
+      for (const f of t.order) {
+        const rung = p.rungs[f] ?? -1;
+        const d = rung >= 0 ? t.dssim[rung * n + f] : t.skipDssim[f];
+        loss += (weights[f] ?? 0) * (d ?? 1);
+        weight += weights[f] ?? 0;
+      }
+    }
+    const quality = weight > 0 ? equivalentQuality(data, planes, loss / weight) : 100;
+    this.live.predictedSsim = predictedSsim(table, model.state.scale, quality);
+    this.changed();
+  }
+
+  private failed(error: unknown): void {
+    this.live.phase = 'failed';
+    this.changed();
+    this.onError(error);
+  }
+
+  private changed(phase?: string): void {
+    if (phase) this.live.phase = phase;
+    this.onChange();
+  }
+}

@@ -1,0 +1,189 @@
+import {
+  Box3, DirectionalLight, HemisphereLight, MathUtils, NeutralToneMapping, PerspectiveCamera, Scene, Spherical, SRGBColorSpace,
+  Vector3, WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+const kFieldOfViewDegrees = 32;
+const kTurnDegrees = 6; // per press of an arrow key
+const kMargin = 0.95; // of the sphere round the box, which hardly any object fills
+
+/**
+ * The picture: a camera that goes round the object by mouse, touch and keyboard, and two scenes of which the left one is shown
+ * left of a movable border. Draws only when something has changed.
+ */
+export class Stage {
+  readonly renderer: WebGLRenderer;
+  readonly camera = new PerspectiveCamera(kFieldOfViewDegrees, 1, 0.01, 100);
+  readonly current = new Scene();
+  readonly original = new Scene();
+  /** Called before each frame; e.g. the library's look at the camera. */
+  onFrame: () => void = () => {};
+  /** Called when the camera, or the size of the picture, has changed. */
+  onView: () => void = () => {};
+
+  private readonly controls: OrbitControls;
+  private readonly lamps: DirectionalLight[];
+  private readonly bounds = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+  private split = 0; // share of the width that shows the original
+  private asked = false;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.outputColorSpace = SRGBColorSpace;
+    this.renderer.toneMapping = NeutralToneMapping;
+    this.renderer.setClearAlpha(0);
+    this.lamps = [this.current, this.original].map(light);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.addEventListener('change', () => {
+      this.draw();
+      this.onView();
+    });
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement ?? canvas);
+    canvas.addEventListener('keydown', (e) => this.key(e));
+    canvas.addEventListener('webglcontextrestored', () => this.draw());
+    this.resize();
+  }
+
+  /** Frames a new object: its box in the scene's units. */
+  frame(min: readonly number[], max: readonly number[]): void {
+    this.bounds.min.fromArray(min as number[]);
+    this.bounds.max.fromArray(max as number[]);
+    this.home();
+  }
+
+  /** The whole object from a little above, its front to the left. */
+  home(): void {
+    const centre = this.bounds.getCenter(new Vector3());
+    const radius = Math.max(this.bounds.getSize(new Vector3()).length() / 2, 1e-9);
+    const half = MathUtils.degToRad(kFieldOfViewDegrees) / 2;
+    const narrow = Math.min(1, this.camera.aspect);
+    const distance = (kMargin * radius) / Math.sin(Math.atan(Math.tan(half) * narrow));
+    this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72), MathUtils.degToRad(28))).add(centre);
+    this.camera.near = distance / 500;
+    this.camera.far = distance * 20;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.controls.minDistance = radius / 50;
+    this.controls.maxDistance = distance * 8;
+    this.controls.update();
+    this.draw();
+    this.onView();
+  }
+
+  /** Height of the object's box on the screen in device pixels, as the step functions count it. */
+  displayedHeightPx(objectHeight: number): number {
+    const centre = this.bounds.getCenter(new Vector3());
+    const distance = Math.max(this.camera.position.distanceTo(centre), this.camera.near);
+    const scale = this.renderer.domElement.height / (2 * Math.tan(MathUtils.degToRad(kFieldOfViewDegrees) / 2));
+    return (objectHeight / distance) * scale;
+  }
+
+  /** Shows the original in the left `share` of the picture; 0 = not at all. */
+  setSplit(share: number): void {
+    this.split = share;
+    this.draw();
+  }
+
+  /** Asks for a frame; several in a row give one. */
+  draw(): void {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.render();
+    });
+  }
+
+  /** Draws now. */
+  render(): void {
+    this.controls.update(); // while it is gliding, this asks for the next frame
+    this.onFrame();
+    this.carryLamps();
+    const r = this.renderer;
+    const { width, height } = this.canvas.getBoundingClientRect();
+    if (this.split > 0) {
+      const border = Math.round(width * this.split);
+      r.setScissorTest(true);
+      r.setScissor(0, 0, border, height);
+      r.render(this.original, this.camera);
+      r.setScissor(border, 0, width - border, height);
+      r.render(this.current, this.camera);
+      r.setScissorTest(false);
+    } else {
+      r.render(this.current, this.camera);
+    }
+  }
+
+  private carryLamps(): void {
+    const side = new Vector3(-0.5, 0.7, 1).applyQuaternion(this.camera.quaternion);
+    for (const lamp of this.lamps) {
+      lamp.target.position.copy(this.controls.target);
+      lamp.position.copy(this.controls.target).add(side);
+    }
+  }
+
+  /** Turns the camera round the object, degrees. */
+  turn(right: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const s = new Spherical().setFromVector3(offset);
+    s.theta += MathUtils.degToRad(right);
+    s.phi = MathUtils.clamp(s.phi - MathUtils.degToRad(up), 0.02, Math.PI - 0.02);
+    this.camera.position.setFromSpherical(s).add(this.controls.target);
+    this.controls.update();
+    this.draw();
+    this.onView();
+  }
+
+  /** Comes nearer by a factor below 1, goes away by one above. */
+  zoom(factor: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const length = MathUtils.clamp(offset.length() * factor, this.controls.minDistance, this.controls.maxDistance);
+    this.camera.position.copy(this.controls.target).add(offset.setLength(length));
+    this.controls.update();
+    this.draw();
+    this.onView();
+  }
+
+  private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    const step = e.shiftKey ? kTurnDegrees * 3 : kTurnDegrees;
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => this.turn(-step, 0),
+      ArrowRight: () => this.turn(step, 0),
+      ArrowUp: () => this.turn(0, step),
+      ArrowDown: () => this.turn(0, -step),
+      '+': () => this.zoom(0.85),
+      '=': () => this.zoom(0.85),
+      '-': () => this.zoom(1 / 0.85),
+      '0': () => this.home(),
+      Home: () => this.home(),
+    };
+    const action = actions[e.key];
+    if (!action) return;
+    e.preventDefault();
+    action();
+  }
+
+  private resize(): void {
+    const box = this.canvas.parentElement?.getBoundingClientRect();
+    if (!box || box.width < 1 || box.height < 1) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(box.width, box.height, false);
+    this.camera.aspect = box.width / box.height;
+    this.camera.updateProjectionMatrix();
+    // A canvas that was resized is empty until the next frame: draw at once, or it flickers.
+    this.render();
+    this.onView();
+  }
+}
+
+/** Daylight from above and a lamp that the camera carries. Scans have their own shadows in the texture. */
+function light(scene: Scene): DirectionalLight {
+  const lamp = new DirectionalLight(0xffffff, 1.4);
+  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 2.2), lamp, lamp.target);
+  return lamp;
+}

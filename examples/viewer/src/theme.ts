@@ -1,0 +1,45 @@
+/** Light or dark: as the system has it until somebody chooses, then what was chosen. */
+
+const kKey = 'texmesh-theme';
+const system = matchMedia('(prefers-color-scheme: dark)');
+const listeners = new Set<() => void>();
+
+function stored(): string | null {
+  try {
+    return localStorage.getItem(kKey);
+  } catch {
+    return null; // storage may be forbidden
+  }
+}
+
+function apply(): void {
+  document.documentElement.dataset['theme'] = stored() ?? (system.matches ? 'dark' : 'light');
+  for (const f of listeners) f();
+}
+
+export function startTheme(): void {
+  system.addEventListener('change', apply);
+  apply();
+}
+
+export function toggleTheme(): void {
+  const next = document.documentElement.dataset['theme'] === 'dark' ? 'light' : 'dark';
+  try {
+    localStorage.setItem(kKey, next);
+  } catch {
+    document.documentElement.dataset['theme'] = next;
+    for (const f of listeners) f();
+    return;
+  }
+  apply();
+}
+
+/** Calls `f` after every change of the theme. */
+export function onTheme(f: () => void): void {
+  listeners.add(f);
+}
+
+/** A colour of style.css, by the name of its variable. */
+export function colour(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}

@@ -1,0 +1,97 @@
+// Debian's chromium, headless, drawing with SwiftShader; and the folders that `run` has made ready.
+import {execFileSync, spawn} from 'node:child_process';
+import fs from 'node:fs';
+import path from 'node:path';
+import {chromium} from 'playwright-core';
+import {PNG} from 'pngjs';
+import {fileURLToPath} from 'node:url';
+import {serve} from './static-server.mjs';
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+export const env = {
+  texmesh: process.env.TEXMESH_BINARY, makeScan: process.env.TEXMESH_MAKE_SCAN, compose: process.env.TEXMESH_COMPOSE_PLANE,
+  work: process.env.TEXMESH_BROWSER_WORK, viewer: process.env.TEXMESH_VIEWER, full: process.env.TEXMESH_FULL === '1',
+  data: process.env.TEXMESH_DATA ?? '', source: process.env.TEXMESH_SOURCE,
+};
+export const packages = path.join(env.work, 'packages');
+export const pictures = path.join(env.work, 'pictures');
+fs.mkdirSync(pictures, {recursive: true});
+
+/** Folders of the laboratory page; packages stand under /packages/ wherever they are served. */
+export const labRoots = {
+  '/packages/': packages, '/three/': path.join(env.work, 'work/examples/viewer/node_modules/three'),
+  '/texmesh/': path.join(env.work, 'work/delivery/web/dist'), '/': path.join(here, 'page'),
+};
+export const viewerRoots = {'/some/where/packages/': packages, '/some/where/': env.viewer};
+
+export const launch = () => chromium.launch({
+  executablePath: process.env.TEXMESH_CHROMIUM ?? '/usr/bin/chromium', timeout: 60000,
+  args: ['--headless=new', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
+    '--disable-sync', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+    '--enable-precise-memory-info', '--js-flags=--expose-gc', '--disable-dev-shm-usage'],
+});
+
+/** A page of the laboratory; what the console says is kept in `page.said`. */
+export async function labPage(browser, origin) {
+  const page = await browser.newPage({viewport: {width: 920, height: 920}, ignoreHTTPSErrors: true});
+  listen(page);
+  await page.goto(`${origin}/index.html`);
+  await page.waitForFunction('window.ready', null, {timeout: 20000}).catch((e) => { throw new Error(`${e.message}\n${page.said.join('\n')}`); });
+  return page;
+}
+
+export function listen(page) {
+  page.said = [];
+  page.wentTo = [];
+  page.on('console', (m) => {
+    const text = m.text();
+    if ((m.type() === 'error' || m.type() === 'warning') && !/GPU stall|GL Driver|swiftshader|GroupMarkerNotSet/i.test(text)) page.said.push(text);
+  });
+  page.on('pageerror', (e) => page.said.push(String(e)));
+  page.on('request', (r) => page.wentTo.push(r.url()));
+}
+
+/** `texmesh view PKG` as a process; {url, stop}. */
+export async function startView(target) {
+  const child = spawn(env.texmesh, ['view', target, '--viewer', env.viewer, '--json'], {stdio: ['ignore', 'pipe', 'inherit']});
+  const line = await new Promise((done, fail) => {
+    let text = '';
+    child.stdout.on('data', (d) => { text += d; if (text.includes('\n')) done(text.split('\n')[0]); });
+    child.on('exit', (code) => fail(new Error(`texmesh view ended with ${code}`)));
+  });
+  return {url: JSON.parse(line).url, stop: () => { child.removeAllListeners('exit'); child.kill('SIGTERM'); }};
+}
+
+export const run = (command, ...args) => execFileSync(command, args, {encoding: 'utf8', maxBuffer: 1 << 28});
+export const lab = (page, f, ...args) => page.evaluate(f, ...args);
+export {PNG, serve, fs, path, here};
+
+export function check(condition, message) {
+  if (!condition) throw new Error(message);
+}
+export function near(value, wanted, within, what) {
+  check(Math.abs(value - wanted) <= within, `${what}: ${value}, expected ${wanted} within ${within}`);
+}
+
+let shared;
+/** One browser and one good server for all cases. */
+export function common() {
+  return (shared ??= (async () => {
+    const [browser, server] = [await launch(), await serve({...labRoots})];
+    return {browser, url: server.url, server};
+  })());
+}
+export async function closeCommon() {
+  const b = await shared;
+  await b?.browser.close();
+  await b?.server.close();
+}
+
+/** The longest chain of requests of which each began after the one before had ended. */
+export function roundTrips(requests) {
+  const depth = requests.map(() => 0);
+  const order = requests.map((_, i) => i).sort((a, c) => requests[a].started - requests[c].started);
+  for (const i of order)
+    depth[i] = 1 + Math.max(0, ...order.filter((j) => requests[j].ended <= requests[i].started).map((j) => depth[j]));
+  return Math.max(0, ...depth);
+}

@@ -1,0 +1,222 @@
+// The figures of the browser client, measured here and printed as a table. Sections by name: first ssim deadline compose blocked
+// shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
+// TEXMESH_FIGURE_PACKAGES. The machine should have nothing else to do.
+import {execFileSync} from 'node:child_process';
+import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, roundTrips, run, serve, viewerRoots} from './browser.mjs';
+import {startLink} from './link.mjs';
+
+const kScans = {sea_turtle: 'sea_turtle/sea_turtle.glb', marble_bust_4k: 'marble_bust_4k/marble_bust_01_4k.obj', yurt: 'yurt/yurt.glb'};
+const kLink = {bytesPerSecond: 250000, rttMs: 40};
+const figures = process.env.TEXMESH_FIGURE_PACKAGES ?? path.join(env.work, 'figures');
+const sections = process.argv.slice(2);
+const wants = (name) => sections.length === 0 || sections.includes(name);
+const rows = [];
+const row = (what, value, wanted, good) => {
+  rows.push([what, value, wanted, good ? 'yes' : 'NO']);
+  console.log(`${what.padEnd(64)} ${String(value).padStart(16)}   ${String(wanted).padStart(12)}   ${good ? 'yes' : 'NO'}`);
+};
+
+function packagesOfScans() {
+  check(env.data !== '', 'TEXMESH_DATA does not name the folder with the scans');
+  fs.mkdirSync(figures, {recursive: true});
+  for (const [name, scan] of Object.entries(kScans)) {
+    const file = path.join(figures, `${name}.texmesh`);
+    if (!fs.existsSync(file)) run(env.texmesh, 'compile', path.join(env.data, scan), '-o', file, '--quiet');
+  }
+}
+
+/** The plain GLB, in a folder with packages of its own: sharp and Draco's encoder are large. */
+function plainGlb() {
+  const file = path.join(figures, 'sea_turtle-plain.glb');
+  if (fs.existsSync(file)) return file;
+  const folder = path.join(env.work, 'plain-glb');
+  fs.cpSync(path.join(path.dirname(new URL(import.meta.url).pathname), 'figures'), folder, {recursive: true});
+  execFileSync('npm', ['ci', '--no-audit', '--no-fund', '--loglevel=error'], {cwd: folder, stdio: 'inherit'});
+  execFileSync('node', ['plain_glb.mjs', path.join(env.data, kScans.sea_turtle), file], {cwd: folder, stdio: 'inherit'});
+  return file;
+}
+
+const browser = await launch();
+const roots = {'/figures/': figures, ...(env.data ? {'/data/': env.data} : {}), ...labRoots};
+const server = await serve(roots);
+const link = await startLink({target: server.port});
+
+/** A page behind the link, with decoders, whose camera sees the package's object; the link is slow from then on. */
+async function readyPage(name, {size = 512, slow = kLink, warm = true} = {}) {
+  await link.set({bytesPerSecond: 1e12, rttMs: 0, changes: 0});
+  const page = await labPage(browser, link.url);
+  await lab(page, async ([u, options, load]) => {
+    await window.lab.draco.preload().decoderPending;
+    const pkg = await window.lab.open(u);
+    const {boundsMin: min, boundsMax: max} = pkg.manifest;
+    pkg.dispose();
+    window.lab.start({min, max, ...options});
+    window.lab.draw();
+    // Parts of the library that load when they are first needed belong to the page, as decoders do.
+    if (load) {
+      const id = window.lab.load(u, {load: {time: 0.5, autoRefine: false}});
+      await window.lab.finished(id);
+      window.lab.dispose(id);
+    }
+  }, [`${link.url}/figures/${name}.texmesh`, {size}, warm]);
+  await page.waitForTimeout(300);
+  await link.set(slow);
+  return page;
+}
+const load = (page, name, options) => lab(page, ([u, o]) => window.lab.load(u, o), [`${link.url}/figures/${name}.texmesh`, options]);
+const finished = (page, id) => lab(page, (i) => window.lab.finished(i), id);
+
+async function firstPictures() {
+  for (const name of Object.keys(kScans)) {
+    const page = await readyPage(name);
+    const id = await load(page, name, {load: {time: 4, autoRefine: false}});
+    const r = await finished(page, id);
+    const shown = r.events.find((e) => e.name === 'first-picture');
+    const before = r.requests.filter((q) => q.ended <= shown.at);
+    const needed = before.filter((q) => ['manifest', 'first-picture', 'mesh', 'preview', 'stream'].includes(q.kind));
+    const bytes = before.reduce((sum, q) => sum + q.received, 0);
+    row(`first picture, ${name}: round trips`, roundTrips(needed), '<= 2', roundTrips(needed) <= 2);
+    row(`first picture, ${name}: package bytes`, bytes, '<= 60 000', bytes <= 60000);
+    row(`first picture, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
+    await page.close();
+  }
+}
+
+async function timeToQuality() {
+  const plain = path.basename(plainGlb());
+  const page = await readyPage('sea_turtle', {slow: {bytesPerSecond: 1e12, rttMs: 0}});
+  const source = await lab(page, (u) => window.lab.loadGlb(u), `${link.url}/data/${kScans.sea_turtle}`);
+  await lab(page, async (i) => { await window.lab.loads[i].promise; window.lab.keepReference(); window.lab.clear(i); }, source);
+  await link.set(kLink);
+  const id = await load(page, 'sea_turtle', {frames: 60, load: {time: 4}});
+  await finished(page, id);
+  const curve = await lab(page, (i) => window.lab.qualityOverTime(i), id);
+  await lab(page, (i) => window.lab.dispose(i), id);
+  await link.set(kLink);
+  const glb = await lab(page, (u) => window.lab.loadGlb(u, {frames: 1}), `${link.url}/figures/${plain}`);
+  await lab(page, (i) => window.lab.loads[i].promise, glb);
+  const [[plainS, plainSsim]] = await lab(page, (i) => window.lab.qualityOverTime(i), glb);
+  console.log('turtle, 512 px, 2 Mbit/s, 40 ms: seconds and SSIM against the source');
+  for (const [s, q] of curve) console.log(`  ${s.toFixed(2).padStart(6)}  ${q.toFixed(4)}`);
+  console.log(`  plain GLB (Draco, WebP): ${plainS.toFixed(2)} s, ${plainSsim.toFixed(4)}`);
+  const reached = curve.find(([, q]) => q >= 0.95)?.[0] ?? Infinity;
+  row('time to SSIM 0.95, turtle: seconds', reached.toFixed(2), '', true);
+  row('time to SSIM 0.95, turtle: of the plain GLB\'s time', (reached / plainS).toFixed(2), '<= 0.5', reached <= 0.5 * plainS);
+  await page.close();
+}
+
+async function deadlines() {
+  const limit = 4;
+  const off = [];
+  const loads = Number(process.env.TEXMESH_FIGURE_LOADS ?? 20);
+  const page = await readyPage('sea_turtle');
+  for (let seed = 1; seed <= loads; seed++) {
+    await link.set({...kLink, changes: 0.5, seed});
+    const id = await load(page, 'sea_turtle', {load: {time: limit, autoRefine: false}});
+    const r = await finished(page, id);
+    const d = r.events.find((e) => e.name === 'deadline');
+    off.push(d ? d.actual / limit - 1 : Infinity);
+    await lab(page, (i) => window.lab.dispose(i), id);
+    await page.waitForTimeout(100);
+  }
+  console.log(`deviations, %: ${off.map((d) => (100 * d).toFixed(1)).join(' ')}`);
+  const sorted = off.map(Math.abs).sort((a, b) => a - b);
+  const p95 = sorted[Math.min(sorted.length - 1, Math.ceil(0.95 * sorted.length) - 1)];
+  row(`deadline 4 s, +-50 % changes, ${loads} loads: p95 deviation, %`, (100 * p95).toFixed(1), '<= 3', p95 <= 0.03);
+  row('deadline: latest, %', (100 * Math.max(...off)).toFixed(1), '<= 5', Math.max(...off) <= 0.05);
+  await page.close();
+}
+
+/** The image that a GLB holds first, as a file of its own. */
+function firstImage(glb, out) {
+  const bytes = fs.readFileSync(glb);
+  const jsonBytes = bytes.readUInt32LE(12);
+  const json = JSON.parse(bytes.subarray(20, 20 + jsonBytes).toString());
+  const view = json.bufferViews[json.images[0].bufferView];
+  const at = 20 + jsonBytes + 8 + (view.byteOffset ?? 0);
+  fs.writeFileSync(out, bytes.subarray(at, at + view.byteLength));
+}
+
+/** All fragments of a 4096 px texture from memory into the GPU, against one JPEG of the whole; the best of some runs each. */
+async function composing() {
+  firstImage(path.join(env.data, kScans.yurt), path.join(figures, 'yurt.jpg'));
+  const page = await readyPage('yurt', {slow: {bytesPerSecond: 1e12, rttMs: 0}});
+  const [own, whole] = [[], []];
+  let fragments = 0;
+  for (let i = 0; i < 5; i++) {
+    const id = await load(page, 'yurt', {memory: true, load: {time: 1e9, scale: 20, rung: 8, fullSize: true, autoRefine: false}});
+    const r = await finished(page, id);
+    check(!r.error, JSON.stringify(r.error));
+    const fetched = r.events.find((e) => e.name === 'progress' && e.phase === 'textures');
+    fragments = r.events.filter((e) => e.name === 'fragment').length;
+    own.push((r.endedAt - fetched.at) * 1000);
+    await lab(page, (n) => window.lab.dispose(n), id);
+    whole.push(await lab(page, (u) => window.lab.wholeJpeg(u), `${link.url}/figures/yurt.jpg`));
+  }
+  console.log(`compose ${fragments} fragments, ms: ${own.map((v) => v.toFixed(0)).join(' ')}; whole JPEG: ${whole.map((v) => v.toFixed(0)).join(' ')}`);
+  const ratio = Math.min(...own) / Math.min(...whole);
+  row(`${fragments} fragments of 4096 px over one whole JPEG`, ratio.toFixed(2), '<= 2', ratio <= 2);
+  await page.close();
+}
+
+async function blocked() {
+  for (const name of Object.keys(kScans)) {
+    const page = await readyPage(name, {warm: false});
+    const id = await load(page, name, {load: {time: 4}});
+    const r = await finished(page, id);
+    await page.waitForTimeout(500);
+    const most = Math.max(0, ...r.longTasks.map((t) => t.ms));
+    row(`main thread, ${name}: longest task, ms`, most.toFixed(0), '<= 50', most <= 50);
+    if (most > 50) console.log('  ', r.longTasks.map((t) => `${t.start.toFixed(2)} s: ${t.ms.toFixed(0)} ms`).join(', '));
+    await page.close();
+  }
+}
+
+/** The viewer with the turtle at 0.2, 1 and 4 s on the slow link. */
+async function shots() {
+  const viewer = await serve({'/packages/': figures, ...Object.fromEntries(Object.entries(viewerRoots).map(([k, v]) => [k.replace('/some/where', ''), v]))});
+  const slow = await startLink({target: viewer.port});
+  const page = await browser.newPage({viewport: {width: 1280, height: 800}});
+  listen(page);
+  await page.addInitScript(() => {
+    window.longTasks = [];
+    new PerformanceObserver((l) => { for (const e of l.getEntries()) window.longTasks.push([e.startTime, e.duration]); }).observe({type: 'longtask', buffered: true});
+  });
+  await page.goto(`${slow.url}/index.html`);
+  await page.waitForTimeout(500);
+  // The page and its decoders come fast; the link is slow from the first byte of the package on.
+  let slowed;
+  await page.route('**/*.texmesh', async (route) => {
+    await (slowed ??= slow.set(kLink));
+    await route.continue();
+  });
+  await page.goto(`${slow.url}/index.html?pkg=packages/sea_turtle.texmesh&time=4`, {waitUntil: 'commit'});
+  await page.waitForFunction(() => window.texmeshViewer?.session.live.startedAt > 0);
+  const since = () => page.evaluate(() => (performance.now() - window.texmeshViewer.session.live.startedAt) / 1000);
+  for (const at of [0.2, 1, 4.1]) {
+    const wait = at - await since();
+    if (wait > 0) await page.waitForTimeout(wait * 1000);
+    const really = await since();
+    await page.screenshot({path: path.join(pictures, `turtle-${at}s.png`)});
+    console.log(`picture for ${at} s taken at ${really.toFixed(2)} s`);
+  }
+  await page.waitForTimeout(3000);
+  await page.screenshot({path: path.join(pictures, 'turtle-refined.png')});
+  const tasks = await page.evaluate(() => window.longTasks);
+  console.log('viewer, long tasks:', tasks.map(([s, d]) => `${(s / 1000).toFixed(2)} s: ${d.toFixed(0)} ms`).join(', '));
+  console.log(page.said.join('\n'));
+  await page.close();
+  slow.close();
+  await viewer.close();
+}
+
+try {
+  packagesOfScans();
+  for (const [name, body] of Object.entries({first: firstPictures, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, shots}))
+    if (wants(name)) await body();
+} finally {
+  await browser.close();
+  link.close();
+  await server.close();
+}
+process.exit(rows.every((r) => r[3] === 'yes') ? 0 : 1);

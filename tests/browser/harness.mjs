@@ -1,0 +1,62 @@
+// A small runner: cases one after the other, each with a time limit, a JUnit file as tests/run counts them.
+import fs from 'node:fs';
+import path from 'node:path';
+
+const cases = [];
+
+/** Registers a case. `body` gets {skip(reason)}; what it throws is the failure. */
+export function test(name, body, {seconds = 60} = {}) {
+  cases.push({name, body, seconds});
+}
+
+class Skipped extends Error {}
+
+const escaped = (text) => String(text).replace(/[<>&"]/g, (c) => `&#${c.charCodeAt(0)};`).replace(/[^\x20-\x7e\n]/g, '?');
+
+/** Runs every case whose name holds TEXMESH_BROWSER_ONLY (all without it); exits with 1 when one fails. */
+export async function runAll(suite) {
+  const only = process.env.TEXMESH_BROWSER_ONLY ?? '';
+  const results = [];
+  for (const c of cases.filter((x) => x.name.includes(only))) {
+    const start = performance.now();
+    let timer;
+    const late = new Promise((_, fail) => {
+      timer = setTimeout(() => fail(new Error(`no end after ${c.seconds} s`)), c.seconds * 1000);
+    });
+    const result = {name: c.name, seconds: 0};
+    try {
+      const skip = (reason) => { throw new Skipped(reason); };
+      await Promise.race([c.body({skip}), late]);
+      result.status = 'ok';
+    } catch (error) {
+      result.status = error instanceof Skipped ? 'skipped' : 'FAILED';
+      result.message = error instanceof Skipped ? error.message : error.stack ?? String(error);
+    }
+    clearTimeout(timer);
+    result.seconds = (performance.now() - start) / 1000;
+    results.push(result);
+    console.log(`${result.status.padEnd(8)} ${result.seconds.toFixed(1).padStart(6)} s  ${c.name}${result.message ? `: ${result.message}` : ''}`);
+  }
+  writeReport(suite, results);
+  const failed = results.filter((r) => r.status === 'FAILED').length;
+  console.log(`${results.length} cases, ${failed} failed`);
+  return failed === 0 && results.length > 0 ? 0 : 1;
+}
+
+/** GoogleTest's layout, to the folder that its environment variable names: tests/run reads both alike. */
+function writeReport(suite, results) {
+  const folder = /^xml:(.*\/)$/.exec(process.env.GTEST_OUTPUT ?? '')?.[1];
+  if (!folder) return;
+  const count = (status) => results.filter((r) => r.status === status).length;
+  const lines = results.map((r) => {
+    const inside = r.status === 'FAILED' ? `<failure message="${escaped(r.message)}"/>` :
+      r.status === 'skipped' ? `<skipped message="${escaped(r.message)}"/>` : '';
+    return `    <testcase name="${escaped(r.name)}" classname="${suite}" time="${r.seconds.toFixed(3)}">${inside}</testcase>`;
+  });
+  fs.mkdirSync(folder, {recursive: true});
+  fs.writeFileSync(path.join(folder, `${suite}.xml`), [
+    '<?xml version="1.0" encoding="UTF-8"?>',
+    `<testsuites tests="${results.length}" failures="${count('FAILED')}" disabled="0" errors="0" name="${suite}">`,
+    `  <testsuite name="${suite}" tests="${results.length}" failures="${count('FAILED')}">`, ...lines, '  </testsuite>',
+    '</testsuites>', ''].join('\n'));
+}

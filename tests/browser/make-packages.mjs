@@ -1,0 +1,36 @@
+// Small packages for the tests, made by make_scan and texmesh; kept while both programs are older than they are.
+import {env, fs, packages, path, run} from './browser.mjs';
+
+const kQuick = ['--no-cache', '--quiet', '--quality.views', '1', '--quality.size_px', '32'];
+
+/** Names and what they are made of. */
+const kPackages = {
+  // Three materials' maps, every fragment small.
+  maps: {scan: ['--triangles', '3000', '--texture', '256', '--charts', '8', '--textures'], options: ['--rungs', '20,50,85']},
+  // Enough bytes for a link of 2 Mbit/s to have something to do.
+  large: {scan: ['--triangles', '30000', '--texture', '2048', '--charts', '30'], options: ['--rungs', '10,20,35,50,70,85,95']},
+  progressive: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'progressive']},
+  webp: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'webp', '--rungs', '20,60']},
+  // No texture at all: colours of vertices.
+  colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
+};
+
+export function makePackages() {
+  fs.mkdirSync(packages, {recursive: true});
+  const newest = Math.max(fs.statSync(env.texmesh).mtimeMs, fs.statSync(path.join(path.dirname(env.texmesh), 'texmesh-core')).mtimeMs);
+  for (const [name, p] of Object.entries(kPackages)) {
+    const file = path.join(packages, `${name}.texmesh`);
+    if (fs.existsSync(file) && fs.statSync(file).mtimeMs > newest) continue;
+    const scan = path.join(packages, `${name}.${p.ending ?? 'glb'}`);
+    run(env.makeScan, '-o', scan, ...p.scan);
+    run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
+    fs.rmSync(scan);
+    run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');
+    // Elsewhere, so that a server without ranges finds each kind of tree alone.
+    fs.mkdirSync(path.join(packages, 'files'), {recursive: true});
+    fs.copyFileSync(file, path.join(packages, 'files', `${name}.texmesh`));
+    run(env.texmesh, 'unpack', file, '-o', path.join(packages, 'files', name), '--fragments', 'files', '--force');
+    fs.mkdirSync(path.join(packages, 'alone'), {recursive: true});
+    fs.copyFileSync(file, path.join(packages, 'alone', `${name}.texmesh`));
+  }
+}

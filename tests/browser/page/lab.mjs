@@ -1,0 +1,258 @@
+// The page that tests and figures drive: the client library alone, a fixed camera, and everything that happens written down.
+import {TexmeshPackage, open} from 'texmesh';
+import {Box3, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer} from 'three';
+import {DRACOLoader} from 'three/addons/loaders/DRACOLoader.js';
+import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
+import {MeshoptDecoder} from 'three/addons/libs/meshopt_decoder.module.js';
+
+const draco = new DRACOLoader().setDecoderPath('/three/examples/jsm/libs/draco/gltf/').setWorkerLimit(2);
+const gltfLoader = () => new GLTFLoader().setDRACOLoader(draco).setMeshoptDecoder(MeshoptDecoder);
+
+let stage;
+const loads = [];
+const longTasks = [];
+new PerformanceObserver((list) => {
+  for (const e of list.getEntries()) longTasks.push({start: e.startTime, ms: e.duration});
+}).observe({type: 'longtask', buffered: true});
+
+/** A canvas of `size` px and a camera that sees a box of the object whole; by default that of make_scan's objects. */
+function start({size = 512, min = [-0.13, -0.18, -0.13], max = [0.13, 0.18, 0.18], azimuth = 30, elevation = 15, zoom = 1} = {}) {
+  stage?.renderer.dispose();
+  document.body.replaceChildren();
+  const renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
+  renderer.setPixelRatio(1);
+  renderer.setSize(size, size);
+  document.body.append(renderer.domElement);
+  const scene = new Scene();
+  scene.background = new Color(0x808080);
+  const box = new Box3(new Vector3(...min), new Vector3(...max));
+  const centre = box.getCenter(new Vector3());
+  const radius = box.getSize(new Vector3()).length() / 2 || 1;
+  const camera = new PerspectiveCamera(30, 1, radius / 100, radius * 20);
+  const [a, e] = [azimuth, elevation].map((d) => (d * Math.PI) / 180);
+  const direction = new Vector3(Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e));
+  camera.position.copy(centre).addScaledVector(direction, (1.02 * radius) / Math.sin((15 * Math.PI) / 180) / zoom);
+  camera.lookAt(centre);
+  camera.updateMatrixWorld();
+  const lamp = new DirectionalLight(0xffffff, 1.5);
+  lamp.position.copy(camera.position).add(new Vector3(0, radius, 0));
+  lamp.target.position.copy(centre);
+  scene.add(new HemisphereLight(0xffffff, 0xcccccc, 2), lamp, lamp.target);
+  stage = {renderer, scene, camera, size, radius, centre};
+}
+
+const draw = () => stage.renderer.render(stage.scene, stage.camera);
+
+/** RGBA of the canvas, top row first. */
+function pixels() {
+  const {size} = stage;
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = size;
+  const c = canvas.getContext('2d');
+  c.drawImage(stage.renderer.domElement, 0, 0);
+  return c.getImageData(0, 0, size, size).data;
+}
+
+/**
+ * Opens and loads a package; events, requests and, with `frames`, pictures are kept. Comes back at once with a number;
+ * `finished` waits. `load` takes LoadOptions without renderer, loader and camera; `follow` gives the camera, too. With `memory`,
+ * all of it is fetched before the clock starts.
+ */
+function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false} = {}) {
+  const run = {events: [], requests: [], frames: [], error: null, t0: performance.now(), pkg: null, model: null, abort: new AbortController()};
+  loads.push(run);
+  let dirty = true;
+  let over = false;
+  let lastFrame = -1e9;
+  const note = (name) => (e) => {
+    run.events.push({name, ...e, error: undefined, at: (e.at - run.t0) / 1000});
+    if (['first-picture', 'scale', 'fragment', 'plane', 'deadline', 'done'].includes(name)) dirty = true;
+  };
+  const tick = () => {
+    if (over === 'yes') return;
+    if (run.model) run.model.update(stage.camera);
+    const now = performance.now();
+    if (dirty && (!frames || now - lastFrame >= frames || over)) {
+      dirty = false;
+      lastFrame = now;
+      draw();
+      // The picture stands on the screen now: its time is this, whatever reading it back takes.
+      if (frames) run.frames.push({at: (now - run.t0) / 1000, data: pixels()});
+    }
+    if (over) { over = 'yes'; run.drawn(); return; }
+    requestAnimationFrame(tick);
+  };
+  run.whole = new Promise((done) => { run.drawn = done; });
+  run.promise = (async () => {
+    try {
+      const bytes = memory ? new Uint8Array(await (await fetch(url)).arrayBuffer()) : null;
+      if (memory) run.t0 = performance.now();
+      const pkg = bytes ? await TexmeshPackage.openBytes(bytes) : await open(url, {signal: run.abort.signal, ...openOptions});
+      run.pkg = pkg;
+      run.requests.push(...pkg.requests);
+      pkg.onRequest((r) => run.requests.push(r));
+      const model = pkg.load(stage.scene, {
+        renderer: stage.renderer, gltfLoader, ...(follow ? {camera: stage.camera} : {}), signal: run.abort.signal, ...loadOptions,
+      });
+      run.model = model;
+      for (const name of ['first-picture', 'scale', 'plane', 'fragment', 'decision', 'progress', 'deadline', 'error', 'done'])
+        model.on(name, note(name));
+      requestAnimationFrame(tick);
+      await model.done;
+    } catch (error) {
+      run.error = {name: error.name, message: error.message};
+    }
+    run.endedAt = (performance.now() - run.t0) / 1000;
+    over = true;
+    if (run.model) await run.whole;
+  })();
+  return loads.length - 1;
+}
+
+/** What became of a load, once its timed part is over. */
+async function finished(id) {
+  const run = loads[id];
+  await run.promise;
+  return report(id);
+}
+
+function report(id) {
+  const run = loads[id];
+  const s = run.model?.state;
+  return {
+    error: run.error, events: run.events, endedAt: run.endedAt,
+    requests: run.requests.map((r) => ({...r, started: r.started - run.t0 / 1000, firstByte: r.firstByte - run.t0 / 1000, ended: r.ended - run.t0 / 1000})),
+    state: s && {
+      phase: s.phase, scale: s.scale, wantedScale: s.wantedScale, displayedPx: s.displayedPx, bytes: s.bytes, pending: s.pending, rttS: s.rttS,
+      planes: s.planes.map((p) => ({base: p.base, plane: p.plane, role: p.role, widthPx: p.widthPx, heightPx: p.heightPx, rungs: [...p.rungs]})),
+    },
+    longTasks: longTasks.filter((t) => t.start >= run.t0).map((t) => ({...t, start: (t.start - run.t0) / 1000})),
+  };
+}
+
+/** A composed plane, as base64 so that it comes over quickly. */
+function plane(id, base) {
+  const run = loads[id];
+  const shown = run.model.state.planes.find((p) => p.base === base);
+  return {...toBase64(run.model.readPlane(base)), widthPx: shown.widthPx, heightPx: shown.heightPx, plane: shown.plane, rungs: [...shown.rungs]};
+}
+
+function toBase64(bytes) {
+  let text = '';
+  for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
+  return {base64: btoa(text)};
+}
+
+function dispose(id) {
+  const run = loads[id];
+  run.model?.dispose();
+  run.pkg?.dispose();
+  run.frames = [];
+  loads[id] = {events: [], requests: []};
+  draw();
+}
+
+/** A plain GLB, as any page would load it; shown when all of it is there. */
+function loadGlb(url, {frames = 0} = {}) {
+  const run = {frames: [], t0: performance.now(), events: [], requests: []};
+  loads.push(run);
+  run.promise = (async () => {
+    const bytes = await (await fetch(url, {cache: 'no-store'})).arrayBuffer();
+    run.bytes = bytes.byteLength;
+    const gltf = await gltfLoader().parseAsync(bytes, '');
+    run.object = gltf.scene;
+    stage.scene.add(gltf.scene);
+    draw();
+    run.endedAt = (performance.now() - run.t0) / 1000;
+    if (frames) run.frames.push({at: run.endedAt, data: pixels()});
+  })();
+  return loads.length - 1;
+}
+
+/** Mean SSIM of luma over covered pixels (8 x 8 windows, step 4), against a kept picture. */
+function ssim(a, b, size) {
+  const luma = (d) => {
+    const l = new Float32Array(size * size);
+    for (let i = 0; i < l.length; i++) l[i] = 0.2126 * d[4 * i] + 0.7152 * d[4 * i + 1] + 0.0722 * d[4 * i + 2];
+    return l;
+  };
+  const [x, y] = [luma(a), luma(b)];
+  const covered = (i) => Math.abs(b[4 * i] - 128) + Math.abs(b[4 * i + 1] - 128) + Math.abs(b[4 * i + 2] - 128) > 6;
+  let [sum, n] = [0, 0];
+  for (let v = 0; v + 8 <= size; v += 4)
+    for (let u = 0; u + 8 <= size; u += 4) {
+      let [sx, sy, sxx, syy, sxy, c] = [0, 0, 0, 0, 0, 0];
+      for (let j = 0; j < 8; j++)
+        for (let i = 0; i < 8; i++) {
+          const k = (v + j) * size + u + i;
+          const [p, q] = [x[k], y[k]];
+          sx += p; sy += q; sxx += p * p; syy += q * q; sxy += p * q;
+          c += covered(k);
+        }
+      if (c < 32) continue;
+      const [mx, my] = [sx / 64, sy / 64];
+      const [vx, vy, cv] = [sxx / 64 - mx * mx, syy / 64 - my * my, sxy / 64 - mx * my];
+      sum += ((2 * mx * my + 6.5025) * (2 * cv + 58.5225)) / ((mx * mx + my * my + 6.5025) * (vx + vy + 58.5225));
+      n++;
+    }
+  return n ? sum / n : 0;
+}
+
+let reference = null;
+/** Keeps the last picture of a load (or of the canvas) as the reference. */
+function keepReference() {
+  draw();
+  reference = pixels();
+}
+function clear(id) {
+  stage.scene.remove(loads[id].object);
+}
+/** [seconds, SSIM] of a load's pictures. */
+function qualityOverTime(id) {
+  return loads[id].frames.map((f) => [f.at, ssim(f.data, reference, stage.size)]);
+}
+
+/** Milliseconds from a JPEG's bytes to a texture with mip levels on the GPU, as a page would do it. */
+async function wholeJpeg(url) {
+  const blob = new Blob([await (await fetch(url)).arrayBuffer()], {type: 'image/jpeg'});
+  const gl = stage.renderer.getContext();
+  const begun = performance.now();
+  const image = await createImageBitmap(blob, {colorSpaceConversion: 'none', premultiplyAlpha: 'none'});
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, image);
+  gl.generateMipmap(gl.TEXTURE_2D);
+  settle(texture);
+  const ms = performance.now() - begun;
+  gl.deleteTexture(texture);
+  image.close();
+  stage.renderer.resetState();
+  return ms;
+}
+
+/** Waits until the GPU has done what was asked: reads a pixel of the texture, or of the canvas. */
+function settle(texture) {
+  const gl = stage.renderer.getContext();
+  const pixel = new Uint8Array(4);
+  if (!texture) return gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  const frame = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.deleteFramebuffer(frame);
+}
+
+const memory = () => ({
+  ...stage.renderer.info.memory, programs: stage.renderer.info.programs.length, heap: performance.memory?.usedJSHeapSize ?? 0,
+});
+
+const gl = () => stage.renderer.getContext();
+
+Object.assign(window, {
+  lab: {
+    start, draw, pixels, load, finished, report, plane, dispose, loadGlb, clear, keepReference, qualityOverTime, memory, loads, longTasks, gl,
+    gltfLoader, toBase64, ssim, wholeJpeg, settle, stage: () => stage, draco, open,
+  },
+  ready: true,
+});

@@ -1,0 +1,353 @@
+// The client library in a real browser: what it shows is what the compiler stored, whatever the server does.
+import {
+  PNG, check, closeCommon, common, env, fs, lab, labPage, labRoots, near, packages, path, pictures, roundTrips, run, serve, startView,
+} from './browser.mjs';
+import {runAll, test} from './harness.mjs';
+import {startLink} from './link.mjs';
+import {makePackages} from './make-packages.mjs';
+import {nginxMissing, startNginx} from './nginx.mjs';
+import './viewer-tests.mjs';
+
+const kTop = 99; // clipped to the highest rung there is
+const kEverything = {time: 1e9, scale: 0, rung: kTop, fullSize: true, autoRefine: false};
+
+/** Loads one package on a new page and gives its report. */
+async function loaded(browser, page_, url, options = {}) {
+  const page = page_ ?? await labPage(browser.browser, browser.url);
+  if (page_ === null) await lab(page, () => window.lab.start({size: 256}));
+  const id = await lab(page, ([u, o]) => window.lab.load(u, o), [url, options]);
+  return {page, id, ...await lab(page, (i) => window.lab.finished(i), id)};
+}
+
+/** Differences of a composed plane from the C++ reconstruction, over stored fragments. */
+async function comparePlane(page, id, base, name, quality) {
+  const got = await lab(page, ([i, b]) => window.lab.plane(i, b), [id, base]);
+  const file = path.join(env.work, `${name}-${got.plane}-${quality}.png`);
+  run(env.compose, path.join(packages, `${name}.texmesh`), String(got.plane), String(quality), file);
+  const wanted = PNG.sync.read(fs.readFileSync(file));
+  check(wanted.width === got.widthPx && wanted.height === got.heightPx, `plane ${got.plane} is ${got.widthPx} x ${got.heightPx}, not ${wanted.width} x ${wanted.height}`);
+  const data = Buffer.from(got.base64, 'base64');
+  let [most, sum, n] = [0, 0, 0];
+  for (let i = 0; i < wanted.data.length; i += 4) {
+    if (wanted.data[i + 3] === 0) continue; // not stored
+    for (let c = 0; c < 3; c++) {
+      const d = Math.abs(wanted.data[i + c] - data[i + c]);
+      most = Math.max(most, d);
+      sum += d;
+      n++;
+    }
+  }
+  return {most, mean: n ? sum / n : 0, n};
+}
+
+const kTopQuality = 100;
+/** Machines that run tests do other things, too; figures.mjs measures what a quiet one keeps. */
+const kLate = 1.15;
+for (const [name, form] of [['maps', 'highest'], ['maps', 'lowest'], ['progressive', 'highest'], ['webp', 'highest']]) {
+  test(`composed textures equal the C++ reconstruction: ${name}, ${form} rungs`, async () => {
+    const b = await common();
+    const rung = form === 'highest' ? kTop : 0;
+    const r = await loaded(b, null, `${b.url}/packages/${name}.texmesh`, {load: {...kEverything, rung}});
+    check(!r.error, JSON.stringify(r.error));
+    check(r.state.planes.length > 0, 'no plane');
+    for (const p of r.state.planes) {
+      const d = await comparePlane(r.page, r.id, p.base, name, rung ? kTopQuality : 0);
+      check(d.n > 0 && d.most <= 3 && d.mean <= 0.4, `${p.role}: differs by ${d.most} at most, ${d.mean.toFixed(3)} in the mean`);
+    }
+    check(r.page.said.length === 0, r.page.said.join('\n'));
+    await r.page.close();
+  });
+}
+
+/** A load whose texture must be right in the end, from a server of the given kind. */
+async function rightFrom(b, origin, file, {page = null, options = {}} = {}) {
+  const r = await loaded({browser: b.browser, url: origin}, page, `${origin}/packages/${file}`, {load: kEverything, ...options});
+  check(!r.error, JSON.stringify(r.error));
+  const d = await comparePlane(r.page, r.id, r.state.planes[0].base, path.basename(file.replace(/\/$/, '').replace(/\.texmesh$/, '')), kTopQuality);
+  check(d.most <= 3, `texture differs by ${d.most}`);
+  return r;
+}
+
+test('nginx with ranges, HTTP/1.1', async ({skip}) => {
+  if (nginxMissing(false)) skip(nginxMissing(false));
+  const [b, nginx] = [await common(), await startNginx()];
+  try {
+    const r = await rightFrom(b, nginx.url, 'maps.texmesh');
+    check(/GET \/packages\/maps.texmesh HTTP\/1.1" 206/.test(nginx.log()), 'no range was asked for');
+    await r.page.close();
+  } finally { nginx.close(); }
+});
+
+test('nginx, HTTP/2', async ({skip}) => {
+  if (nginxMissing(true)) skip(nginxMissing(true));
+  const [b, nginx] = [await common(), await startNginx({http2: true})];
+  try {
+    const r = await rightFrom(b, nginx.url, 'maps.texmesh');
+    check(/GET \/packages\/maps.texmesh HTTP\/2.0" 206/.test(nginx.log()), nginx.log().slice(0, 2000));
+    await r.page.close();
+  } finally { nginx.close(); }
+});
+
+for (const [what, file, wants] of [
+  ['the tree beside the package', 'maps.texmesh', /\/packages\/maps\/manifest.json/],
+  ['fragment files', 'files/maps.texmesh', /\/packages\/files\/maps\/texture\/\d+\/r\d+\/\d+\.jpg/],
+  ['the whole package', 'alone/maps.texmesh', /\/packages\/alone\/maps.texmesh/],
+  ['a tree named by its folder', 'maps/', /\/packages\/maps\/texture/],
+]) {
+  test(`a server without ranges: ${what}`, async () => {
+    const [b, server] = [await common(), await serve(labRoots, {ranges: false})];
+    try {
+      const r = await rightFrom(b, server.url, file);
+      check(server.requests.some((q) => wants.test(q.path)), server.requests.map((q) => q.path).join('\n'));
+      await r.page.close();
+    } finally { await server.close(); }
+  });
+}
+
+test('nothing is fetched twice', async () => {
+  const [b, server] = [await common(), await serve(labRoots)];
+  const r = await rightFrom(b, server.url, 'large.texmesh');
+  const ranges = server.requests.filter((q) => q.path.endsWith('large.texmesh') && q.range)
+    .map((q) => q.range.slice(6).split('-').map(Number)).sort((x, y) => x[0] - y[0]);
+  let [twice, end] = [0, -1];
+  for (const [first, last] of ranges) {
+    twice += Math.max(0, Math.min(end, last) - first + 1);
+    end = Math.max(end, last);
+  }
+  check(twice <= 64, `${twice} bytes came twice`);
+  await r.page.close();
+  await server.close();
+});
+
+const kFirst = ['manifest', 'first-picture', 'mesh', 'preview', 'stream'];
+
+test('the first picture takes two round trips', async () => {
+  const b = await common();
+  const r = await loaded(b, null, `${b.url}/packages/large.texmesh`, {load: {time: 2}});
+  check(!r.error, JSON.stringify(r.error));
+  const shown = r.events.find((e) => e.name === 'first-picture');
+  check(shown, 'no first picture');
+  // Tables and textures that are asked for meanwhile do not hold it up.
+  const trips = roundTrips(r.requests.filter((q) => q.ended <= shown.at && kFirst.includes(q.kind)));
+  check(trips <= 2, `${trips} round trips`);
+  await r.page.close();
+});
+
+/** `body` gets a page whose origin is behind a link of 2 Mbit/s and 40 ms, or as `options` say, from now on. */
+async function throttled(options, body) {
+  const b = await common();
+  const server = await serve(labRoots);
+  const link = await startLink({target: server.port});
+  let page;
+  try {
+    page = await labPage(b.browser, link.url);
+    await lab(page, async () => { await window.lab.draco.preload().decoderPending; window.lab.start({size: 900}); });
+    await link.set({bytesPerSecond: 250000, rttMs: 40, ...options});
+    await body(page, link, `${link.url}/packages/large.texmesh`);
+  } finally {
+    await page?.close();
+    link.close();
+    await server.close();
+  }
+}
+
+test('a deadline is kept on a slow link', () => throttled({}, async (page, link, url) => {
+  const r = await loaded(null, page, url, {load: {time: 4, autoRefine: false}});
+  check(!r.error, JSON.stringify(r.error));
+  const deadline = r.events.find((e) => e.name === 'deadline');
+  check(deadline, 'no deadline');
+  check(deadline.actual <= 4 * kLate, `${deadline.actual} s of 4`);
+  check(deadline.actual >= 4 * 0.85, `${deadline.actual} s of 4 were used`);
+}), {seconds: 90});
+
+test('the link changes by half, the deadline stays', () => throttled({changes: 0.5, seed: 7}, async (page, link, url) => {
+  const r = await loaded(null, page, url, {load: {time: 4, autoRefine: false}});
+  check(!r.error, JSON.stringify(r.error));
+  const deadline = r.events.find((e) => e.name === 'deadline');
+  check(deadline.actual <= 4 * kLate, `${deadline.actual} s of 4`);
+}), {seconds: 90});
+
+test('the server dies in the middle: what is there stays, and the error says so', () => throttled({}, async (page, link, url) => {
+  const id = await lab(page, (u) => window.lab.load(u, {open: {retries: 1, retryDelayS: 0.05, stallTimeoutS: 2}, load: {time: 20, autoRefine: false}}), url);
+  await page.waitForFunction((i) => window.lab.report(i).events.some((e) => e.name === 'fragment'), id, {timeout: 30000});
+  await link.die();
+  const r = await lab(page, (i) => window.lab.finished(i), id);
+  const said = [r.error?.message, ...r.events.filter((e) => e.name === 'error').map((e) => e.message)].filter(Boolean);
+  check(said.some((m) => /127\.0\.0\.1/.test(m)), `no word of it: ${said}`);
+  check(r.state.scale >= 0 && r.state.planes.some((p) => p.rungs.some((v) => v >= 0)), 'the picture is gone');
+  const grey = await lab(page, () => { window.lab.draw(); const p = window.lab.pixels(); let n = 0; for (let i = 0; i < p.length; i += 4) n += Math.abs(p[i] - 128) > 8; return n; });
+  check(grey > 2000, 'nothing is drawn');
+}), {seconds: 90});
+
+test('a fragment that is not there (404) costs that fragment alone', async () => {
+  const b = await common();
+  const server = await serve(labRoots, {ranges: false, fault: (q) => (/files\/maps\/texture\/0\/r\d+\/0003\.jpg/.test(q.path) ? {status: 404} : undefined)});
+  try {
+    const r = await loaded({browser: b.browser, url: server.url}, null, `${server.url}/packages/files/maps.texmesh`, {load: kEverything});
+    check(!r.error, JSON.stringify(r.error));
+    const plane = r.state.planes.find((p) => p.base === 0);
+    const missing = plane.rungs.map((v, f) => (v < 0 ? f : -1)).filter((f) => f >= 0);
+    const d = await comparePlane(r.page, r.id, 0, 'maps', kTopQuality);
+    check(r.events.some((e) => e.name === 'error' && !e.fatal), 'no word of it');
+    check(missing.includes(3) || d.most <= 3, `fragment 3 neither missing nor right: ${missing}`);
+    await r.page.close();
+  } finally { await server.close(); }
+});
+
+test('corrupt bytes are fetched again', async () => {
+  const b = await common();
+  let spoilt = 0;
+  const server = await serve(labRoots, {fault: (q) => {
+    if (!q.path.endsWith('large.texmesh') || !q.range) return undefined;
+    const first = Number(/bytes=(\d+)-/.exec(q.range)[1]);
+    return first > 200000 && spoilt < 3 && ++spoilt ? {flip: 1234} : undefined;
+  }});
+  try {
+    await rightFrom(b, server.url, 'large.texmesh', {options: {load: {...kEverything, scale: 19}}}).then((r) => r.page.close());
+    check(spoilt === 3, 'nothing was spoilt');
+  } finally { await server.close(); }
+});
+
+test('bytes that are corrupt for ever are not shown', async () => {
+  const b = await common();
+  const server = await serve(labRoots, {ranges: false, fault: (q) => (/files\/maps\/texture\/0\/r\d+\/0001\.jpg/.test(q.path) ? {flip: 700} : undefined)});
+  try {
+    const r = await loaded({browser: b.browser, url: server.url}, null, `${server.url}/packages/files/maps.texmesh`, {load: kEverything});
+    check(!r.error, JSON.stringify(r.error));
+    check(r.state.planes.find((p) => p.base === 0).rungs[1] < 0, 'a damaged fragment is shown');
+    check(r.events.some((e) => e.name === 'error' && !e.fatal), 'no word of it');
+    await r.page.close();
+  } finally { await server.close(); }
+});
+
+test('a mirror takes over from a server that dies', async () => {
+  const b = await common();
+  const [first, second, pages] = [await serve(labRoots), await serve(labRoots), await serve(labRoots)];
+  const slow = await startLink({target: first.port, bytesPerSecond: 400000, rttMs: 20});
+  try {
+    const page = await labPage(b.browser, pages.url);
+    await lab(page, () => window.lab.start({size: 256}));
+    const id = await lab(page, ([u, m]) => window.lab.load(u, {open: {mirrors: [m], retries: 2, retryDelayS: 0.05}, load: {time: 1e9, scale: 0, rung: 99, fullSize: true, autoRefine: false}}),
+      [`${slow.url}/packages/large.texmesh`, `${second.url}/packages/large.texmesh`]);
+    await page.waitForFunction((i) => window.lab.report(i).events.some((e) => e.name === 'fragment'), id, {timeout: 30000});
+    await slow.die();
+    const r = await lab(page, (i) => window.lab.finished(i), id);
+    check(!r.error, JSON.stringify(r.error));
+    const d = await comparePlane(page, id, 0, 'large', kTopQuality);
+    check(d.most <= 3, `texture differs by ${d.most}`);
+    check(second.requests.length > 0, 'the mirror was not asked');
+    await page.close();
+  } finally {
+    slow.close();
+    await Promise.all([first, second, pages].map((s) => s.close()));
+  }
+}, {seconds: 90});
+
+test('twenty opens and closes leave nothing behind', async () => {
+  const b = await common();
+  const page = await labPage(b.browser, b.url);
+  await lab(page, () => window.lab.start({size: 256}));
+  const cycle = async () => {
+    const id = await lab(page, ([u, o]) => window.lab.load(u, {load: o}), [`${b.url}/packages/maps.texmesh`, kEverything]);
+    const r = await lab(page, (i) => window.lab.finished(i), id);
+    check(!r.error, JSON.stringify(r.error));
+    await lab(page, (i) => window.lab.dispose(i), id);
+    return lab(page, async () => { for (let i = 0; i < 3; i++) { window.gc(); await new Promise((f) => setTimeout(f, 20)); } return window.lab.memory(); });
+  };
+  await cycle();
+  await cycle(); // pools and compiled code have settled
+  const before = await cycle();
+  let after;
+  for (let i = 0; i < 20; i++) after = await cycle();
+  for (const what of ['geometries', 'textures', 'programs']) check(after[what] <= before[what], `${what}: ${before[what]} -> ${after[what]}`);
+  check(after.heap - before.heap < 4e6, `heap: ${before.heap} -> ${after.heap}`);
+  check(page.workers().length <= 12, `${page.workers().length} workers`);
+  await page.close();
+}, {seconds: 120});
+
+test('cancelling ends it at once', () => throttled({bytesPerSecond: 100000}, async (page, link, url) => {
+  const id = await lab(page, (u) => window.lab.load(u, {load: {time: 60}}), url);
+  await page.waitForFunction((i) => window.lab.report(i).events.some((e) => e.name === 'first-picture'), id, {timeout: 30000});
+  const start = Date.now();
+  await lab(page, (i) => window.lab.loads[i].model.cancel(), id);
+  const r = await lab(page, (i) => window.lab.finished(i), id);
+  check(Date.now() - start < 1500, `${Date.now() - start} ms`);
+  check(r.error?.name === 'AbortError' || r.state.phase === 'cancelled', JSON.stringify([r.error, r.state.phase]));
+  const sent = await link.sent();
+  await new Promise((f) => setTimeout(f, 700));
+  check(await link.sent() - sent < 30000, 'bytes still flow');
+}), {seconds: 60});
+
+test('scale and texture follow the display', async () => {
+  const b = await common();
+  const page = await labPage(b.browser, b.url);
+  await lab(page, () => window.lab.start({size: 512, zoom: 0.25}));
+  const id = await lab(page, (u) => window.lab.load(u, {load: {time: 2}}), `${b.url}/packages/large.texmesh`);
+  const far = await lab(page, (i) => window.lab.finished(i), id);
+  const bytes = far.state.bytes;
+  // Nearer: a finer scale, finer planes.
+  await lab(page, (i) => {
+    const {camera, centre, radius} = window.lab.stage();
+    camera.position.sub(centre).setLength(radius * 1.6).add(centre);
+    camera.updateMatrixWorld();
+    window.lab.loads[i].model.update(camera);
+  }, id);
+  await page.waitForFunction(([i, s]) => {
+    window.lab.loads[i].model.update(window.lab.stage().camera);
+    return window.lab.loads[i].model.state.scale < s;
+  }, [id, far.state.scale], {timeout: 20000});
+  await lab(page, (i) => window.lab.loads[i].model.refine(), id);
+  const near_ = await lab(page, (i) => window.lab.report(i), id);
+  check(near_.state.scale < far.state.scale, `S_${far.state.scale} -> S_${near_.state.scale}`);
+  check(near_.state.bytes > bytes, 'nothing more was fetched');
+  check(near_.state.planes[0].widthPx >= far.state.planes[0].widthPx, 'no finer plane');
+  await page.close();
+}, {seconds: 90});
+
+test('no frame is empty while scales and textures arrive', () => throttled({bytesPerSecond: 400000}, async (page, link, url) => {
+  const id = await lab(page, (u) => window.lab.load(u, {frames: 1, load: {time: 5, autoRefine: false}}), url);
+  const r = await lab(page, (i) => window.lab.finished(i), id);
+  check(!r.error, JSON.stringify(r.error));
+  const covered = await lab(page, (i) => window.lab.loads[i].frames.map((f) => {
+    let n = 0;
+    for (let k = 0; k < f.data.length; k += 4) n += Math.abs(f.data[k] - 128) + Math.abs(f.data[k + 1] - 128) + Math.abs(f.data[k + 2] - 128) > 12;
+    return n;
+  }), id);
+  const last = covered[covered.length - 1];
+  const first = covered.findIndex((n) => n > last / 2);
+  check(first >= 0 && covered.length > 5, `${covered.length} frames`);
+  // The coarsest scale's outline differs by a tenth.
+  for (const n of covered.slice(first)) near(n, last, last * 0.15, 'covered pixels of a frame');
+}), {seconds: 60});
+
+test('a model without textures', async () => {
+  const b = await common();
+  const r = await loaded(b, null, `${b.url}/packages/colours.texmesh`, {load: {time: 3}});
+  check(!r.error && r.state.planes.length === 0, JSON.stringify(r.error));
+  await r.page.close();
+});
+
+test('texmesh view serves a package that the client reads', async () => {
+  const b = await common();
+  const view = await startView(path.join(packages, 'maps.texmesh'));
+  try {
+    const r = await loaded(b, null, new URL('packages/maps.texmesh', view.url).href, {load: kEverything});
+    check(!r.error, JSON.stringify(r.error));
+    await r.page.close();
+  } finally { view.stop(); }
+});
+
+for (const [what, file] of [['no such package', 'none.texmesh'], ['something else', '../page/lab.mjs']]) {
+  test(`an error that says what is wrong: ${what}`, async () => {
+    const b = await common();
+    const r = await loaded(b, null, file.startsWith('..') ? `${b.url}/lab.mjs` : `${b.url}/packages/${file}`, {});
+    check(r.error && r.error.message.length > 10 && r.error.message.length < 400, JSON.stringify(r.error));
+    await r.page.close();
+  });
+}
+
+makePackages();
+const code = await runAll('web_browser');
+console.log(`pictures in ${pictures}`);
+await closeCommon();
+process.exit(code);

@@ -1,0 +1,174 @@
+// The viewer as people use it: its build in a folder of its own, the package somewhere beneath, a screenshot of every state.
+import {check, common, env, fs, listen, path, pictures, serve, startView, viewerRoots, packages} from './browser.mjs';
+import {test} from './harness.mjs';
+import {startLink} from './link.mjs';
+
+const kDesktop = {width: 1280, height: 800};
+const kPhone = {width: 390, height: 844};
+
+/** Opens the viewer on a package; `body` gets the page. Nothing may be said on the console, nothing asked of elsewhere. */
+async function withViewer(query, body, {viewport = kDesktop, dark = false, touch = false, quiet = true, fault, through} = {}) {
+  const {browser} = await common();
+  const server = await serve(viewerRoots, {fault});
+  const link = through ? await startLink({target: server.port, ...through}) : null;
+  const context = await browser.newContext({viewport, colorScheme: dark ? 'dark' : 'light', hasTouch: touch, deviceScaleFactor: touch ? 2 : 1});
+  const page = await context.newPage();
+  listen(page);
+  try {
+    const origin = link?.url ?? server.url;
+    await page.goto(`${origin}/some/where/index.html${query}`);
+    await body(page, server, link);
+    if (quiet) check(page.said.length === 0, page.said.join('\n'));
+    const elsewhere = page.wentTo.filter((u) => !u.startsWith(origin) && !/^(blob|data):/.test(u));
+    check(elsewhere.length === 0, `asked elsewhere: ${elsewhere.join(' ')}`);
+  } finally {
+    await context.close();
+    link?.close();
+    await server.close();
+  }
+}
+
+const shot = (page, name) => page.screenshot({path: path.join(pictures, `${name}.png`)});
+const phase = (page, name, timeout = 60000) => page.waitForFunction((p) => window.texmeshViewer?.session.live.phase === p, name, {timeout});
+const live = (page, f) => page.evaluate(`(${f})(window.texmeshViewer.session.live)`);
+const settled = (page) => page.waitForTimeout(400); // the panel draws a few times a second
+
+async function drawnShare(page) {
+  const png = await page.locator('#view').screenshot();
+  return png.length; // an empty picture is a few hundred bytes of PNG
+}
+
+for (const [name, options] of [
+  ['desktop', {}], ['desktop-dark', {dark: true}], ['phone', {viewport: kPhone, touch: true}], ['phone-dark', {viewport: kPhone, touch: true, dark: true}],
+]) {
+  test(`viewer: a package is shown (${name})`, () => withViewer('?pkg=packages/large.texmesh&time=3', async (page) => {
+    await phase(page, 'done');
+    await settled(page);
+    await shot(page, `viewer-${name}`);
+    const l = await live(page, (x) => ({scale: x.scale, bytes: x.bytes, first: x.firstPictureS, planes: x.tables.length}));
+    check(l.scale !== null && l.bytes > 10000 && l.first > 0 && l.planes > 0, JSON.stringify(l));
+    check(await drawnShare(page) > 8000, 'the picture is empty');
+    check(!(await page.evaluate(() => document.documentElement.scrollWidth > innerWidth)), 'wider than the screen');
+    check((await page.locator('#figure-scale').textContent()).startsWith('S'), 'no scale in the panel');
+    // Every plot with all sections open.
+    await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
+    await settled(page);
+    check(await page.locator('.plot canvas').count() >= 5, `${await page.locator('.plot canvas').count()} plots`);
+    await page.evaluate(() => { const p = document.getElementById('panel'); p.scrollTop = p.scrollHeight; });
+    await settled(page);
+    await shot(page, `viewer-${name}-plots`);
+  }, options), {seconds: 90});
+}
+
+test('viewer: fragments by importance, bytes and skipped', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+  await phase(page, 'done');
+  for (const by of ['η', 'bytes', 'skipped']) {
+    await page.getByRole('button', {name: by, exact: true}).click();
+    await settled(page);
+    await page.locator('.map').scrollIntoViewIfNeeded();
+    await page.locator('.map').screenshot({path: path.join(pictures, `map-${by === 'η' ? 'eta' : by}.png`)});
+  }
+  const box = await page.locator('.map canvas').boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  check(/fragment \d+/.test(await page.locator('.hint').textContent()), 'no word under the pointer');
+}));
+
+test('viewer: original and current side by side', () => withViewer('?pkg=packages/large.texmesh&time=1&scale=20', async (page) => {
+  await phase(page, 'done');
+  await page.locator('#split').click();
+  await page.waitForFunction(() => ['refining', 'done'].includes(window.texmeshViewer.session.original?.model.state.phase), null, {timeout: 60000});
+  await settled(page);
+  await shot(page, 'viewer-split');
+  await page.locator('#divider').focus();
+  await page.keyboard.press('ArrowLeft');
+  check(Number(await page.locator('#divider').getAttribute('aria-valuenow')) < 50, 'the border did not move');
+  await page.keyboard.press('s');
+  check(await page.locator('#divider').isHidden(), 'the border stays');
+}), {seconds: 90});
+
+test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+  await phase(page, 'done');
+  const eye = () => page.evaluate(() => window.texmeshViewer.stage.camera.position.toArray());
+  const differs = (a, b) => Math.hypot(...a.map((v, i) => v - b[i])) > 1e-4;
+  let before = await eye();
+  for (const key of ['ArrowLeft', 'ArrowUp', '+', '-', 'ArrowRight']) {
+    await page.locator('#view').press(key);
+    const after = await eye();
+    check(differs(before, after), `${key} does nothing`);
+    before = after;
+  }
+  const box = await page.locator('#view').boundingBox();
+  await page.mouse.move(box.x + 300, box.y + 300);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 420, box.y + 340, {steps: 4});
+  await page.mouse.up();
+  check(differs(before, await eye()), 'dragging does nothing');
+  await page.locator('#scale').selectOption({index: 1});
+  await page.waitForFunction(() => window.texmeshViewer.session.live.scale === 0, null, {timeout: 20000});
+  await page.keyboard.press('t');
+  check(await page.evaluate(() => document.documentElement.dataset.theme) !== undefined, 'no theme');
+  await page.locator('#toggle').click();
+  check(await page.locator('#panel').isHidden(), 'the panel stays');
+}), {seconds: 90});
+
+test('viewer: two fingers zoom', () => withViewer('?pkg=packages/maps.texmesh&time=2', async (page) => {
+  await phase(page, 'done');
+  const distance = () => page.evaluate(() => window.texmeshViewer.stage.camera.position.length());
+  const before = await distance();
+  const session = await page.context().newCDPSession(page);
+  const touch = (type, spread) => session.send('Input.dispatchTouchEvent', {type, touchPoints: spread === null ? [] : [{x: 195 - spread, y: 240, id: 0}, {x: 195 + spread, y: 240, id: 1}]});
+  await touch('touchStart', 30);
+  for (let s = 40; s <= 120; s += 20) await touch('touchMove', s);
+  await touch('touchEnd', null);
+  await page.waitForTimeout(300);
+  check(Math.abs(await distance() - before) > 1e-3, 'two fingers do nothing');
+}, {viewport: kPhone, touch: true}));
+
+test('viewer: a slow link shows progress, then the picture', () => withViewer('?pkg=packages/large.texmesh&time=4', async (page) => {
+  await page.waitForFunction(() => window.texmeshViewer?.session.live.scale !== null, null, {timeout: 60000});
+  check(await page.locator('#progress').isVisible(), 'no progress bar');
+  await shot(page, 'viewer-loading');
+  await phase(page, 'done');
+  await shot(page, 'viewer-loaded');
+}, {through: {bytesPerSecond: 400000, rttMs: 40}}), {seconds: 120});
+
+test('viewer: errors can be read', async () => {
+  for (const [name, query, text, options] of [
+    ['404', '?pkg=packages/none.texmesh', /no package here/i, {}],
+    ['no-package', '?pkg=index.html', /not a package/i, {}],
+    ['server-error', '?pkg=packages/maps.texmesh', /could not be loaded/i, {fault: (q) => (q.path.endsWith('.texmesh') ? {status: 500} : undefined)}],
+  ]) {
+    await withViewer(query, async (page) => {
+      await page.locator('#message').waitFor({state: 'visible', timeout: 20000});
+      await shot(page, `viewer-error-${name}`);
+      const said = await page.locator('#message').textContent();
+      check(text.test(said), `${name}: ${said}`);
+    }, {quiet: false, ...options});
+  }
+}, {seconds: 90});
+
+test('viewer: texmesh view of a folder offers its packages', async () => {
+  const {browser} = await common();
+  const view = await startView(packages);
+  const page = await browser.newPage({viewport: kDesktop});
+  listen(page);
+  try {
+    await page.goto(view.url);
+    await page.locator('#message a').first().waitFor();
+    await shot(page, 'viewer-packages');
+    await page.getByRole('link', {name: 'maps', exact: true}).click();
+    await phase(page, 'done');
+    check(page.said.length === 0, page.said.join('\n'));
+  } finally {
+    await page.close();
+    view.stop();
+  }
+}, {seconds: 60});
+
+test('viewer: the build names no other server and nothing outside its folder', async () => {
+  const files = fs.readdirSync(env.viewer, {recursive: true}).map((f) => path.join(env.viewer, String(f))).filter((f) => fs.statSync(f).isFile());
+  check(files.length >= 5, `${files.length} files`);
+  const page = fs.readFileSync(path.join(env.viewer, 'index.html'), 'utf8');
+  check(!/(src|href)="(\/|https?:)/.test(page), 'an absolute path in index.html');
+  check(files.some((f) => f.endsWith('draco_decoder.wasm')), 'no Draco decoder');
+});
