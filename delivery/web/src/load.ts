@@ -11,6 +11,9 @@ import type { TextureLoad } from './texture_load';
 import { selectScale, wholeObject } from './viewing';
 import { WorkerPool } from './worker_pool';
 
+/** Limits beyond are none: timers and plans end there. */
+const longestS = 1e5;
+
 /** Everything about one package in one scene; made by TexmeshPackage.load. */
 export class ModelLoad implements LoadedModel {
   readonly object = new Group();
@@ -64,7 +67,7 @@ export class ModelLoad implements LoadedModel {
       object,
       scales: new ScaleSource(reader, options, materials, pool, (slot) => this.textures_?.adopt(slot), fail),
       signal: this.abort_.signal,
-      limitS: options.time ?? 5,
+      limitS: (options.time ?? 5) > longestS ? Infinity : (options.time ?? 5),
       override: this.snapped_(options),
       view: { display: this.readDisplay_(options.camera), camera: options.camera },
       shownScale: -1,

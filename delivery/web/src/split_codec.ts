@@ -1,6 +1,8 @@
 import { FormatError } from './errors';
 import { BitDecoder, BitModels, ValueDecoder } from './split_coder';
+import { octahedralPlace, octahedralVector } from './octahedron';
 import { Corners, Fan, Growing, SplitMesh } from './split_mesh';
+import * as m from './split_models';
 
 /** Attributes as the codec sees them. */
 export interface CodedAttribute {
@@ -9,74 +11,12 @@ export interface CodedAttribute {
   bits: number;
 }
 
-const degrees = 14;
-const lefts = 12;
-const runs = 7;
-const rings = 8;
-const valences = 5;
-
-// Where the models of each kind begin: format/split_codec.h, SplitModels.
-let modelCount = 0;
-const block = (count: number): number => {
-  const at = modelCount;
-  modelCount += count;
-  return at;
-};
-const ask = block(degrees * 4 * 2 * 2);
-const first = block(lefts * 2);
-const turn = block(2 * 2 * lefts * valences);
-const turnBack = block(2 * 2 * runs * rings * valences);
-const turnAgain = block(4);
-const targetExpected = block(2);
-const targetCopied = block(2);
-const listedModel = block(1);
-const moreFaces = block(8);
-const flippedModel = block(1);
-const extraFace = block(1);
-const sameGroup = block(1);
-const besideMoving = block(3);
-const cornerExpected = block(6);
-const seedExists = block(1);
-const gateOpen = block(64);
-const thirdNew = block(64);
-const thirdLeft = block(64);
-const thirdRight = block(1);
-const patchExpected = block(4);
-
 const bitWidth = (value: number): number => (value === 0 ? 0 : 32 - Math.clz32(value));
 const roundedMean = (total: number, count: number): number => Math.trunc((2 * total + count) / (2 * count));
 
-/** A coordinate of the octahedron's vector, scaled to `centre`, rounded towards zero. */
-function scaled(value: number, centre: number, total: number): number {
-  const product = value * centre;
-  if (Math.abs(product) <= Number.MAX_SAFE_INTEGER) return Math.trunc(product / total);
-  return Number((BigInt(value) * BigInt(centre)) / BigInt(total));
-}
-/** A point of the octahedron |x| + |y| + |z| = 2^(bits - 1) - 1. */
-export function octahedralVector(u: number, v: number, bits: number): [number, number, number] {
-  const centre = 2 ** (bits - 1) - 1;
-  const x = u - centre;
-  const y = v - centre;
-  const z = centre - Math.abs(x) - Math.abs(y);
-  if (z >= 0) return [x, y, z];
-  return [(centre - Math.abs(y)) * (x < 0 ? -1 : 1), (centre - Math.abs(x)) * (y < 0 ? -1 : 1), z];
-}
-function octahedralPlace(sum: readonly number[], bits: number, out: number[]): void {
-  const centre = 2 ** (bits - 1) - 1;
-  const total = Math.abs(sum[0]) + Math.abs(sum[1]) + Math.abs(sum[2]);
-  out[0] = out[1] = centre;
-  if (total === 0) return;
-  let x = scaled(sum[0], centre, total);
-  let y = scaled(sum[1], centre, total);
-  if (sum[2] < 0)
-    [x, y] = [(centre - Math.abs(y)) * (x < 0 ? -1 : 1), (centre - Math.abs(x)) * (y < 0 ? -1 : 1)];
-  out[0] += x;
-  out[1] += y;
-}
-
 /** The reader's side of format/split_codec.h: the same walk, every decision read from the stream. */
 export class SplitCodec {
-  private readonly models_ = new BitModels(modelCount, 200);
+  private readonly models_ = new BitModels(m.modelCount, 200);
   private bits_ = new BitDecoder(new Uint8Array(0));
   private work_ = 0;
   private readonly queue_: number[] = [];
@@ -134,8 +74,8 @@ export class SplitCodec {
       this.queued_.data[v] = 0;
       this.spend_(1);
       const asks = this.asks_.data[v];
-      const degree = Math.min(this.mesh_.degree.data[v], degrees - 1);
-      const model = ask + ((degree * 4 + (asks & 3)) * 2 + ((asks >> 2) & 1)) * 2 + (this.lastAnswer_ ? 1 : 0);
+      const degree = Math.min(this.mesh_.degree.data[v], m.degrees - 1);
+      const model = m.ask + ((degree * 4 + (asks & 3)) * 2 + ((asks >> 2) & 1)) * 2 + (this.lastAnswer_ ? 1 : 0);
       this.lastAnswer_ = this.bit_(model);
       if (!this.lastAnswer_) {
         if ((asks & 3) < 3) this.asks_.data[v] = asks + 1;
@@ -200,7 +140,7 @@ export class SplitCodec {
     return this.mesh_.addFace(w0, w1, w2, group);
   }
   private codeGroup_(beside: number): number {
-    if (beside >= 0 && this.bit_(sameGroup)) return this.mesh_.faceGroup.data[beside];
+    if (beside >= 0 && this.bit_(m.sameGroup)) return this.mesh_.faceGroup.data[beside];
     return this.number_(this.groups_);
   }
   private number_(count: number): number {
@@ -212,7 +152,7 @@ export class SplitCodec {
   private takes_(w: number): boolean {
     if (this.listed_.data[w] === this.now_) return false;
     this.listed_.data[w] = this.now_;
-    return this.bit_(listedModel);
+    return this.bit_(m.listedModel);
   }
   private listedWedge_(point: number): number {
     if (point === this.parent_)
@@ -269,7 +209,7 @@ export class SplitCodec {
     for (let i = 0; i < corners.count; ++i) if (corners.moves[i]) this.codeTarget_(i);
     mesh.distribute(v, u, corners);
     for (let f = 0; f < fans.length; ++f) this.codeNewFaces_(fans[f]);
-    while (this.bit_(extraFace)) this.codeExtraFace_();
+    while (this.bit_(m.extraFace)) this.codeExtraFace_();
     this.predictPoint_(u);
     this.codeFreshValues_();
     this.parent_ = this.child_ = -1;
@@ -298,14 +238,14 @@ export class SplitCodec {
       const c = fan.begin + i;
       const side = 2 * open + (moving ? 1 : 0);
       let turned = false;
-      if (i === 0) moving = this.bit_(first + Math.min(n, lefts - 1) * 2 + (fanNumber > 0 ? 1 : 0));
+      if (i === 0) moving = this.bit_(m.first + Math.min(n, m.lefts - 1) * 2 + (fanNumber > 0 ? 1 : 0));
       else if (turns === 0) {
-        const left = Math.min(n - i, lefts - 1);
-        turned = this.bit_(turn + (side * lefts + left) * valences + this.valence_(corners.a[c]));
+        const left = Math.min(n - i, m.lefts - 1);
+        turned = this.bit_(m.turn + (side * m.lefts + left) * m.valences + this.valence_(corners.a[c]));
       } else if (turns === 1) {
-        const long = Math.min(run, runs) - 1;
-        turned = this.bit_(turnBack + ((side * runs + long) * rings + ring) * valences + this.valence_(corners.a[c]));
-      } else turned = this.bit_(turnAgain + side);
+        const long = Math.min(run, m.runs) - 1;
+        turned = this.bit_(m.turnBack + ((side * m.runs + long) * m.rings + ring) * m.valences + this.valence_(corners.a[c]));
+      } else turned = this.bit_(m.turnAgain + side);
       if (turned) {
         moving = !moving;
         ++turns;
@@ -331,12 +271,12 @@ export class SplitCodec {
     const wedge = this.corners_.wedge[i];
     const known = this.mapped_.data[wedge] === this.splitNumber_;
     const expected = known ? this.mapTarget_.data[wedge] : -1;
-    const asExpected = this.bit_(targetExpected + (known ? 1 : 0));
+    const asExpected = this.bit_(m.targetExpected + (known ? 1 : 0));
     let target = -1;
     if (asExpected && known) target = expected;
     else if (!asExpected)
       for (const w of this.childWedges_)
-        if (w !== expected && this.bit_(listedModel)) {
+        if (w !== expected && this.bit_(m.listedModel)) {
           target = w;
           break;
         }
@@ -349,7 +289,7 @@ export class SplitCodec {
   }
   private newTarget_(wedge: number): number {
     const lost = this.stays_.data[wedge] !== this.staysNow_;
-    const copied = this.bit_(targetCopied + (lost ? 1 : 0));
+    const copied = this.bit_(m.targetCopied + (lost ? 1 : 0));
     const w = this.addWedge_(this.child_, !copied);
     if (copied) this.mesh_.copyValues(wedge, w);
     this.childWedges_.push(w);
@@ -373,7 +313,7 @@ export class SplitCodec {
     const x = next >= 0 ? corners.a[c] : corners.b[c];
     const inside = last >= 0 && next >= 0;
     const kind = inside ? (corners.moves[last] !== corners.moves[next] ? 1 : 0) : corners.moves[c] ? 3 : 2;
-    for (let n = 0; this.bit_(moreFaces + 2 * kind + Math.min(n, 1)); ++n) {
+    for (let n = 0; this.bit_(m.moreFaces + 2 * kind + Math.min(n, 1)); ++n) {
       this.spend_(1);
       this.codeFace_(x, last, next);
     }
@@ -382,7 +322,7 @@ export class SplitCodec {
   private codeFace_(x: number, last: number, next: number): void {
     const { corners_: corners, mesh_: mesh } = this;
     const usual = next >= 0 ? corners.moves[next] : !corners.moves[last];
-    const flipped = this.bit_(flippedModel);
+    const flipped = this.bit_(m.flippedModel);
     let moving = -1;
     let staying = -1;
     for (const i of [next, last]) {
@@ -401,7 +341,7 @@ export class SplitCodec {
       const far = mx !== sx;
       if (wedge || far) {
         seam = 1;
-        beside = this.bit_(besideMoving + (wedge && far ? 2 : far ? 1 : 0));
+        beside = this.bit_(m.besideMoving + (wedge && far ? 2 : far ? 1 : 0));
       }
     }
     const corner = beside ? moving : staying;
@@ -426,9 +366,9 @@ export class SplitCodec {
     seam: number,
     beside: number,
   ): void {
-    const v = this.codeWedge_(expectedParent, cornerExpected + seam, this.parent_);
-    const u = this.codeWedge_(expectedChild, cornerExpected + 2 + seam, this.child_);
-    const w = this.codeWedge_(expectedThird, cornerExpected + 4 + seam, x);
+    const v = this.codeWedge_(expectedParent, m.cornerExpected + seam, this.parent_);
+    const u = this.codeWedge_(expectedChild, m.cornerExpected + 2 + seam, this.child_);
+    const w = this.codeWedge_(expectedThird, m.cornerExpected + 4 + seam, x);
     const group = this.codeGroup_(beside);
     if (forward) this.addFace_(v, w, u, group);
     else this.addFace_(v, u, w, group);
@@ -441,11 +381,11 @@ export class SplitCodec {
     const points: number[] = [];
     const wedges: number[] = [];
     for (let k = 0; k < 3; ++k) {
-      if (this.mesh_.points > 0 && this.bit_(seedExists)) {
+      if (this.mesh_.points > 0 && this.bit_(m.seedExists)) {
         const p = this.number_(this.mesh_.points);
         if (k > 0 && (p === points[0] || p === points[k - 1])) this.fail_('three points of a face', 'two');
         points.push(p);
-        wedges.push(this.codeWedge_(-1, listedModel, p));
+        wedges.push(this.codeWedge_(-1, m.listedModel, p));
       } else {
         const before = k > 0 ? points[0] : this.mesh_.points - 1;
         for (let i = 0; i < 3; ++i) this.guess_[i] = before < 0 ? 0 : this.mesh_.places.data[3 * before + i];
@@ -492,10 +432,10 @@ export class SplitCodec {
     const r = atB.begin;
     const right = { a: corners.a[r], wedge: mesh.wedgeAt(corners.face[r], corners.corner[r] + 1) };
     const fans = 8 * sizeA + sizeB;
-    if (!this.bit_(gateOpen + fans)) return false;
+    if (!this.bit_(m.gateOpen + fans)) return false;
     this.fresh_.length = 0;
-    const newB = this.codeWedge_(wb, patchExpected, b);
-    const newA = this.codeWedge_(wa, patchExpected + 1, a);
+    const newB = this.codeWedge_(wb, m.patchExpected, b);
+    const newA = this.codeWedge_(wa, m.patchExpected + 1, a);
     const c = this.codeThird_(a, b, d, left, right, fans);
     this.finishPatchFace_(newB, newA, c, face);
     return true;
@@ -509,16 +449,16 @@ export class SplitCodec {
     fans: number,
   ): number {
     const places = this.mesh_.places.data;
-    if (this.bit_(thirdNew + fans)) {
+    if (this.bit_(m.thirdNew + fans)) {
       for (let k = 0; k < 3; ++k) this.guess_[k] = places[3 * a + k] + places[3 * b + k] - places[3 * d + k];
       return this.addWedge_(this.newPatchPoint_(), true);
     }
-    if (left.b !== b && this.bit_(thirdLeft + fans)) return this.codeWedge_(left.wedge, patchExpected + 2, left.b);
-    if (right.a !== a && right.a !== left.b && this.bit_(thirdRight))
-      return this.codeWedge_(right.wedge, patchExpected + 3, right.a);
+    if (left.b !== b && this.bit_(m.thirdLeft + fans)) return this.codeWedge_(left.wedge, m.patchExpected + 2, left.b);
+    if (right.a !== a && right.a !== left.b && this.bit_(m.thirdRight))
+      return this.codeWedge_(right.wedge, m.patchExpected + 3, right.a);
     const p = this.number_(this.mesh_.points);
     if (p === a || p === b) this.fail_('three points of a face', 'two');
-    return this.codeWedge_(-1, listedModel, p);
+    return this.codeWedge_(-1, m.listedModel, p);
   }
 
   // ---- values

@@ -1,4 +1,4 @@
-import { octahedralVector } from './split_codec';
+import { octahedralVector } from './octahedron';
 import type { SplitGrid, SplitStreamHead, SplitStreamReader } from './split_stream';
 import type { SplitInfo, SplitUpdate } from './worker_protocol';
 

@@ -6,11 +6,12 @@ import {
 } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
-import { isAbort, nowS, sleepS, throwIfAborted } from './http';
+import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import { chooseScale } from './scale_choice';
 import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
+import { TimedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
 import { upgradesInOrder } from './upgrades';
 import { selectScale } from './viewing';
@@ -115,7 +116,10 @@ export class TextureLoad {
       return this.planesFor_(data);
     const bytes = this.textureBytes_(scale);
     let best: TextureBudget | undefined;
-    for (best of budgetSteps(data, this.load_.view.display.heightPx, { scale }, bytes)) await sleepS(0);
+    for (best of budgetSteps(data, this.load_.view.display.heightPx, { scale }, bytes)) {
+      await sleepS(0); // the page goes on meanwhile
+      throwIfAborted(this.load_.signal);
+    }
     return best!.planes;
   }
   /** Bytes that the time leaves for textures when this scale is loaded. */
@@ -237,70 +241,28 @@ export class TextureLoad {
     throwIfAborted(this.load_.signal);
   }
 
-  /** Harmonic Time Compensation: fragment by fragment, so that the last one comes at the limit. */
+  /** Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
   private async fetchInTime_(fragments: FragmentList, limitS: number): Promise<void> {
     const { policy, order, beta0BytesS } = this.load_.options;
-    const { client } = this.load_.reader;
+    const { latencyS } = this.load_.reader.client;
     const defaults = defaultHtcOptions();
     const beta0 = beta0BytesS || this.load_.beta0;
-    const list = groupedList(fragments, this.wholeRungs_ ? Infinity : groupBytes(beta0, client.latencyS, limitS), beta0 * limitS);
+    const bytesEach = this.wholeRungs_ ? Infinity : groupBytes(beta0, latencyS, limitS);
+    const list = groupedList(fragments, bytesEach, beta0 * limitS);
     const plan = new HarmonicTimePlan(list.offers, {
       ...defaults,
       policy: policy ?? 'guard',
       order: order ?? 'credit',
       timeLimitS: limitS,
-      rttS: client.latencyS,
+      rttS: latencyS,
       throughput: { ...defaults.throughput, initialBytesS: Math.max(1, beta0) },
     });
     this.plan_ = plan;
-    const t0 = nowS();
-    const waiting = new Map<number, number>(); // by offer: fragments of it that have not ended
-    const tooLate = new AbortController();
-    const stop = (): void => tooLate.abort();
-    this.load_.signal.addEventListener('abort', stop);
-    const timer = setTimeout(stop, (limitS + mostLate * this.load_.limitS) * 1000);
-    let told = 0;
-    try {
-      await new Promise<void>((finished, failed) => {
-        const end = (wish: Wish, well: boolean): void => {
-          const left = (waiting.get(wish.offer) ?? 1) - 1;
-          waiting.set(wish.offer, left);
-          if (left > 0) return;
-          const at = nowS() - t0;
-          if (well) plan.completed(wish.offer, at);
-          else plan.failed(wish.offer, at);
-          const step = plan.steps.find((s) => s.offer === wish.offer);
-          if (step) this.tell_(list, step);
-          queueMicrotask(pump);
-        };
-        const pump = (): void => {
-          if (this.load_.signal.aborted) return failed(new DOMException('The load was cancelled', 'AbortError'));
-          const wishes: Wish[] = [];
-          for (let step = plan.next(nowS() - t0); step; step = plan.next(nowS() - t0)) {
-            const { offer, rung } = step;
-            const own = list.groups[offer].map((f) => ({ ...f, rung, offer }));
-            waiting.set(step.offer, own.length);
-            wishes.push(...own);
-          }
-          while (told < plan.steps.length) this.tell_(list, plan.steps[told++]);
-          if (wishes.length > 0)
-            void this.transfers_!.fetch(
-              wishes,
-              { gapBytes: 0, mostBytes: Infinity, signal: tooLate.signal },
-              (w) => end(w, true),
-              (w, error) => {
-                this.lost_(w, error);
-                end(w, false);
-              },
-            );
-          if (plan.finished) finished();
-        };
-        pump();
-      });
-    } finally {
-      clearTimeout(timer);
-      this.load_.signal.removeEventListener('abort', stop);
-    }
+    const fetch = new TimedFetch(plan, list, this.transfers_!, this.load_.signal, {
+      decided: (step) => this.tell_(list, step),
+      lost: (wish, error) => this.lost_(wish, error),
+    });
+    await fetch.run(limitS + mostLate * this.load_.limitS);
   }
   private tell_(list: GroupedList, s: HtcStep): void {
     this.load_.emit('decision', {

@@ -58,7 +58,7 @@ export interface GroupOptions {
 export class Transfers {
   private readonly planes_ = new Map<number, PlaneFiles>();
   private readonly held_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
-  private decoding_ = 0;
+  private underWay_ = 0; // requests and decodes
 
   constructor(
     private readonly reader_: PackageReader,
@@ -67,9 +67,9 @@ export class Transfers {
     private readonly hooks_: TransferHooks,
   ) {}
 
-  /** Fragments being decoded. */
+  /** Requests and fragments being decoded. */
   get pending(): number {
-    return this.decoding_;
+    return this.underWay_;
   }
   /** Must have been called for the planes of all wishes. */
   async prepare(planes: readonly number[]): Promise<void> {
@@ -101,12 +101,17 @@ export class Transfers {
     arrived: (wish: Wish) => void,
     failed: (wish: Wish, error: unknown) => void,
   ): Promise<void> {
-    const files = wishes.filter((w) => this.filesOf(w.plane).complete);
-    const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, arrived));
-    await Promise.all([
-      ...files.map((w) => this.fetchFile_(w, options, arrived, failed)),
-      ...groupsOf(parts, options).map((g) => this.fetchGroup_(g, options, arrived, failed)),
-    ]);
+    ++this.underWay_; // what has arrived is not decoded before its request has ended
+    try {
+      const files = wishes.filter((w) => this.filesOf(w.plane).complete);
+      const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, arrived));
+      await Promise.all([
+        ...files.map((w) => this.fetchFile_(w, options, arrived, failed)),
+        ...groupsOf(parts, options).map((g) => this.fetchGroup_(g, options, arrived, failed)),
+      ]);
+    } finally {
+      --this.underWay_;
+    }
   }
 
   private partsOf_(wish: Wish, arrived: (wish: Wish) => void): Part[] {
@@ -185,7 +190,7 @@ export class Transfers {
 
   private async decode_(job: Job): Promise<void> {
     const { plane, fragment } = job.wish;
-    ++this.decoding_;
+    ++this.underWay_;
     try {
       try {
         this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
@@ -202,7 +207,7 @@ export class Transfers {
     } catch (error) {
       this.hooks_.lost(job.wish, error);
     } finally {
-      --this.decoding_;
+      --this.underWay_;
     }
   }
   private async decodeStreams_(job: Job): Promise<Levels> {

@@ -1,7 +1,10 @@
 import { describe, expect, it } from 'vitest';
-import { FormatError, FragmentList, PackageReader, fragmentList, fullSize } from '../src/reader';
+import {
+  FormatError, FragmentList, HarmonicTimePlan, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize,
+} from '../src/reader';
 import { chooseScale } from '../src/scale_choice';
 import { groupBytes, groupedList, throughputOf } from '../src/groups';
+import { TimedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
 import { WorkerPool } from '../src/worker_pool';
 import { packError } from '../src/worker';
@@ -127,6 +130,44 @@ describe('groups', () => {
       { ...record, started: 0.5, firstByte: 0.6, ended: 1.1, received: 100e3 },
     ];
     expect(throughputOf(requests, 0.1)).toBeCloseTo(200e3);
+  });
+});
+
+describe('a timed fetch', () => {
+  async function fetchInTime(fault: Fault | undefined, mostS: number, signal = new AbortController().signal) {
+    const s = await setUp(fault);
+    const list = groupedList(s.list, 2000, 60000);
+    const plan = new HarmonicTimePlan(list.offers, { ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 });
+    const ended: HtcStep[] = [];
+    const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
+    const fetch = new TimedFetch(plan, list, s.transfers, signal, { decided, lost: () => undefined });
+    const run = fetch.run(mostS);
+    return { ...s, list, plan, ended, run };
+  }
+  it('ends when every offer was decided and has come', async () => {
+    const t = await fetchInTime(undefined, 10);
+    await t.run;
+    await t.settled();
+    expect(t.plan.finished).toBe(true);
+    const rungs = t.plan.rungs();
+    const wanted = t.list.groups.flatMap((g, i) => (rungs[i] < 0 ? [] : g));
+    expect(t.decoded.length).toBe(wanted.length);
+    expect(bytesAskedTwice(t.server.log, url)).toBe(0);
+    expect(new Set(t.ended.map((step) => step.offer)).size).toBe(t.list.offers.length);
+  });
+  it('gives up what does not come', async () => {
+    const t = await fetchInTime(({ range }) => range !== undefined && range[0] > 100000 && 'stall', 0.3);
+    const begin = performance.now();
+    await t.run;
+    expect(performance.now() - begin).toBeLessThan(3000);
+    expect(t.plan.finished).toBe(true);
+    expect(t.plan.rungs()).toContain(-1);
+  });
+  it('can be cancelled', async () => {
+    const abort = new AbortController();
+    const t = await fetchInTime(() => false, 10, abort.signal);
+    abort.abort();
+    await expect(t.run).rejects.toThrow('cancelled');
   });
 });
 
