@@ -1,0 +1,151 @@
+import {
+  BoxGeometry, BufferGeometry, Group, Material, Mesh, MeshStandardMaterial, OrthographicCamera, PerspectiveCamera, SphereGeometry,
+  Vector2, WebGLRenderer,
+} from 'three';
+import { describe, expect, it } from 'vitest';
+import { displayOf } from '../src/camera';
+import { Emitter } from '../src/events';
+import { Manifest, PackageReader, displayedHeightPx, selectScale } from '../src/reader';
+import { MaterialSet, ParsedGltf } from '../src/scale_parts';
+import { SplitShapes } from '../src/split_shape';
+import { VisibleSurface } from '../src/visibility';
+import { handle } from '../src/worker';
+import { WorkerPool } from '../src/worker_pool';
+import { golden } from './support';
+
+const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+const { manifest } = reader;
+const renderer = (width: number, height: number): WebGLRenderer =>
+  ({ getDrawingBufferSize: (v: Vector2) => v.set(width, height) }) as unknown as WebGLRenderer;
+
+function lookAt(m: Manifest, heights: number, camera = new PerspectiveCamera(45, 1, 0.001, 100)): PerspectiveCamera {
+  const middle = m.boundsMin.map((least, i) => (least + m.boundsMax[i]) / 2);
+  camera.position.set(middle[0], middle[1], middle[2] + heights * m.objectHeight);
+  camera.lookAt(middle[0], middle[1], middle[2]);
+  camera.updateMatrixWorld();
+  return camera;
+}
+
+describe('the display', () => {
+  const object = new Group();
+  it('is what the camera makes of the object, in device pixels', () => {
+    const whole = displayOf(manifest, object, lookAt(manifest, 3), renderer(800, 600));
+    const expected = displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight, { fovDegrees: 45, viewportPx: 600 });
+    expect(whole.heightPx).toBeCloseTo(expected, 3);
+    expect(whole.part?.clipped).toBe(false);
+    const twice = displayOf(manifest, object, lookAt(manifest, 3), renderer(1600, 1200));
+    expect(twice.heightPx).toBeCloseTo(2 * expected, 3);
+  });
+  it('grows with the object', () => {
+    const large = new Group();
+    large.scale.setScalar(2);
+    const camera = lookAt(manifest, 30);
+    const small = displayOf(manifest, object, camera, renderer(800, 600)).heightPx;
+    expect(displayOf(manifest, large, camera, renderer(800, 600)).heightPx / small).toBeCloseTo(2, 1);
+  });
+  it('knows what is cut off, and what is not to be seen at all', () => {
+    const near = displayOf(manifest, object, lookAt(manifest, 0.7), renderer(800, 600));
+    expect(near.part).toMatchObject({ clipped: true });
+    const away = lookAt(manifest, 3);
+    away.rotateY(Math.PI / 3);
+    away.updateMatrixWorld();
+    const gone = displayOf(manifest, object, away, renderer(800, 600));
+    expect(gone.part).toEqual({ widthPx: 0, heightPx: 0, clipped: true });
+    expect(selectScale(manifest, gone.heightPx, gone.part)).toBe(manifest.scales.at(-1)!.scale);
+  });
+  it('of an orthographic camera has nothing to do with distance', () => {
+    const camera = new OrthographicCamera(-1, 1, 1, -1, 0, 100);
+    camera.position.z = 10;
+    camera.updateMatrixWorld();
+    expect(displayOf(manifest, object, camera, renderer(800, 600)).heightPx).toBeCloseTo(manifest.objectHeight * 300, 3);
+  });
+});
+
+describe('the visible surface', () => {
+  const sphere = new Mesh(new SphereGeometry(1, 64, 32), new MeshStandardMaterial());
+  const root = new Group().add(sphere);
+  const surface = new VisibleSurface(root, [sphere], () => new Set([7]));
+  const camera = new PerspectiveCamera(45, 1, 0.1, 100);
+  camera.position.set(0, 0, 5);
+  camera.lookAt(0, 0, 0);
+  camera.updateMatrixWorld();
+  it('is what is turned to the camera', () => {
+    const seen = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    // u runs from -x over +z, +x to -z: the camera at +z sees the quarters around it.
+    expect(seen[0]).toBeGreaterThan(0.2);
+    expect(seen[1]).toBeGreaterThan(0.2);
+    expect(seen[0] + seen[1]).toBeGreaterThan(2.5 * (seen[2] + seen[3]));
+  });
+  it('ends at the border of the view', () => {
+    const away = camera.clone();
+    away.lookAt(5, 0, 5);
+    away.updateMatrixWorld();
+    expect(Math.max(...surface.ofImage(7, 4, 1, away, root, [0.25, 1]))).toBe(0);
+  });
+});
+
+describe('scales out of the vertex-split stream', () => {
+  const material = new MeshStandardMaterial();
+  const gltf: ParsedGltf = {
+    scene: new Group().add(new Mesh(new BoxGeometry(), material)),
+    parser: {
+      json: { materials: [{}] },
+      associations: new Map([[material, { materials: 0 }]]),
+      getDependency: () => Promise.resolve(material),
+      assignFinalMaterial: () => undefined,
+    },
+  };
+  async function shapes() {
+    const fromMemory = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+    const splits = new SplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined);
+    const { signal } = new AbortController();
+    await splits.open(signal);
+    return { splits, signal };
+  }
+  it('have the triangles and bounds of the manifest', async () => {
+    const { splits, signal } = await shapes();
+    const passed = new Map<number, Mesh>();
+    let arrived = 0;
+    const finest = await splits.load(0, gltf, signal, () => ++arrived, (scale, mesh) => passed.set(scale, mesh));
+    expect(arrived).toBe(1);
+    expect([...passed.keys()]).toEqual([1, 0]);
+    for (const s of manifest.scales) expect(passed.get(s.scale)!.geometry.index!.count / 3).toBe(s.triangles);
+    finest.geometry.computeBoundingBox();
+    const box = finest.geometry.boundingBox!;
+    const slack = manifest.objectHeight * 5e-3; // the grid of positions
+    box.min.toArray().forEach((v, i) => expect(Math.abs(v - manifest.boundsMin[i])).toBeLessThan(slack));
+    box.max.toArray().forEach((v, i) => expect(Math.abs(v - manifest.boundsMax[i])).toBeLessThan(slack));
+    expect(finest.material as Material).toBe(material);
+    expect(passed.get(1)!.geometry.getAttribute('position')).toBe(finest.geometry.getAttribute('position'));
+  });
+  it('a scale that is there costs nothing', async () => {
+    const { splits, signal } = await shapes();
+    const none = (): void => undefined;
+    const coarse = await splits.load(1, gltf, signal, none, none);
+    const positions = [...(coarse.geometry.getAttribute('position').array as Float32Array).slice(0, 30)];
+    await splits.load(0, gltf, signal, none, none);
+    expect([...(coarse.geometry.getAttribute('position').array as Float32Array).slice(0, 30)]).toEqual(positions);
+    expect(await splits.load(1, gltf, signal, none, none)).toBe(coarse);
+    expect(splits.bytesOf(0)).toBe(0);
+    let disposed = 0;
+    (coarse.geometry as BufferGeometry).addEventListener('dispose', () => ++disposed);
+    splits.dispose();
+    expect(disposed).toBe(1);
+  });
+});
+
+it('a listener that throws does not keep others from hearing', () => {
+  const events = new Emitter<{ done: { at: number } }>();
+  const heard: number[] = [];
+  const error = console.error;
+  console.error = () => undefined;
+  events.on('done', () => {
+    throw new Error('mine');
+  });
+  const off = events.on('done', ({ at }) => heard.push(at));
+  events.emit('done', {});
+  off();
+  events.emit('done', {});
+  console.error = error;
+  expect(heard.length).toBe(1);
+});
