@@ -9,10 +9,16 @@
 namespace texmesh {
 namespace {
 
-constexpr double kWindowFactor = 1.5;  // of throughput x round trip
+constexpr double kWindowFactor = 1.5;     // of throughput x round trip
+constexpr std::size_t kTripSamples = 64;  // a window that follows every swing makes them worse
 constexpr std::size_t kWindowSamples = 10, kGuardSamples = 20;
 constexpr double kLargestExponent = 12;  // of kPrice's factor: 1.6e5 either way
-constexpr double kLateFactor = 1.5;      // what is asked for may take this much longer than is left
+// A stall that is over looks like a slow link until something has been transferred: what is skipped on such
+// evidence is lost for good.
+constexpr int kMostSkipsInARow = 1;
+constexpr double kElasticity = 2.5;  // of the price by bytes, on ladders of photographs
+constexpr double kSpareExponent = 1;
+constexpr double kLateFactor = 1.5;  // what is asked for may take this much longer than is left
 
 void require(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
@@ -78,6 +84,9 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
     smallest_left_ += f.bytes[lowest(f, options_.hard_limits)];
   }
   planned_left_ = planned_total_;
+  // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
+  // next; with one request at a time every fragment has a round trip of its own.
+  if (options_.window != 1) latency_s_ = std::min(options_.rtt_s, options_.time_limit_s / 2);
   if (options_.policy == Policy::kPrice) plan_prices();
 }
 
@@ -113,15 +122,22 @@ double HarmonicTimePlan::throughput_bytes_s() const {
   return throughput_.bytes_s();
 }
 
-bool HarmonicTimePlan::window_open() const {
+bool HarmonicTimePlan::window_open(double now_s) const {
   if (options_.window > 0) return in_flight_ < static_cast<std::uint32_t>(options_.window);
   if (in_flight_ < 2) return true;
   if (in_flight_ >= static_cast<std::uint32_t>(options_.max_in_flight)) return false;
-  return in_flight_bytes_ < kWindowFactor * throughput_.recent_bytes_s(kWindowSamples) * options_.rtt_s;
+  // What is in flight takes all the time that is left: what is asked for now could only be late.
+  const double left_s = options_.time_limit_s - now_s;
+  if (left_s > latency_s_ && room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s) <= 0) return false;
+  // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there
+  // is little time, and those are received side by side and late.
+  const double fragment_bytes = planned_total_ / static_cast<double>(offers_.size());
+  const double trip_bytes = throughput_.recent_bytes_s(kTripSamples) * options_.rtt_s;
+  return in_flight_ < 2 + kWindowFactor * trip_bytes / fragment_bytes;
 }
 
 const HtcStep* HarmonicTimePlan::next(double now_s) {
-  while (!all_issued() && window_open()) {
+  while (!all_issued() && window_open(now_s)) {
     const std::size_t position = steps_.size() + 1;
     const double credit = credit_at(position);
     const std::uint32_t offer = choose_offer(credit);
@@ -143,9 +159,12 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
       HtcStep& skipped = steps_.back();
       skipped.done_s = now_s;
       skipped.residual_s = skipped.theta_s;
+      ++skips_in_a_row_;
       spread(skipped.residual_s);
       continue;
     }
+    skips_in_a_row_ = 0;
+    waiting_.push_back(steps_.size() - 1);
     ++in_flight_;
     in_flight_bytes_ += step.bytes;
     return &steps_.back();
@@ -177,7 +196,7 @@ void HarmonicTimePlan::take(std::uint32_t offer) {
 }
 
 double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
-  return options_.time_limit_s * (offers_[offer].planned_bytes / planned_total_);
+  return (options_.time_limit_s - latency_s_) * (offers_[offer].planned_bytes / planned_total_);
 }
 
 // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -197,11 +216,17 @@ void HarmonicTimePlan::spread(double residual_s) {
   credits_.push_back({residual_s / zeta, issued});
 }
 
+/// Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip
+/// later, whether or not enough is in flight until then.
+double HarmonicTimePlan::room_bytes(double beta, double now_s) const {
+  const double left_s = options_.time_limit_s - now_s;
+  return std::max(0.0, std::min(beta * left_s - in_flight_bytes_, beta * (left_s - latency_s_)));
+}
+
 /// What a plan in proportion to the planned sizes gives, as a factor of them.
 double HarmonicTimePlan::proportional_share(double now_s, std::size_t samples) const {
   const double beta = samples ? throughput_.recent_bytes_s(samples) : throughput_bytes_s();
-  const double room = beta * (options_.time_limit_s - now_s) - in_flight_bytes_;
-  return std::max(0.0, room) / std::max(planned_left_, 1.0);
+  return room_bytes(beta, now_s) / std::max(planned_left_, 1.0);
 }
 
 double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double now_s) const {
@@ -227,17 +252,18 @@ double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double n
 
 bool HarmonicTimePlan::may_skip(double now_s) const {
   if (options_.hard_limits) return false;
+  if (options_.time_limit_s - now_s <= latency_s_) return true;  // it could not arrive in time
+  if (skips_in_a_row_ >= kMostSkipsInARow) return false;
   if (options_.policy == Policy::kHtc || options_.policy == Policy::kStatic) return true;
-  const double room = throughput_.recent_bytes_s(kWindowSamples) * (options_.time_limit_s - now_s);
-  return smallest_left_ > room - in_flight_bytes_;
+  return smallest_left_ > room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
 }
 
 std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
   const FragmentOffer& f = offers_[offer];
   const bool skip = may_skip(now_s);
   if (options_.policy != Policy::kPrice) return nearest_rung_of(f, target, skip);
-  const double room = throughput_.recent_bytes_s(kWindowSamples) * (options_.time_limit_s - now_s);
-  return cheapest_rung_of(f, price_at(now_s), skip, std::max(0.0, kLateFactor * room - in_flight_bytes_));
+  const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+  return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
 }
 
 std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool may_skip) const {
@@ -266,12 +292,21 @@ std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double p
   return best;
 }
 
+// A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
+double HarmonicTimePlan::most_exponent(double left_s) const {
+  const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), options_.time_limit_s - left_s);
+  const double ratio = (price_total_ - price_done_) / std::max(room, 1.0);
+  const double enough = kSpareExponent + kElasticity * portable::log(std::max(ratio, 1.0));
+  return std::min(enough, kLargestExponent);
+}
+
 double HarmonicTimePlan::price_at(double now_s) const {
   const double planned_s = price_total_ > 0 ? options_.time_limit_s * (price_done_ / price_total_) : 0;
   // What is in flight has been issued but not paid for yet.
   const double lag = now_s - (planned_s - in_flight_bytes_ / throughput_bytes_s());
   const double left = std::max(options_.time_limit_s - now_s, 1e-3 * options_.time_limit_s);
-  const double exponent = std::clamp(options_.price_kappa * lag / left, -kLargestExponent, kLargestExponent);
+  const double exponent =
+      std::clamp(options_.price_kappa * lag / left, -kLargestExponent, most_exponent(left));
   return price_0_ * portable::exp(exponent);
 }
 
@@ -290,9 +325,13 @@ void HarmonicTimePlan::failed(std::uint32_t offer, double now_s) {
 void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
   require(step.done_s < 0 && now_s >= last_done_s_, "HarmonicTimePlan: completed twice, or time runs back");
   step.done_s = now_s;
-  step.spacing_s = now_s - last_done_s_;
+  step.spacing_s = std::max(0.0, now_s - std::max(last_done_s_, latency_s_));
   step.residual_s = step.theta_s - step.spacing_s;
-  if (sample) throughput_.add(step.bytes, now_s - std::max(last_done_s_, step.issued_s + options_.rtt_s));
+  // The link was idle only while nothing that was asked for could have been on its way.
+  double first_issued_s = step.issued_s;
+  for (const std::size_t i : waiting_) first_issued_s = std::min(first_issued_s, steps_[i].issued_s);
+  std::erase(waiting_, step_of_offer_[step.offer]);
+  if (sample) throughput_.add(step.bytes, now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s));
   last_done_s_ = now_s;
   --in_flight_;
   in_flight_bytes_ -= step.bytes;

@@ -96,18 +96,20 @@ class HarmonicTimePlan {
     std::size_t issued = 0;  // positions that were issued when it arose
   };
   void plan_prices();
-  bool window_open() const;
+  bool window_open(double now_s) const;
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
   void take(std::uint32_t offer);
   double theta_of(std::uint32_t offer) const;
   double target_of(std::uint32_t offer, double theta_s, double now_s) const;
+  double room_bytes(double beta, double now_s) const;
   double proportional_share(double now_s, std::size_t samples) const;
   std::int32_t rung_of(std::uint32_t offer, double target, double now_s) const;
   std::int32_t nearest_rung_of(const FragmentOffer& offer, double target, bool may_skip) const;
   std::int32_t cheapest_rung_of(const FragmentOffer& offer, double price, bool may_skip,
                                 double most_bytes) const;
   double price_at(double now_s) const;
+  double most_exponent(double left_s) const;
   bool may_skip(double now_s) const;
   void finish(HtcStep& step, double now_s, bool sample);
   void spread(double residual_s);
@@ -127,7 +129,10 @@ class HarmonicTimePlan {
   double price_0_ = 0, price_total_ = 0, price_done_ = 0;  // kPrice: lambda_0; its plan's bytes, issued ones
   std::vector<double> price_bytes_;
   std::uint32_t in_flight_ = 0;
+  std::vector<std::size_t> waiting_;  // steps in flight
+  int skips_in_a_row_ = 0;
   double in_flight_bytes_ = 0;
+  double latency_s_ = 0;  // at the start, in which nothing can arrive
   double last_done_s_ = 0, unspent_s_ = 0;
 };
 
