@@ -18,3 +18,9 @@ add_test(NAME house_examples COMMAND ${house}/check_examples $<TARGET_FILE:texme
 add_test(NAME house_serve COMMAND ${house}/check_serve $<TARGET_FILE:texmesh> ${PROJECT_SOURCE_DIR}/tests/golden/v1.1-scan.texmesh
   ${PROJECT_SOURCE_DIR}/examples ${CMAKE_CURRENT_BINARY_DIR}/serve)
 set_tests_properties(house_serve PROPERTIES SKIP_RETURN_CODE 77)
+if(NOT TEXMESH_SANITIZE)
+  add_executable(delivery_client consumer/client.cpp)
+  target_link_libraries(delivery_client PRIVATE texmesh_delivery)
+  add_test(NAME house_delivery_size COMMAND ${house}/check_delivery_size $<TARGET_FILE:delivery_client>
+    ${PROJECT_SOURCE_DIR}/tests/golden/v1.1-scan.texmesh)
+endif()

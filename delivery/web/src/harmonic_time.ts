@@ -88,9 +88,15 @@ export interface HtcStep {
 }
 
 const windowFactor = 1.5;
+const tripSamples = 64; // a window that follows every swing makes them worse
 const windowSamples = 10;
 const guardSamples = 20;
 const largestExponent = 12;
+// A stall that is over looks like a slow link until something has been transferred: what is skipped on such evidence is
+// lost for good.
+const mostSkipsInARow = 1;
+const elasticity = 2.5; // of the price by bytes, on ladders of photographs
+const spareExponent = 1;
 const lateFactor = 1.5;
 const anyRung = 0xffff;
 
@@ -150,6 +156,9 @@ export class HarmonicTimePlan {
   private readonly priceBytes_: number[] = [];
   private inFlight_ = 0;
   private inFlightBytes_ = 0;
+  private skipsInARow_ = 0;
+  private readonly waiting_ = new Set<HtcStep>(); // in flight
+  private latencyS_ = 0; // at the start, in which nothing can arrive
   private lastDoneS_ = 0;
   private unspent_ = 0;
 
@@ -173,6 +182,9 @@ export class HarmonicTimePlan {
       this.smallestLeft_ += f.bytes[lowest(f, options_.hardLimits)];
     }
     this.plannedLeft_ = this.plannedTotal_;
+    // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come next; with
+    // one request at a time every fragment has a round trip of its own.
+    if (options_.window !== 1) this.latencyS_ = Math.min(options_.rttS, options_.timeLimitS / 2);
     if (options_.policy === 'price') this.planPrices_();
   }
 
@@ -233,11 +245,18 @@ export class HarmonicTimePlan {
     return this.throughput_.bytesS();
   }
 
-  private windowOpen_(): boolean {
+  private windowOpen_(nowS: number): boolean {
     if (this.options_.window > 0) return this.inFlight_ < this.options_.window;
     if (this.inFlight_ < 2) return true;
     if (this.inFlight_ >= this.options_.maxInFlight) return false;
-    return this.inFlightBytes_ < windowFactor * this.throughput_.recentBytesS(windowSamples) * this.options_.rttS;
+    // What is in flight takes all the time that is left: what is asked for now could only be late.
+    const leftS = this.options_.timeLimitS - nowS;
+    if (leftS > this.latencyS_ && this.roomBytes_(this.throughput_.recentBytesS(windowSamples), nowS) <= 0) return false;
+    // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there is little
+    // time, and those are received side by side and late.
+    const fragmentBytes = this.plannedTotal_ / this.offers.length;
+    const tripBytes = this.throughput_.recentBytesS(tripSamples) * this.options_.rttS;
+    return this.inFlight_ < 2 + (windowFactor * tripBytes) / fragmentBytes;
   }
 
   /**
@@ -245,7 +264,7 @@ export class HarmonicTimePlan {
    * issue now (wait for a completion) or at all. `nowS` >= 0 counts from the first request.
    */
   next(nowS: number): HtcStep | undefined {
-    while (!this.allIssued && this.windowOpen_()) {
+    while (!this.allIssued && this.windowOpen_(nowS)) {
       const position = this.steps.length + 1;
       const creditS = this.creditAt_(position);
       const offer = this.chooseOffer_(creditS);
@@ -265,9 +284,12 @@ export class HarmonicTimePlan {
         // No transfer: it takes no time and says nothing of the link.
         step.doneS = nowS;
         step.residualS = step.thetaS;
+        ++this.skipsInARow_;
         this.spread_(step.residualS);
         continue;
       }
+      this.skipsInARow_ = 0;
+      this.waiting_.add(step);
       ++this.inFlight_;
       this.inFlightBytes_ += step.bytes;
       return step;
@@ -299,7 +321,7 @@ export class HarmonicTimePlan {
   }
 
   private thetaOf_(offer: number): number {
-    return this.options_.timeLimitS * (this.offers[offer].plannedBytes / this.plannedTotal_);
+    return (this.options_.timeLimitS - this.latencyS_) * (this.offers[offer].plannedBytes / this.plannedTotal_);
   }
 
   // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -320,11 +342,19 @@ export class HarmonicTimePlan {
     this.credits_.push({ value: residualS / zeta, issued });
   }
 
+  /**
+   * Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip later, whether
+   * or not enough is in flight until then.
+   */
+  private roomBytes_(beta: number, nowS: number): number {
+    const leftS = this.options_.timeLimitS - nowS;
+    return Math.max(0, Math.min(beta * leftS - this.inFlightBytes_, beta * (leftS - this.latencyS_)));
+  }
+
   /** What a plan in proportion to the planned sizes gives, as a factor of them. */
   private proportionalShare_(nowS: number, samples: number): number {
     const beta = samples ? this.throughput_.recentBytesS(samples) : this.throughputBytesS();
-    const room = beta * (this.options_.timeLimitS - nowS) - this.inFlightBytes_;
-    return Math.max(0, room) / Math.max(this.plannedLeft_, 1);
+    return this.roomBytes_(beta, nowS) / Math.max(this.plannedLeft_, 1);
   }
 
   private targetOf_(offer: number, thetaS: number, nowS: number): number {
@@ -343,17 +373,18 @@ export class HarmonicTimePlan {
 
   private maySkip_(nowS: number): boolean {
     if (this.options_.hardLimits) return false;
+    if (this.options_.timeLimitS - nowS <= this.latencyS_) return true; // it could not arrive in time
+    if (this.skipsInARow_ >= mostSkipsInARow) return false;
     if (this.options_.policy === 'htc' || this.options_.policy === 'static') return true;
-    const room = this.throughput_.recentBytesS(windowSamples) * (this.options_.timeLimitS - nowS);
-    return this.smallestLeft_ > room - this.inFlightBytes_;
+    return this.smallestLeft_ > this.roomBytes_(this.throughput_.recentBytesS(windowSamples), nowS);
   }
 
   private rungOf_(offer: number, target: number, nowS: number): number {
     const f = this.offers[offer];
     const skip = this.maySkip_(nowS);
     if (this.options_.policy !== 'price') return this.nearestRungOf_(f, target, skip);
-    const room = this.throughput_.recentBytesS(windowSamples) * (this.options_.timeLimitS - nowS);
-    return this.cheapestRungOf_(f, this.priceAt_(nowS), skip, Math.max(0, lateFactor * room - this.inFlightBytes_));
+    const room = this.roomBytes_(this.throughput_.recentBytesS(windowSamples), nowS);
+    return this.cheapestRungOf_(f, this.priceAt_(nowS), skip, lateFactor * room);
   }
 
   private nearestRungOf_(f: FragmentOffer, target: number, maySkip: boolean): number {
@@ -385,13 +416,22 @@ export class HarmonicTimePlan {
     return best;
   }
 
+  // A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
+  private mostExponent_(leftS: number): number {
+    const beta = this.throughput_.recentBytesS(windowSamples);
+    const room = this.roomBytes_(beta, this.options_.timeLimitS - leftS);
+    const ratio = (this.priceTotal_ - this.priceDone_) / Math.max(room, 1);
+    const enough = spareExponent + elasticity * log(Math.max(ratio, 1));
+    return Math.min(enough, largestExponent);
+  }
+
   private priceAt_(nowS: number): number {
     const limit = this.options_.timeLimitS;
     const plannedS = this.priceTotal_ > 0 ? limit * (this.priceDone_ / this.priceTotal_) : 0;
     // What is in flight has been issued but not paid for yet.
     const lag = nowS - (plannedS - this.inFlightBytes_ / this.throughputBytesS());
     const left = Math.max(limit - nowS, 1e-3 * limit);
-    return this.price0_ * exp(clamp((this.options_.priceKappa * lag) / left, -largestExponent, largestExponent));
+    return this.price0_ * exp(clamp((this.options_.priceKappa * lag) / left, -largestExponent, this.mostExponent_(left)));
   }
 
   /** The request for this offer has ended. Completions may come in any order; times must not fall. */
@@ -413,9 +453,13 @@ export class HarmonicTimePlan {
   private finish_(step: HtcStep, nowS: number, sample: boolean): void {
     require(step.doneS < 0 && nowS >= this.lastDoneS_, 'HarmonicTimePlan: completed twice, or time runs back');
     step.doneS = nowS;
-    step.spacingS = nowS - this.lastDoneS_;
+    step.spacingS = Math.max(0, nowS - Math.max(this.lastDoneS_, this.latencyS_));
     step.residualS = step.thetaS - step.spacingS;
-    if (sample) this.throughput_.add(step.bytes, nowS - Math.max(this.lastDoneS_, step.issuedS + this.options_.rttS));
+    // The link was idle only while nothing that was asked for could have been on its way.
+    let firstIssuedS = step.issuedS;
+    for (const s of this.waiting_) firstIssuedS = Math.min(firstIssuedS, s.issuedS);
+    this.waiting_.delete(step);
+    if (sample) this.throughput_.add(step.bytes, nowS - Math.max(this.lastDoneS_, firstIssuedS + this.options_.rttS));
     this.lastDoneS_ = nowS;
     --this.inFlight_;
     this.inFlightBytes_ -= step.bytes;
