@@ -1,4 +1,5 @@
-// A client without the compiler: reads a package, plans, simulates, loads. Its size is tested (house_delivery_size).
+// A client without the compiler: reads a package, plans, simulates, loads. Its size is tested
+// (house_delivery_size).
 #include <iostream>
 
 #include "delivery/cpp/delivery_plan.h"
