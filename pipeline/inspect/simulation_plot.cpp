@@ -25,22 +25,31 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
+/// The step of 1, 2 or 5 times a power of ten that divides a span into about so many parts.
+double round_step(double span, int parts) {
+  const double least = span / parts, power = std::pow(10.0, std::floor(std::log10(least)));
+  for (const double digit : {1.0, 2.0, 5.0})
+    if (digit * power >= least) return digit * power;
+  return 10 * power;
+}
+
 /// One of the panels beneath each other, with axes from 0 (or below) to a largest value.
 class Panel {
  public:
   Panel(int number, const std::string& title, double end_s, double low, double high)
       : top_(kTop + number * (kPanel + kGap)), end_s_(end_s), low_(low), high_(high > low ? high : low + 1) {
+    const double step = round_step(high_ - low_, 5), step_s = round_step(end_s_, 10);
+    low_ = step * std::floor(low_ / step);
+    high_ = step * std::ceil(high_ / step);
     svg_ =
         fmt::format("<text x=\"{}\" y=\"{:.1f}\" class=\"t\">{}</text>\n", kLeft, top_ - 10, escaped(title));
-    for (int i = 0; i <= 4; ++i) {
-      const double v = low_ + (high_ - low_) * i / 4;
+    for (double v = low_; v <= high_ + step / 2; v += step)
       svg_ += fmt::format(
           "<path class=\"g\" d=\"M{} {:.1f}H{}\"/><text x=\"{}\" y=\"{:.1f}\" class=\"l e\">{:.4g}</text>\n",
-          kLeft, y(v), kLeft + kPlot, kLeft - 8, y(v) + 4, v);
-    }
-    for (int i = 0; i <= 8; ++i)
-      svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"l m\">{:.3g}</text>\n", x(end_s_ * i / 8),
-                          top_ + kPanel + 16, end_s_ * i / 8);
+          kLeft, y(v), kLeft + kPlot, kLeft - 8, y(v) + 4, std::abs(v) < step / 2 ? 0 : v);
+    for (double t = 0; t <= end_s_; t += step_s)
+      svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"l m\">{:.3g} s</text>\n", x(t),
+                          top_ + kPanel + 16, t);
   }
   double x(double t) const { return kLeft + kPlot * std::clamp(t / end_s_, 0.0, 1.0); }
   double y(double v) const {
