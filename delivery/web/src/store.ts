@@ -29,7 +29,7 @@ export interface PackageStore {
   readonly form: PackageForm;
   /** For messages. */
   readonly name: string;
-  manifest(): Promise<Uint8Array>;
+  manifest(signal?: AbortSignal): Promise<Uint8Array>;
   /** Exactly these bytes of an entry. */
   read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
   /** A file of a tree that is no entry; undefined where there is none. */
@@ -135,8 +135,8 @@ class RangeStore implements PackageStore {
     return shownUrl(this.mirrors_.all[0].url);
   }
 
-  async manifest(): Promise<Uint8Array> {
-    const bytes = await this.fetchRange_(0, bootstrapBytes, { kind: 'manifest' });
+  async manifest(signal?: AbortSignal): Promise<Uint8Array> {
+    const bytes = await this.fetchRange_(0, bootstrapBytes, { kind: 'manifest', signal });
     this.keep_(0, bytes);
     return manifestOfContainer(bytes, this.name);
   }
@@ -312,7 +312,7 @@ export async function openStore(
   const urls = [url, ...mirrors.filter((m) => m !== url)];
   const use = async (store: PackageStore): Promise<{ store: PackageStore; manifest: Uint8Array }> => ({
     store,
-    manifest: await store.manifest(),
+    manifest: await store.manifest(signal),
   });
   const path = url.replace(/[?#].*$/, '');
   const files = () => import('./store_files');

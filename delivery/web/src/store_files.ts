@@ -21,8 +21,8 @@ export class TreeStore implements PackageStore {
   get name(): string {
     return shownUrl(this.mirrors_.all[0].url);
   }
-  manifest(): Promise<Uint8Array> {
-    return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest' });
+  manifest(signal?: AbortSignal): Promise<Uint8Array> {
+    return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest', signal });
   }
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     const take = async (reload: boolean): Promise<Uint8Array> => {

@@ -93,7 +93,10 @@ export class TextureLoad {
     const meshBytes = this.load_.scales.bytesOf(scale);
     const mesh = this.load_.showScale(scale);
     mesh.shown.catch(() => undefined);
-    const choices = await this.planesInTime_(data, scale);
+    // Coverage that no material asks for is not fetched.
+    const choices = (await this.planesInTime_(data, scale)).filter(
+      ({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base),
+    );
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
     // A mesh that is only waited for leaves the link to the textures.
     if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS) await mesh.arrived;
@@ -165,7 +168,7 @@ export class TextureLoad {
   }
 
   /**
-   * Shows textures by these planes; alpha planes, which no GLB has, begin with their preview. Fragments may come from
+   * Shows textures by these planes; those that the first GLB does not show begin with the package's preview. Fragments may come from
    * then on; `shown` resolves when the scene has changed.
    */
   private async showPlanes_(choices: readonly PlaneChoice[]): Promise<{ shown: Promise<unknown> }> {
@@ -176,7 +179,7 @@ export class TextureLoad {
       if (before?.plane === plane) continue;
       const info = this.data_!.textures[plane];
       let preview: ImageBitmap | undefined;
-      if (!before && info.role === 'alpha') {
+      if (!before && (info.role === 'alpha' || !this.textureSet_!.isUsed(base))) {
         const file = await this.load_.reader.preview(base, this.load_.signal);
         const none = new Uint8Array(0);
         const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
@@ -287,7 +290,7 @@ export class TextureLoad {
     const wanted = this.planesFor_(base, this.load_.view.display.heightPx / hysteresis);
     const finer = wanted.filter((c) => {
       const shown = this.textureSet_!.planes.get(c.base);
-      return !shown || shown.widthPx < base.textures[c.plane].widthPx;
+      return shown && shown.widthPx < base.textures[c.plane].widthPx;
     });
     if (finer.length === 0) return;
     const planes = [...this.textureSet_!.planes.values()].map((p) => p.plane);

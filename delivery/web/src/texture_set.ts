@@ -1,4 +1,4 @@
-import type { Texture, WebGLRenderer } from 'three';
+import { Texture, WebGLRenderer } from 'three';
 import { Blitter, PlaneComposer, ownLevels } from './composer';
 import type { PlaneChoice } from './fragment_list';
 import { MaterialSet, Slot } from './scale_parts';
@@ -54,6 +54,7 @@ export class TextureSet {
     const slots = this.slotsOf_(base);
     const old = slots.map((slot) => this.oldTexture_(slot, base));
     const views = old.map((texture) => texture && next.view(texture));
+    if (slots.length === 0) next.view(new Texture()); // a finer scale may bring the material that wants it
     this.planes.set(base, next);
     await this.fill_(next, before, preview, old);
     if (this.disposed_) return;
@@ -111,6 +112,10 @@ export class TextureSet {
     }
     await Promise.all(strips);
     next.filled = true;
+  }
+  /** Whether a material that is there shows this plane. */
+  isUsed(base: number): boolean {
+    return this.slotsOf_(base).length > 0;
   }
   private slotsOf_(base: number): Slot[] {
     const { image, role } = this.textures_[base];

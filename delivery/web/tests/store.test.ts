@@ -122,6 +122,12 @@ describe('trouble', () => {
     setTimeout(() => abort.abort(), 20);
     expect((await reading).name).toBe('AbortError');
   });
+  it('opening can be cancelled', async () => {
+    const abort = new AbortController();
+    const opening = failure(openAt(range(once('stall', 0)), { stallTimeoutS: 30, signal: abort.signal }));
+    setTimeout(() => abort.abort(), 20);
+    expect((await opening).name).toBe('AbortError');
+  });
   it('a cap holds transfers back', async () => {
     const begin = performance.now();
     await openAt(range(), { capBytesS: 100e3 });
