@@ -261,7 +261,7 @@ export class HttpClient {
       if (this.waits_.push(wait) > latencySamples) this.waits_.shift();
     }
     ++this.requests;
-    if (this.requests === 1 && typeof performance.getEntriesByName === 'function') {
+    if (this.requests <= 4 && typeof performance.getEntriesByName === 'function') {
       const timing = performance.getEntriesByName(url, 'resource').at(-1) as PerformanceResourceTiming | undefined;
       if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit_ = this.options.streams;
     }

@@ -211,12 +211,19 @@ export class ModelLoad implements LoadedModel {
   }
 
   private follow_(): void {
-    const scale = this.scaleForView_();
-    if (scale !== this.context_.wantedScale) {
-      this.context_.wantedScale = scale;
-      this.loadScale_(scale).shown.catch((error: unknown) => this.fail_(error, `scale ${scale}`));
-    }
+    void this.followScale_();
     if (this.options_.autoRefine ?? true) void this.refine();
+  }
+  /** Loads the scale that the view asks for, if it is another one. */
+  private async followScale_(): Promise<void> {
+    const scale = this.scaleForView_();
+    if (scale === this.context_.wantedScale) return;
+    this.context_.wantedScale = scale;
+    try {
+      await this.loadScale_(scale).shown;
+    } catch (error) {
+      this.fail_(error, `scale ${scale}`);
+    }
   }
   /** The scale that the view asks for, by a little more than the last time. */
   private scaleForView_(): number {
@@ -239,6 +246,7 @@ export class ModelLoad implements LoadedModel {
     if (this.phase_ !== 'refining' && this.phase_ !== 'done') await this.done;
     this.phase_ = 'refining';
     const textures = this.textures_!;
+    const scale = this.followScale_(); // the time may have allowed a coarser one only
     try {
       while (this.refineAgain_) {
         this.refineAgain_ = false;
@@ -246,6 +254,7 @@ export class ModelLoad implements LoadedModel {
         while (!this.refineAgain_ && (await textures.refineSome()));
       }
       await textures.composed();
+      await scale;
       this.phase_ = 'done';
       this.events_.emit('done', {});
       this.progress_();

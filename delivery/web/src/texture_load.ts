@@ -24,6 +24,8 @@ const composeS = 0.04;
 const mostLate = 0.03;
 const refineBytes = 256 << 10;
 const refineRequests = 4;
+/** Fragments that may wait for decoding and uploads when the next ones are asked for. */
+const mostPending = 48;
 const gapBytes = 1024;
 const tellsApart = 0.003;
 /** What the camera does not see is worth this much of what it sees. */
@@ -41,6 +43,7 @@ export class TextureLoad {
   private surface_?: VisibleSurface;
   private surfaceScale_ = -1;
   private readonly gaveUp_ = new Set<string>();
+  private readonly asked_ = new Map<string, number>(); // rungs under way while refining
 
   constructor(private readonly load_: LoadContext) {}
 
@@ -135,13 +138,14 @@ export class TextureLoad {
     const order = this.data_?.tables[plane.plane]?.order ?? [];
     return [...order].filter((f) => plane.rungs[f] < 0).length;
   }
-  async composed(): Promise<void> {
-    while ((this.transfers_?.pending ?? 0) > 0 || (this.textureSet_?.pending ?? 0) > 0) {
+  /** Waits until all that has come (but so many) is in its texture. */
+  async composed(but = 0): Promise<void> {
+    while (this.pending > but) {
       throwIfAborted(this.load_.signal);
-      await this.textureSet_?.settled();
+      if (but === 0) await this.textureSet_?.settled();
       await sleepS(0.004);
     }
-    this.textureSet_?.finish();
+    if (but === 0) this.textureSet_?.finish();
   }
 
   private startTextures_(data: PackageData): Transfers {
@@ -312,7 +316,7 @@ export class TextureLoad {
     const seen = this.seen_(choices);
     const wishes: Wish[] = [];
     let bytes = 0;
-    const rungs = list.fragments.map((f) => this.rungOf_(f));
+    const rungs = list.fragments.map((f) => Math.max(this.rungOf_(f), this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1));
     list.offers.forEach((o, i) => {
       const { plane, fragment } = list.fragments[i];
       const weight = seen?.get(plane)?.[fragment] ?? 1;
@@ -330,10 +334,14 @@ export class TextureLoad {
       bytes += u.bytes;
       taken.set(u.offer, u.rung);
     }
-    for (const [offer, rung] of taken) wishes.push({ ...list.fragments[offer], rung, offer });
+    for (const [offer, rung] of taken) {
+      const { plane, fragment } = list.fragments[offer];
+      wishes.push({ plane, fragment, rung, offer });
+      this.asked_.set(`${plane}/${fragment}`, rung);
+    }
     if (wishes.length === 0) return false;
     await this.fetchWishes_(wishes);
-    await this.composed();
+    await this.composed(mostPending);
     return true;
   }
   /** The next rung of the first plane that lacks some. */
