@@ -69,6 +69,7 @@ export class BytesIn {
   }
 }
 
+/** Lower-case hexadecimal digits. */
 export function toHex(bytes: Uint8Array): string {
   let text = '';
   for (const byte of bytes) text += byte.toString(16).padStart(2, '0');

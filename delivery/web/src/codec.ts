@@ -3,6 +3,7 @@ import { FormatError } from './errors';
 /** How a plane's fragments are coded (format/SPEC.md, section 9). */
 export type CodecId = 'jpeg' | 'jpeg-progressive' | 'webp';
 
+/** What a codec needs and gives. */
 export interface CodecTraits {
   requiredFeature: string;
   /** Of complete files, without the dot. */
@@ -21,9 +22,11 @@ const traits: Record<CodecId, CodecTraits> = {
   },
   webp: { requiredFeature: 'codec-webp', extension: 'webp', mediaType: 'image/webp', incremental: false },
 };
+/** Of a codec that this reader knows. */
 export function codecTraits(codec: CodecId): CodecTraits {
   return traits[codec];
 }
+/** Whether this reader knows a codec of that id. */
 export function isCodec(name: string): name is CodecId {
   return Object.hasOwn(traits, name);
 }

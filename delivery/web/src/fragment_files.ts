@@ -11,6 +11,7 @@ export interface FragmentFile {
 export type FragmentFiles = Map<number, FragmentFile>[][];
 
 const file = 'fragments.json';
+/** FormatError where lists are not parallel, or a digest is none. */
 export function readFragmentFiles(json: Uint8Array): FragmentFiles {
   const at = parseJson(json, file, 256 << 20);
   at.at('version').integer(1, 1);

@@ -30,6 +30,7 @@ export interface FragmentList {
   /** Of the losses: a loss of this is 1 - SSIM = 1 everywhere. */
   totalWeight: number;
 }
+/** Of fragmentList. */
 export interface ListOptions {
   scale: number;
   /** Of q_i(x, y); -1 = the mean of eta. */
@@ -37,6 +38,7 @@ export interface ListOptions {
   qualityLow: number;
   qualityHigh: number;
 }
+/** S_0, the mean of eta, the qualities of delivery/cpp. */
 export const defaultListOptions: ListOptions = { scale: 0, gamma: -1, qualityLow: 5, qualityHigh: 97 };
 
 const ln2 = 0.693147180559945309417;
@@ -100,6 +102,9 @@ function addPlane(data: PackageData, plane: number, options: ListOptions, list: 
   }
 }
 
+/**
+ * Ordered by plane and importance; offers carry eta x weight of the role x share of the surface. Needs the planes' tables.
+ */
 export function fragmentList(
   data: PackageData,
   planes: readonly PlaneChoice[],

@@ -29,6 +29,7 @@ export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static';
 /** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
 export type HtcOrder = 'credit' | 'beta0' | 'finest';
 
+/** Of a HarmonicTimePlan. */
 export interface HtcOptions {
   policy: Policy;
   order: HtcOrder;
@@ -48,6 +49,7 @@ export interface HtcOptions {
   priceKappa: number;
 }
 
+/** Those of delivery/cpp. */
 export function defaultHtcOptions(): HtcOptions {
   return {
     policy: 'htc',
@@ -135,6 +137,9 @@ function meanFragment(offers: readonly FragmentOffer[]): number {
 const lowest = (f: FragmentOffer, hard: boolean): number => (hard ? Math.min(f.lowRung, f.bytes.length - 1) : 0);
 const highest = (f: FragmentOffer): number => Math.min(f.highRung ?? anyRung, f.bytes.length - 1);
 
+/**
+ * Decides fragment by fragment what to ask for: call next() until it gives nothing, and completed() or failed() for every request.
+ */
 export class HarmonicTimePlan {
   /** Decisions so far, skipped fragments included. */
   readonly steps: HtcStep[] = [];

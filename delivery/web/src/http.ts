@@ -50,6 +50,7 @@ export interface HttpOptions {
   /** Bytes per second at most, for trying slow links; 0 = no limit. */
   capBytesS: number;
 }
+/** Where the caller says nothing. */
 export const defaultHttpOptions: HttpOptions = {
   retries: 3,
   retryDelayS: 0.2,
@@ -60,6 +61,7 @@ export const defaultHttpOptions: HttpOptions = {
   capBytesS: 0,
 };
 
+/** What came back; the body holds at most what was asked for. */
 export interface Answer {
   /** 0: no answer at all, see problem. */
   status: number;
@@ -74,6 +76,7 @@ export interface Answer {
   tooLong: boolean;
 }
 
+/** Of one GET. */
 export interface GetOptions {
   range?: { offset: number; bytes: number };
   ifRange?: string;
@@ -89,7 +92,9 @@ export interface GetOptions {
 /** Answers that latency is the median of. */
 const latencySamples = 7;
 
+/** Seconds of performance.now(). */
 export const nowS = (): number => performance.now() / 1000;
+/** Resolves after so many seconds. */
 export const sleepS = (seconds: number): Promise<void> => new Promise((done) => setTimeout(done, seconds * 1000));
 
 /** https://host/path without user, password and query, for messages. */
@@ -97,6 +102,7 @@ export function shownUrl(url: string): string {
   return url.replace(/^(\w+:\/\/)[^/@]*@/, '$1').replace(/[?#].*$/, '');
 }
 
+/** Whether an error says that somebody cancelled. */
 export function isAbort(error: unknown): boolean {
   return error instanceof Error && error.name === 'AbortError';
 }
@@ -104,6 +110,7 @@ export function isAbort(error: unknown): boolean {
 function abortError(): Error {
   return new DOMException('The load was cancelled', 'AbortError');
 }
+/** Throws an AbortError where a signal says so. */
 export function throwIfAborted(signal?: AbortSignal): void {
   if (signal?.aborted) throw abortError();
 }
@@ -276,6 +283,7 @@ function plainLength(response: Response): number {
   return length !== null && /^\d+$/.test(length) ? Number(length) : -1;
 }
 
+/** Pieces of `total` bytes as one. */
 export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array {
   const out = new Uint8Array(total);
   let at = 0;
@@ -309,12 +317,14 @@ class StallTimer {
   }
 }
 
+/** Whether asking again may help. */
 export function mayRetry(a: Answer): boolean {
   const { status } = a;
   if (status === 0 || status === 408 || status === 429 || status >= 500) return true;
   return (status === 200 || status === 206) && !a.complete && !a.tooLong;
 }
 
+/** For messages. */
 export function whatCame(a: Answer): string {
   return a.problem !== '' ? a.problem : a.status === 0 ? 'no answer' : `status ${a.status}`;
 }

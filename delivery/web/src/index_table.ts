@@ -16,6 +16,7 @@ export interface IndexPage {
   bytes: number;
   sha256: Uint8Array;
 }
+/** Places and digests of the pages. */
 export interface IndexHead {
   minor: number;
   bytes: number;

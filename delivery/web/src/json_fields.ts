@@ -59,6 +59,7 @@ export class JsonAt {
   }
 }
 
+/** A document of at most so many bytes of UTF-8; FormatError where it is no JSON. */
 export function parseJson(bytes: Uint8Array, file: string, mostBytes: number): JsonAt {
   if (bytes.length > mostBytes) throw new FormatError(file, '', `at most ${mostBytes} bytes`, `${bytes.length}`);
   try {

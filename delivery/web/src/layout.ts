@@ -1,5 +1,6 @@
 // Paths of a package's entries (format/SPEC.md, section 3).
 
+/** Documents and the vertex-split stream. */
 export const manifestPath = 'manifest.json';
 export const indexPath = 'index.bin';
 export const tablesPath = 'tables.bin';

@@ -6,10 +6,12 @@ import * as layout from './layout';
 export const bootstrapBytes = 16384;
 /** "Enough at any size": displayPx... of S_0 and the last step's upToPx. */
 export const anyDisplayPx = 1e9;
+/** Version of the format that this reader is for. */
 export const formatMajor = 1;
 export const formatMinor = 1;
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp', 'mips'];
+/** Previews whose place the manifest tells. */
 export const mostManifestPreviews = 256;
 
 /** Where an entry's data stands in the container, and its digest. */
@@ -31,10 +33,12 @@ export interface StreamRef {
   headBytes: number;
   headSha256: Uint8Array;
 }
+/** Offset and length in bytes. */
 export interface ByteRange {
   offset: number;
   bytes: number;
 }
+/** x, y, z. */
 export type Vector3 = [number, number, number];
 
 /** A mesh scale; lengths in object units, displayed heights in px. */

@@ -71,6 +71,7 @@ function atanPositive(tangent: number): number {
   return 4 * t * s;
 }
 
+/** e to the power of x. */
 export function exp(x: number): number {
   if (Number.isNaN(x)) return x;
   if (x > 709.78) return Infinity;
@@ -108,14 +109,17 @@ export function log(x: number): number {
   return e * ln2Hi + (2 * f * s + e * ln2Lo);
 }
 
+/** Of |x| <= 1e6. */
 export function sin(x: number): number {
   return sinQuadrant(x, 0);
 }
 
+/** Of |x| <= 1e6. */
 export function cos(x: number): number {
   return sinQuadrant(x, 1);
 }
 
+/** Angle of the point (x, y). */
 export function atan2(y: number, x: number): number {
   const ax = Math.abs(x);
   const ay = Math.abs(y);

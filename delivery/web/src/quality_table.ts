@@ -30,6 +30,7 @@ function readFractions(at: JsonAt, count: number): Float32Array {
   return Float32Array.from({ length: count }, (_, i) => at.at(i).number(0, 1));
 }
 
+/** Strict; FormatError names the place in the document. */
 export function readQuality(json: Uint8Array): QualityTable {
   const at = parseJson(json, qualityPath, 4 << 20);
   const views = at.at('views').integer(1, 10000);

@@ -35,6 +35,7 @@ export interface Slot {
   image: number;
 }
 
+/** Textures of a material by the name of their slot. */
 export function texturesOf(material: Material): [string, Texture][] {
   return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
 }
@@ -67,6 +68,7 @@ function require(good: unknown, what: string): asserts good {
   if (!good) throw new FormatError('mesh', '', what, 'none');
 }
 
+/** All meshes beneath an object. */
 export function meshesOf(object: Object3D): Mesh[] {
   const meshes: Mesh[] = [];
   object.traverse((o) => {
@@ -131,6 +133,7 @@ export class MaterialSet {
   }
 }
 
+/** Frees the geometries beneath an object. */
 export function disposeGeometries(object: Object3D): void {
   for (const mesh of meshesOf(object)) mesh.geometry.dispose();
 }

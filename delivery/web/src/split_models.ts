@@ -1,10 +1,12 @@
+// Where the probabilities of the connectivity part stand: the kinds of format/split_codec.h, SplitModels, and how many
+// contexts each has.
+
 export const degrees = 14;
 export const lefts = 12;
 export const runs = 7;
 export const rings = 8;
 export const valences = 5;
 
-// Where the models of each kind begin: format/split_codec.h, SplitModels.
 let count = 0;
 const block = (models: number): number => {
   const at = count;

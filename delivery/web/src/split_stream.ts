@@ -7,6 +7,7 @@ import { SplitCodec } from './split_codec';
 import { ValueDecoder, valueModelCount } from './split_coder';
 import { SplitMesh } from './split_mesh';
 
+/** TEXCOORD_0, TEXCOORD_1, normals, colours. */
 export type SplitKind = 'uv0' | 'uv1' | 'normal' | 'colour';
 const kinds: readonly SplitKind[] = ['uv0', 'uv1', 'normal', 'colour'];
 
@@ -16,6 +17,7 @@ export interface SplitGrid {
   origin: number[];
   range: number;
 }
+/** Values that every wedge has. */
 export interface SplitAttribute {
   kind: SplitKind;
   components: number;
@@ -31,6 +33,7 @@ export interface SplitScale {
   /** Of the faces, those with three different places. */
   triangles: number;
 }
+/** What is decoded at once. */
 export interface SplitBlock {
   isPatch: boolean;
   /** Of faces or splits. */

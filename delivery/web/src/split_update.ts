@@ -4,6 +4,7 @@ import type { SplitInfo, SplitUpdate } from './worker_protocol';
 
 const f = Math.fround;
 
+/** What the main thread needs to know of a head. */
 export function splitInfo(head: SplitStreamHead): SplitInfo {
   const scales = head.scales.map(({ scale, blocks, wedges }) => {
     const last = head.blocks[blocks - 1];

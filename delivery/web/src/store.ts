@@ -14,6 +14,7 @@ export interface Place {
   offset: number;
   bytes: number;
 }
+/** How something is read. */
 export interface ReadOptions {
   kind: RequestKind;
   signal?: AbortSignal;
@@ -296,6 +297,7 @@ export function treeUrl(url: string): string {
   return m ? `${m[1]}/${m[2] ?? ''}` : '';
 }
 
+/** See OpenOptions.mode. */
 export type StoreMode = 'auto' | 'range' | 'files';
 
 /**

@@ -66,7 +66,9 @@ export interface PlaneTables {
   modelError: number;
 }
 
+/** F */
 export const fragmentCount = (t: PlaneTables): number => t.columns * t.rows;
+/** R */
 export const rungCount = (t: PlaneTables): number => t.rungQuality.length;
 
 /** Where a plane's section stands within tables.bin, and its digest. */
@@ -75,6 +77,7 @@ export interface TablesSection {
   bytes: number;
   sha256: Uint8Array;
 }
+/** Places and digests of the sections. */
 export interface TablesHead {
   minor: number;
   bytes: number;

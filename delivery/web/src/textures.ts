@@ -111,6 +111,7 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
   }
 }
 
+/** Strict; FormatError names the place in the document. */
 export function readTextures(json: Uint8Array): TextureInfo[] {
   const list = parseJson(json, layout.texturesPath, 32 << 20).at('textures');
   const textures: TextureInfo[] = [];

@@ -4,6 +4,7 @@
  */
 export type Estimator = 'last' | 'harmonic' | 'ewma';
 
+/** Of a Throughput. */
 export interface ThroughputOptions {
   estimator: Estimator;
   /** 1 .. 64 */
@@ -15,6 +16,7 @@ export interface ThroughputOptions {
   /** beta_0, until there is a sample; > 0. */
   initialBytesS: number;
 }
+/** Those of delivery/cpp. */
 export const defaultThroughput: ThroughputOptions = {
   estimator: 'harmonic',
   samples: 10,

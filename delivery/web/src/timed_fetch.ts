@@ -3,6 +3,7 @@ import type { HarmonicTimePlan, HtcStep } from './harmonic_time';
 import { nowS, throwIfAborted } from './http';
 import type { Transfers, Wish } from './transfers';
 
+/** Who hears of it. */
 export interface TimedFetchHooks {
   /** A decision was taken, or its transfer has ended. */
   decided(step: HtcStep): void;

@@ -44,6 +44,7 @@ interface Group {
   bytes: number;
   parts: Part[];
 }
+/** How requests are made of wishes. */
 export interface GroupOptions {
   /** Streams that nobody asked for but are fetched to join two requests, at most. */
   gapBytes: number;

@@ -81,6 +81,7 @@ export function pixelError(
   return { p95, rms: scale.errorRms * pxPerUnit, max: scale.errorMax * pxPerUnit };
 }
 
+/** In px, y downwards. */
 export interface ScreenRect {
   x0: number;
   y0: number;
@@ -95,6 +96,7 @@ export interface VisiblePart {
   /** false: all of it. */
   clipped: boolean;
 }
+/** Nothing is cut off. */
 export const wholeObject: VisiblePart = { widthPx: 0, heightPx: 0, clipped: false };
 
 /** What of an object that `object` bounds on the screen the border of the view leaves. */

@@ -55,6 +55,7 @@ function startHere(handle: DecodeHere | undefined, onAnswer: OnAnswer): Helper {
   };
 }
 
+/** See LoadOptions. */
 export interface PoolOptions {
   workers?: number;
   workerUrl?: string | URL;

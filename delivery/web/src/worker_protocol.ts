@@ -38,10 +38,12 @@ export interface SplitAddRequest {
   key: number;
   blocks: Uint8Array;
 }
+/** Forget a stream. */
 export interface SplitCloseRequest {
   op: 'split-close';
   key: number;
 }
+/** Anything that a worker is asked. */
 export type WorkerRequest = DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
 
 /** What the head of a stream says of it. */
@@ -70,6 +72,7 @@ export interface SplitUpdate {
   groupTriangles: Uint32Array;
 }
 
+/** What a worker answers. */
 export interface WorkerAnswer {
   id: number;
   /** Levels of decode and enlarge, SplitUpdate of split-add. */
