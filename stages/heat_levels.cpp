@@ -11,11 +11,11 @@ namespace texmesh {
 namespace {
 
 /// A level carries sigmas up to kReach error_ratio spacings; the next one's seeds are kSeed sigma /
-/// error_ratio apart, so that a cell holds some ten vertices. With 1.4 and 0.8 cells had one to four, whose
-/// operator was 22 % off on unevenly sampled surfaces (0.07 to 0.09 now), and levels hardly shrank.
-constexpr double kReach = 2.4, kSeed = 1.2;
-/// The first scale of a level that starts from a state of 0.65 its sigma is up to 11 % off, at 0.4 8.7 %;
-/// less is hardly better.
+/// error_ratio apart, so that a cell holds some eight vertices. Switching at 1.4 made cells of one to four,
+/// whose operator was 22 % off on unevenly sampled surfaces (below 0.07 now).
+constexpr double kReach = 2.4, kSeed = 0.8;
+/// The first scale of a level that starts from a state of 0.65 its sigma is up to a quarter farther off than
+/// at 0.4; less is hardly better.
 constexpr double kHandover = 0.4;
 constexpr double kLeastWeight = 1e-3;
 /// Levels of no more vertices carry all the rest: nothing to gain.

@@ -70,8 +70,8 @@ struct ScaleMap {
 /// sigma at which the smoothed component has shrunk to `convergence` of its extent. A scale counts for a
 /// component only while its sigma, there and on the largest component (most positions), is within
 /// component_cap of the component's diagonal: small parts are detail of the whole. Large sigmas are solved on
-/// coarser levels, whose vertices are positions of the mesh: feature points of a scale are no denser than
-/// sigma / error_ratio asks for. O(n log n); deterministic for any thread count.
+/// coarser levels, whose vertices are positions of the mesh: feature points of a scale are no closer than
+/// 0.8 sigma / error_ratio to one another on any of them. O(n log n); deterministic for any thread count.
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context);
 

@@ -61,12 +61,14 @@ class FeatureFinder {
     for (float& x : g_) x -= mean;
   }
 
-  /// 1-ring extrema, and zero crossings at the endpoint that is closer to zero, both with the contrast rule.
-  std::vector<std::uint8_t> find(const RunContext& context) const {
+  /// 1-ring extrema, and zero crossings at the endpoint that is closer to zero, both with the contrast rule;
+  /// none of a kind closer than `apart` to another along the surface.
+  std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
     parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin; v < end; ++v) found[v] = look_at(static_cast<std::uint32_t>(v));
     });
+    for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
     return found;
   }
 
@@ -92,6 +94,25 @@ class FeatureFinder {
     const double fall = 2 * std::fabs(difference) / degree * (sigma_ / mean) * (sigma_ / mean);
     const bool extremum = (highest || lowest) && std::fabs(g_[v]) > threshold_ && fall > threshold_;
     return static_cast<std::uint8_t>((extremum ? kExtremum : 0) | (crossing ? kCrossing : 0));
+  }
+
+  /// In the order of the vertices, each keeps what is near from counting.
+  void thin_out(std::vector<std::uint8_t>& found, std::uint8_t kind, double apart) const {
+    const HeatOperator& graph = level_.laplacian;
+    std::vector<std::uint32_t> seen_from(found.size(), 0xffffffffu), near;
+    for (std::uint32_t v = 0; v < found.size(); ++v) {
+      if (!(found[v] & kind)) continue;
+      near.assign(1, v);
+      seen_from[v] = v;
+      for (std::size_t i = 0; i < near.size(); ++i)
+        for (std::uint32_t k = graph.first[near[i]]; k < graph.first[near[i] + 1]; ++k) {
+          const std::uint32_t u = graph.column[k];
+          if (seen_from[u] == v || length(level_.points[u] - level_.points[v]) > apart) continue;
+          seen_from[u] = v;
+          near.push_back(u);
+          found[u] = static_cast<std::uint8_t>(found[u] & ~kind);
+        }
+    }
   }
 
   const HeatLevel& level_;
@@ -309,7 +330,7 @@ class ComponentFilter {
     const double least = std::max(kNoise * component_.noise, kBaseShare * rms(fine));
     const std::vector<std::uint8_t> found =
         FeatureFinder(state.level, std::move(g), ladder_.sigma[scale], least, options_.contrast)
-            .find(context_);
+            .find(seed_radius(ladder_.sigma[scale], options_.error_ratio), context_);
     for (std::size_t v = 0; v < found.size(); ++v) {
       if (!found[v]) continue;
       out_.persistence[state.vertex[v]] = static_cast<std::uint8_t>(scale + 1);

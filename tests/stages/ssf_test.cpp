@@ -168,6 +168,26 @@ TEST(Ssf, FindsReliefAndLittleOnAPlainSphere) {
   EXPECT_LT(at_least(bumpy, 18), at_least(bumpy, 2) / 2);
 }
 
+TEST(Ssf, FeaturesKeepTheirDistanceOnEveryLevel) {
+  const Mesh m = even_sphere(6, 0.06);
+  // The solver goes to a coarser level at S_13; the relief ends at S_15.
+  const SsfOptions options{.error_ratio = 2.5};
+  const ScaleMap map = run(m, options);
+  // Counts step down without a cliff there.
+  for (int i = 2; i <= 15; ++i)
+    EXPECT_GT(2.5 * static_cast<double>(at_least(map, i)), static_cast<double>(at_least(map, i - 1))) << i;
+  // Beyond the first scales crossings of one scale are no closer than seeds of a level for it would be.
+  for (int scale : {10, 14}) {
+    const double apart = 0.8 * map.sigma[static_cast<std::size_t>(scale)] / options.error_ratio;
+    std::vector<Vec3d> at;
+    for (std::size_t p = 0; p < map.crossing.size(); ++p)
+      if (map.crossing[p] == scale) at.push_back(to_double(m.positions[p]));
+    ASSERT_GT(at.size(), 10u);
+    for (std::size_t a = 0; a < at.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b) EXPECT_GT(length(at[a] - at[b]), 0.999 * apart);
+  }
+}
+
 TEST(Ssf, MapsHaveTheShapeThatTheHeaderSays) {
   const Mesh m = testing::bumpy_sphere(20, 30);
   const ScaleMap map = run(m, {.scales = 7});
