@@ -41,6 +41,11 @@ export interface HttpOptions {
   retryDelayS: number;
   /** Without a byte. */
   stallTimeoutS: number;
+  /**
+   * The browser's cache, for ranges. Default no-store: Chromium answers ranges of one URL that may be cached one after
+   * the other, however many were asked for at once, and with a round trip for each a slow link stands idle.
+   */
+  rangeCache: RequestCache;
   /** Requests at once while the server speaks HTTP/1.1. */
   connections: number;
   /** Requests at once over HTTP/2 and HTTP/3. */
@@ -55,6 +60,7 @@ export const defaultHttpOptions: HttpOptions = {
   retries: 3,
   retryDelayS: 0.2,
   stallTimeoutS: 10,
+  rangeCache: 'no-store',
   connections: 6,
   streams: 32,
   maxWholeBytes: 1 << 30,
@@ -203,7 +209,8 @@ export class HttpClient {
     if (get.range) headers.Range = `bytes=${get.range.offset}-${get.range.offset + get.range.bytes - 1}`;
     if (get.ifRange) headers['If-Range'] = get.ifRange;
     const doFetch = this.options.fetch ?? globalThis.fetch;
-    const response = await doFetch(url, { headers, signal, ...(get.reload ? { cache: 'reload' as const } : {}) });
+    const cache = get.reload ? 'reload' : get.range ? this.options.rangeCache : 'default';
+    const response = await doFetch(url, { headers, signal, cache });
     stall.restart();
     record.firstByte = nowS();
     answer.status = response.status;
