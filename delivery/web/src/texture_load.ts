@@ -21,7 +21,7 @@ import type { Levels } from './worker_protocol';
 /** What decoding and uploading take after the last byte, of the time limit. */
 const composeS = 0.04;
 /** Fragments that are this late, of the limit, are given up. */
-const mostLate = 0.03;
+const mostLate = 0.02;
 const refineBytes = 256 << 10;
 const refineRequests = 4;
 /** Fragments that may wait for decoding and uploads when the next ones are asked for. */

@@ -9,6 +9,8 @@ import type { Levels } from './worker_protocol';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
 const slicePx = 1 << 20;
+/** Of a strip of an enlarged preview, which is uploaded in one go. */
+const stripPx = 1 << 18;
 /** Pixels that the GPU may be behind; it is not waited for longer than this. */
 const mostBehindPx = 4 << 20;
 const longestFenceMs = 250;
@@ -87,7 +89,7 @@ export class TextureSet {
   /** Enlarged off the main thread, strip by strip: GPUs that are none take seconds for a large texture. */
   private async enlarge_(next: PlaneComposer, image: ImageBitmap | HTMLImageElement): Promise<void> {
     const { widthPx: width, heightPx: height } = next;
-    const rows = Math.max(16, Math.floor(slicePx / width) & ~15);
+    const rows = Math.max(16, Math.floor(stripPx / width) & ~15);
     const strips: Promise<void>[] = [];
     for (let y0 = 0; y0 < height; y0 += rows) {
       const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
