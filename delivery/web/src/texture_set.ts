@@ -8,11 +8,16 @@ import type { Levels } from './worker_protocol';
 
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
-const slicePx = 1 << 20;
+const slicePx = 1 << 19;
 /** Of a strip of an enlarged preview, which is uploaded in one go. */
 const stripPx = 1 << 18;
-/** Pixels that the GPU may be behind; it is not waited for longer than this. */
-const mostBehindPx = 4 << 20;
+/**
+ * Pixels that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn.
+ * How many those are shows when one has waited. It is not waited for longer than longestFenceMs.
+ */
+const behindPx = { least: 1 << 19, most: 1 << 22, first: 1 << 21, more: 1 << 16 };
+/** A turn that took so long has waited. */
+const waitedMs = 20;
 const longestFenceMs = 250;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
@@ -33,6 +38,7 @@ export class TextureSet {
   private pumping_ = false;
   private mipsAt_ = 0;
   private idle_: (() => void)[] = [];
+  private mayBeBehindPx_ = behindPx.first;
   private fences_: { sync: WebGLSync; pixels: number; at: number }[] = [];
   private disposed_ = false;
 
@@ -177,6 +183,10 @@ export class TextureSet {
       pixels += work.pixels;
       work.run();
     }
+    const waited = performance.now() - start > waitedMs;
+    this.mayBeBehindPx_ = waited
+      ? Math.max(behindPx.least, this.mayBeBehindPx_ / 2)
+      : Math.min(behindPx.most, this.mayBeBehindPx_ + behindPx.more);
     if (start - this.mipsAt_ > mipsEveryMs || this.queue_.length === 0) this.finish();
     if (pixels > 0) this.putFence_(pixels);
     if (this.queue_.length > 0) setTimeout(() => this.pump_(), 0);
@@ -199,7 +209,7 @@ export class TextureSet {
       gl.deleteSync(sync);
       return false;
     });
-    return this.fences_.reduce((sum, f) => sum + f.pixels, 0) > mostBehindPx;
+    return this.fences_.reduce((sum, f) => sum + f.pixels, 0) > this.mayBeBehindPx_;
   }
 
   /** All mip levels of everything, at once. */
