@@ -264,7 +264,7 @@ export class Panel {
         { label: 'credit', colour: 'k4', value: secondsTicks, fill: true },
         { label: 'bandwidth', colour: 'k2', side: 1, value: (v) => `${v.toFixed(2)} Mbit/s` },
       ],
-    }, () => turnData(this.live, (t) => [t.creditS, (t.bytesPerSecond * 8) / 1e6]));
+    }, () => turnData(this.live, (t) => [t.creditS, t.bytesPerSecond < kMostRate ? (t.bytesPerSecond * 8) / 1e6 : null]));
   }
 
   private bytesSection(): void {
@@ -290,6 +290,7 @@ function short(n: number): string {
 }
 
 const kLeastPx = 16;
+const kMostRate = 1.25e9; // bytes per second: what came in one piece with something else says nothing of the link
 
 /** Triangles over displayed height by the three rules, on the union of their steps. */
 function stepData(m: Manifest): number[][] {
@@ -323,7 +324,7 @@ function ladderData(t: PlaneTables): number[][] {
   return [[...t.rungQuality], bytes, rows.map(([, s]) => s)];
 }
 
-function turnData(live: Live, of: (t: Live['turns'][number]) => number[]): (number | null)[][] | null {
+function turnData(live: Live, of: (t: Live['turns'][number]) => (number | null)[]): (number | null)[][] | null {
   const turns = live.turns.filter((t) => !t.skipped).sort((a, b) => a.at - b.at);
   if (turns.length < 2) return null;
   const columns: (number | null)[][] = [turns.map((t) => t.at)];
