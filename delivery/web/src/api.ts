@@ -41,8 +41,11 @@ export interface LoadOptions {
   order?: HtcOrder;
   /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
   beta0BytesS?: number;
-  /** Which rule says what scale is enough. */
-  rule?: StepRule;
+  /**
+   * Which rule says what scale is enough: one of the step function's, or (default) measured: its default, and finer as
+   * long as the package's own measurements say that it is seen.
+   */
+  rule?: StepRule | 'measured';
   /** This scale (or the nearest one that the package has) instead of what the display asks for. */
   scale?: number;
   /** This rung of every fragment (clipped to those there are) instead of what fits the time. */

@@ -8,7 +8,7 @@ import type { PackageReader } from './package_reader';
 import { MaterialSet } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
-import { selectScale, wholeObject } from './viewing';
+import { wholeObject } from './viewing';
 import { WorkerPool } from './worker_pool';
 
 /** Limits beyond are none: timers and plans end there. */
@@ -229,7 +229,7 @@ export class ModelLoad implements LoadedModel {
   private scaleForView_(): number {
     if (this.context_.override.scale !== undefined) return this.context_.override.scale;
     const { heightPx, part } = this.context_.view.display;
-    const at = (px: number): number => selectScale(this.reader_.manifest, px, part, this.options_.rule);
+    const at = (px: number): number => this.textures_!.scaleFor(px, part);
     const now = at(heightPx);
     if (this.context_.wantedScale < 0) return now;
     const finer = at(heightPx / hysteresis);

@@ -5,6 +5,22 @@ import type { QualityTable } from './quality_table';
 /** A coarser scale has to look better by this much of SSIM. */
 const worthwhile = 1e-4;
 
+/** A finer scale that gains less of SSIM, rendered and compared with the source, is not worth its bytes. */
+const seenSsim = 0.004;
+
+/**
+ * From a scale that the step function finds good enough to a finer one, as long as the package's measured table says
+ * that each is seen to be better: the rules speak of distances, and shading tells more. The table holds for objects
+ * that are displayed at least as high as its pictures.
+ */
+export function finerWhereSeen(table: QualityTable, scale: number, displayedPx: number): number {
+  const best = (i: number): number => table.ssim[(i + 1) * table.rungs.length - 1];
+  let i = table.scales.indexOf(scale);
+  if (i < 0 || displayedPx < table.sizePx) return scale;
+  while (i > 0 && best(i - 1) - best(i) >= seenSsim) --i;
+  return table.scales[i];
+}
+
 /** What the textures lose when so many bytes are spent in proportion to the planned sizes. */
 function lossFor(list: FragmentList, bytes: number): number {
   let planned = 0;

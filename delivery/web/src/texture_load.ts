@@ -8,13 +8,14 @@ import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
-import { chooseScale } from './scale_choice';
+import type { QualityTable } from './quality_table';
+import { chooseScale, finerWhereSeen } from './scale_choice';
 import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
 import { TimedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
 import { upgradesInOrder } from './upgrades';
-import { selectScale } from './viewing';
+import { VisiblePart, selectScale } from './viewing';
 import { VisibleSurface } from './visibility';
 import type { Levels } from './worker_protocol';
 
@@ -40,6 +41,7 @@ export class TextureLoad {
   private transfers_?: Transfers;
   private data_?: PackageData;
   private plan_?: HarmonicTimePlan;
+  private quality_?: QualityTable;
   private surface_?: VisibleSurface;
   private surfaceScale_ = -1;
   private readonly gaveUp_ = new Set<string>();
@@ -88,6 +90,7 @@ export class TextureLoad {
   /** Scale and textures within the time. */
   async timedPart(data: PackageData): Promise<void> {
     this.data_ = data;
+    this.quality_ = await this.load_.reader.quality();
     this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.latencyS);
     const transfers = this.startTextures_(data);
     const scale = await this.scaleInTime_(data);
@@ -200,14 +203,21 @@ export class TextureLoad {
     return { shown: Promise.all(shown) };
   }
 
+  /** The scale that is enough at a displayed height: by the rule, or finer where that was measured to be seen. */
+  scaleFor(heightPx: number, part: VisiblePart | undefined): number {
+    const { rule } = this.load_.options;
+    const { manifest } = this.load_.reader;
+    if (rule && rule !== 'measured') return selectScale(manifest, heightPx, part, rule);
+    const scale = selectScale(manifest, heightPx, part);
+    return this.quality_ ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
+  }
   private async scaleInTime_(data: PackageData): Promise<number> {
     const { heightPx, part } = this.load_.view.display;
-    const wanted = this.load_.override.scale ?? selectScale(data.manifest, heightPx, part, this.load_.options.rule);
+    const wanted = this.load_.override.scale ?? this.scaleFor(heightPx, part);
     if (this.load_.override.scale !== undefined || !Number.isFinite(this.load_.limitS)) return wanted;
-    const quality = await this.load_.reader.quality();
     const planes = this.planesFor_(data);
     const list = fragmentList(data, planes, { scale: wanted });
-    return chooseScale(data, quality, list, planes, wanted, (scale) => this.textureBytes_(scale));
+    return chooseScale(data, this.quality_!, list, planes, wanted, (scale) => this.textureBytes_(scale));
   }
 
   /** The list of what may be fetched, with the bytes that fetching takes. */
@@ -307,13 +317,14 @@ export class TextureLoad {
   async refineSome(): Promise<boolean> {
     const data = this.data_!;
     const choices = [...this.textureSet_!.planes.values()].map(({ base, plane }) => ({ base, plane }));
+    await sleepS(0);
     const list = this.listOf_(data, choices, Math.max(this.load_.shownScale, 0));
     if (this.load_.override.rung !== undefined) {
       await this.fetchAll_(list);
       return false;
     }
     if (this.wholeRungs_) return this.refineRung_(list);
-    const seen = this.seen_(choices);
+    const seen = await this.seen_(choices);
     const wishes: Wish[] = [];
     let bytes = 0;
     const rungs = list.fragments.map((f) => Math.max(this.rungOf_(f), this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1));
@@ -368,7 +379,8 @@ export class TextureLoad {
   }
 
   /** Share of each fragment that the camera sees, by plane; undefined without a camera. */
-  private seen_(choices: readonly PlaneChoice[]): Map<number, Float32Array> | undefined {
+  private async seen_(choices: readonly PlaneChoice[]): Promise<Map<number, Float32Array> | undefined> {
+    await sleepS(0); // the page goes on in between
     const { camera } = this.load_.view;
     const [shape] = this.load_.object.children;
     if (!camera || !shape) return undefined;
@@ -384,6 +396,7 @@ export class TextureLoad {
     for (const { plane } of choices) {
       const t = this.data_!.textures[plane];
       const cell: [number, number] = [t.fragmentWidthPx / t.widthPx, t.fragmentHeightPx / t.heightPx];
+      await sleepS(0);
       seen.set(plane, this.surface_!.ofImage(t.image, t.columns, t.rows, camera, this.load_.object, cell));
     }
     return seen;

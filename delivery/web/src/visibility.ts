@@ -1,7 +1,7 @@
 import { BufferGeometry, Camera, Matrix4, Mesh, Object3D, Vector3 } from 'three';
 
 /** Triangles looked at per model: enough to tell which fragments are seen. */
-const mostSamples = 20000;
+const mostSamples = 6000;
 
 interface Sample {
   /** x y z of the middle, then the normal times the area. */

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import {
   FormatError, FragmentList, HarmonicTimePlan, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize,
 } from '../src/reader';
-import { chooseScale } from '../src/scale_choice';
+import { chooseScale, finerWhereSeen } from '../src/scale_choice';
 import { groupBytes, groupedList, throughputOf } from '../src/groups';
 import { TimedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
@@ -179,6 +179,15 @@ describe('the scale', () => {
     expect(chooseScale(data, quality, list, planes, 0, () => 1e9)).toBe(0);
     expect(chooseScale(data, quality, list, planes, 0, (scale) => (scale === 0 ? -1 : 1000))).toBe(1);
   });
+});
+
+it('a finer scale is taken while it was measured to be seen', () => {
+  const ssim = Float32Array.from([0.9, 0.999, 0.89, 0.998, 0.88, 0.97, 0.8, 0.9]);
+  const table = { views: 4, sizePx: 192, scales: [0, 2, 5, 9], rungs: [10, 90], ssim, difference: ssim };
+  expect(finerWhereSeen(table, 9, 400)).toBe(2);
+  expect(finerWhereSeen(table, 2, 400)).toBe(2);
+  expect(finerWhereSeen(table, 9, 100)).toBe(9); // smaller than it was measured at
+  expect(finerWhereSeen(table, 7, 400)).toBe(7); // not in the table
 });
 
 it('errors keep their parts on the way from a worker', () => {
