@@ -31,25 +31,42 @@ const Block& dct_matrix() {
   return matrix;
 }
 
-/// out = a b, or a transposed b.
-template <bool kTransposed>
-void multiply(const Block& a, const Block& b, Block& out) {
-  for (std::size_t i = 0; i < 8; ++i) {
-    double row[8] = {};
-    for (std::size_t k = 0; k < 8; ++k) {
-      const double f = kTransposed ? a[k * 8 + i] : a[i * 8 + k];
-      for (std::size_t j = 0; j < 8; ++j) row[j] += f * b[k * 8 + j];
+/// The transform along columns: out[k] = sum of m[k][n] x[n] over rows n, or back. Cosines are symmetric
+/// about the middle for even k and antisymmetric for odd k, which halves the products.
+template <bool kInverse>
+void transform_columns(const Block& x, Block& out) {
+  const Block& m = dct_matrix();
+  double even[4][8] = {}, odd[4][8] = {};
+  for (std::size_t n = 0; n < 4; ++n) {
+    if constexpr (kInverse) {
+      for (std::size_t k = 0; k < 8; k += 2)
+        for (std::size_t j = 0; j < 8; ++j) {
+          even[n][j] += m[k * 8 + n] * x[k * 8 + j];
+          odd[n][j] += m[(k + 1) * 8 + n] * x[(k + 1) * 8 + j];
+        }
+    } else {
+      for (std::size_t j = 0; j < 8; ++j) {
+        const double sum = x[n * 8 + j] + x[(7 - n) * 8 + j], difference = x[n * 8 + j] - x[(7 - n) * 8 + j];
+        for (std::size_t k = 0; k < 4; ++k) {
+          even[k][j] += m[2 * k * 8 + n] * sum;
+          odd[k][j] += m[(2 * k + 1) * 8 + n] * difference;
+        }
+      }
     }
-    for (std::size_t j = 0; j < 8; ++j) out[i * 8 + j] = row[j];
   }
+  for (std::size_t k = 0; k < 4; ++k)
+    for (std::size_t j = 0; j < 8; ++j) {
+      out[(kInverse ? k : 2 * k) * 8 + j] = kInverse ? even[k][j] + odd[k][j] : even[k][j];
+      out[(kInverse ? 7 - k : 2 * k + 1) * 8 + j] = kInverse ? even[k][j] - odd[k][j] : odd[k][j];
+    }
 }
 
-/// (m (m x)^T)^T: the transform along both axes; the transposes cancel when done twice.
+/// The transform along both axes; the transposes cancel when done twice.
 template <bool kInverse>
 void transform(Block& x) {
   Block half;
   for (int axis = 0; axis < 2; ++axis) {
-    multiply<kInverse>(dct_matrix(), x, half);
+    transform_columns<kInverse>(x, half);
     for (std::size_t i = 0; i < 8; ++i)
       for (std::size_t j = 0; j < 8; ++j) x[i * 8 + j] = half[j * 8 + i];
   }

@@ -269,6 +269,34 @@ TEST(Textures, MipsRoundTripAndTheirRulesAreChecked) {
   refused("4", [](Json& j) { j[4]["previewWidthPx"] = 7; });
 }
 
+TEST(Textures, TheLosslessTopRoundTripsAndItsRulesAreChecked) {
+  std::vector<TextureInfo> textures = with_mips();
+  textures[0].lossless = true;
+  textures[1].source_extension = "exr";
+  textures[1].source_colours = false;
+  textures[1].source.path = "source/001.exr";
+  EXPECT_EQ(read_textures(as_bytes(write_textures(textures))), textures);
+  std::vector<TextureInfo> resolved = textures;
+  EXPECT_THROW(resolve_textures(resolved, {}), FormatError);
+  const auto refused = [&](const char* place, auto change) {
+    Json j = Json::parse(write_textures(textures));
+    change(j["textures"]);
+    try {
+      read_textures(as_bytes(j.dump()));
+      ADD_FAILURE() << place;
+    } catch (const FormatError& e) {
+      EXPECT_EQ(e.place(), std::string("/textures/") + place);
+    }
+  };
+  refused("0/lossless", [](Json& j) { j[0]["lossless"] = 1; });
+  refused("0/lossless", [](Json& j) { j[0]["codec"] = "webp"; });
+  refused("2/lossless", [](Json& j) { j[2]["lossless"] = true; });
+  refused("1/source", [](Json& j) { j[1]["source"] = "../png"; });
+  refused("1/sourceColours", [](Json& j) { j[1].erase("sourceColours"); });
+  refused("1/sourceColours", [](Json& j) { j[1]["sourceColours"] = "no"; });
+  refused("2/source", [](Json& j) { j[2]["source"] = "png", j[2]["sourceColours"] = true; });
+}
+
 TEST(Manifest, OnlyMipsMayLackPreviews) {
   Manifest m = make_manifest(3, 4);
   m.previews.resize(2);
