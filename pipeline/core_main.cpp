@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
     add_simulate_command(app, exit_code);
     add_fetch_command(app, exit_code);
     add_view_command(app, exit_code);
+    add_extract_command(app, exit_code);
     add_stages_command(app, exit_code);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

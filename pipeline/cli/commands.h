@@ -32,6 +32,7 @@ void add_check_command(CLI::App& app, int& exit_code);     // command_plan.cpp
 void add_simulate_command(CLI::App& app, int& exit_code);  // command_simulate.cpp
 void add_fetch_command(CLI::App& app, int& exit_code);     // command_fetch.cpp
 void add_view_command(CLI::App& app, int& exit_code);      // command_view.cpp
+void add_extract_command(CLI::App& app, int& exit_code);   // command_extract.cpp
 void add_stages_command(CLI::App& app, int& exit_code);
 
 }  // namespace texmesh

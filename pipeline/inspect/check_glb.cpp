@@ -100,7 +100,8 @@ class GlbChecker {
     const std::string type = json.value("mimeType", std::string());
     const auto shown = sniff_image_format(bytes);
     const bool jpeg = shown == ImageFormat::kJpeg, png = shown == ImageFormat::kPng;
-    if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png"))
+    const bool webp = d_.standalone() && shown == ImageFormat::kWebp;
+    if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png") && !(webp && type == "image/webp"))
       d_.fail("glb-image", place + "/mimeType",
               jpeg  ? "image/jpeg"
               : png ? "image/png"
@@ -114,7 +115,11 @@ class GlbChecker {
 
   void check_texture(std::size_t i, const Json& json) {
     const std::string place = indexed("textures", i);
-    d_.index(json, "source", count_of("images"), place);
+    if (d_.standalone() && json.contains("extensions") && json["extensions"].contains("EXT_texture_webp"))
+      d_.index(json["extensions"]["EXT_texture_webp"], "source", count_of("images"),
+               place + "/extensions/EXT_texture_webp");
+    else
+      d_.index(json, "source", count_of("images"), place);
     if (json.contains("sampler")) d_.index(json, "sampler", count_of("samplers"), place);
   }
 
@@ -365,9 +370,10 @@ class GlbChecker {
 
 }  // namespace
 
-GlbFacts check_glb(std::span<const std::uint8_t> bytes, const std::string& entry, Findings& findings) {
+GlbFacts check_glb(std::span<const std::uint8_t> bytes, const std::string& entry, Findings& findings,
+                   GlbRules rules) {
   GlbFacts facts;
-  GlbDocument document(bytes, entry, findings);
+  GlbDocument document(bytes, entry, findings, rules == GlbRules::kStandalone);
   if (!document.load()) return facts;
   document.guarded("glb-json", "", [&] { GlbChecker(document, facts).run(); });
   return facts;

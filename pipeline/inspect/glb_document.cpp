@@ -166,7 +166,9 @@ bool GlbDocument::load_json() {
     fail("glb-json", "/asset/version", "\"2.0\"", "something else");
   for (const Json& name : array(root_, "extensionsRequired", "")) {
     const std::string text = name.is_string() ? name.get<std::string>() : name.dump();
-    if (std::find(kReadExtensions.begin(), kReadExtensions.end(), text) == kReadExtensions.end())
+    const bool known =
+        std::find(kReadExtensions.begin(), kReadExtensions.end(), text) != kReadExtensions.end();
+    if (!known && !(standalone_ && text == "EXT_texture_webp"))
       fail("glb-json", "/extensionsRequired", "extensions of the package format", text);
     if (!uses_extension(text))
       findings_.add("glb-json", entry_, "/extensionsUsed", "to name " + text, "nothing");

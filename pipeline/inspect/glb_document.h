@@ -32,12 +32,15 @@ class GlbDocument {
     bool normalized = false, ok = false;
   };
 
-  GlbDocument(std::span<const std::uint8_t> bytes, std::string entry, Findings& findings)
-      : bytes_(bytes), entry_(std::move(entry)), findings_(findings) {}
+  /// `standalone`: GlbRules::kStandalone.
+  GlbDocument(std::span<const std::uint8_t> bytes, std::string entry, Findings& findings,
+              bool standalone = false)
+      : bytes_(bytes), entry_(std::move(entry)), findings_(findings), standalone_(standalone) {}
 
   /// Reads everything; false when the file is too broken to look at its elements.
   bool load();
 
+  bool standalone() const { return standalone_; }
   const Json& root() const { return root_; }
   const std::vector<View>& views() const { return views_; }
   const std::vector<Accessor>& accessors() const { return accessors_; }
@@ -84,6 +87,7 @@ class GlbDocument {
   std::span<const std::uint8_t> bytes_, json_, binary_;
   std::string entry_;
   Findings& findings_;
+  bool standalone_ = false;
   Json root_;
   std::vector<std::uint64_t> buffer_bytes_;  // declared; 0 bytes readable for all but buffer 0
   std::vector<View> views_;

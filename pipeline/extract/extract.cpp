@@ -1,0 +1,136 @@
+#include "pipeline/extract/extract.h"
+
+#include <algorithm>
+#include <map>
+
+#include "delivery/cpp/fragment_list.h"
+#include "format/viewing.h"
+#include "pipeline/extract/budget_search.h"
+#include "pipeline/extract/standalone_glb.h"
+#include "pipeline/extract/texture_source.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kDefaultDisplayPx = 1000;
+constexpr double kDisplayQuality = 90;  // of images that were made smaller
+constexpr double kTopQuality = 97;      // of images coded anew from planes that say no quality
+
+const ManifestScale& scale_entry(PackageReader& package, int scale) {
+  for (const ManifestScale& s : package.manifest().scales)
+    if (s.scale == scale) return s;
+  throw InputError(package.store().name(), "scale " + std::to_string(scale), "a scale of the package",
+                   "none");
+}
+
+int wanted_scale(PackageReader& package, const ExtractRequest& request) {
+  if (request.scale) return scale_entry(package, *request.scale).scale;
+  if (request.lods && request.display_px <= 0) return 0;
+  return select_scale(package.manifest(), request.display_px > 0 ? request.display_px : kDefaultDisplayPx);
+}
+
+void check_rung(PackageReader& package, const ExtractRequest& request) {
+  if (request.rung == kBestRung || package.tables().planes.empty()) return;
+  std::size_t most = 0;
+  for (const PlaneTables& t : package.tables().planes) most = std::max(most, t.rung_count());
+  if (request.rung >= most)
+    throw InputError(package.store().name(), "rung " + std::to_string(request.rung),
+                     "0 to " + std::to_string(most - 1) + ", or max", "another");
+}
+
+/// The plane that stands for a full-size one: itself, or where a displayed height is given and no rung, the
+/// smallest mip that has a texel for every pixel.
+std::map<std::uint32_t, std::uint32_t> shown_planes(PackageReader& package, const ExtractRequest& request) {
+  std::map<std::uint32_t, std::uint32_t> out;
+  const bool by_display = request.display_px > 0 && request.rung == kBestRung;
+  for (const PlaneChoice& c :
+       by_display ? planes_for_display(package, request.display_px) : full_size(package))
+    out[c.base] = c.plane;
+  return out;
+}
+
+FileImage format_of(const ExtractRequest& request, bool alpha) {
+  if (request.images == ExtractImages::kPng) return FileImage::kPng;
+  if (request.images == ExtractImages::kWebp) return FileImage::kWebp;
+  return alpha ? FileImage::kPng : FileImage::kJpeg;
+}
+
+double quality_of_rung(PackageReader& package, std::uint32_t plane, std::uint32_t rung) {
+  const PlaneTables& t = package.tables().planes[plane];
+  if (t.rung_quality.empty()) return kTopQuality;
+  return t.rung_quality[std::min<std::size_t>(rung, t.rung_count() - 1)];
+}
+
+/// A plane at full size, or from it the size of a mip: the full-size plane has better rungs than any mip.
+Pixels plane_texels(PackageReader& package, std::uint32_t base, std::uint32_t plane, std::uint32_t rung,
+                    Averaging kind, const RunContext& context) {
+  Pixels pixels = read_plane(package, base, rung, context);
+  if (plane == base) return pixels;
+  const TextureInfo& mip = package.textures()[plane];
+  return reduced(pixels, pixels.width_px, pixels.height_px, std::min(mip.width_px, pixels.width_px),
+                 std::min(mip.height_px, pixels.height_px), kind,
+                 kind == Averaging::kLight ? kSharpening : 0.f);
+}
+
+/// A plane of full size is coded anew at the quality that it was stored with, on the same blocks, so that a
+/// JPEG's numbers hardly change.
+FileImageData image_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+                         const std::map<std::uint32_t, std::uint32_t>& planes, const RunContext& context,
+                         ExtractedImage& row) {
+  const std::uint32_t plane = planes.at(image.plane);
+  Pixels pixels = plane_texels(package, image.plane, plane, request.rung, image.averaging(), context);
+  if (image.alpha_plane) {
+    const Pixels alpha = read_plane(package, *image.alpha_plane, request.rung, context);
+    if (alpha.width_px < pixels.width_px || alpha.height_px < pixels.height_px)
+      throw FormatError(kTexturesPath, "alpha", "a plane as large as its colours", "a smaller one");
+    pixels = with_alpha(pixels, reduced(alpha, alpha.width_px, alpha.height_px, pixels.width_px,
+                                        pixels.height_px, Averaging::kNumbers));
+  }
+  row.image = image.image;
+  row.role = image.role;
+  row.format = format_of(request, image.alpha_plane.has_value());
+  row.width_px = pixels.width_px;
+  row.height_px = pixels.height_px;
+  row.quality = row.format == FileImage::kPng ? 100
+                : plane != image.plane        ? kDisplayQuality
+                                              : quality_of_rung(package, plane, request.rung);
+  FileImageData file{row.format, encode_image(pixels, {row.format, row.quality, !image.colours, false})};
+  row.bytes = file.bytes.size();
+  return file;
+}
+
+Extracted extract_whole(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
+  const Manifest& m = package.manifest();
+  Extracted out;
+  out.scale = wanted_scale(package, request);
+  check_rung(package, request);
+  out.triangles = scale_entry(package, out.scale).triangles;
+  out.levels = request.lods ? levels_of(m, out.scale) : std::vector<int>{out.scale};
+  StandaloneGlb file(package.scale_glb(out.scale), mesh_path(out.scale));
+  if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
+  for (std::size_t l = 1; l < out.levels.size(); ++l)
+    file.add_level(StandaloneGlb(package.scale_glb(out.levels[l]), mesh_path(out.levels[l])),
+                   screen_coverage_of(m, out.levels[l]));
+  const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
+  const std::vector<std::uint32_t> used = file.source_images();
+  std::map<std::uint32_t, FileImageData> images;
+  for (const PackageImage& image : package_images(package)) {
+    if (std::find(used.begin(), used.end(), image.image) == used.end()) continue;
+    images[image.image] = image_file(package, request, image, planes, context, out.images.emplace_back());
+    context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
+  }
+  file.set_images(images);
+  out.glb = file.finish();
+  out.mesh_bytes = out.glb.size();
+  for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
+  return out;
+}
+
+}  // namespace
+
+Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
+  return request.bytes > 0 ? extract_bytes(package, request, context)
+                           : extract_whole(package, request, context);
+}
+
+}  // namespace texmesh

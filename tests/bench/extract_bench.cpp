@@ -1,0 +1,201 @@
+// How good the files of `texmesh extract --bytes` look beside those that other tools make of the same bytes.
+//
+//   extract_bench SOURCE PACKAGE --bytes 100,250,500,1000 [--peers DIR] [--views 6] [--size 512] [--keep DIR]
+//   extract_bench SOURCE --score A.glb,B.glb
+//
+// Renders SOURCE and each file with one renderer from the same views and prints mean LDR-FLIP over the pixels
+// of the object (0 = equal). DIR holds files that tests/bench/extract_peers has made of SOURCE; the best one
+// within the bytes counts. The views are others than those that extract itself compares.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "pipeline/extract/extract.h"
+#include "pipeline/extract/picture_meter.h"
+#include "pipeline/file_resolver.h"
+#include "pipeline/import/import.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes read_bytes(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class NoFiles : public Resolver {
+  std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
+};
+
+struct Views {
+  std::vector<ViewCamera> cameras;
+  std::uint32_t side_px = 512;
+};
+
+std::vector<Picture> pictures(const Model& model, const Views& views, const RunContext& context) {
+  ShownModel shown{&model.mesh, &model.materials, {}};
+  std::map<std::string, MipTexture> textures;
+  std::vector<bool> seen(model.images.size());
+  for (const Material& m : model.materials)
+    for (const TextureRef* ref : {&m.base_colour_texture, &m.emissive_texture})
+      if (ref->used()) seen[static_cast<std::size_t>(ref->image)] = true;
+  for (std::size_t k = 0; k < model.images.size(); ++k) {
+    shown.image_names.push_back(std::to_string(k));
+    if (seen[k]) textures[shown.image_names.back()] = mip_texture(decode_image(model.images[k]));
+  }
+  return ModelViews(shown, views.cameras, views.side_px, context).draw(textures, context);
+}
+
+Model read_source(const fs::path& path, const RunContext& context) {
+  FileResolver resolver(path.parent_path());
+  return import_model(path.filename().string(), read_bytes(path), resolver, {}, context).model;
+}
+
+class Scorer {
+ public:
+  Scorer(const fs::path& source, int views, std::uint32_t side_px, const RunContext& context)
+      : context_(context) {
+    const Model model = read_source(source, context);
+    views_ = {cameras_around(model.mesh, views), side_px};
+    origin_ = model.mesh.origin;
+    meter_ = std::make_unique<PictureMeter>(pictures(model, views_, context), context);
+  }
+  double score(const Bytes& glb, const std::string& name) const {
+    NoFiles none;
+    const Model model = import_model(name, glb, none, {}, context_).model;
+    return meter_->difference(pictures(model, views_, context_), context_);
+  }
+
+ private:
+  RunContext context_;
+  Views views_;
+  Vec3d origin_;
+  std::unique_ptr<PictureMeter> meter_;
+};
+
+struct Scored {
+  std::string name;
+  std::uint64_t bytes = 0;
+  double flip = 1e9;
+};
+
+std::vector<Scored> files_of(const fs::path& folder) {
+  std::vector<Scored> out;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".glb")
+      out.push_back({entry.path().filename().string(), entry.file_size(), 1e9});
+  std::sort(out.begin(), out.end(), [](const Scored& a, const Scored& b) { return a.name < b.name; });
+  return out;
+}
+
+void score(const Scorer& scorer, const fs::path& folder, Scored& s) {
+  try {
+    s.flip = scorer.score(read_bytes(folder / s.name), s.name);
+  } catch (const Error& e) {
+    std::cerr << s.name << ": " << e.what() << '\n';
+  }
+}
+
+/// The best file of at most `limit` bytes. Small pictures find the ten that are looked at closely.
+Scored best_of(const std::vector<Scored>& roughly, const Scorer& scorer, const fs::path& folder,
+               std::uint64_t limit) {
+  std::vector<Scored> fitting;
+  for (const Scored& s : roughly)
+    if (s.bytes <= limit) fitting.push_back(s);
+  std::stable_sort(fitting.begin(), fitting.end(),
+                   [](const Scored& a, const Scored& b) { return a.flip < b.flip; });
+  if (fitting.size() > 10) fitting.resize(10);
+  Scored best;
+  for (Scored& s : fitting) {
+    score(scorer, folder, s);
+    if (s.flip < best.flip) best = s;
+  }
+  return best;
+}
+
+struct Arguments {
+  std::string source, package, peers, keep;
+  std::vector<double> bytes{100, 250, 500, 1000};
+  std::vector<std::string> score;
+  int views = 6, size = 512;
+};
+
+void print_table(const Arguments& a, const Scorer& scorer, const RunContext& context) {
+  std::vector<Scored> peers = a.peers.empty() ? std::vector<Scored>{} : files_of(a.peers);
+  const Scorer rough(a.source, 3, 256, context);
+  for (Scored& s : peers) score(rough, a.peers, s);
+  std::cout << "     kB   extract     bytes  scale  FLIP    s   best other    bytes  FLIP    ratio\n";
+  double logs = 0;
+  int rows = 0;
+  for (const double kilobytes : a.bytes) {
+    const auto limit = static_cast<std::uint64_t>(kilobytes * 1000);
+    PackageReader package(open_store(a.package));
+    ExtractRequest request;
+    request.bytes = limit;
+    const auto start = std::chrono::steady_clock::now();
+    const Extracted e = extract_model(package, request, context);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!a.keep.empty()) {
+      std::ofstream out(fs::path(a.keep) / fmt::format("{}kB.glb", kilobytes), std::ios::binary);
+      out.write(reinterpret_cast<const char*>(e.glb.data()), static_cast<std::streamsize>(e.glb.size()));
+    }
+    const double ours = scorer.score(e.glb, "extract.glb");
+    const Scored best = best_of(peers, scorer, a.peers, limit);
+    std::cout << fmt::format("{:7}  {:>9}{:>10}  S_{:<4}{:.4f}{:5.1f}", kilobytes, e.within ? "" : "outside",
+                             e.glb.size(), e.scale, ours, seconds);
+    if (best.flip < 1) {
+      std::cout << fmt::format("   {:28}{:>9}  {:.4f}  {:.3f}", best.name, best.bytes, best.flip,
+                               ours / best.flip);
+      if (e.within) logs += std::log(ours / best.flip), ++rows;
+    } else if (!peers.empty()) {
+      std::cout << "   none fits";
+    }
+    std::cout << fmt::format("  [own views {:.4f}, mesh {:.4f}]", e.difference, e.mesh_difference);
+    for (const ExtractedImage& i : e.images)
+      std::cout << fmt::format("  [{} {}x{} q{:.0f} {}]", i.role.substr(0, 4), i.width_px, i.height_px,
+                               i.quality, i.bytes);
+    std::cout << std::endl;
+  }
+  if (rows) std::cout << fmt::format("geometric mean of {} ratios: {:.3f}\n", rows, std::exp(logs / rows));
+}
+
+}  // namespace
+}  // namespace texmesh
+
+int main(int argc, char** argv) {
+  using namespace texmesh;
+  CLI::App app{"Compares extract --bytes with files of other tools by rendered FLIP"};
+  Arguments a;
+  app.add_option("source", a.source, "The model that the package was made of")->required();
+  app.add_option("package", a.package, "Its package");
+  app.add_option("--bytes", a.bytes, "Budgets, kB")->delimiter(',')->capture_default_str();
+  app.add_option("--peers", a.peers, "Folder of files to compare with");
+  app.add_option("--keep", a.keep, "Folder for the extracted files");
+  app.add_option("--score", a.score, "Only rate these files")->delimiter(',');
+  app.add_option("--views", a.views)->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  RunContext context;
+  context.threads = 2;
+  try {
+    const Scorer scorer(a.source, a.views, static_cast<std::uint32_t>(a.size), context);
+    for (const std::string& file : a.score) {
+      const Bytes bytes = read_bytes(file);
+      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}\n", file, bytes.size(), scorer.score(bytes, file));
+    }
+    if (!a.package.empty()) print_table(a, scorer, context);
+  } catch (const std::exception& e) {
+    std::cerr << e.what() << '\n';
+    return 1;
+  }
+}
