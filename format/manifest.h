@@ -61,7 +61,8 @@ struct ManifestScale {
   double p95 = 0, p99 = 0;              // relative distance to S_0 (perceptual value), 0 for S_0
   // Displayed object height in px up to which the scale is enough; kAnyDisplayPx for S_0:
   double display_px_jnd = 0, display_px_error = 0, display_px_edge = 0;
-  std::string floor;  // why it has more vertices than its scale asks for, "" where it has not (since 1.1)
+  std::string
+      floor;  // why it has more vertices than its scale asks for, or no scale is coarser; else "" (since 1.1)
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
 

@@ -8,7 +8,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kFadeBelow = 0.02;  // of the vertices: there the attributes' weight starts to fall to 0
+constexpr double kFadeBelow = 0.05;  // of the vertices: there the attributes' weight starts to fall to 0
 // A little of the moved distance keeps flat places, where every collapse is free, from growing slivers.
 constexpr double kDistanceWeight = 1e-6;
 // The hub of a fan of more corners is left alone until the fan has shrunk: every look at it, or at what would

@@ -133,8 +133,13 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
   measure_scale_errors(mesh.component, result.mesh, result.scales, context);
+  const std::size_t taken = result.scales.size();
   drop_far_scales(result, options.max_error * engine.mesh().diagonal());
-  note_floor(result, target, floor.empty() ? "every coarser scale exceeds max_error" : floor);
+  if (result.scales.size() < taken) floor = "every coarser scale exceeds max_error";
+  // The last scale may have met its own target before what stopped the next ones.
+  if (result.scales.size() > 1 && result.scales.back().floor_reason.empty())
+    result.scales.back().floor_reason = floor;
+  note_floor(result, target, floor);
   return result;
 }
 

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 2;
+inline constexpr int kSimplificationVersion = 3;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kQem, kThesis };
 template <>
@@ -26,10 +26,12 @@ struct SimplificationOptions {
   double uv_weight = 0.06;           // of the UV quadric against the geometric one
   double normal_weight = 0.01;       // of the normals' quadric; one radian counts as a mean edge
   double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
-  double boundary_weight = 10;  // of the border quadrics
-  double seam_weight = 1;       // of the same at seams of the texture
-  double max_error =
-      0.05;  // of the diagonal: no collapse with a larger quadric error, no scale that deviates more
+  double boundary_weight = 3;  // of the border quadrics
+  double seam_weight = 1;      // of the same at seams of the texture
+  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more. At twice as much
+  // the last scales of fragmented atlases are five times as far off as the next finer ones, for 5 % fewer
+  // bytes.
+  double max_error = 0.025;
   double max_shift = 0.05;  // of the diagonal: no collapse that shifts the texture by more
   int min_triangles = 100;  // no scale is asked to go below
   // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no
@@ -81,7 +83,8 @@ struct NestedScale {
   // Distance between S_0 and S_i, sampled both ways, object units. What has vanished with its whole component
   // counts as no farther from S_i than the component's diagonal.
   float error_max = 0, error_rms = 0;
-  std::string floor_reason;  // why the scale has more vertices than asked for, "" when it has not
+  std::string floor_reason;  // why the scale has more vertices than asked for, or is the coarsest although
+                             // more were asked for; "" when neither
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,

@@ -41,9 +41,7 @@ std::string scales_text(PackageReader& p) {
     table.column(header);
   std::string floors;
   for (const ManifestScale& s : p.manifest().scales)
-    if (!s.floor.empty())
-      floors +=
-          fmt::format("S_{} has more vertices than its scale asks for: {}\n", s.scale, printable(s.floor));
+    if (!s.floor.empty()) floors += fmt::format("S_{} is no coarser: {}\n", s.scale, printable(s.floor));
   for (const ManifestScale& s : p.manifest().scales)
     table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
                kilobytes(s.glb.bytes), s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
