@@ -28,10 +28,9 @@ struct SimplificationOptions {
   double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
   double boundary_weight = 3;  // of the border quadrics
   double seam_weight = 1;      // of the same at seams of the texture
-  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more. At twice as much
-  // the last scales of fragmented atlases are five times as far off as the next finer ones, for 5 % fewer
-  // bytes.
-  double max_error = 0.025;
+  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more. At half of it
+  // scans cut into scraps keep no scale but S_0.
+  double max_error = 0.05;
   double max_shift = 0.05;  // of the diagonal: no collapse that shifts the texture by more
   int min_triangles = 100;  // no scale is asked to go below
   // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no
