@@ -27,6 +27,13 @@ const refineBytes = 256 << 10;
 const refineRequests = 4;
 /** Fragments that may wait for decoding and uploads when the next ones are asked for. */
 const mostPending = 48;
+/** Of the time left when a mesh is asked for: textures do not wait longer for it. */
+const meshShare = 0.5;
+const longestTimerS = 1e6;
+/** Less of the limit than this, beside two round trips, is not worth another request. */
+const leastRest = 0.01;
+/** Of the bytes that throughput promises. */
+const certain = 0.85;
 const gapBytes = 1024;
 const tellsApart = 0.003;
 /** What the camera does not see is worth this much of what it sees. */
@@ -105,7 +112,9 @@ export class TextureLoad {
     );
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
     // A mesh that is only waited for leaves the link to the textures.
-    if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS) await mesh.arrived;
+    // One that takes longer than it should has coarser scales to show on its way.
+    if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS)
+      await Promise.race([mesh.arrived, sleepS(this.leftS_(meshShare))]);
     this.load_.enter('textures');
     const list = this.listOf_(data, choices, scale);
     for (const o of list.offers) this.load_.expectedBytes += o.plannedBytes;
@@ -115,8 +124,12 @@ export class TextureLoad {
     await shown;
     await this.composed();
     const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
-    await mesh.shown;
+    await Promise.race([mesh.shown, sleepS(this.leftS_(1))]);
     this.load_.emit('deadline', { limit: this.load_.limitS, actual: this.load_.elapsedS(), skipped });
+  }
+  /** A share of the time left, for timers. */
+  private leftS_(share: number): number {
+    return Math.min(longestTimerS, Math.max(0, share * (this.load_.limitS - this.load_.elapsedS())));
   }
   /** Planes for the display, or coarser ones where the time left buys too few bytes for them. */
   private async planesInTime_(data: PackageData, scale: number): Promise<PlaneChoice[]> {
@@ -253,7 +266,10 @@ export class TextureLoad {
       wishes,
       { gapBytes, mostBytes: refineBytes, signal },
       () => undefined,
-      (wish, error) => this.lost_(wish, error),
+      (wish, error) => {
+        this.asked_.delete(`${wish.plane}/${wish.fragment}`);
+        this.lost_(wish, error);
+      },
     );
     throwIfAborted(this.load_.signal);
   }
@@ -280,6 +296,30 @@ export class TextureLoad {
       lost: (wish, error) => this.lost_(wish, error),
     });
     await fetch.run(limitS + mostLate * this.load_.limitS);
+    plan.rungs().forEach((rung, i) => {
+      for (const f of list.groups[i]) if (rung >= 0) this.asked_.set(`${f.plane}/${f.fragment}`, rung);
+    });
+    if (!this.wholeRungs_) await this.spendRest_(fragments, plan);
+  }
+  /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades. */
+  private async spendRest_(list: FragmentList, plan: HarmonicTimePlan): Promise<void> {
+    const { latencyS } = this.load_.reader.client;
+    const least = 2 * latencyS + leastRest * this.load_.limitS;
+    for (let leftS = this.leftS_(1) - composeS; leftS > least; leftS = this.leftS_(1) - composeS) {
+      const bytes = certain * plan.throughputBytesS() * (leftS - latencyS);
+      const rungs = list.fragments.map((f) => this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1);
+      const taken = new Map<number, Wish>();
+      let spent = 0;
+      for (const u of upgradesInOrder(list.offers, rungs)) {
+        if (spent + u.bytes > bytes) break;
+        spent += u.bytes;
+        taken.set(u.offer, { ...list.fragments[u.offer], rung: u.rung, offer: u.offer });
+      }
+      if (taken.size === 0) return;
+      for (const w of taken.values()) this.asked_.set(`${w.plane}/${w.fragment}`, w.rung);
+      const late = AbortSignal.timeout(1000 * (leftS + mostLate * this.load_.limitS));
+      await this.fetchWishes_([...taken.values()], AbortSignal.any?.([late, this.load_.signal]) ?? late);
+    }
   }
   private tell_(list: GroupedList, s: HtcStep): void {
     this.load_.emit('decision', {
