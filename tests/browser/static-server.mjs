@@ -72,7 +72,8 @@ export async function serve(roots, {ranges = true, fault = () => undefined, cors
     record.status = range ? 206 : 200;
     Object.assign(headers, {
       'Content-Type': kTypes[path.extname(file)] ?? 'application/octet-stream', 'Content-Length': body.length, ETag: etag,
-      'Cache-Control': 'no-store',
+      // Pages and decoders are kept as everywhere; packages are not, so that every load shows on the line.
+      'Cache-Control': /packages|figures|data/.test(url) ? 'no-store' : 'max-age=600',
     });
     if (range) headers['Content-Range'] = `bytes ${first}-${last - 1}/${stat.size}`;
     if (ranges) headers['Accept-Ranges'] = 'bytes';

@@ -183,7 +183,7 @@ export class Stage {
 
 /** Daylight from above and a lamp that the camera carries. Scans have their own shadows in the texture. */
 function light(scene: Scene): DirectionalLight {
-  const lamp = new DirectionalLight(0xffffff, 1.4);
-  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 2.2), lamp, lamp.target);
+  const lamp = new DirectionalLight(0xffffff, 2.2);
+  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
   return lamp;
 }
