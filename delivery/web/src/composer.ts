@@ -37,6 +37,13 @@ export class Blitter {
     const gl = gl2(renderer);
     this.buffers_ = [gl.createFramebuffer(), gl.createFramebuffer()];
   }
+  /** Nothing but the processor draws: what a GPU does at once takes it seconds, and workers less. */
+  get isSoftware(): boolean {
+    const gl = gl2(this.renderer);
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+  }
   /** Runs `draw` with framebuffers of its own to attach textures to. */
   private with_(draw: (gl: WebGL2RenderingContext) => void): void {
     const gl = gl2(this.renderer);

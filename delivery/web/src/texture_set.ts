@@ -84,6 +84,7 @@ export class TextureSet {
     const shown = old.find((texture) => pictureOf(texture));
     const image = preview ?? pictureOf(shown);
     if (!image) return void (next.filled = true);
+    if (shown && !this.blitter_.isSoftware) return next.fillFromTexture(shown, image.width, image.height);
     try {
       await this.enlarge_(next, image);
     } catch (error) {
