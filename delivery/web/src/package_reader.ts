@@ -3,7 +3,7 @@ import { CodecId, codecTraits, joinFragment } from './codec';
 import { FormatError, InputError } from './errors';
 import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
-import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS } from './http';
+import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS, sleepS } from './http';
 import type { IndexHead } from './index_table';
 import * as layout from './layout';
 import {
@@ -311,7 +311,10 @@ export class PackageReader {
       for (const p of run) {
         const { offset, bytes: size } = head.planes[p];
         const table = bytes
-          .then((b) => readTablesSection(head, p, b.subarray(offset - begin, offset - begin + size)))
+          .then(async (b) => {
+            await sleepS(0); // a turn of the page for each
+            return readTablesSection(head, p, b.subarray(offset - begin, offset - begin + size));
+          })
           .then(async (t) => (await this.checkPlane_(p, t), t));
         this.tablesOnce_.set(p, table);
         table.catch(() => this.tablesOnce_.delete(p));

@@ -228,8 +228,10 @@ export class TextureLoad {
     const { heightPx, part } = this.load_.view.display;
     const wanted = this.load_.override.scale ?? this.scaleFor(heightPx, part);
     if (this.load_.override.scale !== undefined || !Number.isFinite(this.load_.limitS)) return wanted;
+    await sleepS(0); // the page goes on in between
     const planes = this.planesFor_(data);
     const list = fragmentList(data, planes, { scale: wanted });
+    await sleepS(0);
     return chooseScale(data, this.quality_!, list, planes, wanted, (scale) => this.textureBytes_(scale));
   }
 
