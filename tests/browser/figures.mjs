@@ -150,7 +150,7 @@ async function composing() {
   const [own, whole] = [[], []];
   let fragments = 0;
   for (let i = 0; i < 5; i++) {
-    const id = await load(page, 'yurt', {memory: true, load: {time: 1e9, scale: 20, rung: 8, fullSize: true, autoRefine: false}});
+    const id = await load(page, 'yurt', {memory: true, still: true, load: {time: 1e9, scale: 20, rung: 8, fullSize: true, autoRefine: false}});
     const r = await finished(page, id);
     check(!r.error, JSON.stringify(r.error));
     const fetched = r.events.find((e) => e.name === 'progress' && e.phase === 'textures');

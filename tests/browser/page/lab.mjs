@@ -56,9 +56,9 @@ function pixels() {
 /**
  * Opens and loads a package; events, requests and, with `frames`, pictures are kept. Comes back at once with a number;
  * `finished` waits. `load` takes LoadOptions without renderer, loader and camera; `follow` gives the camera, too. With `memory`,
- * all of it is fetched before the clock starts.
+ * all of it is fetched before the clock starts; with `still`, nothing is drawn before the end.
  */
-function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false} = {}) {
+function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false, still = false} = {}) {
   const run = {events: [], requests: [], frames: [], error: null, t0: performance.now(), pkg: null, model: null, abort: new AbortController()};
   loads.push(run);
   let dirty = true;
@@ -72,7 +72,7 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
     if (over === 'yes') return;
     if (run.model) run.model.update(stage.camera);
     const now = performance.now();
-    if (dirty && (!frames || now - lastFrame >= frames || over)) {
+    if (dirty && (!still || over) && (!frames || now - lastFrame >= frames || over)) {
       dirty = false;
       lastFrame = now;
       draw();
