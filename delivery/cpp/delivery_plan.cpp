@@ -6,6 +6,8 @@
 namespace texmesh {
 namespace {
 
+constexpr float kSeenSsim = 0.004f;
+
 /// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network.
 double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
   NetworkModel model(network);
@@ -73,6 +75,14 @@ void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
 }
 
+int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
+  if (request.scale >= 0) return request.scale;
+  const int scale = scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
+  return request.measured && request.rule == StepRule::kDefault
+             ? finer_where_seen(package.quality(), scale, request.displayed_px)
+             : scale;
+}
+
 DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& request, int scale) {
   const Manifest& m = package.manifest();
   DeliveryPlan plan;
@@ -119,6 +129,15 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
 }
 
 }  // namespace
+
+int finer_where_seen(const QualityTable& table, int scale, double displayed_px) {
+  const auto it = std::ranges::find(table.scales, scale);
+  if (it == table.scales.end() || displayed_px < table.size_px) return scale;
+  const auto best = [&](std::size_t i) { return table.ssim[(i + 1) * table.rungs.size() - 1]; };
+  auto i = static_cast<std::size_t>(it - table.scales.begin());
+  while (i > 0 && best(i - 1) - best(i) >= kSeenSsim) --i;
+  return table.scales[i];
+}
 
 double predicted_ssim(const QualityTable& table, int scale, double quality) {
   if (table.scales.empty() || table.rungs.empty()) return 0;
@@ -176,9 +195,7 @@ double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>
 
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request) {
   const Manifest& m = package.manifest();
-  const int wanted = request.scale >= 0
-                         ? request.scale
-                         : scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  const int wanted = wanted_scale(package, request);
   DeliveryPlan best;
   bool first = true;
   for (const ManifestScale& s : m.scales) {
@@ -199,9 +216,7 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
 
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes) {
   const Manifest& m = package.manifest();
-  const int wanted = request.scale >= 0
-                         ? request.scale
-                         : scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  const int wanted = wanted_scale(package, request);
   std::optional<DeliveryPlan> best;
   for (const ManifestScale& s : m.scales) {
     if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;

@@ -14,6 +14,7 @@ namespace texmesh {
 struct DeliveryRequest {
   double displayed_px = 1000;  // displayed height, device pixels
   StepRule rule = StepRule::kDefault;
+  bool measured = true;      // kDefault only: finer than that where finer_where_seen() says so
   int scale = -1;            // -1 = by the rule
   double time_limit_s = 5;   // from the first request on
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
@@ -47,6 +48,10 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
 /// display needs, mesh first, then texture. Where nothing fits the least there is, with a warning.
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
+/// From a scale that the step function finds good enough to a finer one, as long as the package's measured
+/// table says that each is seen to be better (0.004 of SSIM with the best textures): the rules speak of
+/// distances, and shading tells more. The table holds for objects displayed at least as high as its pictures.
+int finer_where_seen(const QualityTable& table, int scale, double displayed_px);
 /// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
 /// measured table (scale number, log-quantiser of the quality).
 double predicted_ssim(const QualityTable& table, int scale, double quality);

@@ -115,6 +115,8 @@ Fetched fetch(const FetchArguments& a) {
   const Manifest& m = package.manifest();
   f.scale = request.scale >= 0 ? request.scale
                                : scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  if (request.scale < 0 && request.measured)
+    f.scale = finer_where_seen(package.quality(), f.scale, request.displayed_px);
   FragmentWriter writer(package, a.output);
   const auto mesh_start = Clock::now();
   const Bytes mesh = package.scale_glb(f.scale);

@@ -77,8 +77,11 @@ void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_requir
              "Qualities stay within 5 .. 97 whatever happens, nothing is skipped");
   c.add_option("--scale", a.scale, "This scale instead of the one that suits the display")
       ->check(CLI::Range(0, 99));
-  c.add_option("--rule", a.rule, "What decides about the scale: default = the finer of jnd and error")
-      ->check(CLI::IsMember({"default", "jnd", "error", "edge"}))
+  c.add_option("--rule", a.rule,
+               "What decides about the scale: default = the finer of jnd and error; measured = that, or a "
+               "finer one that "
+               "compile has measured to look better")
+      ->check(CLI::IsMember({"measured", "default", "jnd", "error", "edge"}))
       ->capture_default_str();
   c.add_option("--connections", a.connections, "Connections per server")
       ->check(CLI::Range(1, 1000))
@@ -95,7 +98,9 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
   DeliveryRequest r;
   r.displayed_px = a.display_px;
   r.scale = a.scale;
-  r.rule = choice<StepRule>(a.rule, {{"default", StepRule::kDefault},
+  r.measured = a.rule == "measured";
+  r.rule = choice<StepRule>(a.rule, {{"measured", StepRule::kDefault},
+                                     {"default", StepRule::kDefault},
                                      {"jnd", StepRule::kJnd},
                                      {"error", StepRule::kError},
                                      {"edge", StepRule::kEdge}});

@@ -13,7 +13,7 @@ namespace texmesh {
 /// What plan, check and simulate ask about how a package is looked at and over what.
 struct DeliveryArguments {
   std::string package, time = "5", bandwidth, trace, rtt = "0", policy = "guard", order = "credit",
-                       estimator = "auto", rule = "default", beta0;
+                       estimator = "auto", rule = "measured", beta0;
   std::vector<std::string> mirrors;
   double display_px = 1000, loss = 0;
   int scale = -1, window = 0, connections = 6, samples = 10;

@@ -388,6 +388,7 @@ Json lists(PackageReader& package) {
     }
     out.push_back({{"displayed_px", px},
                    {"scale", o.scale},
+                   {"finer_where_seen", finer_where_seen(package.quality(), o.scale, px)},
                    {"planes", shown},
                    {"fragments", fragments},
                    {"offers", offers_json(list.offers)},

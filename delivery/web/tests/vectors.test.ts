@@ -1,6 +1,7 @@
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
+import { finerWhereSeen } from '../src/scale_choice';
 import * as t from '../src/reader';
 import { SplitStreamReader } from '../src/split_stream';
 import { readBytes, readText, root, sameBits } from './support';
@@ -146,6 +147,7 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
     expectBits(numbers, [b.mip_loss, b.bytes, b.dssim], `budget of ${b.budget_bytes}`);
   }
   const quality = await reader.quality();
+  expect(finerWhereSeen(quality, v.scale, v.displayed_px)).toBe(v.finer_where_seen);
   for (const [dssim, equivalent, ssim] of v.dssim_quality_ssim) {
     const q = t.equivalentQuality(data, planes, dssim);
     expectBits([q, t.predictedSsim(quality, v.scale, q)], [equivalent, ssim], `dssim ${dssim}`);
