@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "format/portable_math.h"
+#include "format/srgb.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
 #include "stages/render_view.h"
@@ -43,21 +43,9 @@ Shown shown_planes(const std::vector<Material>& materials, const Fragments& frag
   return out;
 }
 
-const std::array<float, 256>& linear_of_byte() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      const double x = static_cast<double>(i) / 255;
-      t[i] = static_cast<float>(x <= 0.04045 ? x / 12.92 : portable::pow((x + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  return table;
-}
-
 std::uint8_t encode(float linear) {
   const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-  const double s = x <= 0.0031308 ? 12.92 * x : 1.055 * portable::pow(x, 1 / 2.4) - 0.055;
+  const double s = srgb_of_light(x);
   return static_cast<std::uint8_t>(255 * s + 0.5);
 }
 
@@ -74,7 +62,7 @@ MipTexture texture_of(const Pixels& pixels, const TexturePlane& plane) {
   level.width = (plane.width_px + step - 1) / step;
   level.height = (plane.height_px + step - 1) / step;
   level.texels.resize(std::size_t{level.width} * level.height);
-  const auto& linear = linear_of_byte();
+  const auto& linear = light_of_bytes();
   for (std::uint32_t y = 0; y < level.height; ++y)
     for (std::uint32_t x = 0; x < level.width; ++x) {
       Vec3f sum;

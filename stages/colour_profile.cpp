@@ -8,6 +8,7 @@
 
 #include "format/errors.h"
 #include "format/portable_math.h"
+#include "format/srgb.h"
 
 namespace texmesh {
 namespace {
@@ -155,16 +156,12 @@ class IccReader {
   Bytes bytes_;
 };
 
-double srgb_light(double code) {
-  return code <= 0.04045 ? code / 12.92 : portable::pow((code + 0.055) / 1.055, 2.4);
-}
-
 /// sRGB codes of light, rounded as exactly as with the formula, by a table: the bucket's first code, then up
 /// while the next code's lower border is reached.
 class SrgbEncoder {
  public:
   SrgbEncoder() {
-    for (std::size_t k = 1; k < 256; ++k) border_[k] = srgb_light((static_cast<double>(k) - 0.5) / 255);
+    for (std::size_t k = 1; k < 256; ++k) border_[k] = light_of_srgb((static_cast<double>(k) - 0.5) / 255);
     border_[256] = 2;
     std::uint8_t code = 0;
     for (std::size_t i = 0; i < kBuckets; ++i) {

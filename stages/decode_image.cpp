@@ -11,7 +11,7 @@
 #include <webp/decode.h>
 
 #include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/srgb.h"
 #include "stages/colour_profile.h"
 #include "stages/decode_jpeg.h"
 #include "stages/decode_png.h"
@@ -204,8 +204,8 @@ std::uint8_t to_byte(double x) {
 }
 
 double srgb_from_linear(double x) {
-  if (!(x > 0.0031308)) return 12.92 * x;
-  return x >= 1 ? 1 : 1.055 * portable::pow(x, 1 / 2.4) - 0.055;
+  if (!(x > 0)) return 12.92 * x;  // NaN too
+  return x >= 1 ? 1 : srgb_of_light(x);
 }
 
 std::vector<std::uint8_t> bytes_from_words(const std::vector<std::uint16_t>& words) {

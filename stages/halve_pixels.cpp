@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/srgb.h"
 
 namespace texmesh {
 namespace {
@@ -20,20 +20,16 @@ struct LightTables {
   std::vector<std::uint8_t> encoded;  // [kFull + 1]
 };
 
-double light_of(double encoded) {
-  return encoded <= 0.04045 ? encoded / 12.92 : portable::pow((encoded + 0.055) / 1.055, 2.4);
-}
-
 const LightTables& light_tables() {
   static const LightTables tables = [] {
     LightTables t;
     t.encoded.resize(kFull + 1);
     for (std::size_t v = 0; v < 256; ++v)
       t.linear[v] =
-          static_cast<std::uint16_t>(std::floor(light_of(static_cast<double>(v) / 255) * kFull + 0.5));
+          static_cast<std::uint16_t>(std::floor(light_of_srgb(static_cast<double>(v) / 255) * kFull + 0.5));
     std::size_t at = 0;
     for (std::size_t v = 0; v < 256; ++v) {  // v up to where v + 1 is nearer in encoded values
-      const double end = v == 255 ? kFull + 1.0 : light_of((static_cast<double>(v) + 0.5) / 255) * kFull;
+      const double end = v == 255 ? kFull + 1.0 : light_of_srgb((static_cast<double>(v) + 0.5) / 255) * kFull;
       for (; at <= kFull && static_cast<double>(at) < end; ++at) t.encoded[at] = static_cast<std::uint8_t>(v);
     }
     return t;

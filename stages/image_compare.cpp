@@ -5,32 +5,16 @@
 #include <cmath>
 
 #include "format/portable_math.h"
+#include "format/srgb.h"
+#include "stages/sampled_curve.h"
 
 namespace texmesh {
 namespace {
 
-// x -> f(x) for x in 0..1 by linear interpolation; finer than 8-bit pictures can show.
-class Curve {
- public:
-  template <class F>
-  explicit Curve(F f) {
-    for (std::size_t i = 0; i < table_.size(); ++i)
-      table_[i] = static_cast<float>(f(static_cast<double>(i) / kSteps));
-  }
-  float operator()(float x) const {
-    const float at = std::clamp(x, 0.f, 1.f) * kSteps;
-    const auto i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kSteps - 1));
-    return table_[i] + (table_[i + 1] - table_[i]) * (at - static_cast<float>(i));
-  }
-
- private:
-  static constexpr int kSteps = 8192;
-  std::array<float, kSteps + 1> table_;
-};
+using Curve = SampledCurve<8192>;  // finer than 8-bit pictures can show
 
 const Curve& srgb_curve() {
-  static const Curve curve(
-      [](double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * portable::pow(x, 1 / 2.4) - 0.055; });
+  static const Curve curve(srgb_of_light);
   return curve;
 }
 const Curve& lab_curve() {

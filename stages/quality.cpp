@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "format/portable_math.h"
+#include "format/srgb.h"
 #include "stages/image_compare.h"
 #include "stages/parallel.h"
 #include "stages/render_view.h"
@@ -109,23 +109,11 @@ class LevelCount {
   std::vector<std::array<std::uint64_t, kMaxFirstLevel + 1>> wanted_;
 };
 
-const std::array<float, 256>& linear_of_byte() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      const double x = static_cast<double>(i) / 255;
-      t[i] = static_cast<float>(x <= 0.04045 ? x / 12.92 : portable::pow((x + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  return table;
-}
-
 // Writes the box-filtered linear pixels of a block of the plane that starts at (x0, y0), multiples of
 // 2^level.
 void reduce_block(const Pixels& block, std::uint32_t x0, std::uint32_t y0, std::uint32_t level,
                   MipTexture::Level& out) {
-  const auto& linear = linear_of_byte();
+  const auto& linear = light_of_bytes();
   const std::uint32_t step = 1u << level;
   const float scale = 1.f / static_cast<float>(step * step);
   for (std::uint32_t by = 0; by < block.height_px; by += step) {

@@ -52,11 +52,6 @@ void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPla
   plan.texture_dssim = list.total_weight > 0 ? plan.textures.loss / list.total_weight : 0;
 }
 
-double ssim_of(PackageReader& package, double displayed_px, int scale, double texture_dssim) {
-  const std::vector<PlaneChoice> planes = planes_for_display(package, displayed_px);
-  return predicted_ssim(package.quality(), scale, equivalent_quality(package, planes, texture_dssim));
-}
-
 /// Bytes of a range that the first request has not brought yet.
 std::uint64_t beyond_bootstrap(std::uint64_t offset, std::uint64_t bytes) {
   return offset >= kBootstrapBytes ? bytes : bytes - std::min(bytes, kBootstrapBytes - offset);
@@ -73,14 +68,6 @@ void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
   const bool coarsest = scale == m.scales.back().scale;
   for (const ManifestScale& s : m.scales)
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
-}
-
-int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
-  if (request.scale >= 0) return request.scale;
-  const int scale = scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
-  return request.measured && request.rule == StepRule::kDefault
-             ? finer_where_seen(package.quality(), scale, request.displayed_px)
-             : scale;
 }
 
 DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& request, int scale) {
@@ -124,7 +111,7 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
   rate_textures(package, list, plan);
   plan.texture_dssim =
       1 - (1 - plan.texture_dssim) * (1 - mip_loss(package, plan.planes, request.displayed_px));
-  plan.ssim = ssim_of(package, request.displayed_px, scale, plan.texture_dssim);
+  plan.ssim = predicted_ssim(package, request.displayed_px, scale, plan.texture_dssim);
   return plan;
 }
 
@@ -137,6 +124,19 @@ int finer_where_seen(const QualityTable& table, int scale, double displayed_px) 
   auto i = static_cast<std::size_t>(it - table.scales.begin());
   while (i > 0 && best(i - 1) - best(i) >= kSeenSsim) --i;
   return table.scales[i];
+}
+
+int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
+  if (request.scale >= 0) return request.scale;
+  const int scale = scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
+  return request.measured && request.rule == StepRule::kDefault
+             ? finer_where_seen(package.quality(), scale, request.displayed_px)
+             : scale;
+}
+
+double predicted_ssim(PackageReader& package, double displayed_px, int scale, double texture_dssim) {
+  const std::vector<PlaneChoice> planes = planes_for_display(package, displayed_px);
+  return predicted_ssim(package.quality(), scale, equivalent_quality(package, planes, texture_dssim));
 }
 
 double predicted_ssim(const QualityTable& table, int scale, double quality) {
@@ -235,7 +235,7 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     plan.textures.skipped = static_cast<std::uint32_t>(std::ranges::count(budget.rungs, -1));
     rate_textures(package, budget.list, plan);
     plan.texture_dssim = budget.dssim;
-    plan.ssim = ssim_of(package, request.displayed_px, s.scale, budget.dssim);
+    plan.ssim = predicted_ssim(package, request.displayed_px, s.scale, budget.dssim);
     if (fixed > bytes)
       plan.warnings.push_back("mesh and tables alone take " + std::to_string(fixed) + " bytes");
     const bool fits = fixed <= bytes, best_fits = best && best->bytes() <= bytes;

@@ -113,10 +113,7 @@ Fetched fetch(const FetchArguments& a) {
   const auto start = Clock::now();
   PackageReader package(open_url(a.delivery.package, options.http));
   const Manifest& m = package.manifest();
-  f.scale = request.scale >= 0 ? request.scale
-                               : scale_at(step_function(m.scales, request.rule), request.displayed_px);
-  if (request.scale < 0 && request.measured)
-    f.scale = finer_where_seen(package.quality(), f.scale, request.displayed_px);
+  f.scale = wanted_scale(package, request);
   FragmentWriter writer(package, a.output);
   const auto mesh_start = Clock::now();
   const Bytes mesh = package.scale_glb(f.scale);
@@ -129,7 +126,6 @@ Fetched fetch(const FetchArguments& a) {
   mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
   const auto transport = open_transport(mirrors, options);
   TextureLoader loader(package, *transport, a.whole_rungs);
-  const std::vector<PlaneChoice> planes = planes_for_display(package, request.displayed_px);
   LoadOptions load;
   load.list.scale = f.scale;
   load.htc = request.htc;
@@ -137,6 +133,10 @@ Fetched fetch(const FetchArguments& a) {
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
   const double mesh_rate = static_cast<double>(f.mesh_bytes) / std::max(1e-6, seconds_since(mesh_start));
   load.htc.throughput.initial_bytes_s = request.beta0_bytes_s > 0 ? request.beta0_bytes_s : mesh_rate;
+  const auto budget_bytes =
+      static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
+  const std::vector<PlaneChoice> planes =
+      texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
   load.cancelled = [] { return interrupted != 0; };
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.take(fragment); };
   f.load = loader.load(planes, load);
@@ -151,8 +151,9 @@ Fetched fetch(const FetchArguments& a) {
   for (std::size_t i = 0; i < list.offers.size(); ++i)
     loss += list.offers[i].loss[static_cast<std::size_t>(
         loader.held(list.fragments[i].plane, list.fragments[i].fragment) + 1)];
-  f.texture_dssim = list.total_weight > 0 ? loss / list.total_weight : 0;
-  f.ssim = predicted_ssim(package.quality(), f.scale, equivalent_quality(package, planes, f.texture_dssim));
+  const double shown = list.total_weight > 0 ? 1 - loss / list.total_weight : 1;
+  f.texture_dssim = 1 - shown * (1 - mip_loss(package, planes, request.displayed_px));
+  f.ssim = predicted_ssim(package, request.displayed_px, f.scale, f.texture_dssim);
   return f;
 }
 
@@ -235,7 +236,7 @@ void add_fetch_command(CLI::App& app, int& exit_code) {
       "interrupted.");
   c->callback([args, &exit_code] {
     std::signal(SIGINT, [](int) { interrupted = 1; });
-    args->delivery.bandwidth = "1Mbit/s";  // of a model, which is not asked
+    args->delivery.needs_link = false;
     const double limit_s = parse_duration(args->delivery.time, "--time");
     const Fetched f = fetch(*args);
     if (args->json)

@@ -101,7 +101,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c->callback([args, &exit_code] {
     const bool budget = !args->budget.empty();
-    if (budget && args->bandwidth.empty() && args->trace.empty()) args->bandwidth = "1Mbit/s";  // not asked
+    args->needs_link = !budget;
     const DeliveryRequest request = delivery_request(*args);
     PackageReader package(open_store(args->package));
     if (!budget) {

@@ -106,10 +106,11 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
                                      {"edge", StepRule::kEdge}});
   r.time_limit_s = parse_duration(a.time, "--time");
   if (!(r.time_limit_s > 0)) throw InputError("--time", "", "a time above 0", a.time);
-  if (a.bandwidth.empty() && a.trace.empty())
+  if (a.needs_link && a.bandwidth.empty() && a.trace.empty())
     throw InputError("--bandwidth", "", "the throughput of the link, or --trace FILE", "neither");
-  r.network.link = a.trace.empty() ? BandwidthTrace::constant(parse_bandwidth(a.bandwidth, "--bandwidth"))
-                                   : read_trace_csv(read_file(a.trace), a.trace);
+  if (!a.bandwidth.empty())
+    r.network.link = BandwidthTrace::constant(parse_bandwidth(a.bandwidth, "--bandwidth"));
+  if (!a.trace.empty()) r.network.link = read_trace_csv(read_file(a.trace), a.trace);
   // Round trips are told in milliseconds everywhere else, so a bare number is one.
   const bool bare = a.rtt.find_first_not_of("0123456789.") == std::string::npos;
   r.network.rtt_s = parse_duration(bare ? a.rtt + "ms" : a.rtt, "--rtt");

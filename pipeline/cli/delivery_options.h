@@ -19,6 +19,7 @@ struct DeliveryArguments {
   int scale = -1, window = 0, connections = 6, samples = 10;
   std::uint64_t seed = 1;
   bool hard_limits = false, slow_start = false, connect_costs = false, json = false;
+  bool needs_link = true;  // false: a budget in bytes, or a real network
 };
 void add_delivery_options(CLI::App& command, DeliveryArguments& args, bool package_required);
 /// InputError names the flag.

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "format/portable_math.h"
+#include "stages/sampled_curve.h"
 
 namespace texmesh {
 namespace {
@@ -13,23 +14,7 @@ constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m
 constexpr double kWhite[3] = {0.950428545, 1.0, 1.088900371};
 constexpr float kLabStart = 216.f / 24389;
 
-/// A function of 0 .. 1 by linear interpolation of a table.
-class Curve {
- public:
-  explicit Curve(const std::function<double(double)>& f) {
-    for (std::size_t i = 0; i < table_.size(); ++i)
-      table_[i] = static_cast<float>(f(static_cast<double>(i) / kSteps));
-  }
-  float operator()(float x) const {
-    const float at = std::clamp(x, 0.f, 1.f) * kSteps;
-    const auto i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kSteps - 1));
-    return table_[i] + (table_[i + 1] - table_[i]) * (at - static_cast<float>(i));
-  }
-
- private:
-  static constexpr int kSteps = 16384;
-  std::array<float, kSteps + 1> table_;
-};
+using Curve = SampledCurve<16384>;
 
 /// One row of a separable filter, of any parity.
 using Kernel = std::vector<float>;  // [2 * radius + 1]

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/srgb.h"
 #include "stages/parallel.h"
 
 namespace texmesh {
@@ -14,18 +14,6 @@ namespace {
 constexpr int kSamples = 4;                     // of a pixel, as look_at() takes them
 constexpr float kBackground = 0.2f;             // linear, as the quality stage's
 constexpr std::uint32_t kReference = 1u << 12;  // side of the texture that look_at() is told
-
-const std::array<float, 256>& linear_of_byte() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      const double x = static_cast<double>(i) / 255;
-      t[i] = static_cast<float>(x <= 0.04045 ? x / 12.92 : portable::pow((x + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  return table;
-}
 
 /// Two neighbouring texels along an axis and the share of the second.
 struct Neighbours {
@@ -68,7 +56,7 @@ Vec3f product(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 }  // namespace
 
 MipTexture mip_texture(const Pixels& pixels) {
-  const auto& linear = linear_of_byte();
+  const auto& linear = light_of_bytes();
   MipTexture out;
   out.width_px = pixels.width_px;
   out.height_px = pixels.height_px;

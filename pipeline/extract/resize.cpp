@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/srgb.h"
 
 namespace texmesh {
 namespace {
@@ -20,16 +20,12 @@ struct LightCurves {
   std::array<std::uint8_t, kCodeSteps + 1> first{};  // code to start looking at, by linear light
 };
 
-double light_of(double code) {
-  return code <= 0.04045 ? code / 12.92 : portable::pow((code + 0.055) / 1.055, 2.4);
-}
-
 const LightCurves& light_curves() {
   static const LightCurves curves = [] {
     LightCurves c;
     for (std::size_t v = 0; v < 256; ++v) {
-      c.linear[v] = static_cast<float>(light_of(static_cast<double>(v) / 255));
-      c.upto[v] = v == 255 ? 2.f : static_cast<float>(light_of((static_cast<double>(v) + 0.5) / 255));
+      c.linear[v] = static_cast<float>(light_of_srgb(static_cast<double>(v) / 255));
+      c.upto[v] = v == 255 ? 2.f : static_cast<float>(light_of_srgb((static_cast<double>(v) + 0.5) / 255));
     }
     std::uint8_t code = 0;
     for (std::size_t i = 0; i <= kCodeSteps; ++i) {

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "format/portable_math.h"
+#include "format/srgb.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {
@@ -127,7 +127,7 @@ void cut_ears(const std::vector<Vec2d>& flat, std::vector<std::array<std::uint32
 float linear_from_srgb(double srgb) {
   if (!(srgb > 0)) return srgb <= 0 ? 0.0f : 1.0f;
   if (srgb >= 1) return 1;
-  return static_cast<float>(srgb <= 0.04045 ? srgb / 12.92 : portable::pow((srgb + 0.055) / 1.055, 2.4));
+  return static_cast<float>(light_of_srgb(srgb));
 }
 
 Material scan_material(std::string name) {

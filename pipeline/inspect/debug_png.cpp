@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "format/portable_math.h"
+#include "format/srgb.h"
 #include "pipeline/inspect/debug_view.h"
 #include "stages/png_writer.h"
 #include "stages/render_view.h"
@@ -80,11 +81,7 @@ MipTexture mips_of(const Pixels& pixels) {
   MipTexture texture;
   texture.width_px = pixels.width_px, texture.height_px = pixels.height_px;
   MipTexture::Level level{pixels.width_px, pixels.height_px, {}};
-  std::array<float, 256> linear{};
-  for (std::size_t s = 0; s < 256; ++s) {
-    const double x = static_cast<double>(s) / 255;
-    linear[s] = static_cast<float>(x <= 0.04045 ? x / 12.92 : portable::pow((x + 0.055) / 1.055, 2.4));
-  }
+  const std::array<float, 256>& linear = light_of_bytes();
   for (std::size_t i = 0; i < pixels.data.size(); i += 3)
     level.texels.push_back({linear[pixels.data[i]], linear[pixels.data[i + 1]], linear[pixels.data[i + 2]]});
   texture.levels.push_back(std::move(level));
@@ -113,7 +110,7 @@ Picture render(const Mesh& mesh, const std::vector<Material>& materials, const s
 
 std::uint8_t encode(float linear) {
   const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-  const double s = x <= 0.0031308 ? 12.92 * x : 1.055 * portable::pow(x, 1 / 2.4) - 0.055;
+  const double s = srgb_of_light(x);
   return static_cast<std::uint8_t>(255 * s + 0.5);
 }
 

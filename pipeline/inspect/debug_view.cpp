@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "format/portable_math.h"
+#include "format/srgb.h"
 #include "pipeline/inspect/text_table.h"
 
 namespace texmesh {
@@ -28,7 +29,7 @@ Vec4f linear_colour(Srgb c) {
   Vec4f out{0, 0, 0, 1};
   for (std::size_t k = 0; k < 3; ++k) {
     const double s = c[k] / 255.0;
-    const double x = s <= 0.04045 ? s / 12.92 : portable::pow((s + 0.055) / 1.055, 2.4);
+    const double x = light_of_srgb(s);
     (k == 0 ? out.x : k == 1 ? out.y : out.z) = static_cast<float>(x);
   }
   return out;
