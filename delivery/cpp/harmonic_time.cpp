@@ -12,13 +12,14 @@ namespace {
 constexpr double kWindowFactor = 1.5;     // of throughput x round trip
 constexpr std::size_t kTripSamples = 64;  // a window that follows every swing makes them worse
 constexpr std::size_t kWindowSamples = 10, kGuardSamples = 20;
+constexpr double kBreak = 4;             // a link this many times faster or slower is another link
 constexpr double kLargestExponent = 12;  // of kPrice's factor: 1.6e5 either way
 // A stall that is over looks like a slow link until something has been transferred: what is skipped on such
 // evidence is lost for good.
 constexpr int kMostSkipsInARow = 1;
 constexpr double kElasticity = 2.5;  // of the price by bytes, on ladders of photographs
 constexpr double kSpareExponent = 1;
-constexpr double kLateFactor = 1.5;  // what is asked for may take this much longer than is left
+constexpr double kLateFactor = 1.2;  // what is asked for may take this much longer than is left
 
 void require(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
@@ -79,15 +80,19 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
   taken_.assign(n, false);
   right_ = static_cast<std::uint32_t>(n);
   mean_ = mean_fragment(offers_);
+  planned_.reserve(n);
   for (const FragmentOffer& f : offers_) {
+    planned_.push_back(f.planned_bytes);
     planned_total_ += f.planned_bytes;
     smallest_left_ += f.bytes[lowest(f, options_.hard_limits)];
+    low_left_ += f.bytes[lowest(f, true)];
   }
   planned_left_ = planned_total_;
   // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
   // next; with one request at a time every fragment has a round trip of its own.
   if (options_.window != 1) latency_s_ = std::min(options_.rtt_s, options_.time_limit_s / 2);
-  if (options_.policy == Policy::kPrice) plan_prices();
+  if (options_.policy == Policy::kPrice || options_.policy == Policy::kGuard) plan_prices();
+  if (options_.policy == Policy::kGuard) plan_for_least_loss();
 }
 
 // The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
@@ -113,6 +118,16 @@ void HarmonicTimePlan::plan_prices() {
     price_bytes_.push_back(rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)]);
     price_total_ += price_bytes_.back();
   }
+}
+
+void HarmonicTimePlan::plan_for_least_loss() {
+  planned_total_ = 0;
+  for (std::size_t i = 0; i < offers_.size(); ++i) {
+    const FragmentOffer& f = offers_[i];
+    planned_[i] = std::max<double>(price_bytes_[i], f.bytes[lowest(f, options_.hard_limits)]);
+    planned_total_ += planned_[i];
+  }
+  planned_left_ = planned_total_;
 }
 
 double HarmonicTimePlan::throughput_bytes_s() const {
@@ -190,13 +205,14 @@ void HarmonicTimePlan::take(std::uint32_t offer) {
   taken_[offer] = true;
   while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
   while (left_ < right_ && taken_[sorted_[right_ - 1]]) --right_;
-  planned_left_ -= f.planned_bytes;
+  planned_left_ -= planned_[offer];
   smallest_left_ -= f.bytes[lowest(f, options_.hard_limits)];
+  low_left_ -= f.bytes[lowest(f, true)];
   if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
 }
 
 double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
-  return (options_.time_limit_s - latency_s_) * (offers_[offer].planned_bytes / planned_total_);
+  return (options_.time_limit_s - latency_s_) * (planned_[offer] / planned_total_);
 }
 
 // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -224,30 +240,44 @@ double HarmonicTimePlan::room_bytes(double beta, double now_s) const {
 }
 
 /// What a plan in proportion to the planned sizes gives, as a factor of them.
-double HarmonicTimePlan::proportional_share(double now_s, std::size_t samples) const {
-  const double beta = samples ? throughput_.recent_bytes_s(samples) : throughput_bytes_s();
+double HarmonicTimePlan::proportional_share(double now_s, double beta) const {
   return room_bytes(beta, now_s) / std::max(planned_left_, 1.0);
 }
 
+/// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
+/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return to
+/// its mean.
+double HarmonicTimePlan::lasting_bytes_s(double now_s) const {
+  const double recent = throughput_.recent_bytes_s(kGuardSamples);
+  const double left_s = options_.time_limit_s - now_s;
+  if (left_s <= 0) return recent;
+  const double mean = throughput_.mean_bytes_s(left_s);
+  return recent * kBreak > mean && recent < kBreak * mean ? mean : recent;
+}
+
 double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double now_s) const {
-  const FragmentOffer& f = offers_[offer];
+  const double planned = planned_[offer];
   switch (options_.policy) {
     case Policy::kStatic:
     case Policy::kPrice:
-      return f.planned_bytes;
+      return planned;
     case Policy::kProportional:
-      return f.planned_bytes * proportional_share(now_s, 0);
+      return planned * proportional_share(now_s, throughput_bytes_s());
     case Policy::kHtc:
     case Policy::kGuard:
       break;
   }
-  if (steps_.empty()) return f.planned_bytes;  // F-bar has the quality Q_i
+  if (steps_.empty()) return planned;  // F-bar has the quality Q_i
   // Alone in flight it has to wait for a round trip first.
   const double wait = options_.window == 1 ? options_.rtt_s : 0;
   const double target = throughput_bytes_s() * (theta_s - wait);
   if (options_.policy == Policy::kHtc) return target;
-  const double even = f.planned_bytes * proportional_share(now_s, kGuardSamples);
+  const double even = planned * proportional_share(now_s, lasting_bytes_s(now_s));
   return std::clamp(target, even / options_.guard, even * options_.guard);
+}
+
+bool HarmonicTimePlan::limits_can_hold(double now_s) const {
+  return options_.hard_limits || low_left_ <= room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
 }
 
 bool HarmonicTimePlan::may_skip(double now_s) const {
@@ -261,15 +291,19 @@ bool HarmonicTimePlan::may_skip(double now_s) const {
 std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
   const FragmentOffer& f = offers_[offer];
   const bool skip = may_skip(now_s);
-  if (options_.policy != Policy::kPrice) return nearest_rung_of(f, target, skip);
+  if (options_.policy != Policy::kPrice) {
+    const bool limits = limits_can_hold(now_s);
+    return nearest_rung_of(f, target, limits, skip && !limits);
+  }
   const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
   return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
 }
 
-std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool may_skip) const {
-  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, options_.hard_limits));
+std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool limits,
+                                               bool may_skip) const {
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, limits));
   double distance = std::abs(target - (best < 0 ? 0.0 : f.bytes[static_cast<std::size_t>(best)]));
-  for (std::size_t r = lowest(f, options_.hard_limits); r <= highest(f); ++r)
+  for (std::size_t r = lowest(f, limits); r <= highest(f); ++r)
     if (const double d = std::abs(target - f.bytes[r]); d < distance) {
       distance = d;
       best = static_cast<std::int32_t>(r);

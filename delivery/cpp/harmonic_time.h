@@ -25,8 +25,9 @@ struct FragmentOffer {
   std::uint16_t low_rung = 0, high_rung = 0xffff;  // limits of quality, see HtcOptions::hard_limits
 };
 
-/// How rungs are chosen. kHtc: the method. kGuard: the method, with sizes kept within a factor of what a
-/// proportional plan gives, which takes the swings out of noisy links. kPrice: one price of bytes in units of
+/// How rungs are chosen. kHtc: the method. kGuard: the method over the plan of least loss instead of
+/// Eq. 3.2's, with sizes kept within a factor of that plan's share of what the link gives in the time left,
+/// which takes the swings out of noisy links. kPrice: one price of bytes in units of
 /// loss that rises when the plan is late. kProportional: sizes scaled by what is left of time over what is
 /// left to send. kStatic: the planned sizes, whatever happens.
 enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic };
@@ -42,9 +43,11 @@ struct HtcOptions {
   double rtt_s = 0;                                                    // round trip, measured or told
   int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2
   int max_in_flight = 64;
-  bool hard_limits = false;  // true: never below low_rung, nothing skipped, as in the thesis
-  double guard = 1.5;        // factor of kGuard, > 1
-  double price_kappa = 10;   // how fast kPrice's price rises with delay
+  // true: never below low_rung, nothing skipped, as in the thesis. false: so while the time is enough for it,
+  // then the bottom of the ladder, then skipping.
+  bool hard_limits = false;
+  double guard = 1.5;       // factor of kGuard, > 1
+  double price_kappa = 10;  // how fast kPrice's price rises with delay
 };
 
 /// A decision and what became of it.
@@ -96,6 +99,7 @@ class HarmonicTimePlan {
     std::size_t issued = 0;  // positions that were issued when it arose
   };
   void plan_prices();
+  void plan_for_least_loss();
   bool window_open(double now_s) const;
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
@@ -103,9 +107,11 @@ class HarmonicTimePlan {
   double theta_of(std::uint32_t offer) const;
   double target_of(std::uint32_t offer, double theta_s, double now_s) const;
   double room_bytes(double beta, double now_s) const;
-  double proportional_share(double now_s, std::size_t samples) const;
+  double proportional_share(double now_s, double beta) const;
+  double lasting_bytes_s(double now_s) const;
+  bool limits_can_hold(double now_s) const;
   std::int32_t rung_of(std::uint32_t offer, double target, double now_s) const;
-  std::int32_t nearest_rung_of(const FragmentOffer& offer, double target, bool may_skip) const;
+  std::int32_t nearest_rung_of(const FragmentOffer& offer, double target, bool limits, bool may_skip) const;
   std::int32_t cheapest_rung_of(const FragmentOffer& offer, double price, bool may_skip,
                                 double most_bytes) const;
   double price_at(double now_s) const;
@@ -124,8 +130,10 @@ class HarmonicTimePlan {
   std::vector<std::size_t> step_of_offer_;
   std::vector<bool> taken_;
   std::uint32_t left_ = 0, right_ = 0, mean_ = 0;          // remaining: [left_, right_) less what is taken
+  std::vector<double> planned_;                            // d_g in bytes by offer, by the policy's plan
   double planned_total_ = 0, planned_left_ = 0;            // bytes
   double smallest_left_ = 0;                               // bytes of the lowest rungs of what is not issued
+  double low_left_ = 0;                                    // and of their low_rung
   double price_0_ = 0, price_total_ = 0, price_done_ = 0;  // kPrice: lambda_0; its plan's bytes, issued ones
   std::vector<double> price_bytes_;
   std::uint32_t in_flight_ = 0;

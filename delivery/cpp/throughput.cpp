@@ -14,6 +14,8 @@ Throughput::Throughput(const ThroughputOptions& options)
 void Throughput::add(double bytes, double seconds) {
   const Sample sample{bytes, std::max(seconds, kLeastSeconds)};
   ring_[count_++ % kRing] = sample;
+  const Sample before = sums_.empty() ? Sample{} : sums_.back();
+  sums_.push_back({before.bytes + sample.bytes, before.seconds + sample.seconds});
   const double weight = options_.ewma * std::min(1.0, bytes / options_.small_bytes);
   ewma_ += weight * (sample.bytes / sample.seconds - ewma_);
 }
@@ -41,6 +43,17 @@ double Throughput::recent_bytes_s(std::size_t samples) const {
     seconds += s.seconds;
   }
   return bytes / seconds;
+}
+
+double Throughput::mean_bytes_s(double seconds) const {
+  const Sample all = sums_.empty() ? Sample{} : sums_.back();
+  const double from = all.seconds - seconds;
+  if (from <= 0) return (all.bytes - from * options_.initial_bytes_s) / seconds;
+  const auto cut = std::upper_bound(sums_.begin(), sums_.end() - 1, from,
+                                    [](double s, const Sample& sum) { return s < sum.seconds; });
+  const Sample before = cut == sums_.begin() ? Sample{} : cut[-1];
+  const double part = (cut->seconds - from) / (cut->seconds - before.seconds);
+  return (all.bytes - cut->bytes + part * (cut->bytes - before.bytes)) / seconds;
 }
 
 }  // namespace texmesh

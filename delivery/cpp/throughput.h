@@ -27,6 +27,8 @@ class Throughput {
   void add(double bytes, double seconds);
   double bytes_s() const;                            // by the estimator chosen
   double recent_bytes_s(std::size_t samples) const;  // bytes over seconds of at most so many samples
+  /// The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0.
+  double mean_bytes_s(double seconds) const;
 
  private:
   struct Sample {
@@ -34,6 +36,7 @@ class Throughput {
   };
   ThroughputOptions options_;
   std::vector<Sample> ring_;  // the newest at (count_ - 1) % size
+  std::vector<Sample> sums_;  // of all samples up to each
   std::size_t count_ = 0;
   double ewma_ = 0;
 };

@@ -53,8 +53,9 @@ void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_requir
       ->capture_default_str();
   c.add_option(
        "--policy", a.policy,
-       "htca = the method; guard = the method within 1.5 x of a proportional plan; price = one price of "
-       "bytes that rises with delay; proportional; static = does not adapt")
+       "htca = the method; guard = the method over the plan of least loss, within 1.5 x of that plan's share "
+       "of what the link lasts to give; price = one price of bytes that rises with delay; proportional; "
+       "static = does not adapt")
       ->check(CLI::IsMember({"htca", "guard", "price", "proportional", "static", "htca-guard", "htca-price"}))
       ->capture_default_str();
   c.add_option("--order", a.order,
@@ -74,7 +75,8 @@ void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_requir
       ->check(CLI::Range(0, 64))
       ->capture_default_str();
   c.add_flag("--hard-limits", a.hard_limits,
-             "Qualities stay within 5 .. 97 whatever happens, nothing is skipped");
+             "Qualities stay within 5 .. 97 and nothing is skipped, however late it gets (default: while the "
+             "time is enough for that)");
   c.add_option("--scale", a.scale, "This scale instead of the one that suits the display")
       ->check(CLI::Range(0, 99));
   c.add_option("--rule", a.rule,

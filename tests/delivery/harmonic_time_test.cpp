@@ -156,6 +156,39 @@ TEST(HarmonicTime, PriceLosesLessThanTheMethodOnABurstyLink) {
   EXPECT_LE(late, 0.02 * limit);
 }
 
+TEST(HarmonicTime, GuardLosesLessThanTheMethodOnABurstyLinkAndIsPunctual) {
+  const std::vector<FragmentOffer> offers = some_offers(256);
+  const double limit = planned(offers) / 1e4;
+  double htc = 0, guard = 0, guard_off = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const BandwidthTrace trace = random_trace(1e4, 0.9, 0.9, 0.1, 5 * limit, seed);
+    HtcOptions o = serial(limit, 1e4);
+    htc += simulate_serial_trace(offers, o, trace).loss;
+    o.policy = Policy::kGuard;
+    const SimulationResult guarded = simulate_serial_trace(offers, o, trace);
+    guard += guarded.loss;
+    guard_off += std::abs(guarded.deviation_percent);
+  }
+  EXPECT_LT(guard, 0.95 * htc);
+  EXPECT_LT(guard_off, 10 * 0.2);  // percent
+}
+
+TEST(HarmonicTime, LimitsHoldWhileThereIsTimeForThem) {
+  std::vector<FragmentOffer> offers = some_offers(100), limited = offers;
+  double low = 0;
+  for (FragmentOffer& f : limited) low += f.bytes[f.low_rung = 2];
+  const HtcOptions o = serial(planned(offers) / 1e4, 1e4);
+  const auto below = [&](const std::vector<FragmentOffer>& list, double rate) {
+    const SimulationResult r =
+        simulate_samples(list, o, [&](std::size_t k, double) { return k % 2 ? 0.7 * rate : 1.7 * rate; });
+    return std::count_if(r.rungs.begin(), r.rungs.end(), [](std::int32_t rung) { return rung < 2; });
+  };
+  const double enough = 3 * low / o.time_limit_s;
+  EXPECT_GT(below(offers, enough), 5);
+  EXPECT_LE(below(limited, enough), 1);  // the last one may find its time spent
+  EXPECT_GT(below(limited, 0.2 * enough), 20);
+}
+
 TEST(HarmonicTime, TheWindowHidesRoundTrips) {
   const std::vector<FragmentOffer> offers = some_offers(256);
   const double limit = planned(offers) / 1e4;

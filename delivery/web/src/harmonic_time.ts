@@ -21,9 +21,10 @@ export interface FragmentOffer {
 }
 
 /**
- * How rungs are chosen. htc: the method. guard: the method, with sizes kept within a factor of a proportional plan.
- * price: one price of bytes in units of loss that rises when the plan is late. proportional: sizes scaled by what is
- * left of time over what is left to send. static: the planned sizes, whatever happens.
+ * How rungs are chosen. htc: the method. guard: the method over the plan of least loss instead of Eq. 3.2's, with
+ * sizes kept within a factor of that plan's share of what the link gives in the time left. price: one price of bytes in
+ * units of loss that rises when the plan is late. proportional: sizes scaled by what is left of time over what is left
+ * to send. static: the planned sizes, whatever happens.
  */
 export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static';
 /** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
@@ -41,7 +42,10 @@ export interface HtcOptions {
   /** Requests in flight; 0 = until 1.5 x throughput x round trip, at least 2. */
   window: number;
   maxInFlight: number;
-  /** true: never below lowRung, nothing skipped, as in the thesis. */
+  /**
+   * true: never below lowRung, nothing skipped, as in the thesis. false: so while the time is enough for it, then the
+   * bottom of the ladder, then skipping.
+   */
   hardLimits: boolean;
   /** Factor of guard, > 1. */
   guard: number;
@@ -93,13 +97,14 @@ const windowFactor = 1.5;
 const tripSamples = 64; // a window that follows every swing makes them worse
 const windowSamples = 10;
 const guardSamples = 20;
+const breakFactor = 4; // a link this many times faster or slower is another link
 const largestExponent = 12;
 // A stall that is over looks like a slow link until something has been transferred: what is skipped on such evidence is
 // lost for good.
 const mostSkipsInARow = 1;
 const elasticity = 2.5; // of the price by bytes, on ladders of photographs
 const spareExponent = 1;
-const lateFactor = 1.5;
+const lateFactor = 1.2;
 const anyRung = 0xffff;
 
 const clamp = (v: number, least: number, most: number): number => (v < least ? least : most < v ? most : v);
@@ -152,9 +157,11 @@ export class HarmonicTimePlan {
   private left_ = 0;
   private right_: number;
   private readonly mean_: number;
+  private planned_: number[]; // d_g in bytes by offer, by the policy's plan
   private plannedTotal_ = 0;
   private plannedLeft_ = 0;
   private smallestLeft_ = 0;
+  private lowLeft_ = 0;
   private price0_ = 0;
   private priceTotal_ = 0;
   private priceDone_ = 0;
@@ -182,15 +189,18 @@ export class HarmonicTimePlan {
     this.taken_ = new Array<boolean>(n).fill(false);
     this.right_ = n;
     this.mean_ = meanFragment(offers);
+    this.planned_ = offers.map((f) => f.plannedBytes);
     for (const f of offers) {
       this.plannedTotal_ += f.plannedBytes;
       this.smallestLeft_ += f.bytes[lowest(f, options_.hardLimits)];
+      this.lowLeft_ += f.bytes[lowest(f, true)];
     }
     this.plannedLeft_ = this.plannedTotal_;
     // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come next; with
     // one request at a time every fragment has a round trip of its own.
     if (options_.window !== 1) this.latencyS_ = Math.min(options_.rttS, options_.timeLimitS / 2);
-    if (options_.policy === 'price') this.planPrices_();
+    if (options_.policy === 'price' || options_.policy === 'guard') this.planPrices_();
+    if (options_.policy === 'guard') this.planForLeastLoss_();
   }
 
   get allIssued(): boolean {
@@ -241,6 +251,14 @@ export class HarmonicTimePlan {
       this.priceBytes_.push(rungBytes(f, this.price0_));
       this.priceTotal_ += this.priceBytes_[this.priceBytes_.length - 1];
     }
+  }
+
+  private planForLeastLoss_(): void {
+    const hard = this.options_.hardLimits;
+    this.planned_ = this.offers.map((f, i) => Math.max(this.priceBytes_[i], f.bytes[lowest(f, hard)]));
+    this.plannedTotal_ = 0;
+    for (const b of this.planned_) this.plannedTotal_ += b;
+    this.plannedLeft_ = this.plannedTotal_;
   }
 
   throughputBytesS(): number {
@@ -320,13 +338,14 @@ export class HarmonicTimePlan {
     this.taken_[offer] = true;
     while (this.left_ < this.right_ && this.taken_[this.sorted_[this.left_]]) ++this.left_;
     while (this.left_ < this.right_ && this.taken_[this.sorted_[this.right_ - 1]]) --this.right_;
-    this.plannedLeft_ -= f.plannedBytes;
+    this.plannedLeft_ -= this.planned_[offer];
     this.smallestLeft_ -= f.bytes[lowest(f, this.options_.hardLimits)];
+    this.lowLeft_ -= f.bytes[lowest(f, true)];
     if (this.priceBytes_.length > 0) this.priceDone_ += this.priceBytes_[offer];
   }
 
   private thetaOf_(offer: number): number {
-    return (this.options_.timeLimitS - this.latencyS_) * (this.offers[offer].plannedBytes / this.plannedTotal_);
+    return (this.options_.timeLimitS - this.latencyS_) * (this.planned_[offer] / this.plannedTotal_);
   }
 
   // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -357,23 +376,39 @@ export class HarmonicTimePlan {
   }
 
   /** What a plan in proportion to the planned sizes gives, as a factor of them. */
-  private proportionalShare_(nowS: number, samples: number): number {
-    const beta = samples ? this.throughput_.recentBytesS(samples) : this.throughputBytesS();
+  private proportionalShare_(nowS: number, beta: number): number {
     return this.roomBytes_(beta, nowS) / Math.max(this.plannedLeft_, 1);
   }
 
+  /**
+   * What the link will give in the time left: its mean over as long a time until now, so that bursts shorter than that do
+   * not count; but a link that stalls, falls or comes back by more than breakFactor does not return to its mean.
+   */
+  private lastingBytesS_(nowS: number): number {
+    const recent = this.throughput_.recentBytesS(guardSamples);
+    const leftS = this.options_.timeLimitS - nowS;
+    if (leftS <= 0) return recent;
+    const mean = this.throughput_.meanBytesS(leftS);
+    return recent * breakFactor > mean && recent < breakFactor * mean ? mean : recent;
+  }
+
   private targetOf_(offer: number, thetaS: number, nowS: number): number {
-    const f = this.offers[offer];
+    const planned = this.planned_[offer];
     const { policy } = this.options_;
-    if (policy === 'static' || policy === 'price') return f.plannedBytes;
-    if (policy === 'proportional') return f.plannedBytes * this.proportionalShare_(nowS, 0);
-    if (this.steps.length === 0) return f.plannedBytes; // F-bar has the quality Q_i
+    if (policy === 'static' || policy === 'price') return planned;
+    if (policy === 'proportional') return planned * this.proportionalShare_(nowS, this.throughputBytesS());
+    if (this.steps.length === 0) return planned; // F-bar has the quality Q_i
     // Alone in flight it has to wait for a round trip first.
     const wait = this.options_.window === 1 ? this.options_.rttS : 0;
     const target = this.throughputBytesS() * (thetaS - wait);
     if (policy === 'htc') return target;
-    const even = f.plannedBytes * this.proportionalShare_(nowS, guardSamples);
+    const even = planned * this.proportionalShare_(nowS, this.lastingBytesS_(nowS));
     return clamp(target, even / this.options_.guard, even * this.options_.guard);
+  }
+
+  private limitsCanHold_(nowS: number): boolean {
+    if (this.options_.hardLimits) return true;
+    return this.lowLeft_ <= this.roomBytes_(this.throughput_.recentBytesS(windowSamples), nowS);
   }
 
   private maySkip_(nowS: number): boolean {
@@ -387,13 +422,16 @@ export class HarmonicTimePlan {
   private rungOf_(offer: number, target: number, nowS: number): number {
     const f = this.offers[offer];
     const skip = this.maySkip_(nowS);
-    if (this.options_.policy !== 'price') return this.nearestRungOf_(f, target, skip);
+    if (this.options_.policy !== 'price') {
+      const limits = this.limitsCanHold_(nowS);
+      return this.nearestRungOf_(f, target, limits, skip && !limits);
+    }
     const room = this.roomBytes_(this.throughput_.recentBytesS(windowSamples), nowS);
     return this.cheapestRungOf_(f, this.priceAt_(nowS), skip, lateFactor * room);
   }
 
-  private nearestRungOf_(f: FragmentOffer, target: number, maySkip: boolean): number {
-    const low = lowest(f, this.options_.hardLimits);
+  private nearestRungOf_(f: FragmentOffer, target: number, limits: boolean, maySkip: boolean): number {
+    const low = lowest(f, limits);
     let best = maySkip ? -1 : low;
     let distance = Math.abs(target - (best < 0 ? 0 : f.bytes[best]));
     for (let r = low; r <= highest(f); ++r) {

@@ -27,10 +27,12 @@ export const defaultThroughput: ThroughputOptions = {
 
 const ringSize = 64;
 const leastSeconds = 1e-9;
+const none = { bytes: 0, seconds: 0 };
 
 /** Throughput of a connection or a group of them: delivery/cpp/throughput.h. */
 export class Throughput {
   private readonly ring_: { bytes: number; seconds: number }[] = [];
+  private readonly sums_: { bytes: number; seconds: number }[] = []; // of all samples up to each
   private count_ = 0;
   private mean_: number;
 
@@ -42,6 +44,8 @@ export class Throughput {
   add(bytes: number, seconds: number): void {
     const sample = { bytes, seconds: Math.max(seconds, leastSeconds) };
     this.ring_[this.count_++ % ringSize] = sample;
+    const before = this.sums_[this.sums_.length - 1] ?? none;
+    this.sums_.push({ bytes: before.bytes + sample.bytes, seconds: before.seconds + sample.seconds });
     const weight = this.options_.ewma * Math.min(1, bytes / this.options_.smallBytes);
     this.mean_ += weight * (sample.bytes / sample.seconds - this.mean_);
   }
@@ -66,5 +70,24 @@ export class Throughput {
       seconds += s.seconds;
     }
     return bytes / seconds;
+  }
+
+  /** The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0. */
+  meanBytesS(seconds: number): number {
+    const last = this.sums_.length - 1;
+    const all = this.sums_[last] ?? none;
+    const from = all.seconds - seconds;
+    if (from <= 0) return (all.bytes - from * this.options_.initialBytesS) / seconds;
+    let low = 0; // the first sum that ends after `from`, or the last
+    let high = last;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.sums_[middle].seconds > from) high = middle;
+      else low = middle + 1;
+    }
+    const cut = this.sums_[low];
+    const before = this.sums_[low - 1] ?? none;
+    const part = (cut.seconds - from) / (cut.seconds - before.seconds);
+    return (all.bytes - cut.bytes + part * (cut.bytes - before.bytes)) / seconds;
   }
 }
