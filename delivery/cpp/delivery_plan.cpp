@@ -7,6 +7,14 @@ namespace texmesh {
 namespace {
 
 constexpr float kSeenSsim = 0.004f;
+constexpr double kWorthwhileSsim = 1e-4;  // a coarser scale must look better, not only as good
+
+/// SSIM of a scale with textures as good as the table knows them.
+double best_ssim(const QualityTable& table, int scale) {
+  double best = 0;
+  for (const int quality : table.rungs) best = std::max(best, predicted_ssim(table, scale, quality));
+  return best;
+}
 
 /// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network.
 double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
@@ -200,9 +208,11 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   bool first = true;
   for (const ManifestScale& s : m.scales) {
     if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;
+    // A mesh that comes too late is no picture in the time.
+    const bool needed = first || best.mesh_s >= request.time_limit_s;
+    if (!needed && best_ssim(package.quality(), s.scale) <= best.ssim + kWorthwhileSsim) continue;
     DeliveryPlan plan = plan_at_scale(package, request, s.scale);
-    // A coarser scale must pay: it has to look better, not only as good.
-    if (first || (plan.ssim > best.ssim + 1e-4 && best.complete_s > 0)) best = std::move(plan);
+    if (needed || plan.ssim > best.ssim + kWorthwhileSsim) best = std::move(plan);
     first = false;
   }
   if (first)

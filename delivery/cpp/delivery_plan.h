@@ -42,7 +42,7 @@ struct DeliveryPlan {
 };
 
 /// The scale is the rule's, or a coarser one where a simulation of both shows a better picture in the time:
-/// mesh first, then texture. Deterministic.
+/// mesh first, then texture; or where the mesh itself comes too late. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
 /// The scale and the textures that look best in so many bytes, whatever the time: no scale finer than the
 /// display needs, mesh first, then texture. Where nothing fits the least there is, with a warning.

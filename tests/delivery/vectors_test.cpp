@@ -399,6 +399,39 @@ Json lists(PackageReader& package) {
   return out;
 }
 
+/// What is chosen over links that are fast, slow and too slow.
+Json plans(PackageReader& package) {
+  Json out = Json::array();
+  for (const auto& [policy, name] : kPolicies)
+    for (const double px : {60.0, 400.0, 1500.0})
+      for (const double bytes_s : {4e3, 2e4, 3e5})
+        for (const double limit_s : {1.0, 4.0}) {
+          DeliveryRequest r;
+          r.displayed_px = px;
+          r.time_limit_s = limit_s;
+          r.htc.policy = policy;
+          r.network.link = BandwidthTrace::constant(bytes_s);
+          r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
+          const DeliveryPlan p = plan_delivery(package, r);
+          Json shown = Json::array();
+          for (const PlaneChoice& c : p.planes) shown.push_back({c.base, c.plane});
+          out.push_back({{"policy", name},
+                         {"displayed_px", px},
+                         {"bytes_s", bytes_s},
+                         {"rtt_s", r.network.rtt_s},
+                         {"time_limit_s", limit_s},
+                         {"wanted_scale", wanted_scale(package, r)},
+                         {"scale", p.scale},
+                         {"planes", shown},
+                         {"rungs", p.textures.rungs},
+                         {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
+                         {"bytes", p.bytes()},
+                         {"texture_dssim", p.texture_dssim},
+                         {"ssim", p.ssim}});
+        }
+  return out;
+}
+
 Json fragments(PackageReader& package) {
   Json out = Json::array();
   for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
@@ -453,6 +486,7 @@ Json packages() {
                      {"viewing", viewing(package)},
                      {"tables", planes},
                      {"lists", lists(package)},
+                     {"plans", plans(package)},
                      {"fragment_plane_rung_index_path_offset_bytes_sha256", fragments(package)}});
     if (package.manifest().stream) cases.back()["split_stream"] = split_stream(package);
   }

@@ -57,7 +57,7 @@ export interface ManifestScale {
   displayPxJnd: number;
   displayPxError: number;
   displayPxEdge: number;
-  /** Why it has more vertices than its scale asks for; mostly "". */
+  /** Why it has more vertices than its scale asks for, or (on the last one) why none is coarser; mostly "". Since 1.1. */
   floor: string;
 }
 /** One step of the step function from displayed height to scale. */

@@ -1,4 +1,6 @@
-import { FragmentList, PackageData, PlaneChoice } from './fragment_list';
+import { FragmentList, PackageData, PlaneChoice, TextureBudget, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
+import { HtcOptions } from './harmonic_time';
+import { LinkOptions, simulate } from './link_model';
 import { equivalentQuality, predictedSsim } from './prediction';
 import type { QualityTable } from './quality_table';
 
@@ -21,50 +23,73 @@ export function finerWhereSeen(table: QualityTable, scale: number, displayedPx: 
   return table.scales[i];
 }
 
-/** What the textures lose when so many bytes are spent in proportion to the planned sizes. */
-function lossFor(list: FragmentList, bytes: number): number {
-  let planned = 0;
-  for (const o of list.offers) planned += o.plannedBytes;
-  const factor = Math.max(0, bytes) / Math.max(planned, 1);
-  let loss = 0;
-  for (const o of list.offers) {
-    const target = o.plannedBytes * factor;
-    let best = 0;
-    let distance = target;
-    o.bytes.forEach((b, r) => {
-      if (Math.abs(target - b) >= distance) return;
-      distance = Math.abs(target - b);
-      best = r + 1;
-    });
-    loss += o.loss[best];
-  }
-  return list.totalWeight > 0 ? loss / list.totalWeight : 0;
+/** SSIM of a scale with textures as good as the table knows them. */
+function bestSsim(table: QualityTable, scale: number): number {
+  return table.rungs.reduce((best, q) => Math.max(best, predictedSsim(table, scale, q)), 0);
+}
+
+/** A scale and textures as they can be had in a time. */
+export interface InTime {
+  scale: number;
+  planes: PlaneChoice[];
+  list: FragmentList;
+  /** By offer of the list; -1 = skipped. */
+  rungs: number[];
+  bytes: number;
+  /** 1 - SSIM of the textures as displayed, and the picture's predicted SSIM. */
+  textureDssim: number;
+  ssim: number;
+  /** Of the last fragment, after the first request for one. */
+  endS: number;
+  /** No time is left after the mesh. */
+  late: boolean;
+}
+/** What a choice is made for. */
+export interface InTimeRequest {
+  displayedPx: number;
+  /** The finest scale that is worth showing. */
+  wanted: number;
+  /** Only this one. */
+  only?: boolean;
+  connections: number;
+  /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
+  afterMesh(scale: number): { htc: HtcOptions; linkBytesS: number };
+}
+
+/** Textures beside one scale; the generator gives the page a turn between its steps. */
+function* texturesInTime(data: PackageData, quality: QualityTable, request: InTimeRequest, scale: number): Generator<void, InTime> {
+  const { displayedPx, connections } = request;
+  const { htc, linkBytesS } = request.afterMesh(scale);
+  const budget = Math.floor(Math.max(0, htc.timeLimitS) * htc.throughput.initialBytesS);
+  let spent: TextureBudget | undefined;
+  for (spent of budgetSteps(data, displayedPx, { scale }, budget)) yield;
+  const { list, planes } = spent!;
+  const link: LinkOptions = { bytesS: linkBytesS, rttS: htc.rttS, connections };
+  const played =
+    htc.timeLimitS > 0
+      ? simulate(list.offers, htc, link)
+      : { rungs: list.offers.map(() => -1), bytes: 0, endS: 0, loss: list.offers.reduce((sum, o) => sum + o.loss[0], 0) };
+  yield;
+  const shown = list.totalWeight > 0 ? played.loss / list.totalWeight : 0;
+  const textureDssim = 1 - (1 - shown) * (1 - mipLoss(data, planes, displayedPx));
+  const ssim = predictedSsim(quality, scale, equivalentQuality(data, planesForDisplay(data, displayedPx), textureDssim));
+  return { scale, planes, list, textureDssim, ssim, rungs: played.rungs, bytes: played.bytes, endS: played.endS, late: htc.timeLimitS <= 0 };
 }
 
 /**
- * The wanted scale, or a coarser one whose smaller mesh leaves more for the texture and looks better in the time: the
- * measured table's SSIM for the scale and the quality of textures that `textureBytes` buy.
+ * The wanted scale, or a coarser one where a simulation of both shows a better picture in the time or where the wanted mesh
+ * comes too late; with the textures that go with it: delivery/cpp/delivery_plan. A generator, so that a page can breathe between its steps. undefined:
+ * the package has no such scale.
  */
-export function chooseScale(
-  data: PackageData,
-  quality: QualityTable,
-  list: FragmentList,
-  planes: readonly PlaneChoice[],
-  wanted: number,
-  textureBytes: (scale: number) => number,
-): number {
-  let best = wanted;
-  let bestSsim = -1;
+export function* choiceInTime(data: PackageData, quality: QualityTable, request: InTimeRequest): Generator<void, InTime | undefined> {
+  let best: InTime | undefined;
   for (const { scale } of data.manifest.scales) {
-    if (scale < wanted) continue;
-    const bytes = textureBytes(scale);
-    const coarsest = scale === data.manifest.scales[data.manifest.scales.length - 1].scale;
-    if (bytes < 0 && !coarsest) continue; // not even the mesh comes in time
-    const ssim = predictedSsim(quality, scale, equivalentQuality(data, planes, lossFor(list, bytes)));
-    if (bestSsim < 0 || ssim > bestSsim + worthwhile) {
-      best = scale;
-      bestSsim = ssim;
-    }
+    if (scale < request.wanted || (request.only && scale !== request.wanted)) continue;
+    // A mesh that comes too late is no picture in the time.
+    const least: number = !best || best.late ? -1 : best.ssim + worthwhile;
+    if (bestSsim(quality, scale) <= least) continue;
+    const now = yield* texturesInTime(data, quality, request, scale);
+    if (now.ssim > least) best = now;
   }
   return best;
 }

@@ -1,15 +1,13 @@
 import type { Mesh } from 'three';
 import type { ComposedPlane } from './api';
 import { fullSizePlanes } from './documents';
-import {
-  FragmentList, PackageData, PlaneChoice, TextureBudget, budgetSteps, fragmentList, fullSize, planesForDisplay,
-} from './fragment_list';
+import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
-import { HarmonicTimePlan, HtcStep, defaultHtcOptions } from './harmonic_time';
+import { HarmonicTimePlan, HtcOptions, HtcStep, defaultHtcOptions } from './harmonic_time';
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
-import { chooseScale, finerWhereSeen } from './scale_choice';
+import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
 import { TimedFetch } from './timed_fetch';
@@ -17,6 +15,7 @@ import { Transfers, Wish } from './transfers';
 import { upgradesInOrder } from './upgrades';
 import { VisiblePart, selectScale } from './viewing';
 import { VisibleSurface } from './visibility';
+import type { TextureInfo } from './textures';
 import type { Levels } from './worker_protocol';
 
 /** What decoding and uploading take after the last byte, of the time limit. */
@@ -30,8 +29,8 @@ const mostPending = 48;
 /** Of the time left when a mesh is asked for: textures do not wait longer for it. */
 const meshShare = 0.5;
 const longestTimerS = 1e6;
-/** Less of the limit than this, beside two round trips, is not worth another request. */
-const leastRest = 0.01;
+/** Less of the limit than this, beside a round trip, is not worth another request. */
+const leastRest = 0.004;
 /** Of the bytes that throughput promises. */
 const certain = 0.85;
 const gapBytes = 1024;
@@ -87,8 +86,10 @@ export class TextureLoad {
     if (whole) return this.load_.reader.data();
     const textures = await this.load_.reader.textures();
     const base = Array.from({ length: fullSizePlanes(textures) }, (_, p) => p);
-    const planes = this.planesFor_(await this.load_.reader.data(base)).map((p) => p.plane);
-    return this.load_.reader.data([...base, ...planes]);
+    const shown = this.planesFor_(await this.load_.reader.data(base));
+    // With the mips below, which a short time may ask for.
+    const among = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= textures[c.plane].mip);
+    return this.load_.reader.data([...base, ...textures.flatMap((t, p) => (among(t) ? [p] : []))]);
   }
   private planesFor_(data: PackageData, displayedPx = this.load_.view.display.heightPx): PlaneChoice[] {
     return this.load_.options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
@@ -100,16 +101,14 @@ export class TextureLoad {
     this.quality_ = await this.load_.reader.quality();
     this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.latencyS);
     const transfers = this.startTextures_(data);
-    const scale = await this.scaleInTime_(data);
+    const { scale, planes } = await this.choice_(data);
     this.load_.wantedScale = scale;
     if (scale !== this.load_.shownScale) this.load_.enter('mesh');
     const meshBytes = this.load_.scales.bytesOf(scale);
     const mesh = this.load_.showScale(scale);
     mesh.shown.catch(() => undefined);
     // Coverage that no material asks for is not fetched.
-    const choices = (await this.planesInTime_(data, scale)).filter(
-      ({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base),
-    );
+    const choices = planes.filter(({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base));
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
     // A mesh that is only waited for leaves the link to the textures.
     // One that takes longer than it should has coarser scales to show on its way.
@@ -131,24 +130,35 @@ export class TextureLoad {
   private leftS_(share: number): number {
     return Math.min(longestTimerS, Math.max(0, share * (this.load_.limitS - this.load_.elapsedS())));
   }
-  /** Planes for the display, or coarser ones where the time left buys too few bytes for them. */
-  private async planesInTime_(data: PackageData, scale: number): Promise<PlaneChoice[]> {
-    const all = data.tables.every((t) => t !== undefined);
-    if (this.load_.options.fullSize || !Number.isFinite(this.load_.limitS) || this.load_.override.rung !== undefined || !all)
-      return this.planesFor_(data);
-    const bytes = this.textureBytes_(scale);
-    let best: TextureBudget | undefined;
-    for (best of budgetSteps(data, this.load_.view.display.heightPx, { scale }, bytes)) {
+  /** Scale and planes: those for the display, or what looks best in the time. */
+  private async choice_(data: PackageData): Promise<{ scale: number; planes: PlaneChoice[] }> {
+    const { limitS, options, override, view } = this.load_;
+    const { heightPx, part } = view.display;
+    const wanted = override.scale ?? this.scaleFor(heightPx, part);
+    if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined)
+      return { scale: wanted, planes: this.planesFor_(data) };
+    const steps = choiceInTime(data, this.quality_!, {
+      displayedPx: heightPx, wanted, only: override.scale !== undefined,
+      connections: this.load_.reader.client.options.connections,
+      afterMesh: (scale) => ({ htc: this.htc_(limitS - this.load_.elapsedS() - composeS - this.meshS_(scale)), linkBytesS: this.load_.beta0 }),
+    });
+    for (let step = steps.next(); ; step = steps.next()) {
+      if (step.done) return step.value!;
       await sleepS(0); // the page goes on meanwhile
       throwIfAborted(this.load_.signal);
     }
-    return best!.planes;
   }
-  /** Bytes that the time leaves for textures when this scale is loaded. */
-  private textureBytes_(scale: number): number {
-    const mesh = this.load_.scales.bytesOf(scale);
-    const meshS = mesh > 0 ? mesh / this.load_.beta0 + this.load_.reader.client.latencyS : 0;
-    return (this.load_.limitS - this.load_.elapsedS() - composeS - meshS) * this.load_.beta0;
+  /** What the mesh of a scale takes when nothing shares the link. */
+  private meshS_(scale: number): number {
+    const bytes = this.load_.scales.bytesOf(scale);
+    return bytes > 0 ? bytes / this.load_.beta0 + this.load_.reader.client.latencyS : 0;
+  }
+  private htc_(timeLimitS: number): HtcOptions {
+    const { policy, order } = this.load_.options;
+    const defaults = defaultHtcOptions();
+    const throughput = { ...defaults.throughput, initialBytesS: Math.max(1, this.load_.beta0) };
+    const { latencyS: rttS } = this.load_.reader.client;
+    return { ...defaults, policy: policy ?? 'guard', order: order ?? 'credit', timeLimitS, rttS, throughput };
   }
   private skippedOf_(plane: ComposedPlane): number {
     const order = this.data_?.tables[plane.plane]?.order ?? [];
@@ -224,17 +234,6 @@ export class TextureLoad {
     const scale = selectScale(manifest, heightPx, part);
     return this.quality_ ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
   }
-  private async scaleInTime_(data: PackageData): Promise<number> {
-    const { heightPx, part } = this.load_.view.display;
-    const wanted = this.load_.override.scale ?? this.scaleFor(heightPx, part);
-    if (this.load_.override.scale !== undefined || !Number.isFinite(this.load_.limitS)) return wanted;
-    await sleepS(0); // the page goes on in between
-    const planes = this.planesFor_(data);
-    const list = fragmentList(data, planes, { scale: wanted });
-    await sleepS(0);
-    return chooseScale(data, this.quality_!, list, planes, wanted, (scale) => this.textureBytes_(scale));
-  }
-
   /** The list of what may be fetched, with the bytes that fetching takes. */
   private listOf_(data: PackageData, choices: readonly PlaneChoice[], scale: number): FragmentList {
     const list = fragmentList(data, choices, { scale });
@@ -278,20 +277,10 @@ export class TextureLoad {
 
   /** Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
   private async fetchInTime_(fragments: FragmentList, limitS: number): Promise<void> {
-    const { policy, order, beta0BytesS } = this.load_.options;
-    const { latencyS } = this.load_.reader.client;
-    const defaults = defaultHtcOptions();
-    const beta0 = beta0BytesS || this.load_.beta0;
-    const bytesEach = this.wholeRungs_ ? Infinity : groupBytes(beta0, latencyS, limitS);
+    const { beta0 } = this.load_;
+    const bytesEach = this.wholeRungs_ ? Infinity : groupBytes(beta0, this.load_.reader.client.latencyS, limitS);
     const list = groupedList(fragments, bytesEach, beta0 * limitS);
-    const plan = new HarmonicTimePlan(list.offers, {
-      ...defaults,
-      policy: policy ?? 'guard',
-      order: order ?? 'credit',
-      timeLimitS: limitS,
-      rttS: latencyS,
-      throughput: { ...defaults.throughput, initialBytesS: Math.max(1, beta0) },
-    });
+    const plan = new HarmonicTimePlan(list.offers, this.htc_(limitS));
     this.plan_ = plan;
     const fetch = new TimedFetch(plan, list, this.transfers_!, this.load_.signal, {
       decided: (step) => this.tell_(list, step),
@@ -303,23 +292,30 @@ export class TextureLoad {
     });
     if (!this.wholeRungs_) await this.spendRest_(fragments, plan);
   }
-  /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades. */
+  /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */
   private async spendRest_(list: FragmentList, plan: HarmonicTimePlan): Promise<void> {
-    const { latencyS } = this.load_.reader.client;
-    const least = 2 * latencyS + leastRest * this.load_.limitS;
-    for (let leftS = this.leftS_(1) - composeS; leftS > least; leftS = this.leftS_(1) - composeS) {
+    const { limitS, reader } = this.load_;
+    const { latencyS, options } = reader.client;
+    for (;;) {
+      const leftS = limitS - composeS - this.load_.elapsedS();
       const bytes = certain * plan.throughputBytesS() * (leftS - latencyS);
+      if (leftS < latencyS + leastRest * limitS) return;
       const rungs = list.fragments.map((f) => this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1);
       const taken = new Map<number, Wish>();
-      let spent = 0;
+      const full = new Set<number>();
+      let left = bytes;
       for (const u of upgradesInOrder(list.offers, rungs)) {
-        if (spent + u.bytes > bytes) break;
-        spent += u.bytes;
+        const before = taken.get(u.offer);
+        const more = u.bytes - (before ? list.offers[u.offer].bytes[before.rung] : 0);
+        // What is too large leaves room for smaller ones; more requests at once would wait for connections.
+        if (more > left || (!before && taken.size >= 2 * options.connections)) full.add(u.offer);
+        if (full.has(u.offer)) continue;
+        left -= more;
         taken.set(u.offer, { ...list.fragments[u.offer], rung: u.rung, offer: u.offer });
       }
       if (taken.size === 0) return;
       for (const w of taken.values()) this.asked_.set(`${w.plane}/${w.fragment}`, w.rung);
-      const late = AbortSignal.timeout(1000 * (leftS + mostLate * this.load_.limitS));
+      const late = AbortSignal.timeout(1000 * (leftS + mostLate * limitS));
       await this.fetchWishes_([...taken.values()], AbortSignal.any?.([late, this.load_.signal]) ?? late);
     }
   }

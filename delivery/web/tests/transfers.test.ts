@@ -2,7 +2,8 @@ import { describe, expect, it } from 'vitest';
 import {
   FormatError, FragmentList, HarmonicTimePlan, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize,
 } from '../src/reader';
-import { chooseScale, finerWhereSeen } from '../src/scale_choice';
+import { finerWhereSeen } from '../src/scale_choice';
+import { defaultDeliveryRequest, planDelivery } from '../src/delivery_plan';
 import { groupBytes, groupedList, throughputOf } from '../src/groups';
 import { TimedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
@@ -173,11 +174,17 @@ describe('a timed fetch', () => {
 
 describe('the scale', () => {
   it('is the wanted one when time is plenty, the coarsest when there is none', async () => {
-    const { reader, data, list } = await setUp();
+    const { reader, data } = await setUp();
     const quality = await reader.quality();
-    const planes = fullSize(data.textures);
-    expect(chooseScale(data, quality, list, planes, 0, () => 1e9)).toBe(0);
-    expect(chooseScale(data, quality, list, planes, 0, (scale) => (scale === 0 ? -1 : 1000))).toBe(1);
+    const at = (timeLimitS: number, scale = -1) => {
+      const base = defaultDeliveryRequest();
+      return planDelivery(data, quality, { ...base, displayedPx: 1e6, timeLimitS, scale });
+    };
+    const coarsest = data.manifest.scales[data.manifest.scales.length - 1].scale;
+    expect(at(1e3)).toMatchObject({ scale: 0, late: false });
+    expect(at(1e-3)).toMatchObject({ scale: coarsest, late: true });
+    expect(at(1e-3, 0)).toMatchObject({ scale: 0, late: true }); // as it was asked for
+    expect(at(1e3, 98)).toBeUndefined();
   });
 });
 

@@ -1,7 +1,6 @@
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { finerWhereSeen } from '../src/scale_choice';
 import * as t from '../src/reader';
 import { SplitStreamReader } from '../src/split_stream';
 import { readBytes, readText, root, sameBits } from './support';
@@ -147,11 +146,31 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
     expectBits(numbers, [b.mip_loss, b.bytes, b.dssim], `budget of ${b.budget_bytes}`);
   }
   const quality = await reader.quality();
-  expect(finerWhereSeen(quality, v.scale, v.displayed_px)).toBe(v.finer_where_seen);
+  expect(t.finerWhereSeen(quality, v.scale, v.displayed_px)).toBe(v.finer_where_seen);
   for (const [dssim, equivalent, ssim] of v.dssim_quality_ssim) {
     const q = t.equivalentQuality(data, planes, dssim);
     expectBits([q, t.predictedSsim(quality, v.scale, q)], [equivalent, ssim], `dssim ${dssim}`);
   }
+}
+
+/** Scale, planes and rungs that a time and a link leave. */
+async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
+  const base = t.defaultDeliveryRequest();
+  const request: t.DeliveryRequest = {
+    ...base,
+    displayedPx: v.displayed_px,
+    timeLimitS: v.time_limit_s,
+    htc: { ...base.htc, policy: v.policy },
+    link: { ...base.link, bytesS: v.bytes_s, rttS: v.rtt_s },
+  };
+  const [data, quality] = [await reader.data(), await reader.quality()];
+  expect(t.wantedScale(data.manifest, quality, request)).toBe(v.wanted_scale);
+  const p = t.planDelivery(data, quality, request)!;
+  expect(p.scale).toBe(v.scale);
+  expect(p.planes.map((c) => [c.base, c.plane])).toEqual(v.planes);
+  expectBits(p.rungs, v.rungs, 'rungs');
+  expectBits([p.firstPictureS, p.meshS, p.completeS], v.times_s, 'times');
+  expectBits([p.fixedBytes + p.bytes, p.textureDssim, p.ssim], [v.bytes, v.texture_dssim, v.ssim], 'plan');
 }
 
 async function digestOf(values: ArrayLike<number> & { buffer: ArrayBufferLike }, bytesEach = 4): Promise<string> {
@@ -205,6 +224,10 @@ async function runPackages(cases: Json[]): Promise<void> {
         for (const v of c.tables) checkTables(await reader.planeTables(v.plane), v);
       });
       for (const v of c.lists) it(`list at ${v.displayed_px} px, S_${v.scale}`, () => checkList(reader, v));
+      it('plans', async () => {
+        expect(new Set(c.plans.map((v: Json) => v.scale - v.wanted_scale)).size).toBeGreaterThan(1);
+        for (const v of c.plans) await checkPlan(reader, v);
+      });
       it('vertex splits', () => checkSplits(reader, c.split_stream ?? []));
       it('fragments', async () => {
         const rows = c.fragment_plane_rung_index_path_offset_bytes_sha256;
