@@ -15,7 +15,7 @@ const stripPx = 1 << 18;
  * Pixels that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn.
  * How many those are shows when one has waited. It is not waited for longer than longestFenceMs.
  */
-const behindPx = { least: 1 << 19, most: 1 << 22, first: 1 << 21, more: 1 << 16 };
+const behindPx = { least: 1 << 21, most: 1 << 24, first: 1 << 22, more: 1 << 18 };
 /** A turn that took so long has waited. */
 const waitedMs = 20;
 const longestFenceMs = 250;
