@@ -7,6 +7,8 @@ namespace texmesh {
 namespace {
 
 constexpr float kSeenSsim = 0.004f;
+constexpr double kBelowLowest =
+    2;  // the line through the two lowest rungs goes on for so many of their steps
 constexpr double kWorthwhileSsim = 1e-4;  // a coarser scale must look better, not only as good
 
 /// SSIM of a scale with textures as good as the table knows them.
@@ -149,21 +151,24 @@ double predicted_ssim(PackageReader& package, double displayed_px, int scale, do
 
 double predicted_ssim(const QualityTable& table, int scale, double quality) {
   if (table.scales.empty() || table.rungs.empty()) return 0;
-  const auto place = [](const auto& values, double at, auto&& axis) {
+  const auto place = [](const auto& values, double at, double least, auto&& axis) {
     std::size_t i = 0;
     while (i + 2 < values.size() && axis(values[i + 1]) < at) ++i;
     const double a = axis(values[i]), b = axis(values[std::min(i + 1, values.size() - 1)]);
-    return std::pair(i, b > a ? std::clamp((at - a) / (b - a), 0.0, 1.0) : 0.0);
+    return std::pair(i, b > a ? std::clamp((at - a) / (b - a), least, 1.0) : 0.0);
   };
-  const auto [s, u] = place(table.scales, scale, [](int v) { return static_cast<double>(v); });
-  const auto [r, v] = place(table.rungs, log_quantiser(std::clamp(quality, 1.0, 100.0)),
+  const auto [s, u] = place(table.scales, scale, 0, [](int v) { return static_cast<double>(v); });
+  // Textures of which little more than a preview has come are worse than the lowest rung.
+  const auto [r, v] = place(table.rungs, log_quantiser(std::clamp(quality, 1.0, 100.0)), -kBelowLowest,
                             [](int q) { return log_quantiser(q); });
   const std::size_t s1 = std::min(s + 1, table.scales.size() - 1),
                     r1 = std::min(r + 1, table.rungs.size() - 1);
   const auto at = [&](std::size_t i, std::size_t j) {
     return static_cast<double>(table.ssim[i * table.rungs.size() + j]);
   };
-  return (1 - u) * ((1 - v) * at(s, r) + v * at(s, r1)) + u * ((1 - v) * at(s1, r) + v * at(s1, r1));
+  const double ssim =
+      (1 - u) * ((1 - v) * at(s, r) + v * at(s, r1)) + u * ((1 - v) * at(s1, r) + v * at(s1, r1));
+  return std::max(0.0, ssim);
 }
 
 double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,

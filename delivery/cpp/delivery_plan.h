@@ -53,7 +53,8 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
 /// distances, and shading tells more. The table holds for objects displayed at least as high as its pictures.
 int finer_where_seen(const QualityTable& table, int scale, double displayed_px);
 /// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
-/// measured table (scale number, log-quantiser of the quality).
+/// measured table (scale number, log-quantiser of the quality), and below its lowest quality on the same
+/// line.
 double predicted_ssim(const QualityTable& table, int scale, double quality);
 /// The same for what the textures lose as they are displayed, mip_loss() included.
 double predicted_ssim(PackageReader& package, double displayed_px, int scale, double texture_dssim);

@@ -3,27 +3,31 @@ import { PackageData, PlaneChoice, roleWeight } from './fragment_list';
 import type { QualityTable } from './quality_table';
 import { fragmentCount, rungCount } from './tables';
 
+const belowLowest = 2; // the line through the two lowest rungs goes on for so many of their steps
+
 /** Where `at` lies between the values of an axis: index and fraction to the next. */
-function place(values: readonly number[], at: number, axis: (v: number) => number): [number, number] {
+function place(values: readonly number[], at: number, least: number, axis: (v: number) => number): [number, number] {
   let i = 0;
   while (i + 2 < values.length && axis(values[i + 1]) < at) ++i;
   const a = axis(values[i]);
   const b = axis(values[Math.min(i + 1, values.length - 1)]);
-  return [i, b > a ? Math.min(Math.max((at - a) / (b - a), 0), 1) : 0];
+  return [i, b > a ? Math.min(Math.max((at - a) / (b - a), least), 1) : 0];
 }
 
 /**
  * SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's measured table
- * (scale number, log-quantiser of the quality).
+ * (scale number, log-quantiser of the quality), and below its lowest quality on the same line.
  */
 export function predictedSsim(table: QualityTable, scale: number, quality: number): number {
   if (table.scales.length === 0 || table.rungs.length === 0) return 0;
-  const [s, u] = place(table.scales, scale, (v) => v);
-  const [r, v] = place(table.rungs, logQuantiser(Math.min(Math.max(quality, 1), 100)), logQuantiser);
+  const [s, u] = place(table.scales, scale, 0, (v) => v);
+  // Textures of which little more than a preview has come are worse than the lowest rung.
+  const [r, v] = place(table.rungs, logQuantiser(Math.min(Math.max(quality, 1), 100)), -belowLowest, logQuantiser);
   const s1 = Math.min(s + 1, table.scales.length - 1);
   const r1 = Math.min(r + 1, table.rungs.length - 1);
   const at = (i: number, j: number): number => table.ssim[i * table.rungs.length + j];
-  return (1 - u) * ((1 - v) * at(s, r) + v * at(s, r1)) + u * ((1 - v) * at(s1, r) + v * at(s1, r1));
+  const ssim = (1 - u) * ((1 - v) * at(s, r) + v * at(s, r1)) + u * ((1 - v) * at(s1, r) + v * at(s1, r1));
+  return Math.max(0, ssim);
 }
 
 /** The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs' losses. */
