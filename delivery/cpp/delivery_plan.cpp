@@ -67,12 +67,19 @@ std::uint64_t beyond_bootstrap(std::uint64_t offset, std::uint64_t bytes) {
   return offset >= kBootstrapBytes ? bytes : bytes - std::min(bytes, kBootstrapBytes - offset);
 }
 
+/// The table streams behind the previews, which the coarsest mesh has as its images.
+std::uint64_t table_stream_bytes(const Manifest& m) {
+  std::uint64_t before = m.scales.back().glb.bytes;
+  for (const ByteRange& preview : m.previews) before += preview.bytes;
+  return m.first_picture_bytes - std::min(before, m.first_picture_bytes);
+}
+
 /// What every delivery takes besides fragments.
 void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
   plan.bootstrap_bytes = kBootstrapBytes;
-  plan.first_picture_bytes = beyond_bootstrap(m.first_picture_offset, m.first_picture_bytes);
+  plan.first_picture_bytes = beyond_bootstrap(m.scales.back().glb.offset, m.scales.back().glb.bytes);
   // Index, tables, textures.json: asked for together with the first picture's end.
-  plan.table_bytes = 0;
+  plan.table_bytes = table_stream_bytes(m);
   for (const EntryRef& e : {static_cast<EntryRef>(m.index), static_cast<EntryRef>(m.tables), m.textures})
     plan.table_bytes += beyond_bootstrap(e.offset, e.bytes);
   const bool coarsest = scale == m.scales.back().scale;

@@ -28,7 +28,7 @@ struct DeliveryPlan {
   std::vector<PlaneChoice> planes;
   std::uint64_t bootstrap_bytes = 0, first_picture_bytes = 0, mesh_bytes = 0, table_bytes = 0,
                 texture_bytes = 0;
-  double first_picture_s = 0;                  // coarsest mesh with previews is complete
+  double first_picture_s = 0;                  // the coarsest mesh is complete, its images are previews
   double mesh_s = 0;                           // the chosen scale and all tables are there
   double complete_s = 0;                       // the last fragment
   SimulationResult textures;                   // its times count from mesh_s

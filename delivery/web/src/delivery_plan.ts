@@ -51,13 +51,20 @@ function beyondBootstrap({ offset, bytes }: { offset: number; bytes: number }): 
   return offset >= bootstrapBytes ? bytes : bytes - Math.min(bytes, bootstrapBytes - offset);
 }
 
+/** The table streams behind the previews, which the coarsest mesh has as its images. */
+function tableStreamBytes({ firstPicture, scales, previews }: Manifest): number {
+  let before = scales[scales.length - 1].glb.bytes;
+  for (const preview of previews) before += preview.bytes;
+  return firstPicture.bytes - Math.min(before, firstPicture.bytes);
+}
+
 /** When the fixed parts are there. */
 function timesOf(m: Manifest, link: LinkOptions, scale: number) {
-  const firstPictureBytes = beyondBootstrap(m.firstPicture);
-  const coarsest = scale === m.scales[m.scales.length - 1].scale;
-  const mesh = coarsest ? undefined : m.scales.find((s) => s.scale === scale);
-  const moved =
-    firstPictureBytes + (mesh?.glb.bytes ?? 0) + beyondBootstrap(m.index) + beyondBootstrap(m.tables) + beyondBootstrap(m.textures);
+  const coarsest = m.scales[m.scales.length - 1];
+  const firstPictureBytes = beyondBootstrap(coarsest.glb);
+  const mesh = scale === coarsest.scale ? undefined : m.scales.find((s) => s.scale === scale);
+  const tableBytes = tableStreamBytes(m) + beyondBootstrap(m.index) + beyondBootstrap(m.tables) + beyondBootstrap(m.textures);
+  const moved = firstPictureBytes + (mesh?.glb.bytes ?? 0) + tableBytes;
   const manifestS = fetchedS(link, 0, bootstrapBytes);
   const firstPictureS = fetchedS(link, manifestS, firstPictureBytes);
   return { moved, manifestS, firstPictureS, meshS: fetchedS(link, manifestS, moved) };
