@@ -85,7 +85,6 @@ Vec3f QuantisationGrid::place(Vec3f p) const {
 }
 
 QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits) {
-  constexpr int kLeastBits = 8;
   QuantisationGrid grid;
   Vec3f hi = grid.origin = mesh.positions.at(0);
   for (Vec3f p : mesh.positions)
@@ -106,9 +105,10 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   const double error =
       std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
   // The farthest that a point moves is half the diagonal of a cell.
-  grid.bits = std::max(kLeastBits, bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range));
+  grid.bits = bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range);
   if (const double part = finest_part_edge(mesh, length(size)); part > 0 && grid.bits <= max_bits)
     grid.bits = std::max(grid.bits, std::min(max_bits, bits_for(grid.range, part / 8 * 2 / std::sqrt(3.0))));
+  if (grid.bits <= max_bits) grid.bits = std::max(grid.bits, std::min(max_bits, options.least_position_bits));
   while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
   if (grid.bits > max_bits) grid.bits = 0;
   return grid;
@@ -116,7 +116,6 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
 
 QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
                          const ScalesOptions& options, int max_bits) {
-  constexpr int kLeastBits = 8;
   QuantisationGrid grid;
   if (uv.empty()) return grid;
   Vec2f lo = uv[0], hi = uv[0];
@@ -131,8 +130,9 @@ QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px
     grid.bits = std::min(options.uv_bits, max_bits);
     return grid;
   }
-  grid.bits = std::max(kLeastBits, bits_for(grid.range, 0.5 / std::max(largest_texture_px, 1.0)));
-  if (grid.bits > max_bits) grid.bits = 0;
+  const double texels = std::max(largest_texture_px, 1.0);
+  if (bits_for(grid.range, 0.5 / texels) > max_bits) return grid;
+  grid.bits = std::min(max_bits, std::max(options.least_uv_bits, bits_for(grid.range, 0.25 / texels)));
   return grid;
 }
 

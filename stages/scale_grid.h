@@ -25,11 +25,12 @@ struct QuantisationGrid {
 
 /// Bits from the options, or so that a rounded position moves by at most 1/16 of the mean and 1/4 of the
 /// shorter edges and 1/8 of the mean edge of any part that can be seen, and at most one triangle in a
-/// thousand loses its area. `max_bits` is what the codec can hold; more means floats.
+/// thousand loses its area; but at least options.least_position_bits. `max_bits` is what the codec can hold;
+/// where the edges need more, coordinates stay floats.
 QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits);
 
-/// Bits from the options, or so that a rounded texture coordinate moves by at most 1/4 texel of the largest
-/// texture.
+/// Bits from the options, or so that a rounded texture coordinate moves by at most 1/8 texel of the largest
+/// texture, and at least options.least_uv_bits. Floats only where max_bits do not hold even 1/4 texel.
 QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
                          const ScalesOptions& options, int max_bits);
 

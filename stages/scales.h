@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 2;
+inline constexpr int kScalesVersion = 3;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -26,7 +26,10 @@ struct ScalesOptions {
   // At most 24 (a float's mantissa; Draco takes minutes beyond) and 16 for the codecs on unsigned shorts;
   // where 0 would need more, coordinates stay floats.
   int position_bits = 0;  // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
-  int uv_bits = 0;        // 0 = error <= 1/4 texel of the largest texture
+  int uv_bits = 0;        // 0 = error <= 1/8 texel of the largest texture
+  // Where 0: at least so many. A picture 512 px high still tells 12 bits from floats (FLIP .005 to .010).
+  int least_position_bits = 14;
+  int least_uv_bits = 14;
   int normal_bits = 10;
   int tangent_bits = 8;
   bool stream = true;  // the vertex-split stream beside the files
@@ -37,7 +40,11 @@ struct ScalesOptions {
     v("position_bits", s.position_bits, Range{0, 24},
       "bits per position coordinate; 0 = from the edge lengths");
     v("uv_bits", s.uv_bits, Range{0, 24},
-      "bits per texture coordinate; 0 = so that the error is under 1/4 texel");
+      "bits per texture coordinate; 0 = so that the error is under 1/8 texel");
+    v("least_position_bits", s.least_position_bits, Range{1, 24},
+      "fewest bits per position coordinate where they follow from the edge lengths");
+    v("least_uv_bits", s.least_uv_bits, Range{1, 24},
+      "fewest bits per texture coordinate where they follow from the textures");
     v("normal_bits", s.normal_bits, Range{4, 16}, "bits per normal component");
     v("tangent_bits", s.tangent_bits, Range{4, 16}, "bits per tangent component");
     v("stream", s.stream, "also write all scales as one stream of vertex splits");

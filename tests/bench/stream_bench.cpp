@@ -197,7 +197,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> models;
   app.add_flag("--all-scales", all, "every nested scale, not only steps of 2x");
   app.add_option("--bits", bits, "per position coordinate; 0 = as compile chooses");
-  app.add_option("--uv-bits", uv_bits, "per texture coordinate; 0 = 1/4 texel of 4096");
+  app.add_option("--uv-bits", uv_bits, "per texture coordinate; 0 = 1/8 texel of 4096");
   app.add_option("model", models)->required();
   CLI11_PARSE(app, argc, argv);
   try {

@@ -471,15 +471,20 @@ TEST(Scales, HugeRangesOfTextureCoordinatesStayFine) {
 TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   const Case c(testing::bumpy_sphere(16, 24));
   const ScaleFiles automatic = c.write(MeshCodec::kDraco);
-  EXPECT_GE(automatic.position_bits, 8);
-  EXPECT_LE(automatic.position_bits, 14);
+  EXPECT_EQ(automatic.position_bits, 14);
+  EXPECT_EQ(automatic.uv_bits, 15);  // 1/8 texel of 4096
+  const ScaleFiles by_edges = c.write(MeshCodec::kDraco, {.least_position_bits = 1, .least_uv_bits = 1});
+  EXPECT_GE(by_edges.position_bits, 6);
+  EXPECT_LE(by_edges.position_bits, 12);
+  EXPECT_GT(by_edges.position_error, automatic.position_error);
+  EXPECT_EQ(by_edges.uv_bits, 15);
   double mean = 0, count = 0;
   const Mesh& m = c.scales.mesh;
   for (const Triangle& t : m.triangles)
     for (std::size_t k = 0; k < 3; ++k)
       mean += length(m.positions[m.wedge_position[t[k]]] - m.positions[m.wedge_position[t[(k + 1) % 3]]]),
           ++count;
-  EXPECT_LE(automatic.position_error * 1.7321, mean / count / 4);
+  EXPECT_LE(by_edges.position_error * 1.7321, mean / count / 4);
   EXPECT_GT(automatic.position_error, 0);
   ScalesOptions options;
   options.position_bits = 18, options.uv_bits = 15;
