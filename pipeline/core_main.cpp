@@ -1,10 +1,12 @@
 // texmesh-core: every command and the workers. People call texmesh (main.cpp), which starts it.
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 
 #include "format/errors.h"
 #include "format/manifest.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/units.h"
 #include "pipeline/library_versions.h"
 #include "pipeline/worker.h"
 
@@ -45,7 +47,13 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kExitOk : kExitUsage;
+  } catch (const UsageError& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitUsage;
   } catch (const Error& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitModelFailed;
+  } catch (const std::filesystem::filesystem_error& e) {
     std::cerr << "texmesh: " << e.what() << '\n';
     return kExitModelFailed;
   } catch (const std::exception& e) {

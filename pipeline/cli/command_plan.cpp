@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -14,14 +15,32 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json plan_json(const DeliveryPlan& p) {
-  Json rungs = Json::array();
-  for (const std::int32_t r : p.textures.rungs) rungs.push_back(r);
+/// The fragments that the plan decided about, in the order of its rungs.
+FragmentList list_of(PackageReader& package, const DeliveryPlan& p) {
+  ListOptions options;
+  options.scale = p.scale;
+  return fragment_list(package, p.planes, options);
+}
+
+/// By plane: the rung of each fragment, row by row; -1 skipped, null where nothing is stored.
+Json planes_json(PackageReader& package, const DeliveryPlan& p) {
+  const FragmentList list = list_of(package, p);
   Json planes = Json::array();
-  for (const PlaneChoice& c : p.planes) planes.push_back({{"texture", c.base}, {"plane", c.plane}});
+  for (const PlaneChoice& c : p.planes) {
+    const PlaneTables& t = package.tables().planes[c.plane];
+    Json rungs(std::vector<Json>(t.fragment_count()));
+    for (std::size_t i = 0; i < list.fragments.size(); ++i)
+      if (list.fragments[i].plane == c.plane) rungs[list.fragments[i].fragment] = p.textures.rungs[i];
+    planes.push_back(
+        {{"texture", c.base}, {"plane", c.plane}, {"rung_quality", t.rung_quality}, {"rungs", rungs}});
+  }
+  return planes;
+}
+
+Json plan_json(PackageReader& package, const DeliveryPlan& p) {
   return {{"version", 1},
           {"scale", p.scale},
-          {"planes", planes},
+          {"planes", planes_json(package, p)},
           {"first_picture_s", p.first_picture_s},
           {"mesh_s", p.mesh_s},
           {"complete_s", p.complete_s},
@@ -41,34 +60,49 @@ Json plan_json(const DeliveryPlan& p) {
           {"warnings", p.warnings}};
 }
 
-std::string textures_text(const DeliveryPlan& p) {
+/// How many fragments get which quality: "12 x 30, 40 x 53".
+std::string rungs_text(PackageReader& package, const DeliveryPlan& p) {
+  const FragmentList list = list_of(package, p);
+  std::map<int, int> count;
+  for (std::size_t i = 0; i < list.fragments.size(); ++i)
+    if (const std::int32_t r = p.textures.rungs[i]; r >= 0)
+      ++count[package.tables().planes[list.fragments[i].plane].rung_quality[static_cast<std::size_t>(r)]];
+  std::string text;
+  for (const auto& [quality, n] : count)
+    text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", n, quality);
+  return text;
+}
+
+std::string textures_text(PackageReader& package, const DeliveryPlan& p) {
   std::string text;
   if (!p.textures.rungs.empty())
     text += fmt::format("fragments: {}, {} skipped; quality {:.0f} in the mean, {:.0f} at worst\n",
                         p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
+  if (const std::string rungs = rungs_text(package, p); !rungs.empty())
+    text += "rungs (fragments x quality): " + rungs + "\n";
   for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
   return text;
 }
 
-std::string plan_text(const DeliveryPlan& p) {
+std::string plan_text(PackageReader& package, const DeliveryPlan& p) {
   std::string text = fmt::format(
       "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
-      "first picture at {:.2f} s ({} bytes), mesh complete at {:.2f} s, textures at {:.2f} s\n"
+      "first picture {} ({} bytes), mesh complete {}, textures {}\n"
       "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-      p.scale, p.ssim, 1 - p.texture_dssim, p.first_picture_s,
-      grouped(p.bootstrap_bytes + p.first_picture_bytes), p.mesh_s, p.complete_s, grouped(p.bootstrap_bytes),
-      grouped(p.first_picture_bytes), grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes),
-      grouped(p.bytes()));
-  return text + textures_text(p);
+      p.scale, p.ssim, 1 - p.texture_dssim, moment(p.first_picture_s),
+      grouped(p.bootstrap_bytes + p.first_picture_bytes), moment(p.mesh_s), moment(p.complete_s),
+      grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes), grouped(p.mesh_bytes),
+      grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes()));
+  return text + textures_text(package, p);
 }
 
-std::string budget_text(const DeliveryPlan& p) {
+std::string budget_text(PackageReader& package, const DeliveryPlan& p) {
   return fmt::format(
              "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
              "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
              p.scale, p.ssim, 1 - p.texture_dssim, grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes),
              grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes())) +
-         textures_text(p);
+         textures_text(package, p);
 }
 
 struct PlanArguments : DeliveryArguments {
@@ -79,6 +113,33 @@ struct CheckArguments : DeliveryArguments {
   double min_ssim = 0, min_texture_ssim = 0;
   std::string max_first_picture, max_bytes;
 };
+
+/// What check asks for.
+struct Gate {
+  double min_ssim = 0, min_texture_ssim = 0, max_first_picture_s = 1e300;
+  std::uint64_t max_bytes = ~0ull;
+};
+
+/// One sentence per limit that the plan misses.
+std::vector<std::string> why_not(const DeliveryPlan& plan, const Gate& gate, double time_limit_s) {
+  std::vector<std::string> reasons;
+  if (!(plan.ssim >= gate.min_ssim))
+    reasons.push_back(
+        fmt::format("predicted SSIM {:.4f}, expected at least {:.4f}", plan.ssim, gate.min_ssim));
+  if (!(1 - plan.texture_dssim >= gate.min_texture_ssim))
+    reasons.push_back(fmt::format("SSIM of the textures {:.4f}, expected at least {:.4f}",
+                                  1 - plan.texture_dssim, gate.min_texture_ssim));
+  if (!(plan.first_picture_s <= gate.max_first_picture_s))
+    reasons.push_back(fmt::format("first picture {}, expected by {:.2f} s", moment(plan.first_picture_s),
+                                  gate.max_first_picture_s));
+  if (!(plan.complete_s <= 1.01 * time_limit_s))
+    reasons.push_back(
+        fmt::format("complete {}, expected by {:.2f} s", moment(plan.complete_s), time_limit_s));
+  if (plan.bytes() > gate.max_bytes)
+    reasons.push_back(
+        fmt::format("{} bytes, expected at most {}", grouped(plan.bytes()), grouped(gate.max_bytes)));
+  return reasons;
+}
 
 }  // namespace
 
@@ -103,18 +164,18 @@ void add_plan_command(CLI::App& app, int& exit_code) {
     const bool budget = !args->budget.empty();
     args->needs_link = !budget;
     const DeliveryRequest request = delivery_request(*args);
+    const std::uint64_t bytes = budget ? parse_bytes(args->budget, "--budget") : 0;
     PackageReader package(open_store(args->package));
     if (!budget) {
       const DeliveryPlan plan = plan_delivery(package, request);
-      std::cout << (args->json ? plan_json(plan).dump() + "\n" : plan_text(plan));
+      std::cout << (args->json ? plan_json(package, plan).dump() + "\n" : plan_text(package, plan));
       exit_code = kExitOk;
       return;
     }
-    const std::uint64_t bytes = parse_bytes(args->budget, "--budget");
     const DeliveryPlan plan = plan_budget(package, request, bytes);
-    Json j = plan_json(plan);
+    Json j = plan_json(package, plan);
     for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
-    std::cout << (args->json ? j.dump() + "\n" : budget_text(plan));
+    std::cout << (args->json ? j.dump() + "\n" : budget_text(package, plan));
     exit_code = plan.bytes() <= bytes ? kExitOk : kExitDifferent;
   });
 }
@@ -125,9 +186,9 @@ void add_check_command(CLI::App& app, int& exit_code) {
       app.add_subcommand("check", "Fail when a package does not show well enough in a time: a gate for CI");
   add_delivery_options(*c, *args, true);
   c->add_option("--min-ssim", args->min_ssim, "Least predicted SSIM of the rendered object")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(NumberIn(0, 1));
   c->add_option("--min-texture-ssim", args->min_texture_ssim, "Least surface-weighted SSIM of the textures")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(NumberIn(0, 1));
   c->add_option("--max-first-picture", args->max_first_picture,
                 "Latest time of the first picture: 1s, 800ms");
   c->add_option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB");
@@ -139,33 +200,20 @@ void add_check_command(CLI::App& app, int& exit_code) {
       "Exit code: 0 good enough, 4 not, 1 when the package cannot be read, 2 usage.");
   c->callback([args, &exit_code] {
     const DeliveryRequest request = delivery_request(*args);
-    const double first_s = args->max_first_picture.empty()
-                               ? 1e300
-                               : parse_duration(args->max_first_picture, "--max-first-picture");
+    Gate gate{args->min_ssim, args->min_texture_ssim};
+    if (!args->max_first_picture.empty())
+      gate.max_first_picture_s = parse_duration(args->max_first_picture, "--max-first-picture");
+    if (!args->max_bytes.empty()) gate.max_bytes = parse_bytes(args->max_bytes, "--max-bytes");
     PackageReader package(open_store(args->package));
     const DeliveryPlan plan = plan_delivery(package, request);
-    std::vector<std::string> reasons;
-    if (plan.ssim < args->min_ssim)
-      reasons.push_back(
-          fmt::format("predicted SSIM {:.4f}, expected at least {:.4f}", plan.ssim, args->min_ssim));
-    if (1 - plan.texture_dssim < args->min_texture_ssim)
-      reasons.push_back(fmt::format("SSIM of the textures {:.4f}, expected at least {:.4f}",
-                                    1 - plan.texture_dssim, args->min_texture_ssim));
-    if (plan.first_picture_s > first_s)
-      reasons.push_back(
-          fmt::format("first picture at {:.2f} s, expected by {:.2f} s", plan.first_picture_s, first_s));
-    if (plan.complete_s > 1.01 * request.time_limit_s)
-      reasons.push_back(
-          fmt::format("complete at {:.2f} s, expected by {:.2f} s", plan.complete_s, request.time_limit_s));
-    if (!args->max_bytes.empty() && plan.bytes() > parse_bytes(args->max_bytes, "--max-bytes"))
-      reasons.push_back(fmt::format("{} bytes, expected at most {}", grouped(plan.bytes()), args->max_bytes));
+    const std::vector<std::string> reasons = why_not(plan, gate, request.time_limit_s);
     if (args->json) {
-      Json j = plan_json(plan);
+      Json j = plan_json(package, plan);
       j["good"] = reasons.empty();
       j["reasons"] = reasons;
       std::cout << j.dump() << '\n';
     } else {
-      std::cout << plan_text(plan);
+      std::cout << plan_text(package, plan);
       for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
       if (reasons.empty()) std::cout << "good enough\n";
     }

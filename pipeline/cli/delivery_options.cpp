@@ -1,6 +1,8 @@
 #include "pipeline/cli/delivery_options.h"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
@@ -13,7 +15,7 @@ template <class T>
 T choice(const std::string& name, const std::vector<std::pair<std::string, T>>& names) {
   for (const auto& [n, value] : names)
     if (n == name) return value;
-  throw InputError(name, "", "a name that the option's help lists", name);
+  throw UsageError(name, "", "a name that the option's help lists", name);
 }
 
 std::string read_file(const std::string& path) {
@@ -30,7 +32,7 @@ MirrorModel mirror_of(const std::string& text) {
   m.rate = BandwidthTrace::constant(parse_bandwidth(text.substr(0, comma), "--mirror"));
   if (comma == std::string::npos) return m;
   const std::string rest = text.substr(comma + 1);
-  if (!rest.starts_with("dead=")) throw InputError("--mirror", "", "RATE or RATE,dead=SECONDS", text);
+  if (!rest.starts_with("dead=")) throw UsageError("--mirror", "", "RATE or RATE,dead=SECONDS", text);
   m.dead_from_s = parse_duration(rest.substr(5), "--mirror");
   return m;
 }
@@ -41,8 +43,18 @@ void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_requir
   auto* package =
       c.add_option("package", a.package, "A .texmesh file, a folder that unpack made, or an http(s) URL");
   if (package_required) package->required();
-  c.add_option("--display", a.display_px, "Displayed height of the object, device pixels")
-      ->check(CLI::Range(1.0, 1e6))
+  auto* display = c.add_option("--display", a.display_px, "Displayed height of the object, device pixels")
+                      ->check(NumberIn(1, 1e6))
+                      ->capture_default_str();
+  c.add_option("--distance", a.distance,
+               "Instead: viewing distance, in heights (largest extents) of the object")
+      ->check(NumberIn(1e-3, 1e6))
+      ->excludes(display);
+  c.add_option("--fov", a.camera.fov_degrees, "Vertical field of view for --distance, degrees")
+      ->check(NumberIn(0.01, 179))
+      ->capture_default_str();
+  c.add_option("--viewport", a.camera.viewport_px, "Height of the picture for --distance, device pixels")
+      ->check(NumberIn(1, 1e6))
       ->capture_default_str();
   c.add_option("--time", a.time, "Time limit from the first request on: 4, 1.5s, 800ms")
       ->capture_default_str();
@@ -90,15 +102,21 @@ void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_requir
       ->capture_default_str();
   c.add_flag("--connect-costs", a.connect_costs, "A connection's first request takes another round trip");
   c.add_flag("--slow-start", a.slow_start, "Connections begin slowly, as TCP's do");
-  c.add_option("--loss", a.loss, "Share of packets lost")->check(CLI::Range(0.0, 0.5))->capture_default_str();
+  c.add_option("--loss", a.loss, "Share of packets lost")->check(NumberIn(0, 0.5))->capture_default_str();
   c.add_option("--mirror", a.mirrors,
                "A server's own rate, 2Mbit/s, or 2Mbit/s,dead=3s; several times for several servers");
   c.add_option("--seed", a.seed, "Of lost packets")->capture_default_str();
 }
 
+std::string moment(double time_s) {
+  constexpr double kNever_s = 1e8;  // no link that a request may ask for takes as long
+  return time_s < kNever_s ? fmt::format("at {:.2f} s", time_s) : "never";
+}
+
 DeliveryRequest delivery_request(const DeliveryArguments& a) {
   DeliveryRequest r;
-  r.displayed_px = a.display_px;
+  r.displayed_px =
+      a.distance > 0 ? std::clamp(displayed_height_px(1, a.distance, a.camera), 1.0, 1e6) : a.display_px;
   r.scale = a.scale;
   r.measured = a.rule == "measured";
   r.rule = choice<StepRule>(a.rule, {{"measured", StepRule::kDefault},
@@ -107,9 +125,9 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
                                      {"error", StepRule::kError},
                                      {"edge", StepRule::kEdge}});
   r.time_limit_s = parse_duration(a.time, "--time");
-  if (!(r.time_limit_s > 0)) throw InputError("--time", "", "a time above 0", a.time);
+  if (!(r.time_limit_s > 0)) throw UsageError("--time", "", "a time above 0", a.time);
   if (a.needs_link && a.bandwidth.empty() && a.trace.empty())
-    throw InputError("--bandwidth", "", "the throughput of the link, or --trace FILE", "neither");
+    throw UsageError("--bandwidth", "", "the throughput of the link, or --trace FILE", "neither");
   if (!a.bandwidth.empty())
     r.network.link = BandwidthTrace::constant(parse_bandwidth(a.bandwidth, "--bandwidth"));
   if (!a.trace.empty()) r.network.link = read_trace_csv(read_file(a.trace), a.trace);

@@ -15,14 +15,17 @@ struct DeliveryArguments {
   std::string package, time = "5", bandwidth, trace, rtt = "0", policy = "guard", order = "credit",
                        estimator = "auto", rule = "measured", beta0;
   std::vector<std::string> mirrors;
-  double display_px = 1000, loss = 0;
+  double display_px = 1000, distance = 0, loss = 0;  // distance > 0 counts instead of display_px
+  Camera camera;
   int scale = -1, window = 0, connections = 6, samples = 10;
   std::uint64_t seed = 1;
   bool hard_limits = false, slow_start = false, connect_costs = false, json = false;
   bool needs_link = true;  // false: a budget in bytes, or a real network
 };
 void add_delivery_options(CLI::App& command, DeliveryArguments& args, bool package_required);
-/// InputError names the flag.
+/// UsageError names the flag.
 DeliveryRequest delivery_request(const DeliveryArguments& args);
+/// "at 1.25 s", or "never" for what a network does not bring.
+std::string moment(double time_s);
 
 }  // namespace texmesh

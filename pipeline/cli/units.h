@@ -2,18 +2,35 @@
 #include <cstdint>
 #include <string>
 
+#include "format/errors.h"
+
 namespace texmesh {
 
-/// "500MB", "8GiB", "1234". InputError that names the flag.
+/// What was asked for on the command line makes no sense: exit code 2. The file is the flag.
+struct UsageError : InputError {
+  using InputError::InputError;
+};
+
+/// A check for options: a number from `least` to `most`, and not NaN, which CLI::Range lets pass.
+class NumberIn {
+ public:
+  NumberIn(double least, double most) : least_(least), most_(most) {}
+  std::string operator()(const std::string& text) const;  // "" or what is wrong
+
+ private:
+  double least_, most_;
+};
+
+/// "500MB", "8GiB", "1234". UsageError that names the flag.
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag);
 
-/// "90d", "12h", "30min", "45s", "45". InputError that names the flag.
+/// "90d", "12h", "30min", "45s", "45". UsageError that names the flag.
 std::int64_t parse_seconds(const std::string& text, const std::string& flag);
 
-/// "4", "1.5s", "250ms", in seconds. InputError that names the flag.
+/// "4", "1.5s", "250ms", in seconds, at most 1e6. UsageError that names the flag.
 double parse_duration(const std::string& text, const std::string& flag);
 
-/// "2Mbit/s", "41.68kB/s", in bytes per second. InputError that names the flag.
+/// "2Mbit/s", "41.68kB/s", in bytes per second, at most 1e12. UsageError that names the flag.
 double parse_bandwidth(const std::string& text, const std::string& flag);
 
 }  // namespace texmesh

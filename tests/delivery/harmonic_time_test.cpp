@@ -138,6 +138,17 @@ TEST(HarmonicTime, TheStaticPolicyAdaptsToNothing) {
   EXPECT_NEAR(constant_run(offers, o, 5e3), 2 * end, 1e-9);
 }
 
+TEST(HarmonicTime, TheStaticColumnOfTable42IsWhatSuchATransferLeaves) {
+  const std::vector<FragmentOffer> offers = table_4_2_offers();
+  for (const Table42Row& row : table_4_2({}, 1)) {
+    HtcOptions o = serial(row.t0_s, row.beta0_kb_s * 1e3);
+    o.policy = Policy::kStatic;
+    const double end_s = constant_run(offers, o, 41.68e3);
+    // Sizes are those of rungs, all together 1 % from the planned ones.
+    EXPECT_NEAR(100 * (row.t0_s - end_s) / row.t0_s, row.static_percent, 1.5) << row.beta0_kb_s;
+  }
+}
+
 TEST(HarmonicTime, PriceLosesLessThanTheMethodOnABurstyLink) {
   const std::vector<FragmentOffer> offers = some_offers(256);
   const double limit = planned(offers) / 1e4;

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -37,6 +39,51 @@ TEST(CliSimulate, Table42HasTwelveRowsOfTheSetUp) {
   const Json theorem = json_of({"simulate", "--theorem"});
   EXPECT_LE(theorem["identity_error"].get<double>(), 1e-9);
   EXPECT_EQ(theorem["corrected_bound_broken"], 0);
+  ASSERT_EQ(theorem["rows"].size(), 1000u);
+  for (const Json& r : theorem["rows"]) {
+    const double surplus_s = r["surplus_s"], bound_s = r["corrected_bound_s"];
+    ASSERT_LE(std::abs(surplus_s), bound_s * (1 + 1e-9) + 1e-8);
+    ASSERT_NEAR(surplus_s, r["last_residual_s"].get<double>(), 1e-8);
+  }
+  for (const char* column : {"dT_n [s]", "corrected bound [s]", "published [s]"})
+    EXPECT_NE(texmesh({"simulate", "--theorem", "--seeds", "1"}).output.find(column), std::string::npos);
+}
+
+TEST(CliSimulate, OneFormOfOutputAndOneThingToPlay) {
+  for (const std::vector<std::string>& both : {std::vector<std::string>{"--json", "--csv"},
+                                               {"--table", "4.2", "--theorem"},
+                                               {kGolden, "--theorem"}}) {
+    std::vector<std::string> arguments{"simulate", "--bandwidth", "1MB/s"};
+    arguments.insert(arguments.end(), both.begin(), both.end());
+    EXPECT_EQ(texmesh(arguments).exit_code, 2) << both[0];
+  }
+  const CommandResult csv = texmesh({"simulate", "--theorem", "--seeds", "1", "--csv"});
+  EXPECT_EQ(csv.output.rfind("run,surplus_s,", 0), 0u);
+  EXPECT_EQ(std::count(csv.output.begin(), csv.output.end(), '\n'), 51);
+}
+
+TEST(CliSimulate, ValuesThatMakeNoSenseAreUsage) {
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--time", "0"},
+                                                {"--time", "nan"},
+                                                {"--time", "-3"},
+                                                {"--time", "1e12"},
+                                                {"--bandwidth", "2Mbps"},
+                                                {"--bandwidth", "1e17B/s"},
+                                                {"--rtt", "-5"},
+                                                {"--mirror", "fast"},
+                                                {"--beta0", "0"},
+                                                {"--display", "nan"},
+                                                {"--display", "0"},
+                                                {"--distance", "0"},
+                                                {"--loss", "nan"}}) {
+    std::vector<std::string> arguments{"simulate", kGolden};
+    if (wrong[0] != "--bandwidth") arguments.insert(arguments.end(), {"--bandwidth", "1MB/s"});
+    arguments.insert(arguments.end(), wrong.begin(), wrong.end());
+    const CommandResult r = texmesh(arguments);
+    EXPECT_EQ(r.exit_code, 2) << wrong[0] << ' ' << wrong[1] << r.errors;
+    EXPECT_NE(r.errors.find(wrong[0]), std::string::npos) << r.errors;
+  }
+  EXPECT_EQ(texmesh({"simulate", kGolden}).exit_code, 2);  // no link
 }
 
 TEST(CliSimulate, APackageIsPlayedByEveryPolicy) {
@@ -58,6 +105,9 @@ TEST(CliSimulate, APackageIsPlayedByEveryPolicy) {
       {"simulate", kGolden, "--time", "100ms", "--bandwidth", "1kB/s", "--plot", folder / "late.svg"});
   EXPECT_EQ(late.exit_code, 0) << late.errors;
   EXPECT_NE(late.output.find("no time is left"), std::string::npos) << late.output;
+  const Json overrun = json_of({"simulate", kGolden, "--time", "100ms", "--bandwidth", "1kB/s"});
+  EXPECT_GT(overrun["whole_late_s"].get<double>(), 10);
+  EXPECT_LT(overrun["whole_deviation_percent"].get<double>(), -1000);
   EXPECT_EQ(texmesh({"simulate"}).exit_code, 2);
   EXPECT_NE(texmesh({"simulate", kGolden, "--bandwidth", "fast"}).exit_code, 0);
   EXPECT_NE(texmesh({"simulate", folder / "none", "--bandwidth", "1MB/s"}).exit_code, 0);
@@ -84,6 +134,37 @@ TEST(CliPlan, ASmallDisplayTakesACoarserScale) {
         .get<int>();
   };
   EXPECT_GT(scale("20"), scale("5000"));
+}
+
+TEST(CliPlan, ADistanceIsADisplayedHeight) {
+  const auto scale = [](std::vector<std::string> how) {
+    how.insert(how.begin(), {"plan", kGolden, "--time", "60", "--bandwidth", "1MB/s"});
+    return json_of(how)["scale"].get<int>();
+  };
+  // 1 / (2 x 2 tan 22.5 degrees) of 1080 px
+  EXPECT_EQ(scale({"--distance", "2"}), scale({"--display", "651.8"}));
+  EXPECT_EQ(scale({"--distance", "60"}), scale({"--display", "21.7"}));
+  EXPECT_GT(scale({"--distance", "60"}), scale({"--distance", "0.1"}));
+  EXPECT_EQ(scale({"--distance", "60", "--fov", "1"}), scale({"--distance", "2"}));
+  EXPECT_EQ(texmesh({"plan", kGolden, "--bandwidth", "1MB/s", "--distance", "2", "--display", "5"}).exit_code,
+            2);
+}
+
+TEST(CliPlan, SaysTheRungOfEveryFragment) {
+  const Json p = json_of({"plan", kGolden, "--display", "800", "--time", "2", "--bandwidth", "30kB/s"});
+  std::size_t decided = 0, skipped = 0;
+  for (const Json& plane : p["planes"])
+    for (const Json& rung : plane["rungs"]) {
+      if (rung.is_null()) continue;
+      ++decided;
+      skipped += rung == -1;
+      EXPECT_LT(rung.get<int>(), static_cast<int>(plane["rung_quality"].size()));
+    }
+  EXPECT_EQ(decided, p["fragments"].get<std::size_t>());
+  EXPECT_EQ(skipped, p["skipped"].get<std::size_t>());
+  const CommandResult text =
+      texmesh({"plan", kGolden, "--display", "800", "--time", "9", "--bandwidth", "30kB/s"});
+  EXPECT_NE(text.output.find("rungs (fragments x quality): "), std::string::npos) << text.output;
 }
 
 TEST(CliPlan, ABudgetIsKeptAndMoreBytesLookBetter) {
@@ -141,7 +222,9 @@ TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
   EXPECT_EQ(with({"--min-ssim", "0.1", "--max-first-picture", "5s"}).exit_code, 0);
   const CommandResult r = with({"--min-ssim", "0.99999", "--max-bytes", "1kB", "--max-first-picture", "1ms"});
   EXPECT_EQ(r.exit_code, 4);
-  for (const char* reason : {"predicted SSIM", "first picture at", "expected at most 1kB"})
+  for (const char* nan : {"--min-ssim", "--min-texture-ssim"}) EXPECT_EQ(with({nan, "nan"}).exit_code, 2);
+  EXPECT_EQ(with({"--max-bytes", "much"}).exit_code, 2);
+  for (const char* reason : {"predicted SSIM", "first picture at", "expected at most 1 000"})
     EXPECT_NE(r.output.find(reason), std::string::npos) << r.output;
 }
 
