@@ -1,5 +1,5 @@
 // The figures of the browser client, measured here and printed as a table. Sections by name: first ssim deadline compose blocked
-// shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
+// viewer shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
 // TEXMESH_FIGURE_PACKAGES. The machine should have nothing else to do.
 import {execFileSync} from 'node:child_process';
 import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, roundTrips, run, serve} from './browser.mjs';
@@ -178,45 +178,87 @@ async function blocked() {
   }
 }
 
+/** What the page shows as time goes by: [{at, jpeg}], seconds of performance.timeOrigin's clock. A screenshot would wait for the GPU. */
+async function screencast(page) {
+  const session = await page.context().newCDPSession(page);
+  const frames = [];
+  session.on('Page.screencastFrame', ({data, metadata, sessionId}) => {
+    frames.push({at: metadata.timestamp, jpeg: data});
+    session.send('Page.screencastFrameAck', {sessionId}).catch(() => {});
+  });
+  await session.send('Page.startScreencast', {format: 'jpeg', quality: 92, everyNthFrame: 1});
+  return {frames, stop: () => session.send('Page.stopScreencast')};
+}
+
+/** The viewer on the slow link, page and decoders in the browser's cache; `unseen`: nothing is drawn, the page works as ever. */
+async function viewerPage(slow, {unseen = false, size = {width: 1280, height: 800}} = {}) {
+  await slow.set({bytesPerSecond: 1e12, rttMs: 0, changes: 0});
+  const page = await browser.newPage({viewport: size});
+  listen(page);
+  await page.addInitScript((none) => {
+    window.longTasks = [];
+    new PerformanceObserver((l) => { for (const e of l.getEntries()) window.longTasks.push([e.startTime, e.duration]); }).observe({type: 'longtask', buffered: true});
+    if (none) for (const draw of ['drawElements', 'drawArrays']) WebGL2RenderingContext.prototype[draw] = () => {};
+  }, unseen);
+  await page.goto(`${slow.url}/index.html?pkg=packages/yurt.texmesh&time=1`);
+  await page.waitForFunction(() => Number.isFinite(window.texmeshViewer?.session.live.doneS), null, {timeout: 30000});
+  await slow.set(kLink);
+  return page;
+}
+const loadTurtle = async (page, slow) => {
+  await page.goto(`${slow.url}/index.html?pkg=packages/sea_turtle.texmesh&time=4`, {waitUntil: 'commit'});
+  await page.waitForFunction(() => window.texmeshViewer?.session.live.startedAt > 0);
+};
+/** Long tasks from the load's start on, ms. */
+const tasksOf = (page) => page.evaluate(() => {
+  const start = window.texmeshViewer.session.live.startedAt;
+  return window.longTasks.filter(([at, ms]) => at + ms >= start).map(([at, ms]) => [(at - start) / 1000, ms]);
+});
+
 /** The viewer with the turtle at 0.2, 1 and 4 s on the slow link. */
 async function shots() {
   const viewer = await serve({'/packages/': figures, '/': env.viewer});
   const slow = await startLink({target: viewer.port});
-  const page = await browser.newPage({viewport: {width: 1280, height: 800}});
-  listen(page);
-  await page.addInitScript(() => {
-    window.longTasks = [];
-    new PerformanceObserver((l) => { for (const e of l.getEntries()) window.longTasks.push([e.startTime, e.duration]); }).observe({type: 'longtask', buffered: true});
-  });
-  await page.goto(`${slow.url}/index.html`);
-  await page.waitForTimeout(500);
-  // Another package first: page and decoders are in the browser's cache then, as for whoever has been here before.
-  await page.goto(`${slow.url}/index.html?pkg=packages/yurt.texmesh&time=1`);
-  await page.waitForFunction(() => Number.isFinite(window.texmeshViewer?.session.live.doneS), null, {timeout: 30000});
-  await slow.set(kLink);
-  await page.goto(`${slow.url}/index.html?pkg=packages/sea_turtle.texmesh&time=4`, {waitUntil: 'commit'});
-  await page.waitForFunction(() => window.texmeshViewer?.session.live.startedAt > 0);
-  const since = () => page.evaluate(() => (performance.now() - window.texmeshViewer.session.live.startedAt) / 1000);
-  for (const at of [0.2, 1, 4.1]) {
-    const wait = at - await since();
-    if (wait > 0) await page.waitForTimeout(wait * 1000);
-    const really = await since();
-    await page.screenshot({path: path.join(pictures, `turtle-${at}s.png`)});
-    console.log(`picture for ${at} s taken at ${really.toFixed(2)} s`);
-  }
+  const page = await viewerPage(slow, {size: {width: 960, height: 600}});
+  const cast = await screencast(page);
+  await loadTurtle(page, slow);
+  await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
   await page.waitForTimeout(3000);
-  await page.screenshot({path: path.join(pictures, 'turtle-refined.png')});
-  const tasks = await page.evaluate(() => window.longTasks);
-  console.log('viewer, long tasks:', tasks.map(([s, d]) => `${(s / 1000).toFixed(2)} s: ${d.toFixed(0)} ms`).join(', '));
-  console.log(page.said.join('\n'));
+  await cast.stop();
+  const started = await page.evaluate(() => (performance.timeOrigin + window.texmeshViewer.session.live.startedAt) / 1000);
+  for (const at of [0.2, 1, 4.1, 7]) {
+    const shown = cast.frames.filter((f) => f.at <= started + at).at(-1);
+    if (!shown) continue;
+    fs.writeFileSync(path.join(pictures, `turtle-${at}s.jpg`), Buffer.from(shown.jpeg, 'base64'));
+    console.log(`at ${at} s the page showed what it drew at ${(shown.at - started).toFixed(2)} s`);
+  }
   await page.close();
+  slow.close();
+  await viewer.close();
+}
+
+/** The viewer's own work, and with it what this machine's GPU, which is its processor, takes to draw. */
+async function viewerTasks() {
+  const viewer = await serve({'/packages/': figures, '/': env.viewer});
+  const slow = await startLink({target: viewer.port});
+  for (const unseen of [true, false]) {
+    const page = await viewerPage(slow, {unseen});
+    await loadTurtle(page, slow);
+    await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
+    await page.waitForTimeout(500);
+    const tasks = await tasksOf(page);
+    const most = Math.max(0, ...tasks.map(([, ms]) => ms));
+    row(`viewer, turtle: longest task, ms${unseen ? '' : ', with what SwiftShader draws'}`, most.toFixed(0), unseen ? '<= 50' : '', !unseen || most <= 50);
+    if (most > 50) console.log('  ', tasks.map(([at, ms]) => `${at.toFixed(2)} s: ${ms.toFixed(0)} ms`).join(', '));
+    await page.close();
+  }
   slow.close();
   await viewer.close();
 }
 
 try {
   packagesOfScans();
-  for (const [name, body] of Object.entries({first: firstPictures, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, shots}))
+  for (const [name, body] of Object.entries({first: firstPictures, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, viewer: viewerTasks, shots}))
     if (wants(name)) await body();
 } finally {
   await browser.close();

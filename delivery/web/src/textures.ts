@@ -27,6 +27,10 @@ export interface TextureInfo {
   previewHeightPx: number;
   /** IJG quality per rung, strictly rising. */
   rungQuality: number[];
+  /** The last rung loses nothing of the source: shown as any other, and fetched where it is asked for or refining is to go so far. */
+  lossless: boolean;
+  /** Ending of the source's own file among the entries, source/PPP.EXT; "" = none. Loads leave it alone; PackageReader.entry reads it. */
+  source: string;
 }
 
 const mostSide = 1 << 20;
@@ -57,6 +61,19 @@ function readGrid(at: JsonAt) {
   return grid;
 }
 
+const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
+
+/** What a package may keep of the source itself; since 1.1. */
+function readSource(at: JsonAt, codec: CodecId, mip: number): { lossless: boolean; source: string } {
+  const lossless = at.has('lossless') && at.at('lossless').boolean();
+  if (lossless && (codec !== 'jpeg' || mip > 0)) at.at('lossless').fail('a full-size plane of codec jpeg', 'another');
+  if (!at.has('source')) return { lossless, source: '' };
+  const source = at.at('source').text(100);
+  if (!sourceEndings.includes(source) || mip > 0) at.at('source').fail('jpg, png, tif, webp or exr of a full-size plane', source);
+  at.at('sourceColours').boolean();
+  return { lossless, source };
+}
+
 function readTexture(at: JsonAt): TextureInfo {
   const colourSpace = at.at('colourSpace').text(100);
   if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.at('colourSpace').fail('srgb or linear', colourSpace);
@@ -78,6 +95,7 @@ function readTexture(at: JsonAt): TextureInfo {
     colourSpace: colourSpace as 'srgb' | 'linear',
     codec,
     ...readGrid(at),
+    ...readSource(at, codec, mip),
     previewWidthPx: at.at('previewWidthPx').integer(1, mostSide),
     previewHeightPx: at.at('previewHeightPx').integer(1, mostSide),
     rungQuality,

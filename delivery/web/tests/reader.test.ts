@@ -158,6 +158,22 @@ describe('small parts', () => {
     expect(() => joinFragment('jpeg', bytes(...soi, ...eoi), scans)).toThrow(FormatError);
     expect(() => joinFragment('webp', bytes(), [bytes(1, 2, 3)])).toThrow(FormatError);
   });
+  it('textures that keep their sources', async () => {
+    const entry = await (await PackageReader.openBytes(golden('v1.1-scan'), 'golden')).entry('textures.json');
+    const { textures } = JSON.parse(new TextDecoder().decode(entry));
+    const withFirst = (more: object) => {
+      const [first, ...others] = textures;
+      return new TextEncoder().encode(JSON.stringify({ textures: [{ ...first, ...more }, ...others] }));
+    };
+    expect(readTextures(withFirst({}))[0]).toMatchObject({ lossless: false, source: '' });
+    expect(readTextures(withFirst({ lossless: true }))[0].lossless).toBe(true);
+    expect(readTextures(withFirst({ source: 'exr', sourceColours: false }))[0].source).toBe('exr');
+    for (const bad of [{ lossless: 1 }, { source: 'gif', sourceColours: true }, { source: 'png' }, { lossless: true, codec: 'webp' }])
+      expect(() => readTextures(withFirst(bad)), JSON.stringify(bad)).toThrow(FormatError);
+    const mip = textures.findIndex((t: { mip?: number }) => (t.mip ?? 0) > 0);
+    textures[mip].lossless = true;
+    expect(() => readTextures(withFirst({}))).toThrow(FormatError);
+  });
   it('fragments.json', () => {
     const text = (value: unknown): Uint8Array => new TextEncoder().encode(JSON.stringify(value));
     const plane = { order: [3, 1], rungs: [{ bytes: [10, 0], sha256: ['00112233445566ff', '0000000000000000'] }] };

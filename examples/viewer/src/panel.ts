@@ -48,6 +48,7 @@ export class Panel {
   private planeChosen = false;
   private packageShown: Manifest | null = null;
   private timer = 0;
+  private stale = false;
 
   constructor(
     private readonly root: HTMLElement,
@@ -67,14 +68,18 @@ export class Panel {
 
   update(live: Live): void {
     this.live = live;
+    this.stale = true;
     if (this.timer) return;
-    this.timer = window.setTimeout(() => {
+    this.timer = window.setTimeout(() => void this.refresh().finally(() => {
       this.timer = 0;
-      this.refresh();
-    }, 150);
+      if (this.stale) this.update(this.live);
+    }), 150);
   }
 
-  private refresh(): void {
+  /** One thing after the other, with turns of the page between them: frames and fragments go first. */
+  private async refresh(): Promise<void> {
+    const turn = (): Promise<void> => new Promise((go) => setTimeout(go, 0));
+    this.stale = false;
     const l = this.live;
     if (l.manifest && l.manifest !== this.packageShown) this.newPackage(l.manifest);
     if (l.tables.length && this.planeSelect.options.length !== l.tables.length) this.newTables();
@@ -82,10 +87,12 @@ export class Panel {
     this.writeFigures(l);
     for (const p of this.plots) {
       if (!p.box.open) continue;
+      await turn();
       const data = p.data();
       if (data) p.plot.set(data);
     }
-    if (this.mapBox.open) this.map.show(l, this.plane(), this.colourBy);
+    await turn();
+    if (this.mapBox.open) this.map.show(this.live, this.plane(), this.colourBy);
   }
 
   private writeFigures(l: Live): void {
@@ -224,7 +231,7 @@ export class Panel {
     }
     this.planeSelect.addEventListener('change', () => {
       this.planeChosen = true;
-      this.refresh();
+      this.update(this.live);
     });
     this.mapBox = this.details('Fragments', 'The texture as it is cut; each fragment in the colour of its quality, importance, bytes, or of being left out.', true,
       this.planeSelect, segments, this.map.box);

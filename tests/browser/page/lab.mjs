@@ -243,6 +243,71 @@ function settle(texture) {
   gl.deleteFramebuffer(frame);
 }
 
+/** Triangles of all visible meshes beneath an object: corners and texture coordinates, [15 each]. */
+function trianglesOf(root) {
+  const out = [];
+  root.updateMatrixWorld(true);
+  root.traverse((o) => {
+    if (!o.isMesh) return;
+    const {index, drawRange, groups, attributes: {position, uv}} = o.geometry;
+    const count = index ? index.count : position.count;
+    const parts = groups.length ? groups : [{start: 0, count: Infinity}];
+    const p = new Vector3();
+    for (const g of parts) {
+      const from = Math.max(g.start, drawRange.start);
+      const to = Math.min(g.start + g.count, drawRange.start + drawRange.count, count);
+      for (let t = from; t + 2 < to; t += 3) {
+        const corners = [0, 1, 2].map((k) => (index ? index.getX(t + k) : t + k));
+        const at = corners.map((i) => { p.fromBufferAttribute(position, i).applyMatrix4(o.matrixWorld); return [p.x, p.y, p.z, uv ? uv.getX(i) : 0, uv ? uv.getY(i) : 0]; });
+        out.push(at);
+      }
+    }
+  });
+  return out;
+}
+
+/** Each triangle of a load's mesh against those of a GLB: the same corners, in any order and to a thousandth of the extent. */
+async function compareMesh(id, glb) {
+  const own = trianglesOf(loads[id].model.object);
+  const gltf = await gltfLoader().parseAsync(await (await fetch(glb)).arrayBuffer(), '');
+  const theirs = trianglesOf(gltf.scene);
+  const {boundsMin: min, boundsMax: max} = loads[id].pkg.manifest;
+  const extent = Math.max(...max.map((v, k) => v - min[k]));
+  const eps = 1e-3;
+  const middle = (t) => [0, 1, 2].map((k) => (t[0][k] + t[1][k] + t[2][k]) / 3 / extent);
+  const cell = (m) => m.map((v) => Math.floor(v / eps));
+  const grid = new Map();
+  theirs.forEach((t, i) => {
+    const key = cell(middle(t)).join();
+    grid.set(key, [...(grid.get(key) ?? []), i]);
+  });
+  const taken = new Uint8Array(theirs.length);
+  const apart = (a, b) => {
+    let best = Infinity;
+    for (let turn = 0; turn < 3; turn++) {
+      let most = 0;
+      for (let c = 0; c < 3; c++) {
+        const [x, y] = [a[c], b[(c + turn) % 3]];
+        most = Math.max(most, Math.hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]) / extent, Math.abs(x[3] - y[3]), Math.abs(x[4] - y[4]));
+      }
+      best = Math.min(best, most);
+    }
+    return best;
+  };
+  let [unmatched, farthest] = [0, 0];
+  for (const t of own) {
+    const [x, y, z] = cell(middle(t));
+    let [at, best] = [-1, Infinity];
+    for (let k = 0; k < 27; k++)
+      for (const i of grid.get([x + (k % 3) - 1, y + (Math.floor(k / 3) % 3) - 1, z + Math.floor(k / 9) - 1].join()) ?? []) {
+        const d = taken[i] ? Infinity : apart(t, theirs[i]);
+        if (d < best) [at, best] = [i, d];
+      }
+    if (best <= eps) { taken[at] = 1; farthest = Math.max(farthest, best); } else unmatched++;
+  }
+  return {triangles: [own.length, theirs.length], unmatched, farthest};
+}
+
 const memory = () => ({
   ...stage.renderer.info.memory, programs: stage.renderer.info.programs.length, heap: performance.memory?.usedJSHeapSize ?? 0,
 });
@@ -252,7 +317,7 @@ const gl = () => stage.renderer.getContext();
 Object.assign(window, {
   lab: {
     start, draw, pixels, load, finished, report, plane, dispose, loadGlb, clear, keepReference, qualityOverTime, memory, loads, longTasks, gl,
-    gltfLoader, toBase64, ssim, wholeJpeg, settle, stage: () => stage, draco, open,
+    gltfLoader, toBase64, ssim, wholeJpeg, settle, compareMesh, stage: () => stage, draco, open,
   },
   ready: true,
 });
