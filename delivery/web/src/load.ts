@@ -1,8 +1,8 @@
-import { Camera, Group, Material, Object3D } from 'three';
+import { Camera, Group, Material, Object3D, Scene } from 'three';
 import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedModel } from './api';
 import { displayOf } from './camera';
 import { Emitter } from './events';
-import { isAbort, nowS, throwIfAborted } from './http';
+import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { PackageReader } from './package_reader';
 import { MaterialSet } from './scale_parts';
@@ -11,6 +11,8 @@ import type { TextureLoad } from './texture_load';
 import { wholeObject } from './viewing';
 import { WorkerPool } from './worker_pool';
 
+/** A picture that waits for its programs no longer than this. */
+const mostCompileS = 0.5;
 /** Limits beyond are none: timers and plans end there. */
 const longestS = 1e5;
 
@@ -159,7 +161,19 @@ export class ModelLoad implements LoadedModel {
       if (this.scaleInTransit_ === scale && (k === scale || k < this.context_.shownScale)) this.showScale_(k);
     };
     const load = this.context_.scales.load(scale, this.context_.signal, show);
-    return { arrived: load.arrived, shown: load.shape.then(() => show(scale)) };
+    const shown = load.shape.then(async (shape) => {
+      if (this.context_.shownScale < 0) await this.compiled_(shape);
+      show(scale);
+    });
+    return { arrived: load.arrived, shown };
+  }
+  /** Materials' programs before they are first drawn with: the page goes on meanwhile. */
+  private async compiled_(shape: Object3D): Promise<void> {
+    const { renderer } = this.options_;
+    let root = this.scene_;
+    while (root.parent) root = root.parent;
+    const compiled = renderer.compileAsync?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
+    await Promise.race([compiled?.catch(() => undefined), sleepS(mostCompileS)]);
   }
   /** In one turn of the page: what is drawn next is the new scale, whole. */
   private showScale_(scale: number): void {

@@ -7,6 +7,7 @@ import { HarmonicTimePlan, HtcOptions, HtcStep, defaultHtcOptions } from './harm
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
+import { isSoftware } from './composer';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
@@ -18,8 +19,8 @@ import { VisibleSurface } from './visibility';
 import type { TextureInfo } from './textures';
 import type { Levels } from './worker_protocol';
 
-/** What decoding and uploading take after the last byte, of the time limit. */
-const composeS = 0.04;
+/** What decoding and uploading take after the last byte: 4 ms, or 11, on a machine whose GPU is its processor. */
+const composeS = 0.015;
 /** Fragments that are this late, of the limit, are given up. */
 const mostLate = 0.02;
 const refineBytes = 256 << 10;
@@ -53,7 +54,9 @@ export class TextureLoad {
   private readonly gaveUp_ = new Set<string>();
   private readonly asked_ = new Map<string, number>(); // rungs under way while refining
 
-  constructor(private readonly load_: LoadContext) {}
+  constructor(private readonly load_: LoadContext) {
+    isSoftware(load_.options.renderer); // while the GPU has nothing to do
+  }
 
   get planes(): readonly ComposedPlane[] {
     return [...(this.textureSet_?.planes.values() ?? [])];
@@ -295,7 +298,7 @@ export class TextureLoad {
   /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */
   private async spendRest_(list: FragmentList, plan: HarmonicTimePlan): Promise<void> {
     const { limitS, reader } = this.load_;
-    const { latencyS, options } = reader.client;
+    const { rttS: latencyS, options } = reader.client; // nothing else is on its way
     for (;;) {
       const leftS = limitS - composeS - this.load_.elapsedS();
       const bytes = certain * plan.throughputBytesS() * (leftS - latencyS);

@@ -1,5 +1,5 @@
 import { Texture, WebGLRenderer } from 'three';
-import { Blitter, PlaneComposer, ownLevels } from './composer';
+import { Blitter, PlaneComposer, isSoftware, ownLevels } from './composer';
 import type { PlaneChoice } from './fragment_list';
 import { MaterialSet, Slot } from './scale_parts';
 import type { TextureInfo } from './textures';
@@ -9,13 +9,14 @@ import type { Levels } from './worker_protocol';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
 const slicePx = 1 << 19;
-/** Of a strip of an enlarged preview, which is uploaded in one go. */
+/** Of a piece of an enlarged preview, which is uploaded in one go; and pieces under way. */
 const stripPx = 1 << 18;
+const mostPieces = 4;
 /**
  * Pixels that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn.
  * How many those are shows when one has waited. It is not waited for longer than longestFenceMs.
  */
-const behindPx = { least: 1 << 21, most: 1 << 24, first: 1 << 22, more: 1 << 18 };
+const behindPx = { least: 1 << 20, most: 1 << 21, first: 1 << 21, more: 1 << 18 };
 /** A turn that took so long has waited. */
 const waitedMs = 20;
 const longestFenceMs = 250;
@@ -25,6 +26,7 @@ const mipsEveryMs = 200;
 /** Something for the GPU to do, and how many pixels it is. */
 interface Work {
   pixels: number;
+  fragment?: number;
   run(): void;
   drop?(): void;
 }
@@ -84,7 +86,7 @@ export class TextureSet {
     const shown = old.find((texture) => pictureOf(texture));
     const image = preview ?? pictureOf(shown);
     if (!image) return void (next.filled = true);
-    if (shown && !this.blitter_.isSoftware) return next.fillFromTexture(shown, image.width, image.height);
+    if (shown && !isSoftware(this.renderer_)) return next.fillFromTexture(shown, image.width, image.height);
     try {
       await this.enlarge_(next, image);
     } catch (error) {
@@ -93,34 +95,59 @@ export class TextureSet {
       next.fillFromTexture(shown, image.width, image.height);
     }
   }
-  /** Enlarged off the main thread, strip by strip: GPUs that are none take seconds for a large texture. */
+  /**
+   * Enlarged off the main thread, piece by piece: GPUs that are none take seconds for a large texture. Fragments that have come
+   * meanwhile need no preview.
+   */
   private async enlarge_(next: PlaneComposer, image: ImageBitmap | HTMLImageElement): Promise<void> {
-    const { widthPx: width, heightPx: height } = next;
-    const rows = Math.max(16, Math.floor(stripPx / width) & ~15);
-    const strips: Promise<void>[] = [];
-    for (let y0 = 0; y0 < height; y0 += rows) {
-      const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
-      const y1 = Math.min(height, y0 + rows);
-      const levels = this.pool_.enlarge({ picture, width, height, y0, y1, levels: ownLevels });
-      strips.push(
-        levels.then(
-          (bitmaps) =>
-            new Promise((done) => {
-              const end = (): void => {
-                bitmaps.forEach((b) => b.close());
-                done();
-              };
-              const run = (): void => {
-                next.upload(bitmaps, 0, y0);
-                end();
-              };
-              this.enqueue_({ pixels: width * (y1 - y0), run, drop: end });
-            }),
-        ),
-      );
+    const running = new Set<Promise<void>>();
+    for (const piece of this.pieces_(next)) {
+      const done = this.enlargePiece_(next, image, piece).finally(() => running.delete(done));
+      done.catch(() => undefined); // the first to fail is told
+      running.add(done);
+      if (running.size >= mostPieces) await Promise.race(running);
+      if (this.disposed_) break;
     }
-    await Promise.all(strips);
+    await Promise.all(running);
     next.filled = true;
+  }
+  /** Runs of neighbours that have not come when it is their turn. */
+  private *pieces_(next: PlaneComposer): Generator<{ x0: number; x1: number; y0: number; y1: number }> {
+    const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
+    const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));
+    const most = Math.max(1, Math.floor(stripPx / (width * rise)));
+    for (let row = 0; row < rows; ++row)
+      for (let y = row * height; y < Math.min((row + 1) * height, next.heightPx); y += rise)
+        for (let from = 0, to = 0; from < columns; from = to) {
+          const come = new Set(this.waiting_.get(next)?.map((work) => work.fragment));
+          const lacks = (column: number): boolean => column < columns && !come.has(row * columns + column);
+          to = from + 1;
+          if (!lacks(from)) continue;
+          while (to - from < most && lacks(to)) ++to;
+          const [x1, y1] = [Math.min(to * width, next.widthPx), Math.min(y + rise, (row + 1) * height, next.heightPx)];
+          yield { x0: from * width, x1, y0: y, y1 };
+        }
+  }
+  private async enlargePiece_(
+    next: PlaneComposer,
+    image: ImageBitmap | HTMLImageElement,
+    piece: { x0: number; x1: number; y0: number; y1: number },
+  ): Promise<void> {
+    const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
+    const { widthPx: width, heightPx: height } = next;
+    const bitmaps = await this.pool_.enlarge({ picture, width, height, ...piece, levels: ownLevels });
+    const { x0, x1, y0, y1 } = piece;
+    await new Promise<void>((done) => {
+      const end = (): void => {
+        bitmaps.forEach((b) => b.close());
+        done();
+      };
+      const run = (): void => {
+        next.upload(bitmaps, x0, y0);
+        end();
+      };
+      this.enqueue_({ pixels: (x1 - x0) * (y1 - y0), run, drop: end });
+    });
   }
   /** Whether a material that is there shows this plane. */
   isUsed(base: number): boolean {
@@ -155,6 +182,7 @@ export class TextureSet {
     const close = (): void => levels.forEach((b) => b.close());
     const work: Work = {
       pixels: levels[0].width * levels[0].height,
+      fragment,
       run: () => {
         const current = this.planes.get(plane.base) === plane;
         if (current && rung > plane.rungs[fragment]) plane.uploadFragment(levels, fragment, rung);

@@ -29,17 +29,18 @@ async function decode(request: DecodeRequest): Promise<Levels> {
   return levels;
 }
 
-/** Every strip is drawn as a part of the whole, so that strips meet without a seam. */
-function enlarge({ picture, width, height, y0, y1, levels }: EnlargeRequest): Levels {
+/** Every piece is drawn as a part of the whole, so that pieces meet without a seam. */
+function enlarge({ picture, width, height, x0, x1, y0, y1, levels }: EnlargeRequest): Levels {
   const out: Levels = [];
   for (let level = 0; level < levels; ++level) {
-    const [w, h, top] = [width >> level, height >> level, y0 >> level];
-    const rows = Math.min(h, y1 >= height ? h : y1 >> level) - top;
-    if (w < 1 || rows < 1) break;
-    const canvas = new OffscreenCanvas(w, rows);
+    const [w, h, left, top] = [width >> level, height >> level, x0 >> level, y0 >> level];
+    const columns = (x1 >= width ? w : x1 >> level) - left;
+    const rows = (y1 >= height ? h : y1 >> level) - top;
+    if (columns < 1 || rows < 1) break;
+    const canvas = new OffscreenCanvas(columns, rows);
     const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true })!;
     context.imageSmoothingQuality = 'low';
-    context.drawImage(picture, 0, -top, w, h);
+    context.drawImage(picture, -left, -top, w, h);
     out.push(canvas.transferToImageBitmap());
   }
   picture.close();

@@ -14,12 +14,14 @@ export interface DecodeRequest {
   /** Mip levels to make, itself included. */
   levels: number;
 }
-/** Rows y0 .. y1 (multiples of 16) of a picture enlarged to width x height, bilinearly. Gives Levels. */
+/** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
 export interface EnlargeRequest {
   op: 'enlarge';
   picture: ImageBitmap;
   width: number;
   height: number;
+  x0: number;
+  x1: number;
   y0: number;
   y1: number;
   levels: number;

@@ -109,7 +109,8 @@ function start(): void {
     return;
   }
   warmDecoders();
-  void session.start(choices);
+  // In a turn of its own: making the context of the GPU took the last one.
+  setTimeout(() => void session.start(choices), 0);
 }
 
 function wireTools(stage: Stage, session: Session): void {
