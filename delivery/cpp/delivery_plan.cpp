@@ -18,15 +18,6 @@ double best_ssim(const QualityTable& table, int scale) {
   return best;
 }
 
-/// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network.
-double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
-  NetworkModel model(network);
-  while (model.now_s() < from_s) model.advance(from_s);
-  model.request(0, 0, static_cast<double>(bytes));
-  const auto arrival = model.advance(1e9);
-  return arrival ? arrival->time_s : 1e9;
-}
-
 BandwidthTrace shifted(const BandwidthTrace& trace, double by_s) {
   BandwidthTrace out{{0}, {trace.at(by_s)}};
   for (std::size_t i = 0; i < trace.time_s.size(); ++i)
@@ -101,9 +92,10 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
   htc.rtt_s = request.network.rtt_s;
   const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+  const double moved_s =
+      std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - request.network.rtt_s : moved;
   htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s
-                                : moved / std::max(1e-9, plan.mesh_s - manifest_s - request.network.rtt_s);
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved / std::max(1e-9, moved_s);
   ListOptions options;
   options.scale = scale;
   TextureBudget budget = texture_for_budget(

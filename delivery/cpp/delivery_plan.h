@@ -22,7 +22,7 @@ struct DeliveryRequest {
   NetworkOptions network;
 };
 
-/// What a viewer will get.
+/// What a viewer will get. Times of what never comes, because every server dies before, are +infinity.
 struct DeliveryPlan {
   int scale = 0;
   std::vector<PlaneChoice> planes;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kNever = 1e300;
 constexpr double kPacketBytes = 1460;
-constexpr double kDone = 1e-6;  // bytes: what rounding may leave of a transfer
+constexpr double kForEver = 1e9;  // a time that nobody waits for
+constexpr double kDone = 1e-6;    // bytes: what rounding may leave of a transfer
 
 double next_step(const BandwidthTrace& trace, double t_s) {
   const auto it = std::upper_bound(trace.time_s.begin(), trace.time_s.end(), t_s);
@@ -134,6 +135,16 @@ void NetworkModel::cancel(std::uint32_t number) {
   start_waiting();
 }
 
+std::optional<double> NetworkModel::bytes_left(std::uint32_t number) const {
+  const auto it = std::ranges::find(flows_, number, &Flow::number);
+  return it == flows_.end() ? std::nullopt : std::optional(it->bytes_left);
+}
+
+bool NetworkModel::dead() const {
+  return std::ranges::all_of(flows_,
+                             [&](const Flow& f) { return options_.mirrors[f.mirror].dead_from_s <= now_s_; });
+}
+
 /// Gives free connections to those who wait, in their order.
 void NetworkModel::start_waiting() {
   for (Flow& f : flows_) {
@@ -237,7 +248,7 @@ std::optional<NetworkModel::Arrival> NetworkModel::advance(double until_s) {
       start_waiting();
       return Arrival{f.number, now_s_};
     }
-    if (now_s_ >= until_s) return std::nullopt;
+    if (now_s_ >= until_s || (until_s >= kForEver && dead())) return std::nullopt;
     share_rates();
     const double next = next_event_s(until_s);
     if (next >= kNever) return std::nullopt;  // nothing will ever happen

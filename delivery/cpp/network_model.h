@@ -52,7 +52,9 @@ class NetworkModel {
   /// Asks mirror `mirror` for `bytes` now; the number is the caller's own and comes back in its Arrival.
   void request(std::uint32_t number, std::uint32_t mirror, double bytes);
   void cancel(std::uint32_t number);
-  /// Runs until a request is complete or the time comes, whichever is first.
+  std::optional<double> bytes_left(std::uint32_t number) const;  // of a request under way
+  /// Runs until a request is complete or the time comes, whichever is first. Nothing, and no time passes,
+  /// when all that is under way was asked of dead mirrors and `until_s` is 1e9 or more.
   std::optional<Arrival> advance(double until_s);
   double bytes_moved() const { return bytes_moved_; }
 
@@ -75,6 +77,7 @@ class NetworkModel {
   double next_event_s(double until_s) const;
   void move_to(double time_s);
   bool active(const Flow& f) const;
+  bool dead() const;
   double random();
 
   NetworkOptions options_;

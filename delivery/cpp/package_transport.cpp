@@ -66,7 +66,7 @@ class HttpTransport final : public Transport {
       if (it == open_.end()) continue;
       if (!keep(it->second, part, std::move(ended->answer))) return fail(number);
       if (--it->second.left > 0) continue;
-      Outcome outcome{number, now_s(), true, std::move(it->second.parts)};
+      Outcome outcome{number, now_s(), true, std::move(it->second.parts), {}, 0, false};
       open_.erase(it);
       return outcome;
     }
@@ -102,7 +102,7 @@ class HttpTransport final : public Transport {
   }
   Outcome fail(std::uint32_t number) {
     cancel(number);
-    return {number, now_s(), false, {}};
+    return {number, now_s(), false, {}, "not delivered", 0, false};
   }
 
   std::vector<std::string> mirrors_;

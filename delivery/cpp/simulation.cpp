@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
 
 #include "delivery/cpp/transfer.h"
 #include "format/portable_math.h"
@@ -34,7 +37,9 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
   for (const HtcStep& s : r.steps) {
     r.bytes += s.rung < 0 ? 0 : s.bytes;
     r.skipped += s.rung < 0;
+    r.given_up += s.rung < 0 && s.bytes > 0;
   }
+  r.skipped += static_cast<std::uint32_t>(plan.offers().size() - r.steps.size());
   for (std::size_t i = 0; i < r.rungs.size(); ++i) {
     const FragmentOffer& f = plan.offers()[i];
     r.loss += loss_of(f, r.rungs[i]);
@@ -45,6 +50,8 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
 
 namespace {
 
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
 /// A model of a network as a transport.
 class ModelTransport final : public Transport {
  public:
@@ -53,18 +60,52 @@ class ModelTransport final : public Transport {
   std::size_t mirrors() const override { return mirrors_; }
   double now_s() override { return model_.now_s(); }
   void start(const TransferRequest& request, std::uint32_t mirror) override {
-    model_.request(request.number, mirror, static_cast<double>(request.bytes));
+    Part& part = parts_[request.number];
+    if (part.left <= 0) part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes)};
+    model_.request(request.number, mirror, part.left);
   }
-  void cancel(std::uint32_t number) override { model_.cancel(number); }
+  void cancel(std::uint32_t number) override {
+    if (const auto left = model_.bytes_left(number)) parts_[number].left = *left;
+    model_.cancel(number);
+  }
+  double received(std::uint32_t number) override {
+    const auto left = model_.bytes_left(number);
+    return left ? parts_[number].bytes - *left : 0;
+  }
   std::optional<Outcome> wait(double until_s) override {
     const auto arrival = model_.advance(until_s);
     if (!arrival) return std::nullopt;
-    return Outcome{arrival->request, arrival->time_s, true, {}};
+    parts_.erase(arrival->request);
+    return Outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
+  }
+  void move_to(double time_s) {
+    while (model_.now_s() < time_s) model_.advance(time_s);
   }
 
  private:
+  struct Part {
+    double bytes = 0, left = 0;
+  };
   NetworkModel model_;
   std::size_t mirrors_;
+  std::map<std::uint32_t, Part> parts_;  // by request, of what is still to come
+};
+
+/// One request and nothing more.
+class OneRequest final : public RequestSource {
+ public:
+  explicit OneRequest(std::uint64_t bytes) : bytes_(bytes) {}
+  std::optional<TransferRequest> next(double) override {
+    if (std::exchange(asked_, true)) return std::nullopt;
+    return TransferRequest{0, bytes_, {}};
+  }
+  bool arrived(const Transport::Outcome&) override { return ended_ = true; }
+  void failed(std::uint32_t, double) override { ended_ = true; }
+  bool finished() const override { return ended_; }
+
+ private:
+  std::uint64_t bytes_;
+  bool asked_ = false, ended_ = false;
 };
 
 }  // namespace
@@ -78,7 +119,24 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
   how.rtt_s = network.rtt_s;
   how.initial_bytes_s = options.throughput.initial_bytes_s;
   const TransferEnd end = transfer(source, transport, how);
-  return result_of(plan, options.time_limit_s, end.last_s);
+  SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNever : end.last_s);
+  result.never = end.given_up > 0;
+  return result;
+}
+
+double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
+  if (!std::isfinite(from_s)) return kNever;
+  ModelTransport transport(network);
+  transport.move_to(from_s);
+  OneRequest source(bytes);
+  TransferOptions how;
+  how.rtt_s = network.rtt_s;
+  // A client knows by then about how fast its link and its best server are.
+  double best = 0;
+  for (const MirrorModel& m : network.mirrors) best = std::max(best, m.rate.at(from_s));
+  how.initial_bytes_s = std::max(1.0, std::min(best, network.link.at(from_s)));
+  const TransferEnd end = transfer(source, transport, how);
+  return end.given_up > 0 ? kNever : end.last_s;
 }
 
 SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,

@@ -10,11 +10,15 @@ namespace texmesh {
 
 /// A transfer, played through without a network or a real one.
 struct SimulationResult {
+  /// Simulated, and some fragments never arrive because every server that was asked has died: end_s and
+  /// late_s are +infinity then, deviation_percent is -infinity, and the fragments count as given up.
+  bool never = false;
   double time_limit_s = 0, end_s = 0;
   double deviation_percent = 0;  // of the limit: positive = ended early (the thesis's surplus)
   double late_s = 0;
   std::uint64_t bytes = 0;
-  std::uint32_t skipped = 0;
+  std::uint32_t skipped = 0;   // by decision, or not decided when it ended; given up ones, too
+  std::uint32_t given_up = 0;  // asked for, and never delivered
   double loss = 0,
          planned_loss = 0;  // sums of the offers' losses: as shown, and if all were at their planned size
   std::vector<HtcStep> steps;
@@ -27,6 +31,9 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
 /// Plays the plan over the network model, as transfer() runs it over a network.
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
                           const NetworkOptions& network);
+/// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network, from
+/// whichever of its mirrors answers; +infinity when none does.
+double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes);
 
 /// The thesis's set-up: one request at a time, no latency, transfer k at the rate `rate(k, start time)`
 /// (bytes per second, k = 1 .. n).

@@ -77,11 +77,9 @@ class UpgradeSource final : public RequestSource {
   }
   void failed(std::uint32_t number, double) override {
     dead_[number] = true;
-    ++given_up_;
     end(number);
   }
   bool finished() const override { return in_flight_ == 0 && at_ >= upgrades_.size(); }
-  std::uint32_t given_up() const { return given_up_; }
 
  private:
   void end(std::uint32_t offer) {
@@ -91,7 +89,6 @@ class UpgradeSource final : public RequestSource {
   std::vector<Upgrade> upgrades_;
   std::vector<bool> busy_, dead_;  // dead: failed, or beyond the bytes that may be spent
   std::vector<std::int32_t> rung_;
-  std::uint32_t given_up_ = 0;
   std::uint64_t bytes_left_;
   int window_, in_flight_ = 0;
   std::size_t at_ = 0;
@@ -206,7 +203,7 @@ LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const Loa
   LoadReport report;
   report.transfer = result_of(plan, options.htc.time_limit_s, std::max(0.0, end.last_s - start_s));
   report.cancelled = end.cancelled;
-  for (const HtcStep& s : plan.steps()) report.given_up += s.rung < 0 && s.bytes > 0;
+  report.given_up = end.given_up;
   // Rungs as the package counts them.
   for (std::size_t i = 0; i < wanted.size(); ++i)
     report.transfer.rungs[i] = held_[wanted[i].plane][wanted[i].fragments[0]];
@@ -249,8 +246,8 @@ LoadReport TextureLoader::refine(const std::vector<PlaneChoice>& planes, const L
   how.until_s = start_s + limits.seconds;
   const TransferEnd end = transfer(source, transport_, how);
   LoadReport report;
-  report.cancelled = end.cancelled;
-  report.given_up = source.given_up();
+  report.cancelled = end.cancelled || end.out_of_time;
+  report.given_up = end.given_up;
   report.transfer.time_limit_s = limits.seconds;
   report.transfer.end_s = std::max(0.0, end.last_s - start_s);
   report.transfer.bytes = bytes_ - bytes_before;

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 namespace texmesh {
 namespace {
 
 constexpr double kRetryFactor = 4, kLeastRetryRtts = 8, kLeastRetry_s = 0.5;
 constexpr double kAskCancelled_s = 0.1;
-constexpr double kForEver = 1e9;
+constexpr double kFirstPause_s = 0.1, kMostPause_s = 5;
 
 /// Which mirror delivers first, by what each has delivered so far and has to deliver yet.
 class Mirrors {
@@ -16,19 +17,17 @@ class Mirrors {
   Mirrors(std::size_t count, double initial_bytes_s) {
     ThroughputOptions options;
     options.initial_bytes_s = initial_bytes_s;
-    for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options), 0, 0, true});
+    for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options)});
   }
-  /// `but`: the one that has just failed, unless it is the only one.
-  std::uint32_t choose(double bytes, std::optional<std::uint32_t> but) const {
-    std::size_t best = mirrors_.size();
-    double best_s = 0;
-    for (std::size_t m = 0; m < mirrors_.size(); ++m) {
-      if (!mirrors_[m].alive || (but && *but == m && mirrors_.size() > 1)) continue;
-      const double s = (mirrors_[m].owed_bytes + bytes) / mirrors_[m].throughput.bytes_s();
-      if (best == mirrors_.size() || s < best_s) best = m, best_s = s;
-    }
-    return static_cast<std::uint32_t>(best == mirrors_.size() ? but.value_or(0) : best);
+  /// Nothing when all of them have failed for good. `but`: the one that has just failed, unless it is the
+  /// only one.
+  std::optional<std::uint32_t> choose(double bytes, std::optional<std::uint32_t> but, double now_s) const {
+    std::optional<std::uint32_t> best = best_of(bytes, but, now_s);
+    if (!best && but) best = best_of(bytes, {}, now_s);
+    return best;
   }
+  /// When it may be asked.
+  double ready_s(std::uint32_t m) const { return mirrors_[m].ready_s; }
   double asked(std::uint32_t m, double bytes) {
     mirrors_[m].owed_bytes += bytes;
     return mirrors_[m].owed_bytes / mirrors_[m].throughput.bytes_s();
@@ -38,21 +37,49 @@ class Mirrors {
     mirror.throughput.add(bytes, now_s - std::max(mirror.last_s, from_s));
     mirror.last_s = now_s;
     mirror.owed_bytes -= bytes;
+    mirror.failures = 0;
+    mirror.has_delivered = true;
   }
   /// It is left alone while another answers.
-  void failed(std::uint32_t m, double bytes) {
+  void failed(std::uint32_t m, double bytes, bool for_good) {
     mirrors_[m].owed_bytes -= bytes;
-    std::size_t alive = 0;
-    for (const Mirror& mirror : mirrors_) alive += mirror.alive;
-    if (alive > 1) mirrors_[m].alive = false;
+    mirrors_[m].alive = false;
+    mirrors_[m].gone |= for_good;
+    if (std::ranges::none_of(mirrors_, &Mirror::alive))
+      for (Mirror& mirror : mirrors_) mirror.alive = !mirror.gone;
+  }
+  /// It is asked again no sooner than after a pause: its own, or one that grows from failure to failure.
+  void pause(std::uint32_t m, double now_s, double wait_s) {
+    Mirror& mirror = mirrors_[m];
+    const double own = kFirstPause_s * static_cast<double>(1 << std::min(mirror.failures++, 6));
+    mirror.ready_s = std::max(mirror.ready_s, now_s + std::min(kMostPause_s, std::max(wait_s, own)));
+  }
+  /// Another one that has shown that it delivers.
+  bool another_delivers(std::uint32_t but) const {
+    for (std::size_t m = 0; m < mirrors_.size(); ++m)
+      if (m != but && mirrors_[m].alive && mirrors_[m].has_delivered) return true;
+    return false;
   }
 
  private:
   struct Mirror {
     Throughput throughput;
-    double owed_bytes = 0, last_s = 0;
-    bool alive = true;
+    double owed_bytes = 0, last_s = 0, ready_s = 0;
+    int failures = 0;
+    bool alive = true, gone = false, has_delivered = false;
   };
+  std::optional<std::uint32_t> best_of(double bytes, std::optional<std::uint32_t> but, double now_s) const {
+    std::optional<std::uint32_t> best;
+    double best_s = 0;
+    for (std::size_t m = 0; m < mirrors_.size(); ++m) {
+      const Mirror& mirror = mirrors_[m];
+      if (!mirror.alive || (but && *but == m)) continue;
+      const double s =
+          (mirror.owed_bytes + bytes) / mirror.throughput.bytes_s() + std::max(0.0, mirror.ready_s - now_s);
+      if (!best || s < best_s) best = static_cast<std::uint32_t>(m), best_s = s;
+    }
+    return best;
+  }
   std::vector<Mirror> mirrors_;
 };
 
@@ -61,6 +88,7 @@ struct Asked {
   std::uint32_t mirror = 0;
   double at_s = 0, patience_s = 0;
   int tries = 0;
+  double received = 0;  // when last looked at
 };
 
 class Run {
@@ -74,13 +102,16 @@ class Run {
   TransferEnd run() {
     while (!source_.finished()) {
       if (over()) return stop();
-      while (auto request = source_.next(transport_.now_s())) ask({std::move(*request), 0, 0, 0, 0}, {});
+      start_waiting();
+      while (auto request = source_.next(transport_.now_s())) ask({std::move(*request)}, {});
       if (source_.finished()) break;
       const double until = next_look_s();
       if (auto outcome = transport_.wait(until))
         take(*outcome);
-      else if (asked_.empty() || transport_.now_s() >= kForEver)
+      else if (asked_.empty() && waiting_.empty())
         break;
+      else if (until >= kForEver_s)
+        give_up_all();
       else
         ask_late_ones_elsewhere();
     }
@@ -88,31 +119,74 @@ class Run {
   }
 
  private:
-  bool over() const {
-    return transport_.now_s() > options_.until_s || (options_.cancelled && options_.cancelled());
+  bool over() {
+    end_.cancelled = options_.cancelled && options_.cancelled();
+    end_.out_of_time = transport_.now_s() > options_.until_s;
+    return end_.cancelled || end_.out_of_time;
   }
   TransferEnd stop() {
     for (const auto& [number, a] : asked_) transport_.cancel(number);
-    end_.cancelled = true;
+    end_.unfinished = static_cast<std::uint32_t>(asked_.size() + waiting_.size());
+    for (const auto& [number, a] : asked_) source_.failed(number, transport_.now_s());
+    for (const Asked& a : waiting_) source_.failed(a.request.number, transport_.now_s());
     return end_;
   }
+  /// No server will ever answer.
+  void give_up_all() {
+    end_.dead = true;
+    const auto dead = std::exchange(asked_, {});
+    for (const auto& [number, a] : dead) {
+      transport_.cancel(number);
+      mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), false);
+      give_up(a, "no answer");
+    }
+  }
+  void give_up(const Asked& a, const std::string& why) {
+    ++end_.problems[why];
+    ++end_.given_up;
+    source_.failed(a.request.number, transport_.now_s());
+  }
 
+  /// Asks a mirror, or notes that one is to be asked when its pause is over.
   void ask(Asked a, std::optional<std::uint32_t> but) {
+    const double now_s = transport_.now_s();
     const auto bytes = static_cast<double>(a.request.bytes);
-    a.mirror = mirrors_.choose(bytes, but);
+    const auto mirror = mirrors_.choose(bytes, but, now_s);
+    if (!mirror) {
+      give_up(a, "no server is left");
+      return;
+    }
+    a.mirror = *mirror;
+    a.at_s = mirrors_.ready_s(a.mirror);
+    if (a.at_s > now_s) {
+      waiting_.push_back(std::move(a));
+      return;
+    }
     const double expected = mirrors_.asked(a.mirror, bytes);
     a.patience_s = std::max({kLeastRetry_s, kLeastRetryRtts * options_.rtt_s, kRetryFactor * expected});
-    a.at_s = transport_.now_s();
+    a.at_s = now_s;
+    a.received = 0;
     ++a.tries;
     transport_.start(a.request, a.mirror);
     asked_[a.request.number] = std::move(a);
   }
+  void start_waiting() {
+    const double now_s = transport_.now_s();
+    std::vector<Asked> due;
+    std::erase_if(waiting_, [&](Asked& a) {
+      if (a.at_s > now_s) return false;
+      due.push_back(std::move(a));
+      return true;
+    });
+    for (Asked& a : due) ask(std::move(a), {});
+  }
 
   double next_look_s() const {
     double until =
-        options_.until_s < kForEver ? std::max(options_.until_s, transport_.now_s()) + 1e-3 : kForEver;
+        options_.until_s < kForEver_s ? std::max(options_.until_s, transport_.now_s()) + 1e-3 : kForEver_s;
     if (transport_.mirrors() > 1)  // a single one can only be waited for
       for (const auto& [number, a] : asked_) until = std::min(until, a.at_s + a.patience_s);
+    for (const Asked& a : waiting_) until = std::min(until, a.at_s);
     if (options_.cancelled) until = std::min(until, transport_.now_s() + kAskCancelled_s);
     return until;
   }
@@ -128,11 +202,17 @@ class Run {
       end_.last_s = outcome.time_s;
       return;
     }
-    mirrors_.failed(a.mirror, bytes);
+    const std::string why = outcome.good ? "bytes of another digest" : outcome.problem;
+    if (outcome.wait_s > 0) mirrors_.pause(a.mirror, outcome.time_s, outcome.wait_s);
+    again(std::move(a), why, outcome.for_good);
+  }
+  void again(Asked a, const std::string& why, bool for_good) {
+    mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), for_good);
     if (a.tries >= options_.tries) {
-      source_.failed(a.request.number, outcome.time_s);
+      give_up(a, why);
       return;
     }
+    ++end_.problems[why];
     const std::uint32_t failed_by = a.mirror;
     ask(std::move(a), failed_by);
   }
@@ -140,14 +220,21 @@ class Run {
   void ask_late_ones_elsewhere() {
     if (transport_.mirrors() < 2) return;
     std::vector<Asked> late;
-    for (const auto& [number, a] : asked_)
-      if (a.at_s + a.patience_s <= transport_.now_s()) late.push_back(a);
+    for (auto& [number, a] : asked_) {
+      if (a.at_s + a.patience_s > transport_.now_s()) continue;
+      // Slow, but nobody is known to be faster.
+      const double received = transport_.received(number);
+      if (received > a.received && !mirrors_.another_delivers(a.mirror)) {
+        a.received = received;
+        a.at_s = transport_.now_s();
+        continue;
+      }
+      late.push_back(a);
+    }
     for (Asked& a : late) {
       transport_.cancel(a.request.number);
-      mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes));
       asked_.erase(a.request.number);
-      const std::uint32_t silent = a.mirror;
-      ask(std::move(a), silent);
+      again(std::move(a), "no answer in time", false);
     }
   }
 
@@ -156,6 +243,7 @@ class Run {
   TransferOptions options_;
   Mirrors mirrors_;
   std::map<std::uint32_t, Asked> asked_;
+  std::vector<Asked> waiting_;  // for the end of their mirror's pause, at_s
   TransferEnd end_;
 };
 

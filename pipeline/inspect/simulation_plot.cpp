@@ -78,7 +78,9 @@ class Panel {
 
 std::string simulation_svg(const SimulationResult& result, const std::vector<double>& qualities,
                            const BandwidthTrace& link, const std::string& title) {
-  const double end_s = 1.02 * std::max({result.end_s, result.time_limit_s, 1e-3});
+  double last_s = std::max(std::isfinite(result.end_s) ? result.end_s : 0.0, 1e-3);
+  if (std::isfinite(result.time_limit_s)) last_s = std::max(last_s, result.time_limit_s);
+  const double end_s = 1.02 * last_s;
   Panel quality(0, "quality of fragments, from request to arrival (grey ticks: skipped)", end_s, 0, 100);
   double top_rate = 0, low_credit = 0, high_credit = 0;
   std::vector<std::pair<double, double>> rate, belief, credit;
