@@ -167,13 +167,18 @@ export class ModelLoad implements LoadedModel {
     });
     return { arrived: load.arrived, shown };
   }
-  /** Materials' programs before they are first drawn with: the page goes on meanwhile. */
+  /** Materials' programs before they are first drawn with: the page goes on while the GPU's process makes them. */
   private async compiled_(shape: Object3D): Promise<void> {
     const { renderer } = this.options_;
     let root = this.scene_;
     while (root.parent) root = root.parent;
-    const compiled = renderer.compileAsync?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
-    await Promise.race([compiled?.catch(() => undefined), sleepS(mostCompileS)]);
+    const gl = renderer.getContext?.() as WebGL2RenderingContext | undefined;
+    renderer.compile?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
+    const made = gl?.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (!gl || !made) return;
+    gl.flush();
+    for (const end = nowS() + mostCompileS; nowS() < end && gl.getSyncParameter(made, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
+    gl.deleteSync(made);
   }
   /** In one turn of the page: what is drawn next is the new scale, whole. */
   private showScale_(scale: number): void {
