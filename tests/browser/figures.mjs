@@ -111,6 +111,7 @@ async function timeToQuality() {
   await page.close();
 }
 
+/** For a display of 1000 px, which can show more than comes in the time: who has everything is ready before. */
 async function deadlines() {
   const limit = 4;
   const off = [];
@@ -118,7 +119,7 @@ async function deadlines() {
   const page = await readyPage('sea_turtle');
   for (let seed = 1; seed <= loads; seed++) {
     await link.set({...kLink, changes: 0.5, seed});
-    const id = await load(page, 'sea_turtle', {load: {time: limit, autoRefine: false}});
+    const id = await load(page, 'sea_turtle', {load: {time: limit, display: 1000, autoRefine: false}});
     const r = await finished(page, id);
     const d = r.events.find((e) => e.name === 'deadline');
     off.push(d ? d.actual / limit - 1 : Infinity);

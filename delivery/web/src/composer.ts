@@ -30,22 +30,6 @@ interface Copy {
   target: Rect;
 }
 
-const software = new WeakMap<WebGLRenderer, boolean>();
-/**
- * Nothing but the processor draws: what a GPU does at once takes it seconds, and workers less. To be asked early: the first
- * answer waits for all that was asked of the GPU.
- */
-export function isSoftware(renderer: WebGLRenderer): boolean {
-  let is = software.get(renderer);
-  if (is === undefined) {
-    const gl = gl2(renderer);
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-    software.set(renderer, (is = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name)));
-  }
-  return is;
-}
-
 /** Copies between textures on the GPU, and leaves the renderer's state as it was. */
 export class Blitter {
   private readonly buffers_: (WebGLFramebuffer | null)[];

@@ -2,7 +2,8 @@ import { Camera, Group, Material, Object3D, Scene } from 'three';
 import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedModel } from './api';
 import { displayOf } from './camera';
 import { Emitter } from './events';
-import { isAbort, nowS, sleepS, throwIfAborted } from './http';
+import { gpuIdle } from './gpu';
+import { isAbort, nowS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { PackageReader } from './package_reader';
 import { MaterialSet } from './scale_parts';
@@ -172,13 +173,8 @@ export class ModelLoad implements LoadedModel {
     const { renderer } = this.options_;
     let root = this.scene_;
     while (root.parent) root = root.parent;
-    const gl = renderer.getContext?.() as WebGL2RenderingContext | undefined;
     renderer.compile?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
-    const made = gl?.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    if (!gl || !made) return;
-    gl.flush();
-    for (const end = nowS() + mostCompileS; nowS() < end && gl.getSyncParameter(made, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
-    gl.deleteSync(made);
+    await gpuIdle(renderer, mostCompileS);
   }
   /** In one turn of the page: what is drawn next is the new scale, whole. */
   private showScale_(scale: number): void {

@@ -7,7 +7,6 @@ import { HarmonicTimePlan, HtcOptions, HtcStep, defaultHtcOptions } from './harm
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
-import { isSoftware } from './composer';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
@@ -54,9 +53,7 @@ export class TextureLoad {
   private readonly gaveUp_ = new Set<string>();
   private readonly asked_ = new Map<string, number>(); // rungs under way while refining
 
-  constructor(private readonly load_: LoadContext) {
-    isSoftware(load_.options.renderer); // while the GPU has nothing to do
-  }
+  constructor(private readonly load_: LoadContext) {}
 
   get planes(): readonly ComposedPlane[] {
     return [...(this.textureSet_?.planes.values() ?? [])];

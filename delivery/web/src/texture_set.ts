@@ -1,6 +1,7 @@
 import { Texture, WebGLRenderer } from 'three';
-import { Blitter, PlaneComposer, isSoftware, ownLevels } from './composer';
+import { Blitter, PlaneComposer, ownLevels } from './composer';
 import type { PlaneChoice } from './fragment_list';
+import { isSoftware } from './gpu';
 import { MaterialSet, Slot } from './scale_parts';
 import type { TextureInfo } from './textures';
 import type { WorkerPool } from './worker_pool';
@@ -86,7 +87,7 @@ export class TextureSet {
     const shown = old.find((texture) => pictureOf(texture));
     const image = preview ?? pictureOf(shown);
     if (!image) return void (next.filled = true);
-    if (shown && !isSoftware(this.renderer_)) return next.fillFromTexture(shown, image.width, image.height);
+    if (shown && !(await isSoftware(this.renderer_))) return next.fillFromTexture(shown, image.width, image.height);
     try {
       await this.enlarge_(next, image);
     } catch (error) {

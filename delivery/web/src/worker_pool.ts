@@ -13,6 +13,9 @@ interface Job {
   failed: (error: unknown) => void;
 }
 
+/** What is posted takes all of its buffer along, be it the whole package: so in one of its own. */
+const alone = (b: Uint8Array): Uint8Array => (b.length < b.buffer.byteLength ? b.slice() : b);
+
 /** Answers requests; a Worker, or the main thread where there is none. */
 interface Helper {
   post(id: number, request: WorkerRequest, transfer: Transferable[]): void;
@@ -134,17 +137,17 @@ export class WorkerPool {
     });
   }
 
-  decode(request: Omit<DecodeRequest, 'op'>): Promise<Levels> {
-    return this.ask_({ op: 'decode', ...request }) as Promise<Levels>;
+  decode({ streams, tables, ...request }: Omit<DecodeRequest, 'op'>): Promise<Levels> {
+    return this.ask_({ op: 'decode', ...request, tables: alone(tables), streams: streams.map(alone) }) as Promise<Levels>;
   }
   enlarge(request: Omit<EnlargeRequest, 'op'>): Promise<Levels> {
     return this.ask_({ op: 'enlarge', ...request }) as Promise<Levels>;
   }
   openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
-    return this.ask_({ op: 'split-open', key, head }, 0) as Promise<SplitInfo>;
+    return this.ask_({ op: 'split-open', key, head: alone(head) }, 0) as Promise<SplitInfo>;
   }
   addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
-    return this.ask_({ op: 'split-add', key, blocks }, 0) as Promise<SplitUpdate>;
+    return this.ask_({ op: 'split-add', key, blocks: alone(blocks) }, 0) as Promise<SplitUpdate>;
   }
   /** Requests under way or waiting. */
   get pending(): number {
