@@ -117,6 +117,57 @@ void set_up(draco::ExpertEncoder& encoder, const Work& work, const Extent& posit
   }
 }
 
+Vec3f value_of(const draco::PointAttribute& attribute, std::uint32_t point) {
+  float v[3] = {};
+  attribute.ConvertValue(attribute.mapped_index(draco::PointIndex(point)), std::int8_t{3}, v);
+  return {v[0], v[1], v[2]};
+}
+
+/// One value per point.
+void set_values(draco::PointAttribute& attribute, std::span<const Vec3f> values) {
+  attribute.Reset(values.size());
+  attribute.SetIdentityMapping();
+  for (std::uint32_t i = 0; i < values.size(); ++i)
+    attribute.SetAttributeValue(draco::AttributeValueIndex(i), &values[i]);
+}
+
+/// Fits the normals of all primitives together. Those without normals are only shapes.
+void light_as(std::vector<Work>& all, const NormalSamples& samples, const std::string& entry,
+              const RunContext& context) {
+  std::vector<Vec3d> points;
+  std::vector<Triangle> triangles;
+  std::vector<Vec3f> normals;
+  for (const Work& w : all) {
+    const auto first = static_cast<std::uint32_t>(points.size());
+    const auto normal = w.ids.find("NORMAL"), position = w.ids.find("POSITION");
+    if (position == w.ids.end()) throw FormatError(entry, "POSITION", "an attribute", "none");
+    for (std::uint32_t i = 0; i < w.mesh->num_points(); ++i) {
+      points.push_back(to_double(value_of(*w.mesh->attribute(position->second), i)));
+      normals.push_back(normal == w.ids.end() ? Vec3f{0, 0, 1}
+                                              : value_of(*w.mesh->attribute(normal->second), i));
+    }
+    for (std::uint32_t f = 0; f < w.mesh->num_faces(); ++f) {
+      const auto& face = w.mesh->face(draco::FaceIndex(f));
+      for (const draco::PointIndex& corner : face)
+        if (corner.value() >= w.mesh->num_points())
+          throw FormatError(entry, "draco", "indices of points", "one beyond them");
+      triangles.push_back({first + face[0].value(), first + face[1].value(), first + face[2].value()});
+    }
+  }
+  for (const Vec3d p : points)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      throw FormatError(entry, "POSITION", "finite numbers", "others");
+  normals = fit_normals(points, triangles, std::move(normals), samples, context);
+  std::size_t first = 0;
+  for (Work& w : all) {
+    const auto normal = w.ids.find("NORMAL");
+    draco::PointAttribute* attribute = normal == w.ids.end() ? nullptr : w.mesh->attribute(normal->second);
+    if (attribute && attribute->data_type() == draco::DT_FLOAT32 && attribute->num_components() == 3)
+      set_values(*attribute, std::span<const Vec3f>(normals).subspan(first, w.mesh->num_points()));
+    first += w.mesh->num_points();
+  }
+}
+
 DracoStream coded(Work& work, const Extent& positions, const Extent& uvs, const DracoSteps& steps,
                   const std::string& entry) {
   for (const auto& [name, id] : work.ids)
@@ -148,7 +199,8 @@ DracoStream coded(Work& work, const Extent& positions, const Extent& uvs, const 
 
 }  // namespace
 
-void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const std::string& entry) {
+void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
+                  const std::string& entry, const RunContext& context) {
   std::vector<Work> work;
   std::size_t before = 0;
   for (const DracoStream& p : primitives) {
@@ -161,6 +213,7 @@ void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps,
       w.ids[name] = id;
     }
   }
+  if (lit_as) light_as(work, *lit_as, entry, context);
   const Extent positions = extent_of(work, "POSITION"), uvs = extent_of(work, "TEXCOORD_");
   std::vector<DracoStream> out;
   std::size_t after = 0;
@@ -168,7 +221,7 @@ void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps,
     out.push_back(coded(w, positions, uvs, steps, entry));
     after += out.back().bytes.size();
   }
-  if (after < before) primitives = std::move(out);
+  if (lit_as || after < before) primitives = std::move(out);
 }
 
 }  // namespace texmesh

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/vec.h"
+#include "pipeline/extract/fit_normals.h"
 
 namespace texmesh {
 
@@ -27,7 +28,9 @@ struct DracoStream {
 
 /// Codes the primitives of one file anew on coarser grids that all of them share, so that borders between
 /// primitives stay closed. A stream that does not get smaller is kept, and with it all the others of the file
-/// (one grid for all). FormatError when a stream does not decode; StageError when Draco refuses.
-void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const std::string& entry);
+/// (one grid for all). With `lit_as`, normals are fitted to it and nothing is kept, however many bytes come
+/// out. FormatError when a stream does not decode; StageError when Draco refuses.
+void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
+                  const std::string& entry, const RunContext& context);
 
 }  // namespace texmesh

@@ -19,17 +19,24 @@ using Curve = SampledCurve<16384>;
 /// One row of a separable filter, of any parity.
 using Kernel = std::vector<float>;  // [2 * radius + 1]
 
-void filter_lines(const std::vector<float>& from, std::vector<float>& to, int side, std::size_t step,
-                  std::size_t line_step, const Kernel& kernel) {
+/// A rectangle of pixels.
+struct Box {
+  int x = 0, y = 0, width = 0, height = 0;
+  std::size_t count() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+};
+
+/// Filters `lines` lines of `length` values that are `step` apart.
+void filter_lines(const std::vector<float>& from, std::vector<float>& to, int length, int lines,
+                  std::size_t step, std::size_t line_step, const Kernel& kernel) {
   const int radius = static_cast<int>(kernel.size() / 2);
-  std::vector<float> line(static_cast<std::size_t>(side + 2 * radius));
-  for (int l = 0; l < side; ++l) {
+  std::vector<float> line(static_cast<std::size_t>(length + 2 * radius));
+  for (int l = 0; l < lines; ++l) {
     const float* in = from.data() + static_cast<std::size_t>(l) * line_step;
     float* out = to.data() + static_cast<std::size_t>(l) * line_step;
-    for (int i = -radius; i < side + radius; ++i)
+    for (int i = -radius; i < length + radius; ++i)
       line[static_cast<std::size_t>(i + radius)] =
-          in[static_cast<std::size_t>(std::clamp(i, 0, side - 1)) * step];
-    for (int i = 0; i < side; ++i) {
+          in[static_cast<std::size_t>(std::clamp(i, 0, length - 1)) * step];
+    for (int i = 0; i < length; ++i) {
       float sum = 0;
       const float* at = line.data() + i;
       for (std::size_t k = 0; k < kernel.size(); ++k) sum += at[k] * kernel[k];
@@ -38,11 +45,12 @@ void filter_lines(const std::vector<float>& from, std::vector<float>& to, int si
   }
 }
 
-std::vector<float> filtered(const std::vector<float>& image, std::uint32_t side, const Kernel& along_x,
+std::vector<float> filtered(const std::vector<float>& image, const Box& box, const Kernel& along_x,
                             const Kernel& along_y) {
+  const auto stride = static_cast<std::size_t>(box.width);
   std::vector<float> half(image.size()), out(image.size());
-  filter_lines(image, half, static_cast<int>(side), 1, side, along_x);
-  filter_lines(half, out, static_cast<int>(side), side, 1, along_y);
+  filter_lines(image, half, box.width, box.height, 1, stride, along_x);
+  filter_lines(half, out, box.height, box.width, stride, 1, along_y);
   return out;
 }
 
@@ -66,7 +74,7 @@ Kernel sensitivity(double b, int radius) {
 struct Term {
   double a, b;
 };
-std::vector<float> seen(const std::vector<float>& channel, std::uint32_t side,
+std::vector<float> seen(const std::vector<float>& channel, const Box& box,
                         std::initializer_list<Term> terms) {
   constexpr int kRadius = 10;  // three deviations of the widest term
   double whole = 0;
@@ -77,7 +85,7 @@ std::vector<float> seen(const std::vector<float>& channel, std::uint32_t side,
   std::vector<float> out(channel.size());
   for (const Term& t : terms) {
     const Kernel kernel = sensitivity(t.b, kRadius);
-    const std::vector<float> part = filtered(channel, side, kernel, kernel);
+    const std::vector<float> part = filtered(channel, box, kernel, kernel);
     const auto weight = static_cast<float>(t.a * std::sqrt(portable::kPi / t.b) / whole);
     for (std::size_t i = 0; i < out.size(); ++i) out[i] += weight * part[i];
   }
@@ -161,44 +169,77 @@ const FeatureKernels& feature_kernels() {
   return kernels;
 }
 
-std::vector<float> strength(const std::vector<float>& luma, std::uint32_t side, const Kernel& derivative) {
+std::vector<float> strength(const std::vector<float>& luma, const Box& box, const Kernel& derivative) {
   const Kernel& smooth = feature_kernels().smooth;
-  std::vector<float> out = filtered(luma, side, derivative, smooth);
-  const std::vector<float> y = filtered(luma, side, smooth, derivative);
+  std::vector<float> out = filtered(luma, box, derivative, smooth);
+  const std::vector<float> y = filtered(luma, box, smooth, derivative);
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::sqrt(out[i] * out[i] + y[i] * y[i]);
+  return out;
+}
+
+/// What is not plain background, and so far around it that filters neither see it nor are seen by it.
+Box busy_box(const Picture& picture) {
+  constexpr int kReach = 24;
+  const int side = static_cast<int>(picture.side_px);
+  int x0 = side, y0 = side, x1 = 0, y1 = 0;
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x) {
+      const auto i = static_cast<std::size_t>(y) * picture.side_px + static_cast<std::size_t>(x);
+      if (!picture.covered[i] && picture.linear[i] == picture.linear[0]) continue;
+      x0 = std::min(x0, x), x1 = std::max(x1, x + 1);
+      y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+    }
+  x0 = std::max(std::min(x0, x1) - kReach, 0), y0 = std::max(std::min(y0, y1) - kReach, 0);
+  return {x0, y0, std::min(x1 + kReach, side) - x0, std::min(y1 + kReach, side) - y0};
+}
+
+/// A pixel of the box that only sees background, where the box is not the whole picture.
+std::size_t plain_pixel(const Box& box) { return box.x > 0 || box.y > 0 ? 0 : box.count() - 1; }
+
+/// Puts the values of a box into a whole picture, plain background around them.
+template <class T>
+std::vector<T> whole(const std::vector<T>& part, const Box& box, std::uint32_t side) {
+  std::vector<T> out(std::size_t{side} * side, part[plain_pixel(box)]);
+  for (int y = 0; y < box.height; ++y)
+    std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(y) * box.width, box.width,
+                out.begin() + static_cast<std::ptrdiff_t>(box.y + y) * side + box.x);
   return out;
 }
 
 }  // namespace
 
 FlipPicture prepare_flip(const Picture& picture) {
-  const std::size_t count = picture.linear.size();
-  std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
-  for (auto& channel : opponent) channel.resize(count);
-  std::vector<float> luma(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d xyz = xyz_of(clamped(picture.linear[i]));
-    const double x = xyz.x / kWhite[0], y = xyz.y, z = xyz.z / kWhite[2];
-    opponent[0][i] = static_cast<float>(116 * y - 16);
-    opponent[1][i] = static_cast<float>(500 * (x - y));
-    opponent[2][i] = static_cast<float>(200 * (y - z));
-    luma[i] = static_cast<float>(y);
-  }
-  opponent[0] = seen(opponent[0], picture.side_px, {{1, 0.0047}});
-  opponent[1] = seen(opponent[1], picture.side_px, {{1, 0.0053}});
-  opponent[2] = seen(opponent[2], picture.side_px, {{34.1, 0.04}, {13.5, 0.025}});
   FlipPicture out;
   out.side_px = picture.side_px;
   out.covered = picture.covered;
-  out.lab.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
+  if (picture.linear.empty()) return out;
+  const Box box = busy_box(picture);
+  std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
+  for (auto& channel : opponent) channel.resize(box.count());
+  std::vector<float> luma(box.count());
+  for (std::size_t i = 0; i < luma.size(); ++i) {
+    const std::size_t x = i % static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.x),
+                      y = i / static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.y);
+    const Vec3d xyz = xyz_of(clamped(picture.linear[y * picture.side_px + x]));
+    const double a = xyz.x / kWhite[0], b = xyz.y, c = xyz.z / kWhite[2];
+    opponent[0][i] = static_cast<float>(116 * b - 16);
+    opponent[1][i] = static_cast<float>(500 * (a - b));
+    opponent[2][i] = static_cast<float>(200 * (b - c));
+    luma[i] = static_cast<float>(b);
+  }
+  opponent[0] = seen(opponent[0], box, {{1, 0.0047}});
+  opponent[1] = seen(opponent[1], box, {{1, 0.0053}});
+  opponent[2] = seen(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
+  std::vector<Vec3f> lab(box.count());
+  for (std::size_t i = 0; i < lab.size(); ++i) {
     const double y = (static_cast<double>(opponent[0][i]) + 16) / 116;
     const double x = y + static_cast<double>(opponent[1][i]) / 500,
                  z = y - static_cast<double>(opponent[2][i]) / 200;
-    out.lab[i] = hunt_lab(clamped(linear_of(x * kWhite[0], y, z * kWhite[2])));
+    lab[i] = hunt_lab(clamped(linear_of(x * kWhite[0], y, z * kWhite[2])));
   }
-  out.detail[0] = strength(luma, picture.side_px, feature_kernels().edge);
-  out.detail[1] = strength(luma, picture.side_px, feature_kernels().point);
+  out.lab = whole(lab, box, picture.side_px);
+  out.detail[0] = whole(strength(luma, box, feature_kernels().edge), box, picture.side_px);
+  out.detail[1] = whole(strength(luma, box, feature_kernels().point), box, picture.side_px);
   return out;
 }
 

@@ -14,10 +14,10 @@ const char* mime_type_of(FileImage format);
 /// How an image of a standalone file is coded.
 struct ImageCoding {
   FileImage format = FileImage::kJpeg;
-  double quality = 75;  // JPEG 1..100 (rounded), WebP 0..100; no meaning for PNG
+  double quality = 75;  // JPEG 1..100, WebP 0..100; no meaning for PNG
   bool data = false;    // numbers (normals, roughness ..) instead of colours: JPEGs keep their channels apart
   bool quick = false;   // WebP: a third of the time for some percent more bytes, for searches
-  bool full_chroma = false;  // JPEG: colours 4:4:4
+  bool full_chroma = false;  // JPEG: colours 4:4:4, with tables for textures
 };
 
 /// A complete image file of 1, 3 or 4 channels (grey becomes RGB in a WebP; 4 channels are for PNG and WebP

@@ -185,7 +185,7 @@ bool StandaloneGlb::has_draco() const {
              root_["extensionsUsed"].end();
 }
 
-void StandaloneGlb::recode(const DracoSteps& steps) {
+void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
   std::vector<DracoStream> streams;
   for_each_primitive(root_, [&](Json& primitive) {
     const Json* draco = draco_of(primitive);
@@ -196,7 +196,7 @@ void StandaloneGlb::recode(const DracoSteps& steps) {
     streams.push_back(std::move(s));
   });
   if (streams.empty()) return;
-  recode_draco(streams, steps, entry_);
+  recode_draco(streams, steps, lit_as, entry_, context);
   std::size_t next = 0;
   for_each_primitive(root_, [&](Json& primitive) {
     Json* draco = draco_of(primitive);

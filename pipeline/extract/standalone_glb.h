@@ -32,8 +32,8 @@ class StandaloneGlb {
   /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
   /// makes EXT_texture_webp a required extension.
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
-  /// Codes Draco streams anew; other codecs stay as they are.
-  void recode(const DracoSteps& steps);
+  /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
+  void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
   bool has_draco() const;
 
   /// Makes the nodes of the scene the children of one node, the first level of detail. Once, before

@@ -105,7 +105,8 @@ std::uint32_t TextureSource::plane_for(std::size_t index, std::uint32_t base, st
 }
 
 Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px,
-                                   std::uint32_t height_px, const std::vector<std::uint8_t>& coverage) {
+                                   std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
+                                   float sharpening) {
   const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
   const std::vector<Pixels>& from = levels(plane_for(index, base, width_px), images_[index].colours, kind);
   std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
@@ -114,18 +115,18 @@ Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::u
     ++level;
   const Pixels& p = from[level];
   Pixels out = reduced(p, p.width_px, p.height_px, std::min(width_px, p.width_px),
-                       std::min(height_px, p.height_px), kind, images_[index].colours ? kSharpening : 0.f);
+                       std::min(height_px, p.height_px), kind, images_[index].colours ? sharpening : 0.f);
   if (coverage.size() == (std::size_t{out.width_px} + 7) / 8 * out.height_px)
     fill_uncovered(out, coverage, context_);
   return out;
 }
 
 Pixels TextureSource::texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
-                             const std::vector<std::uint8_t>& coverage) {
+                             const std::vector<std::uint8_t>& coverage, float sharpening) {
   const PackageImage& image = images_.at(index);
-  Pixels colours = plane_texels(index, image.plane, width_px, height_px, coverage);
+  Pixels colours = plane_texels(index, image.plane, width_px, height_px, coverage, sharpening);
   if (!image.alpha_plane) return colours;
-  return with_alpha(colours, plane_texels(index, *image.alpha_plane, width_px, height_px, coverage));
+  return with_alpha(colours, plane_texels(index, *image.alpha_plane, width_px, height_px, coverage, 0));
 }
 
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {

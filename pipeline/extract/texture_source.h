@@ -37,9 +37,10 @@ class TextureSource {
   const std::vector<PackageImage>& images() const { return images_; }
   /// 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and at most those of the image;
   /// where memory was bounded, larger ones are cut down, see largest(). `coverage` (bits as
-  /// TexturePlane::coverage, empty = all): what shows; the other texels are made cheap to code.
+  /// TexturePlane::coverage, empty = all): what shows; the other texels are made cheap to code. `sharpening`
+  /// (see reduced()) is for colours alone.
   Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
-                const std::vector<std::uint8_t>& coverage);
+                const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
   /// Largest share of an image's sides, 0 .. 1, that texels() gives.
   double largest(std::size_t index);
 
@@ -47,7 +48,7 @@ class TextureSource {
   const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
   std::uint32_t plane_for(std::size_t index, std::uint32_t base, std::uint32_t width_px) const;
   Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
-                      const std::vector<std::uint8_t>& coverage);
+                      const std::vector<std::uint8_t>& coverage, float sharpening);
   PackageReader& package_;
   RunContext context_;
   std::vector<PackageImage> images_;

@@ -1,11 +1,13 @@
 // How good the files of `texmesh extract --bytes` look beside those that other tools make of the same bytes.
 //
 //   extract_bench SOURCE PACKAGE --bytes 100,250,500,1000 [--peers DIR] [--views 6] [--size 512] [--keep DIR]
+//                 [--neighbours]
 //   extract_bench SOURCE --score A.glb,B.glb
 //
 // Renders SOURCE and each file with one renderer from the same views and prints mean LDR-FLIP over the pixels
-// of the object (0 = equal). DIR holds files that tests/bench/extract_peers has made of SOURCE; the best one
-// within the bytes counts. The views are others than those that extract itself compares.
+// of the object (0 = equal). --neighbours also makes the best file of the next finer and the next coarser
+// scale. DIR holds files that tests/bench/extract_peers has made of SOURCE; the best one within the bytes
+// counts. The views are others than those that extract itself compares.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -128,7 +130,27 @@ struct Arguments {
   std::vector<double> bytes{100, 250, 500, 1000};
   std::vector<std::string> score;
   int views = 6, size = 512;
+  bool neighbours = false;
 };
+
+/// What the search chose, and what it would have made of the scales beside that, in its own views.
+void print_neighbours(const Arguments& a, std::uint64_t limit, const Extracted& chosen,
+                      const RunContext& context) {
+  PackageReader package(open_store(a.package));
+  const std::vector<ManifestScale>& scales = package.manifest().scales;
+  for (std::size_t k = 0; k < scales.size(); ++k) {
+    const bool finer = k + 1 < scales.size() && scales[k + 1].scale == chosen.scale;
+    if (!finer && !(k > 0 && scales[k - 1].scale == chosen.scale)) continue;
+    ExtractRequest request;
+    request.bytes = limit;
+    request.scale = scales[k].scale;
+    const Extracted e = extract_model(package, request, context);
+    std::cout << fmt::format("           {} S_{}: {} ({:.3f} of the chosen file's difference)\n",
+                             finer ? "finer" : "coarser", e.scale,
+                             e.within ? fmt::format("{:.4f}", e.difference) : "does not fit",
+                             e.difference / chosen.difference);
+  }
+}
 
 void print_table(const Arguments& a, const Scorer& scorer, const RunContext& context) {
   std::vector<Scored> peers = a.peers.empty() ? std::vector<Scored>{} : files_of(a.peers);
@@ -165,6 +187,7 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
       std::cout << fmt::format("  [{} {}x{} q{:.0f} {}]", i.role.substr(0, 4), i.width_px, i.height_px,
                                i.quality, i.bytes);
     std::cout << std::endl;
+    if (a.neighbours) print_neighbours(a, limit, e, context);
   }
   if (rows) std::cout << fmt::format("geometric mean of {} ratios: {:.3f}\n", rows, std::exp(logs / rows));
 }
@@ -184,6 +207,7 @@ int main(int argc, char** argv) {
   app.add_option("--score", a.score, "Only rate these files")->delimiter(',');
   app.add_option("--views", a.views)->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
+  app.add_flag("--neighbours", a.neighbours, "Also the best files of the scales beside the chosen one");
   CLI11_PARSE(app, argc, argv);
   RunContext context;
   context.threads = 2;

@@ -93,6 +93,10 @@ TEST(EncodeImage, LowerQualityIsSmallerAndWrongPixelsAreRefused) {
   const Pixels pixels = pattern(64, 64, 3);
   for (const FileImage format : {FileImage::kJpeg, FileImage::kWebp})
     EXPECT_LT(encode_image(pixels, {format, 10}).size(), encode_image(pixels, {format, 90}).size());
+  EXPECT_LT(encode_image(pixels, {FileImage::kJpeg, 90}).size(),
+            encode_image(pixels, {FileImage::kJpeg, 91.5}).size());
+  EXPECT_LT(encode_image(pixels, {FileImage::kJpeg, 91.5}).size(),
+            encode_image(pixels, {FileImage::kJpeg, 93}).size());
   Pixels torn = pixels;
   torn.data.pop_back();
   EXPECT_THROW(encode_image(torn, {}), StageError);
