@@ -197,6 +197,22 @@ it('a finer scale is taken while it was measured to be seen', () => {
   expect(finerWhereSeen(table, 7, 400)).toBe(7); // not in the table
 });
 
+it('workers are sent the bytes that they need, not the package that they lie in', async () => {
+  const sent: WorkerRequest[] = [];
+  const pool = new WorkerPool({ decode: async (request) => (sent.push(request), [[], []]) });
+  const whole = Uint8Array.from({ length: 1000 }, (_, i) => i & 255);
+  const [tables, stream] = [whole.subarray(0, 10), whole.subarray(500, 540)];
+  await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1 });
+  await pool.addSplits(1, stream);
+  const [decode, splits] = sent as [WorkerRequest & { op: 'decode' }, WorkerRequest & { op: 'split-add' }];
+  for (const [found, expected] of [[decode.tables, tables], [decode.streams[0], stream], [splits.blocks, stream]]) {
+    expect(found).toEqual(expected);
+    expect(found.buffer.byteLength).toBe(expected.length);
+  }
+  expect(decode.streams[1]).toBe(whole); // nothing to copy
+  pool.dispose();
+});
+
 it('errors keep their parts on the way from a worker', () => {
   expect(packError(new FormatError('f', 'p', 'e', 'x'))?.parts).toEqual(['f', 'p', 'e', 'x']);
   expect(packError(new Error('other'))?.message).toBe('other');
