@@ -18,6 +18,17 @@ class CollapseCost {
 
   const Quadric& quadric(std::uint32_t point) const { return quadric_[point]; }
   bool has_attributes() const { return attribute_quadric_.channels() > 0; }
+  /// As CollapseMesh::prefetch_list.
+  void prefetch_point(std::uint32_t point) const {
+    const auto* q = reinterpret_cast<const char*>(&quadric_[point]);
+    __builtin_prefetch(q);
+    __builtin_prefetch(q + sizeof(Quadric) - 1);
+  }
+  void prefetch_wedge(std::uint32_t wedge) const {
+    if (!has_attributes()) return;
+    __builtin_prefetch(attributes(wedge));
+    attribute_quadric_.prefetch(wedge);
+  }
   struct Distortion {
     double cost = 0;
     double shift = 0;  // of the texture, root mean square over the area that the centre's wedges stand for

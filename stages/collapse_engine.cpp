@@ -61,6 +61,35 @@ void CollapseEngine::fill_queue(const RunContext& context) {
   queue_.order();
 }
 
+/// The cheapest collapses lie anywhere on the surface: on millions of triangles nearly all time would go in
+/// waiting for memory. What comes out next stands in the first places of the heap, the sooner the nearer to
+/// its top, so its data are asked for some collapses ahead, in the order in which one leads to the next.
+void CollapseEngine::look_ahead() const {
+  constexpr std::size_t kFaces = 5, kCorners = 21, kLists = 85;  // ends of the levels of a 4-ary heap
+  const std::size_t count = std::min(queue_.size(), kLists);
+  const auto is_point = [&](std::size_t i) { return queue_.item(i) < mesh_.point_count(); };
+  for (std::size_t i = kCorners; i < count; ++i)
+    if (is_point(i)) mesh_.prefetch_list(queue_.item(i));
+  for (std::size_t i = kFaces; i < std::min(count, kCorners); ++i)
+    if (is_point(i)) mesh_.prefetch_corners(queue_.item(i)), cost_.prefetch_point(queue_.item(i));
+  std::size_t next = 0;
+  for (std::size_t i = 1; i < std::min(count, kFaces); ++i) {
+    if (!is_point(i)) continue;
+    mesh_.prefetch_faces(queue_.item(i));
+    if (next == 0 || queue_.less(i, next)) next = i;
+  }
+  if (next == 0) return;
+  for (std::uint32_t entry : mesh_.corners(queue_.item(next))) {
+    const CollapseMesh::Face& face = mesh_.faces()[entry / 4];
+    if (!face.alive()) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      mesh_.prefetch_point(face.point[k]);
+      ring_.prefetch(face.point[k]);
+      cost_.prefetch_wedge(face.wedge[k]);
+    }
+  }
+}
+
 /// The part of a collapse's cost that needs no wedge map, a lower bound of the whole.
 double CollapseEngine::shape_cost(std::uint32_t u, std::uint32_t v) const {
   const Vec3d p = mesh_.point(v), moved = p - mesh_.point(u);
@@ -254,6 +283,7 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
       continue;
     }
     if (thesis && persistence_[u] >= scale) return CollapseStop::kReached;
+    look_ahead();
     fade_ = std::min(1.0, mesh_.alive_positions() / (kFadeBelow * initial_positions_));
     const Choice choice = confirm(u);
     if (!choice.found()) {

@@ -48,6 +48,7 @@ class CollapseEngine {
   enum Flag : std::uint8_t { kStale = 1, kExact = 2, kTooFar = 4 };
 
   void fill_queue(const RunContext& context);
+  void look_ahead() const;
   double shape_cost(std::uint32_t u, std::uint32_t v) const;
   double error_of(std::uint32_t u, std::uint32_t v) const;
   Choice evaluate(CollapseRing& ring, std::uint32_t u) const;

@@ -12,8 +12,12 @@ class CollapseQueue {
   explicit CollapseQueue(std::size_t items) : at_(items, kOut) {}
   bool empty() const { return heap_.empty(); }
   std::uint32_t top() const { return heap_[0].item; }
+  /// The heap itself: what comes out after top() is among items 1 to 4, what comes next among 1 to 20.
+  std::size_t size() const { return heap_.size(); }
+  std::uint32_t item(std::size_t i) const { return heap_[i].item; }
   bool contains(std::uint32_t item) const { return at_[item] != kOut; }
   double key(std::uint32_t item) const { return heap_[at_[item]].key; }  // of one that it contains
+  bool less(std::size_t i, std::size_t j) const { return heap_[i] < heap_[j]; }
   /// For an empty queue: all items at once, in linear time; call order() behind the last.
   void append(std::uint32_t item, double key);
   void order();

@@ -35,6 +35,7 @@ class CollapseRing {
 
   /// Looks at point u: everything below is about it from now on, until the mesh changes.
   void gather(std::uint32_t u);
+  void prefetch(std::uint32_t neighbour) const { __builtin_prefetch(&mark_[neighbour]); }
   std::uint32_t centre() const { return centre_; }
   const std::vector<Vec2f>& uv0() const { return uv0_; }
   const std::vector<Corner>& corners() const { return corners_; }

@@ -56,6 +56,11 @@ class AttributeQuadrics {
     c[0] += f(area * g.x), c[1] += f(area * g.y), c[2] += f(area * g.z);
   }
   void add_area(std::size_t wedge, double area) { data_[wedge * stride_ + 10] += f(area); }
+  void prefetch(std::size_t wedge) const {
+    const float* q = &data_[wedge * stride_];
+    __builtin_prefetch(q);
+    __builtin_prefetch(q + stride_ - 1);
+  }
   double area(std::size_t wedge) const { return data_[wedge * stride_ + 10]; }
   /// Adds the quadric of `from`, whose place and attributes `to` has at `-move` and `-step` of its own: the
   /// collapse moved the wedge by `move` and its attributes by `step`.

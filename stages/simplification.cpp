@@ -15,17 +15,21 @@ namespace {
 // triangles.
 constexpr double kRepeatedShare = 0.97;
 
-/// #{p >= i} for i = 0..scales, scaled down so that the last is at most the share that the options ask for.
+constexpr double kCoarsestShare = 0.05;  // of the vertices: coarsest_vertices asks for no more
+
+/// #{p >= i} for i = 0..scales, scaled down so that the last is at most the share that the options ask for,
+/// but not below coarsest_vertices.
 std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const SimplificationOptions& options) {
   std::vector<std::uint32_t> target(static_cast<std::size_t>(scale_map.scales) + 1, 0);
   for (std::uint8_t p : scale_map.persistence)
     for (std::size_t i = 0; i <= std::min<std::size_t>(p, target.size() - 1); ++i) ++target[i];
-  const double most = options.coarsest * target[0], last = target.back();
-  if (options.order == CollapseOrder::kThesis || last <= most) return target;
-  const double factor = portable::pow(most / last, 1.0 / scale_map.scales);
+  if (options.order == CollapseOrder::kThesis) return target;
+  const double least = std::min<double>(options.coarsest_vertices, kCoarsestShare * target[0]);
+  const double most = std::max(options.coarsest * target[0], least), last = target.back();
+  const double factor = last > most ? portable::pow(most / last, 1.0 / scale_map.scales) : 1;
   double scale = 1;
   for (std::uint32_t& t : target) {
-    t = static_cast<std::uint32_t>(std::floor(t * scale + 0.5));
+    t = static_cast<std::uint32_t>(std::floor(std::max(t * scale, least) + 0.5));
     scale *= factor;
   }
   return target;

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 3;
+inline constexpr int kSimplificationVersion = 4;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kQem, kThesis };
 template <>
@@ -37,6 +37,9 @@ struct SimplificationOptions {
   // scale small enough for a first picture; targets are then scaled down geometrically so that the coarsest
   // is asked for this share.
   double coarsest = 0.03;  // of S_0's vertices; 1 = the scale map's counts as they are; not for order thesis
+  // A scale below this would be good for a thumbnail of 50..100 px and save 2..4 kB; as a first picture it
+  // shows corners for outlines and blurs faces.
+  int coarsest_vertices = 400;  // no scale is asked for fewer where S_0 has 20 times as many; else 1 / 20
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("order", s.order,
@@ -55,6 +58,8 @@ struct SimplificationOptions {
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
       "share of the vertices that the coarsest scale is asked for at most");
+    v("coarsest_vertices", s.coarsest_vertices, Range{0, 1000000},
+      "no scale is asked for fewer vertices, nor for less than a 20th of them where that is less still");
     v("min_triangles", s.min_triangles, Range{1, 1000000}, "no scale is asked to have fewer triangles");
   }
 };

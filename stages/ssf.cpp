@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "stages/morton.h"
 #include "stages/parallel.h"
 #include "stages/ssf_component.h"
 
@@ -24,15 +25,6 @@ struct Layout {
   std::size_t component_count() const { return diagonal.size(); }
   std::size_t size(std::size_t c) const { return first_position[c + 1] - first_position[c]; }
 };
-
-std::uint64_t spread_bits(std::uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffffull;
-  x = (x | x << 16) & 0x1f0000ff0000ffull;
-  x = (x | x << 8) & 0x100f00f00f00f00full;
-  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-  return (x | x << 2) & 0x1249249249249249ull;
-}
 
 /// Places of positions along a Morton curve: neighbours in space are neighbours in memory.
 class MortonCode {

@@ -161,7 +161,7 @@ void add_debug_command(CLI::App& app, int& exit_code) {
       "their values. A GLB has them as vertex colours (fragments: as textures), the skeleton as lines.\n"
       "Examples:\n"
       "  texmesh debug turtle.glb --what persistence -o turtle.png\n"
-      "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=80\n"
+      "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=120\n"
       "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json\n"
       "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
   c->callback([args, &exit_code] {

@@ -9,6 +9,7 @@
 #include "format/portable_math.h"
 #include "format/srgb.h"
 #include "pipeline/inspect/text_table.h"
+#include "stages/heat_levels.h"
 
 namespace texmesh {
 namespace {
@@ -83,6 +84,68 @@ void require_same(std::size_t positions, std::size_t values, const char* what) {
 
 std::string share(double count, double of) { return fixed(of > 0 ? 100 * count / of : 0, 1) + " %"; }
 
+std::vector<double> component_diagonals(const ConditionedMesh& mesh) {
+  std::vector<Vec3f> lo(mesh.component_count), hi(mesh.component_count);
+  std::vector<bool> seen(mesh.component_count, false);
+  for (std::size_t p = 0; p < mesh.component.size(); ++p) {
+    const std::uint32_t c = mesh.component[p];
+    const Vec3f at = mesh.mesh.positions[p];
+    for (int k = 0; k < 3; ++k) {
+      lo[c][k] = seen[c] ? std::min(lo[c][k], at[k]) : at[k];
+      hi[c][k] = seen[c] ? std::max(hi[c][k], at[k]) : at[k];
+    }
+    seen[c] = true;
+  }
+  std::vector<double> diagonal;
+  for (std::size_t c = 0; c < lo.size(); ++c) diagonal.push_back(length(to_double(hi[c]) - to_double(lo[c])));
+  return diagonal;
+}
+
+/// Neighbours along the edges, [first[p], first[p + 1]) of `list`; with repetitions.
+struct Neighbours {
+  std::vector<std::uint32_t> first, list;
+  explicit Neighbours(const Mesh& m) : first(m.positions.size() + 1, 0), list(6 * m.triangles.size()) {
+    for (std::uint32_t t = 0; t < m.triangles.size(); ++t)
+      for (int k = 0; k < 3; ++k) first[m.position_of(t, k) + 1] += 2;
+    for (std::size_t p = 0; p < m.positions.size(); ++p) first[p + 1] += first[p];
+    std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
+    for (std::uint32_t t = 0; t < m.triangles.size(); ++t)
+      for (int k = 0; k < 3; ++k)
+        for (int other = 1; other < 3; ++other)
+          list[at[m.position_of(t, k)]++] = m.position_of(t, (k + other) % 3);
+  }
+};
+
+/// A feature of a large scale is one vertex for all that are nearer than the distance that features of that
+/// scale keep; on a dense mesh a line of them would be specks. Each is painted half as large: they touch.
+std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap& map) {
+  const Mesh& m = mesh.mesh;
+  const Neighbours neighbours(m);
+  const std::vector<double> diagonal = component_diagonals(mesh);
+  const SsfOptions usual;
+  std::vector<double> value(map.persistence.begin(), map.persistence.end());
+  std::vector<std::uint32_t> seen_from(value.size(), 0xffffffffu), near;
+  for (std::uint32_t feature = 0; feature < value.size(); ++feature) {
+    const std::uint8_t scale = map.persistence[feature];
+    const double sigma =
+        std::min<double>(map.sigma.at(scale), usual.sigma_max * diagonal[mesh.component[feature]]);
+    const double reach = 0.5 * seed_radius(sigma, usual.error_ratio);
+    near.assign(1, feature);
+    seen_from[feature] = feature;
+    for (std::size_t i = 0; i < near.size(); ++i)
+      for (std::uint32_t k = neighbours.first[near[i]]; k < neighbours.first[near[i] + 1]; ++k) {
+        const std::uint32_t p = neighbours.list[k];
+        if (seen_from[p] == feature ||
+            length(to_double(m.positions[p]) - to_double(m.positions[feature])) > reach)
+          continue;
+        seen_from[p] = feature;
+        value[p] = std::max<double>(value[p], scale);
+        near.push_back(p);
+      }
+  }
+  return value;
+}
+
 /// R's remarks: how the skeleton came about, in the notes' own words.
 void add_remarks(const Notes& notes, DebugLegend& legend) {
   for (const Note& n : notes) legend.remarks.push_back(n.code + ": " + n.text);
@@ -111,16 +174,17 @@ DebugView view_persistence(const ConditionedMesh& mesh, const ScaleMap& scale_ma
                      true,
                      {},
                      {}};
-  std::vector<double> value(scale_map.persistence.begin(), scale_map.persistence.end());
   for (const double share_of : {0.5, 1.0}) {
     const int scale = std::max(1, static_cast<int>(share_of * scale_map.scales));
-    const auto count = std::count_if(value.begin(), value.end(), [&](double v) { return v >= scale; });
-    legend.remarks.push_back(
-        fmt::format("{} of the vertices persist to scale {} or beyond (sigma {})",
-                    share(static_cast<double>(count), static_cast<double>(value.size())), scale,
-                    shortest(static_cast<double>(scale_map.sigma.at(static_cast<std::size_t>(scale))))));
+    const auto count = std::count_if(scale_map.persistence.begin(), scale_map.persistence.end(),
+                                     [&](int p) { return p >= scale; });
+    legend.remarks.push_back(fmt::format(
+        "{} of the vertices persist to scale {} or beyond (sigma {})",
+        share(static_cast<double>(count), static_cast<double>(scale_map.persistence.size())), scale,
+        shortest(static_cast<double>(scale_map.sigma.at(static_cast<std::size_t>(scale))))));
   }
-  return coloured(mesh.mesh, value, std::move(legend));
+  legend.remarks.push_back("features of a scale keep a distance; each is painted to the half of it");
+  return coloured(mesh.mesh, spread_features(mesh, scale_map), std::move(legend));
 }
 
 DebugView view_radius(const ConditionedMesh& mesh, const Skeleton& skeleton) {

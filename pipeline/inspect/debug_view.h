@@ -49,6 +49,7 @@ struct DebugView {
 /// The scale of colours: dark blue for 0, through green, to yellow for 1; brightness rises all the way.
 Srgb colour_of(double fraction);
 
+/// Features are painted as far as half the distance that they keep from others of their scale.
 DebugView view_persistence(const ConditionedMesh& mesh, const ScaleMap& scale_map);
 DebugView view_skeleton(const ConditionedMesh& mesh, const Skeleton& skeleton);
 DebugView view_radius(const ConditionedMesh& mesh, const Skeleton& skeleton);

@@ -1,11 +1,9 @@
 // Scale-space filtering of meshes: speed, growth, memory and accuracy, all in one run.
-//   ssf_bench                      made scans of 125k .. 2M triangles: seconds and peak bytes of the stage,
-//   and
-//                                  the exponent of the log-log fit; the machine's STREAM triad against what
-//                                  the Chebyshev recurrence moves at 1M vertices
-//   ssf_bench --accuracy [MODEL..] the response on the pyramid against one level in double precision, scale
-//   by
-//                                  scale; without models a made scan of --triangles
+//   ssf_bench                       made scans of 125k .. 2M triangles: seconds and peak bytes of the stage,
+//                                   the exponent of the log-log fit; the machine's STREAM triad against what
+//                                   the Chebyshev recurrence moves at 1M vertices
+//   ssf_bench --accuracy [MODEL..]  the response on the pyramid against one level in double precision, by
+//                                   scale; without models a made scan of --triangles
 #include <malloc.h>
 #include <sys/resource.h>
 
@@ -30,6 +28,8 @@
 #include "stages/parallel.h"
 #include "stages/ssf.h"
 #include "stages/ssf_component.h"
+#include "tests/bench/growth.h"
+#include "tests/support/pyramid_accuracy.h"
 
 namespace {
 
@@ -135,30 +135,19 @@ void print_growth(const std::vector<int>& sizes, const RunContext& context) {
     const std::size_t before = live_bytes;
     const double start = seconds(), start_cpu = processor_seconds();
     const ScaleMap map = filter_scale_space(mesh, {}, context);
-    wall.push_back(std::log(seconds() - start));
-    cpu.push_back(std::log(processor_seconds() - start_cpu));
-    x.push_back(std::log(static_cast<double>(mesh.mesh.triangles.size())));
+    wall.push_back(seconds() - start);
+    cpu.push_back(processor_seconds() - start_cpu);
+    x.push_back(static_cast<double>(mesh.mesh.triangles.size()));
     std::printf("%10zu %10zu %9.2f %9.2f %9.0f ", mesh.mesh.triangles.size(), mesh.mesh.positions.size(),
-                std::exp(wall.back()), std::exp(cpu.back()), 1e-6 * static_cast<double>(peak_bytes - before));
+                wall.back(), cpu.back(), 1e-6 * static_cast<double>(peak_bytes - before));
     for (int i : {1, 5, 10, 15, 20})
       std::printf(" %td", std::count_if(map.persistence.begin(), map.persistence.end(),
                                         [&](int p) { return p >= i; }));
     std::printf("\n");
     std::fflush(stdout);
   }
-  const auto slope = [&](const std::vector<double>& y) {
-    double mx = 0, my = 0, top = 0, bottom = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      mx += x[i] / static_cast<double>(x.size());
-      my += y[i] / static_cast<double>(x.size());
-    }
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      top += (x[i] - mx) * (y[i] - my);
-      bottom += (x[i] - mx) * (x[i] - mx);
-    }
-    return top / bottom;
-  };
-  if (x.size() > 1) std::printf("time exponent: wall %.2f, cpu %.2f\n", slope(wall), slope(cpu));
+  if (x.size() > 1)
+    std::printf("time exponent: wall %.2f, cpu %.2f\n", growth_exponent(x, wall), growth_exponent(x, cpu));
 }
 
 void print_bandwidth(int triangles, const RunContext& context) {
@@ -173,118 +162,18 @@ void print_bandwidth(int triangles, const RunContext& context) {
       level.laplacian.bound);
 }
 
-struct Difference {
-  double error = 0, flips = 0, significant = 0;
-};
-
-/// Of `flow` at some vertices against the truth there: relative error, and the share of components of the
-/// response that have the wrong sign, all of them and those above a tenth of the rms.
-std::vector<Vec3d> normals(const SurfaceComponent& c, const HeatFlow& truth) {
-  std::vector<Vec3d> n(c.points.size());
-  const auto at = [&](std::uint32_t v) { return c.points[v] + to_double(truth.moved[v]); };
-  for (std::size_t h = 0; h < c.corners.size(); h += 3) {
-    const Vec3d a = at(c.corners[h]), m = cross(at(c.corners[h + 1]) - a, at(c.corners[h + 2]) - a);
-    for (std::size_t k = 0; k < 3; ++k) n[c.corners[h + k]] = n[c.corners[h + k]] + m;
-  }
-  for (Vec3d& v : n) v = normalized(v);
-  return n;
-}
-
-Difference compare_n(const std::vector<Vec3d>& n, const HeatFlow& flow, const HeatFlow& truth,
-                     const std::vector<std::uint32_t>& vertex) {
-  double difference = 0, size = 0, tangential = 0;
-  for (std::size_t v = 0; v < vertex.size(); ++v) {
-    const Vec3d t = to_double(truth.response[vertex[v]]);
-    const double a = dot(to_double(flow.response[v]), n[vertex[v]]), b = dot(t, n[vertex[v]]);
-    difference += (a - b) * (a - b);
-    size += b * b;
-    tangential += dot(t, t) - b * b;
-  }
-  Difference out;
-  const double count = static_cast<double>(vertex.size()), limit = 0.1 * std::sqrt(size / count);
-  for (std::size_t v = 0; v < vertex.size(); ++v) {
-    const double a = dot(to_double(flow.response[v]), n[vertex[v]]),
-                 b = dot(to_double(truth.response[vertex[v]]), n[vertex[v]]);
-    const bool flip = (a < 0) != (b < 0);
-    out.significant += (flip && std::fabs(b) > limit) / count;
-  }
-  out.error = std::sqrt(difference / size);
-  out.flips = std::sqrt(tangential / size);
-  return out;
-}
-
-Difference compare(const HeatFlow& flow, const HeatFlow& truth, const std::vector<std::uint32_t>& vertex) {
-  double difference = 0, size = 0;
-  for (std::size_t v = 0; v < vertex.size(); ++v)
-    for (int k = 0; k < 3; ++k) {
-      const double a = flow.response[v][k], b = truth.response[vertex[v]][k];
-      difference += (a - b) * (a - b);
-      size += b * b;
-    }
-  Difference out;
-  const double count = 3 * static_cast<double>(vertex.size()), limit = 0.1 * std::sqrt(size / count);
-  for (std::size_t v = 0; v < vertex.size(); ++v)
-    for (int k = 0; k < 3; ++k) {
-      const double a = flow.response[v][k], b = truth.response[vertex[v]][k];
-      const bool flip = (a < 0) != (b < 0);
-      out.flips += flip / count;
-      out.significant += (flip && std::fabs(b) > limit) / count;
-    }
-  out.error = std::sqrt(difference / size);
-  return out;
-}
-
 void print_accuracy(const std::string& name, const ConditionedMesh& mesh, const SsfOptions& options,
                     const RunContext& context) {
-  SurfaceComponent c = largest_surface(mesh);
-  const SigmaLadder ladder = make_sigma_ladder(options.sigma_max * c.diagonal / c.mean_edge, options);
-  const std::span<const double> times(ladder.time.data(), static_cast<std::size_t>(options.scales));
-  HeatLevel level = finest_level(c.points, c.corners, 1, options.rate_cap);
-  std::printf("%s: %zu vertices, %.1f %% of edges capped, bound %.0f\n", name.c_str(), c.points.size(),
-              100 * level.laplacian.capped, level.laplacian.bound);
-  double start = seconds();
-  const auto truth = diffuse(level.laplacian, c.points, 0, times, context, HeatPrecision::kDouble);
-  std::printf("  double %.1f s, ", seconds() - start);
-  start = seconds();
-  const auto single = diffuse(level.laplacian, c.points, 0, times, context);
-  std::printf("single %.1f s\n", seconds() - start);
-  std::vector<std::uint32_t> vertex = level.vertex;
-  const std::vector<std::uint32_t> all = vertex;
-  std::vector<std::vector<Vec3d>> states{c.points};
-  std::vector<double> state_times{0};
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    if (!carries(level, ladder.sigma[i], options.error_ratio) && i > 0) {
-      HeatLevel coarse = coarsen(level, seed_radius(ladder.sigma[i], options.error_ratio), options.rate_cap);
-      std::size_t s = states.size() - 1;
-      const double wanted = handover_sigma(ladder.sigma[i]);
-      while (s > 0 && state_times[s - 1] > 0 && std::sqrt(2 * state_times[s]) > wanted) --s;
-      std::vector<Vec3d> points;
-      for (std::size_t v = 0; v < coarse.vertex.size(); ++v) {
-        vertex[v] = vertex[coarse.vertex[v]];
-        points.push_back(states[s][coarse.vertex[v]]);
-      }
-      vertex.resize(coarse.vertex.size());
-      states = {std::move(points)};
-      state_times = {state_times[s]};
-      level = std::move(coarse);
-    }
-    const std::vector<HeatFlow> flow =
-        diffuse(level.laplacian, states.back(), state_times.back(), times.subspan(i, 1), context);
-    const Difference one = compare(single[i], truth[i], all), pyramid = compare(flow[0], truth[i], vertex);
-    std::printf(
-        "  S%-2zu sigma %6.2f  single: error %.4f %% flips %.4f %%   pyramid: %8zu vertices, bound %5.0f, "
-        "error %6.3f %% "
-        "flips %.3f %% significant %.3f %%\n",
-        i + 1, ladder.sigma[i], 100 * one.error, 100 * one.flips, vertex.size(),
-        level.laplacian.bound * level.spacing * level.spacing, 100 * pyramid.error, 100 * pyramid.flips,
-        100 * pyramid.significant);
-    const Difference nn = compare_n(normals(c, truth[i]), flow[0], truth[i], vertex);
-    std::printf("     normal part: error %6.3f %%  significant flips %.3f %%   tangential/normal %.3f\n",
-                100 * nn.error, 100 * nn.significant, nn.flips);
-    states.push_back(states.back());
-    for (std::size_t v = 0; v < vertex.size(); ++v)
-      states.back()[v] = states.back()[v] + to_double(flow[0].moved[v]);
-    state_times.push_back(times[i]);
+  const SurfaceComponent c = largest_surface(mesh);
+  std::printf("%s: %zu vertices\n%5s %9s | %8s %8s | %9s %6s %8s %8s %12s\n", name.c_str(), c.points.size(),
+              "scale", "sigma", "single %", "flips %", "pyramid", "bound", "error %", "flips %",
+              "significant %");
+  const std::vector<testing::ScaleAccuracy> scales = testing::measure_pyramid(c, options, context);
+  for (std::size_t i = 0; i < scales.size(); ++i) {
+    const testing::ScaleAccuracy& s = scales[i];
+    std::printf("  S%-2zu %9.2f | %8.4f %8.4f | %9zu %6.0f %8.3f %8.3f %12.3f\n", i + 1, s.sigma,
+                100 * s.single.error, 100 * s.single.flips, s.vertices, s.bound, 100 * s.pyramid.error,
+                100 * s.pyramid.flips, 100 * s.pyramid.significant);
   }
 }
 

@@ -57,7 +57,7 @@ int count_near(const Pixels& p, Srgb colour, int tolerance = 40) {
 ScaleMap map_of(const ConditionedMesh& mesh) {
   ScaleMap map;
   map.scales = 8;
-  map.sigma.assign(9, 0.5f);
+  map.sigma.assign(9, 0.001f);
   for (Vec3f p : mesh.mesh.positions) map.persistence.push_back(p.y > 0.3f ? 8 : 0);
   return map;
 }
@@ -102,6 +102,29 @@ TEST(DebugView, PersistencePaintsEveryVertex) {
   EXPECT_EQ(picture.height_px, 64u);
   EXPECT_GT(count_near(picture, colour_of(1)), 50);
   EXPECT_THROW(view_persistence(mesh, {}), StageError);
+}
+
+TEST(DebugView, FeaturesArePaintedToHalfTheDistanceThatTheyKeep) {
+  const ConditionedMesh mesh = condition_mesh(testing::sphere(120, 180), false, {}, kOneThread);
+  ScaleMap map = map_of(mesh);
+  std::uint32_t feature = 0;
+  for (std::uint32_t p = 0; p < map.persistence.size(); ++p)
+    if (mesh.mesh.positions[p].x > mesh.mesh.positions[feature].x) feature = p;
+  map.persistence.assign(map.persistence.size(), 0);
+  map.persistence[feature] = 8;
+  std::size_t alone = 0, near = 0;
+  for (const float sigma : {0.001f, 100.0f}) {  // the second one is held at the component's largest
+    map.sigma.assign(9, sigma);
+    const DebugView view = view_persistence(mesh, map);
+    for (std::size_t w = 0; w < mesh.mesh.wedge_count(); ++w) {
+      if (view.mesh.colours[w].x < 0.9f) continue;
+      const Vec3f p = mesh.mesh.positions[mesh.mesh.wedge_position[w]];
+      EXPECT_LT(length(p - mesh.mesh.positions[feature]), sigma < 1 ? 1e-6f : 0.05f);
+      ++(sigma < 1 ? alone : near);
+    }
+  }
+  EXPECT_GE(alone, 1u);
+  EXPECT_GT(near, 3 * alone);
 }
 
 TEST(DebugView, SkeletonIsLines) {

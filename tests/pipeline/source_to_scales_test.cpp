@@ -243,6 +243,49 @@ TEST_F(SourceToScales, MillimetresTenThousandKilometresAway) {
   }
 }
 
+TEST_F(SourceToScales, NamesMaterialsNormalsAndColoursSurviveToEveryScale) {
+  constexpr int kSide = 16, kPoints = (kSide + 1) * (kSide + 1);
+  GltfBuilder b = sheet(kSide);
+  std::vector<float> normals, colours;
+  for (int i = 0; i < kPoints; ++i) {
+    normals.insert(normals.end(), {0.6f, 0, 0.8f});
+    colours.insert(colours.end(), {0.25f, 0.5f, i < kPoints / 2 ? 0.75f : 1.0f});
+  }
+  Json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["NORMAL"] = b.attribute(normals, "VEC3");
+  attributes["COLOR_0"] = b.attribute(colours, "VEC3");
+  b.push("materials", {{"name", "stone"}});
+  b.push("materials", {{"name", "brick \u00e4"}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  b.json["meshes"].push_back(b.json["meshes"][0]);
+  b.json["meshes"][1]["primitives"][0]["material"] = 1;
+  b.json["nodes"][0]["name"] = "left \"wing\"";
+  b.node({{"mesh", 1}, {"name", "right"}, {"translation", {30, 0, 0}}});
+  for (MeshCodec codec : {MeshCodec::kDraco, MeshCodec::kMeshopt, MeshCodec::kQuantized, MeshCodec::kNone}) {
+    CompileOptions options;
+    options.scales.mesh_codec = codec;
+    Package package = compile("m.glb", b.glb(), options);
+    ASSERT_GT(package.reader->manifest().scales.size(), 2u);
+    for (const auto& scale : package.reader->manifest().scales) {
+      const Json json = package.glb_json(scale.scale);
+      ASSERT_EQ(json["nodes"].size(), 2u);
+      EXPECT_EQ(json["nodes"][0]["name"], "left \"wing\"");
+      EXPECT_EQ(json["nodes"][1]["name"], "right");
+      ASSERT_EQ(json["materials"].size(), 2u);
+      EXPECT_EQ(json["materials"][1]["name"], "brick \u00e4");
+      const Mesh mesh = package.import_scale(scale.scale).model.mesh;
+      ASSERT_EQ(mesh.normals.size(), mesh.wedge_count());
+      ASSERT_EQ(mesh.colours.size(), mesh.wedge_count());
+      for (const Vec3f& n : mesh.normals) EXPECT_LT(length(n - Vec3f{0.6f, 0, 0.8f}), 0.03f);
+      for (const Vec4f& c : mesh.colours) {
+        EXPECT_NEAR(c.x, 0.25, 0.005);
+        EXPECT_NEAR(c.y, 0.5, 0.005);
+        EXPECT_TRUE(std::fabs(c.z - 0.75f) < 0.005f || c.z > 0.995f);
+      }
+    }
+  }
+}
+
 TEST_F(SourceToScales, TangentsSurviveToEveryScale) {
   constexpr int kSide = 16;
   GltfBuilder b = sheet(kSide);

@@ -30,6 +30,7 @@ inline ConditionedMesh condition(const Mesh& mesh) { return condition_mesh(mesh,
 
 inline NestedScales run(const ConditionedMesh& mesh, SimplificationOptions options = {}, int scales = 12) {
   options.min_triangles = std::min(options.min_triangles, 20);
+  options.coarsest_vertices = 0;
   return simplify(mesh, random_scale_map(mesh.mesh.positions.size(), scales), options, kOneThread);
 }
 

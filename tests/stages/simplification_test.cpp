@@ -74,7 +74,8 @@ TEST(Simplification, KeepsBordersOfSheets) {
 TEST(Simplification, MeetsVertexTargetsWhereNothingLocks) {
   const ConditionedMesh mesh = condition(sheet(40, 0.2f));
   const ScaleMap map = random_scale_map(mesh.mesh.positions.size());
-  const NestedScales scales = simplify(mesh, map, {.min_triangles = 20, .coarsest = 1}, kOneThread);
+  const NestedScales scales =
+      simplify(mesh, map, {.min_triangles = 20, .coarsest = 1, .coarsest_vertices = 0}, kOneThread);
   for (const NestedScale& s : scales.scales) {
     const auto asked = static_cast<std::uint32_t>(std::count_if(
         map.persistence.begin(), map.persistence.end(), [&](std::uint8_t p) { return p >= s.scale; }));
@@ -99,6 +100,20 @@ TEST(Simplification, CoarsestScaleIsSmallWhereMuchPersists) {
   EXPECT_GE(last(1).position_count, mesh.mesh.positions.size() / 3);
   EXPECT_EQ(last(0.05).position_count, std::lround(0.05 * static_cast<double>(mesh.mesh.positions.size())));
   EXPECT_EQ(last(0.05).scale, 12);
+}
+
+TEST(Simplification, CoarsestScaleHasEnoughVerticesForAFirstPicture) {
+  const ConditionedMesh mesh = condition(sheet(60, 0.1f));  // 3721 positions
+  const ScaleMap map = random_scale_map(mesh.mesh.positions.size(), 20);
+  const auto coarsest = [&](int vertices) {
+    const NestedScales scales =
+        simplify(mesh, map, {.min_triangles = 20, .coarsest_vertices = vertices}, kOneThread);
+    expect_sound(scales);
+    return scales.scales.back().position_count;
+  };
+  EXPECT_LT(coarsest(0), 20u);
+  EXPECT_EQ(coarsest(100), 100u);
+  EXPECT_EQ(coarsest(400), 186u);  // a 20th of them is less
 }
 
 TEST(Simplification, CubeOfTwelveTrianglesStaysAsItIs) {

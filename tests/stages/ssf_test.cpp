@@ -346,6 +346,33 @@ TEST(RangeScan, UnequalSpacingSeesTheSameShape) {
   EXPECT_LT(dense.crossings_at[4], even.crossings_at[4] * 5);
 }
 
+TEST(RangeScan, SigmaEndsWhereTheSignalHasConverged) {
+  // Waves of a tenth of the height: gone long before 0.5 of the diagonal.
+  RangeGrid g = relief_grid(120, 90, 0);
+  for (std::uint32_t y = 0; y < g.rows; ++y)
+    for (std::uint32_t x = 0; x < g.columns; ++x)
+      g.radius[y * g.columns + x] += static_cast<float>(0.05 * portable::sin(12 * g.alpha_step_rad * x) *
+                                                        portable::sin(2 * portable::kPi * 10 * y / g.rows));
+  const SsfOptions far{.sigma_max = 0.5, .convergence = 0}, ends{.sigma_max = 0.5, .convergence = 0.3};
+  const ScaleMap whole = filter_range_scan(g, 120 * 90, far, RunContext{}),
+                 ended = filter_range_scan(g, 120 * 90, ends, RunContext{});
+  EXPECT_LT(ended.sigma[20], 0.5f * whole.sigma[20]);
+  EXPECT_FLOAT_EQ(ended.sigma[1], whole.sigma[1]);
+  EXPECT_LT(ended.convergence[20], 0.3f);
+  EXPECT_GE(ended.convergence[19], 0.3f);
+  EXPECT_LT(whole.convergence[20], 0.05f);
+}
+
+TEST(Ssf, SigmaEndsWhereTheSurfaceHasConverged) {
+  const Mesh m = testing::bumpy_sphere(40, 60);
+  const ScaleMap whole = run(m, {.sigma_max = 0.5, .convergence = 0}),
+                 ended = run(m, {.sigma_max = 0.5, .convergence = 0.6});
+  EXPECT_FLOAT_EQ(ended.sigma[1], whole.sigma[1]);
+  EXPECT_LT(ended.sigma[20], 0.9f * whole.sigma[20]);
+  EXPECT_NEAR(ended.convergence[20], 0.6, 0.05);
+  EXPECT_LT(whole.convergence[20], 0.5f);
+}
+
 TEST(RangeScan, HolesPositionsAndThreads) {
   RangeGrid g = relief_grid(90, 50, 0.05);
   for (std::size_t i = 0; i < g.radius.size(); i += 7) g.radius[i] = 0;
@@ -418,7 +445,7 @@ double spearman(const std::vector<double>& a, const std::vector<double>& b) {
 
 /// A vase with relief of many sizes; sharp detail here, smooth there, so that persistence differs from place
 /// to place.
-RangeGrid vase(std::uint32_t columns, std::uint32_t rows) {
+RangeGrid vase(std::uint32_t columns, std::uint32_t rows, double bulge = 0.1) {
   RangeGrid g = relief_grid(columns, rows, 0);
   g.y_step = 3.0f / 80;
   for (std::uint32_t y = 0; y < rows; ++y)
@@ -428,7 +455,7 @@ RangeGrid vase(std::uint32_t columns, std::uint32_t rows) {
       const double middle = 0.02 * portable::sin(5 * a - 4 * h) * (0.5 + 0.5 * portable::sin(a + 1));
       const double fine =
           0.008 * portable::sin(13 * a) * portable::sin(14 * h) * (0.5 - 0.5 * portable::sin(a + 1));
-      g.radius[y * columns + x] = static_cast<float>(1 + 0.1 * portable::sin(h) + coarse + middle + fine);
+      g.radius[y * columns + x] = static_cast<float>(1 + bulge * portable::sin(h) + coarse + middle + fine);
     }
   return g;
 }
@@ -453,9 +480,9 @@ std::vector<double> around(const std::vector<std::uint8_t>& crossing, const Rang
 
 /// Spearman of both persistences of a vase 7.5 radii high over the rows that no Gaussian reaches from its
 /// ends, for sigmas from a sample to a fifth of the radius.
-double agreement(double window, double range_band) {
+double agreement(double window, double range_band, double bulge = 0.1) {
   const std::uint32_t columns = 160, rows = 200;
-  const RangeGrid g = vase(columns, rows);
+  const RangeGrid g = vase(columns, rows, bulge);
   const double height = 3.0 / 80 * rows, diagonal = std::sqrt(8 * 1.15 * 1.15 + height * height);
   // One level: the coarser ones of the pyramid mark fewer vertices than there are samples on a crossing.
   SsfOptions options{.scales = 10, .sigma_max = 0.2 / diagonal, .convergence = 0, .error_ratio = 1000};
@@ -470,6 +497,7 @@ double agreement(double window, double range_band) {
 TEST(RangeScan, PersistenceRanksAsThatOfTheMesh) {
   // The same Gaussian and the same band: what is left is that a mesh's curvature is taken along its normals.
   EXPECT_GT(agreement(4, SsfOptions{}.band), 0.88);
+  std::printf("XX %f %f %f %f\n", agreement(1.4, 0), agreement(1.4, 0, 0), agreement(4, 0, 0), agreement(1.4, 2.75, 0));
   // As the thesis has it: a window of 1.4 sigma, and a LoG that keeps the base shape's curvature.
   EXPECT_GT(agreement(SsfOptions{}.window, SsfOptions{}.range_band), 0.74);
 }
