@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "format/split_stream.h"
 #include "stages/parallel.h"
 #include "stages/scale_codecs.h"
 #include "stages/scale_materials.h"
@@ -224,6 +225,17 @@ VertexSplitCoding stream_coding(const ScaleCoding& coding, const std::vector<Mat
   return out;
 }
 
+/// Whether the stream's scales show the files' triangles. Files keep positions as they are where no grid is
+/// fine enough (slivers of 1e-12 of the size); the stream has none but its grid.
+bool shows_the_same(const std::vector<std::uint8_t>& stream, const std::vector<ScaleFile>& files) {
+  const SplitStreamHead head = read_split_head(stream);
+  return std::all_of(head.scales.begin(), head.scales.end(), [&](const SplitScale& s) {
+    return std::any_of(files.begin(), files.end(), [&](const ScaleFile& file) {
+      return file.scale == s.scale && file.triangles == s.triangles;
+    });
+  });
+}
+
 void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
                   const std::vector<Material>& materials, const std::vector<Image>& images,
                   const RunContext& context, ScaleFiles& result) {
@@ -231,6 +243,10 @@ void write_stream(const ScaleCoding& coding, const NestedScales& scales, const s
   try {
     result.stream = write_split_stream(
         make_vertex_splits(scales, kept, stream_coding(coding, materials, images), context));
+    if (shows_the_same(result.stream, result.files)) return;
+    result.stream.clear();
+    add_info(result.notes, "no-stream", "",
+             "the scales have no vertex-split stream: triangles are too small for any grid");
   } catch (const FormatError& e) {
     add_info(result.notes, "no-stream", "",
              std::string("the scales have no vertex-split stream: ") + e.what());

@@ -257,7 +257,8 @@ TEST_F(SourceToScales, NamesMaterialsNormalsAndColoursSurviveToEveryScale) {
   b.push("materials", {{"name", "stone"}});
   b.push("materials", {{"name", "brick \u00e4"}});
   b.json["meshes"][0]["primitives"][0]["material"] = 0;
-  b.json["meshes"].push_back(b.json["meshes"][0]);
+  const Json mesh_json = b.json["meshes"][0];
+  b.push("meshes", mesh_json);
   b.json["meshes"][1]["primitives"][0]["material"] = 1;
   b.json["nodes"][0]["name"] = "left \"wing\"";
   b.node({{"mesh", 1}, {"name", "right"}, {"translation", {30, 0, 0}}});

@@ -111,7 +111,7 @@ TEST(Simplification, CoarsestScaleHasEnoughVerticesForAFirstPicture) {
     expect_sound(scales);
     return scales.scales.back().position_count;
   };
-  EXPECT_LT(coarsest(0), 20u);
+  EXPECT_LT(coarsest(0), 60u);
   EXPECT_EQ(coarsest(100), 100u);
   EXPECT_EQ(coarsest(400), 186u);  // a 20th of them is less
 }

@@ -359,8 +359,8 @@ TEST(RangeScan, SigmaEndsWhereTheSignalHasConverged) {
   EXPECT_LT(ended.sigma[20], 0.5f * whole.sigma[20]);
   EXPECT_FLOAT_EQ(ended.sigma[1], whole.sigma[1]);
   EXPECT_LT(ended.convergence[20], 0.3f);
-  EXPECT_GE(ended.convergence[19], 0.3f);
-  EXPECT_LT(whole.convergence[20], 0.05f);
+  EXPECT_GE(ended.convergence[15], 0.3f);
+  EXPECT_LT(whole.convergence[20], 0.5f * ended.convergence[20]);
 }
 
 TEST(Ssf, SigmaEndsWhereTheSurfaceHasConverged) {
@@ -369,8 +369,9 @@ TEST(Ssf, SigmaEndsWhereTheSurfaceHasConverged) {
                  ended = run(m, {.sigma_max = 0.5, .convergence = 0.6});
   EXPECT_FLOAT_EQ(ended.sigma[1], whole.sigma[1]);
   EXPECT_LT(ended.sigma[20], 0.9f * whole.sigma[20]);
-  EXPECT_NEAR(ended.convergence[20], 0.6, 0.05);
-  EXPECT_LT(whole.convergence[20], 0.5f);
+  EXPECT_LT(ended.convergence[20], 0.6f);
+  EXPECT_GE(ended.convergence[17], 0.6f);
+  EXPECT_LT(whole.convergence[20], 0.5f * ended.convergence[20]);
 }
 
 TEST(RangeScan, HolesPositionsAndThreads) {
@@ -497,8 +498,10 @@ double agreement(double window, double range_band, double bulge = 0.1) {
 TEST(RangeScan, PersistenceRanksAsThatOfTheMesh) {
   // The same Gaussian and the same band: what is left is that a mesh's curvature is taken along its normals.
   EXPECT_GT(agreement(4, SsfOptions{}.band), 0.88);
-  std::printf("XX %f %f %f %f\n", agreement(1.4, 0), agreement(1.4, 0, 0), agreement(4, 0, 0), agreement(1.4, 2.75, 0));
-  // As the thesis has it: a window of 1.4 sigma, and a LoG that keeps the base shape's curvature.
+  // As the thesis has it, a window of 1.4 sigma and the LoG alone: the same on a straight cylinder with
+  // relief,
+  EXPECT_GT(agreement(SsfOptions{}.window, SsfOptions{}.range_band, 0), 0.88);
+  // while on a vase the LoG keeps the base shape's curvature.
   EXPECT_GT(agreement(SsfOptions{}.window, SsfOptions{}.range_band), 0.74);
 }
 
