@@ -15,6 +15,7 @@ constexpr double kDefaultDisplayPx = 512;
 constexpr double kReferenceTexels = 8e6;  // of all colours together: finer ones cost memory and show nothing
 constexpr double kTexelsPerByte = 40;     // more texels than that are never worth a byte
 constexpr std::uint32_t kLeastSide = 4;
+constexpr double kWholeBlocks = 16;
 
 class NoFiles : public Resolver {
   std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
@@ -80,7 +81,8 @@ ShownModel shown(const Model& model) {
 std::string image_name(std::uint32_t image) { return std::to_string(image); }
 
 std::uint32_t side_of(std::uint32_t full, double share) {
-  const double side = std::floor(static_cast<double>(full) * share + 0.5);
+  double side = std::floor(static_cast<double>(full) * share + 0.5);
+  if (side >= 8 * kWholeBlocks && side < full) side = std::floor(side / kWholeBlocks + 0.5) * kWholeBlocks;
   return static_cast<std::uint32_t>(
       std::clamp(side, std::min<double>(kLeastSide, full), static_cast<double>(full)));
 }

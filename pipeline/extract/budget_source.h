@@ -50,7 +50,8 @@ ShownModel shown(const Model& model);
 /// As import names "texture/<image>": without the folder.
 std::string image_name(std::uint32_t image);
 
-/// A side of a texture made smaller.
+/// A side of a texture made smaller. Of 128 px and more a multiple of 16, so that viewers can halve it
+/// several times: smaller copies of odd sizes lie beside their place.
 std::uint32_t side_of(std::uint32_t full, double share);
 
 MipTexture decoded_texture(const std::vector<std::uint8_t>& file);

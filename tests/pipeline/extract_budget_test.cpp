@@ -98,6 +98,18 @@ TEST(Recode, NormalsAreFittedToTheLightAskedFor) {
   EXPECT_GT(height(lit), height(same) + 0.2);
 }
 
+TEST(SideOf, LargeSidesCanBeHalvedSeveralTimes) {
+  for (const std::uint32_t full : {100u, 678u, 2048u, 4096u})
+    for (double share = 1; share > 0.001; share *= 0.97) {
+      const std::uint32_t side = side_of(full, share);
+      EXPECT_GE(side, 4u);
+      EXPECT_LE(side, full);
+      EXPECT_TRUE(side < 128 || side == full || side % 16 == 0) << full << " " << share << " " << side;
+      EXPECT_NEAR(side, full * share, share * full >= 120 ? 8.5 : 4) << full << " " << share;
+    }
+  EXPECT_EQ(side_of(3, 0.5), 3u);
+}
+
 TEST(MeshCandidates, ForgottenOnesAreMadeAgainAlike) {
   PackageReader package(open_store(kGolden));
   ExtractRequest request;

@@ -133,6 +133,25 @@ TEST(Flip, IsNothingForEqualPicturesAndGrowsWithTheDifference) {
   EXPECT_GT(flip_of(prepare_flip(white), prepare_flip(black)), 0.9);
 }
 
+TEST(Flip, EmptyBackgroundAroundDoesNotMatter) {
+  const auto in_corner = [](std::uint32_t side, float value) {
+    Picture p;
+    p.side_px = side;
+    for (std::uint32_t y = 0; y < side; ++y)
+      for (std::uint32_t x = 0; x < side; ++x) {
+        const bool object = x >= 40 && x < 60 && y >= 30 && y < 66;
+        p.linear.push_back(object ? Vec3f{value, (x / 3) % 2 ? 0.5f : 0.2f, value} : Vec3f{0.2f, 0.2f, 0.2f});
+        p.covered.push_back(object);
+      }
+    return p;
+  };
+  const auto flip = [&](std::uint32_t side) {
+    return flip_of(prepare_flip(in_corner(side, 0.5f)), prepare_flip(in_corner(side, 0.4f)));
+  };
+  EXPECT_GT(flip(100), 0.01);
+  EXPECT_NEAR(flip(100), flip(240), 1e-6);
+}
+
 TEST(Flip, SeesTexture) {
   const FlipPicture reference = prepare_flip(picture(48, 0.4f, 0.2f));
   EXPECT_GT(flip_of(reference, prepare_flip(picture(48, 0.4f, 0))),
