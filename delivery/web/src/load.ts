@@ -3,10 +3,10 @@ import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedMode
 import { displayOf } from './camera';
 import { Emitter } from './events';
 import { gpuIdle } from './gpu';
-import { isAbort, nowS, throwIfAborted } from './http';
+import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { PackageReader } from './package_reader';
-import { MaterialSet } from './scale_parts';
+import { MaterialSet, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
 import { wholeObject } from './viewing';
@@ -168,12 +168,21 @@ export class ModelLoad implements LoadedModel {
     });
     return { arrived: load.arrived, shown };
   }
-  /** Materials' programs before they are first drawn with: the page goes on while the GPU's process makes them. */
+  /** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
   private async compiled_(shape: Object3D): Promise<void> {
     const { renderer } = this.options_;
     let root = this.scene_;
     while (root.parent) root = root.parent;
+    await sleepS(0);
+    throwIfAborted(this.context_.signal);
     renderer.compile?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
+    await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
+    for (const material of this.materialSet_.all)
+      for (const [, texture] of texturesOf(material)) {
+        await sleepS(0);
+        throwIfAborted(this.context_.signal);
+        renderer.initTexture?.(texture);
+      }
     await gpuIdle(renderer, mostCompileS);
   }
   /** In one turn of the page: what is drawn next is the new scale, whole. */
