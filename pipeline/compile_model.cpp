@@ -10,6 +10,7 @@
 #include "pipeline/file_resolver.h"
 #include "pipeline/library_versions.h"
 #include "pipeline/resource_error.h"
+#include "pipeline/wire_text.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -27,7 +28,8 @@ std::string lower_extension(const fs::path& path) {
 Json to_json(const Requests& requests) {
   Json list = Json::array();
   for (const FileRequest& r : requests)
-    list.push_back({{"uri", r.uri}, {"found", r.found}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
+    list.push_back(
+        {{"uri", to_wire(r.uri)}, {"found", r.found}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
   return list;
 }
 
@@ -37,7 +39,7 @@ std::optional<std::vector<std::string>> uris_of(const std::string& note) {
   std::vector<std::string> uris;
   for (const Json& r : list) {
     if (!r.is_object() || !r.contains("uri") || !r["uri"].is_string()) return std::nullopt;
-    uris.push_back(r["uri"].get<std::string>());
+    uris.push_back(from_wire(r["uri"].get<std::string>()));
   }
   return uris;
 }
@@ -65,9 +67,9 @@ class ModelSource {
     key.add_input("model", main_.digest, main_.bytes);
     for (const FileRequest& r : requests_)
       if (r.found)
-        key.add_input("file " + r.uri, r.digest, r.bytes);
+        key.add_input("file " + to_wire(r.uri), r.digest, r.bytes);
       else
-        key.add("input file " + r.uri, "not there");
+        key.add("input file " + to_wire(r.uri), "not there");
     std::vector<std::pair<std::string, std::string>> parts = key.parts();
     parts.erase(parts.begin(), parts.begin() + 3);  // schema, stage and version are the reading stage's own
     return parts;
@@ -91,7 +93,10 @@ class ModelSource {
     Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_.digest)}, {"bytes", main_.bytes}}});
     for (const FileRequest& r : requests_)
       if (r.found)
-        list.push_back({{"role", "file"}, {"uri", r.uri}, {"sha256", to_hex(r.digest)}, {"bytes", r.bytes}});
+        list.push_back({{"role", "file"},
+                        {"uri", readable_name(r.uri)},
+                        {"sha256", to_hex(r.digest)},
+                        {"bytes", r.bytes}});
     return list;
   }
 

@@ -44,6 +44,7 @@ std::string message(int error) { return std::generic_category().message(error); 
 [[noreturn]] void fail_to_read(const std::string& name, const std::string& place, const char* expected,
                                int error) {
   switch (error) {
+    case EACCES:  // another moment or another user may read it: not the model is wrong
     case EIO:
     case EMFILE:
     case ENFILE:
@@ -182,7 +183,6 @@ int FileResolver::open_regular(const std::string& uri) {
   switch (errno) {
     case ENOENT:
     case ENOTDIR:
-    case EACCES:
     case ENAMETOOLONG:
       return -1;
     case ELOOP:

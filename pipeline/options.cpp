@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "format/errors.h"
+#include "pipeline/wire_text.h"
 
 namespace texmesh {
 namespace {
@@ -225,6 +226,7 @@ std::vector<OptionField> list_options(CompileOptions& options) {
 std::string option_text(const OptionField& field) { return to_json(field).dump(); }
 
 void set_option(OptionField& field, const std::string& text, const std::string& source) {
+  if (!is_utf8(text)) throw InputError(source, "", "UTF-8", readable_name(text));
   FieldReader(source, "").read(field, parse_text(field, text));
 }
 

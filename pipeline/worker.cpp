@@ -22,6 +22,7 @@
 #include "pipeline/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/core_path.h"
+#include "pipeline/wire_text.h"
 
 extern char** environ;
 
@@ -93,12 +94,14 @@ std::string job_text(const WorkerJob& job, const std::string& temporary, const W
                      int threads) {
   Json keys = Json::object();
   for (const auto& [stage, key] : job.earlier_keys) keys[stage] = to_hex(key);
-  return Json{{"input", job.input},
-              {"output", job.output},
-              {"temporary", temporary},
+  Json layers = Json::array();
+  for (const std::string& layer : job.cache.layers) layers.push_back(to_wire(layer));
+  return Json{{"input", to_wire(job.input)},
+              {"output", to_wire(job.output)},
+              {"temporary", to_wire(temporary)},
               {"profile", *job.profile},
-              {"cache", job.cache.folder},
-              {"layers", job.cache.layers},
+              {"cache", to_wire(job.cache.folder)},
+              {"layers", layers},
               {"upload", job.cache.upload},
               {"strict", job.strict},
               {"parent", ::getpid()},

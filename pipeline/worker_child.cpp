@@ -17,6 +17,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/compile_model.h"
 #include "pipeline/resource_error.h"
+#include "pipeline/wire_text.h"
 #include "pipeline/worker.h"
 
 namespace texmesh {
@@ -45,9 +46,10 @@ class EventWriter {
   std::mutex mutex_;
 };
 
-void limit(int resource, std::uint64_t value) {
+/// `more`: from the soft limit, which a signal tells of, to the hard one, which kills.
+void limit(int resource, std::uint64_t value, std::uint64_t more = 0) {
   if (value == 0) return;
-  const rlimit r{value, value};
+  const rlimit r{value, value + more};
   ::setrlimit(static_cast<__rlimit_resource>(resource), &r);
 }
 
@@ -59,7 +61,7 @@ void apply_limits(const Json& job) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers map terabytes of shadow
   limit(RLIMIT_AS, job.value("memory_bytes", std::uint64_t{0}));
 #endif
-  limit(RLIMIT_CPU, job.value("cpu_s", std::uint64_t{0}));
+  limit(RLIMIT_CPU, job.value("cpu_s", std::uint64_t{0}), 1);
   struct sigaction action {};
   action.sa_handler = [](int) { g_cancelled = true; };
   ::sigaction(SIGTERM, &action, nullptr);
@@ -118,9 +120,9 @@ Json explanation_event(const Stage& stage, const StageExplanation& e) {
 
 CompileRequest request_of(const Json& job) {
   CompileRequest request;
-  request.input = job.at("input").get<std::string>();
-  request.output = job.at("output").get<std::string>();
-  request.temporary = job.at("temporary").get<std::string>();
+  request.input = from_wire(job.at("input").get<std::string>());
+  request.output = from_wire(job.at("output").get<std::string>());
+  request.temporary = from_wire(job.at("temporary").get<std::string>());
   request.strict = job.at("strict").get<bool>();
   request.known = files_from_json(job.at("known").get<std::string>());
   for (const auto& [stage, key] : job.at("keys").items())
@@ -130,11 +132,12 @@ CompileRequest request_of(const Json& job) {
 }
 
 std::unique_ptr<Store> store_of(const Json& job) {
-  const std::string cache = job.at("cache").get<std::string>();
+  const std::string cache = from_wire(job.at("cache").get<std::string>());
   if (cache.empty()) return std::make_unique<NullStore>();
   std::unique_ptr<Store> store = open_disk_store(cache);
   std::vector<std::unique_ptr<CacheLayer>> layers;
-  for (const Json& place : job.at("layers")) layers.push_back(open_layer(place.get<std::string>()));
+  for (const Json& place : job.at("layers"))
+    layers.push_back(open_layer(from_wire(place.get<std::string>())));
   if (layers.empty()) return store;
   return layered_store(std::move(store), std::move(layers), job.at("upload").get<bool>());
 }
@@ -214,9 +217,10 @@ int worker_main() {
   } catch (const std::bad_alloc&) {
     const std::string limit_text =
         std::to_string(job.value("memory_bytes", std::uint64_t{0}) >> 20) + " MiB of memory";
-    return report_error(events, "resource",
-                        InputError(std::filesystem::path(job.value("input", "")).filename().string(), "",
-                                   "at most " + limit_text, "a need for more"));
+    return report_error(
+        events, "resource",
+        InputError(std::filesystem::path(from_wire(job.value("input", ""))).filename().string(), "",
+                   "at most " + limit_text, "a need for more"));
   } catch (const std::exception& e) {
     return report_error(events, "internal", StageError("texmesh", "", "", e.what())), kExitInternal;
   }

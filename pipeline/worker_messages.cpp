@@ -1,6 +1,7 @@
 // What parent and child tell each other about files.
 #include <nlohmann/json.hpp>
 
+#include "pipeline/wire_text.h"
 #include "pipeline/worker.h"
 
 namespace texmesh {
@@ -11,8 +12,8 @@ using Json = nlohmann::ordered_json;
 std::string files_to_json(const std::vector<FileRequest>& files) {
   Json list = Json::array();
   for (const FileRequest& r : files)
-    list.push_back({r.uri, r.found, to_hex(r.digest), r.bytes, r.stamp.device, r.stamp.inode, r.stamp.bytes,
-                    r.stamp.modified_ns, r.stamp.changed_ns});
+    list.push_back({to_wire(r.uri), r.found, to_hex(r.digest), r.bytes, r.stamp.device, r.stamp.inode,
+                    r.stamp.bytes, r.stamp.modified_ns, r.stamp.changed_ns});
   return list.dump();
 }
 
@@ -25,7 +26,7 @@ std::vector<FileRequest> files_from_json(const std::string& json) {
     if (!j.is_array() || j.size() != 9 || !j[0].is_string() || !j[2].is_string() ||
         !from_hex(j[2].get<std::string>(), r.digest))
       continue;
-    r.uri = j[0].get<std::string>();
+    r.uri = from_wire(j[0].get<std::string>());
     r.found = j[1].get<bool>();
     r.bytes = j[3].get<std::uint64_t>();
     r.stamp = {j[4].get<std::uint64_t>(), j[5].get<std::uint64_t>(), j[6].get<std::uint64_t>(),

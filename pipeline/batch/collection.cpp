@@ -61,6 +61,9 @@ class CollectionReader {
     if (!v.is_string() || v.get_ref<const std::string&>().empty() ||
         v.get_ref<const std::string&>().size() > kMaxPathBytes)
       fail(place + "/" + key, "a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes", v.dump());
+    for (const char c : v.get_ref<const std::string&>())
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+        fail(place + "/" + key, "a path without control characters", v.dump());
     return v.get<std::string>();
   }
 

@@ -40,6 +40,8 @@ void add_folder(const std::string& folder, std::vector<Found>& found) {
 }  // namespace
 
 bool is_range_scan(const std::string& path) {
+  std::error_code ec;
+  if (!fs::is_regular_file(path, ec)) return false;  // to open a FIFO is to wait
   std::ifstream in(path, std::ios::binary);
   std::string head(4096, '\0');
   in.read(head.data(), static_cast<std::streamsize>(head.size()));
@@ -49,15 +51,18 @@ bool is_range_scan(const std::string& path) {
 
 std::vector<std::string> list_models(const std::string& folder) {
   std::error_code ec;
-  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, ec), end;
+  fs::recursive_directory_iterator it(folder, ec), end;
   if (ec) throw InputError(folder, "", "a folder with models", ec.message());
   std::vector<std::string> models;
   const std::size_t prefix = folder.ends_with('/') ? folder.size() : folder.size() + 1;
-  for (; it != end; it.increment(ec)) {
-    if (ec) throw InputError(folder, "", "a folder that can be listed", ec.message());
+  while (it != end) {
     const std::string path = it->path().string();
-    if (it->path().filename().string().front() == '.') continue;
-    if (is_model(it->path()) && it->is_regular_file()) models.push_back(path.substr(prefix));
+    if (it->path().filename().string().front() == '.')
+      it.disable_recursion_pending();
+    else if (it->is_regular_file(ec) && is_model(it->path()))
+      models.push_back(path.substr(prefix));
+    it.increment(ec);  // a folder that is left out without a word is a collection without its models
+    if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
   }
   if (models.empty()) throw InputError(folder, "", "a folder with models", "none");
   std::sort(models.begin(), models.end(), path_less);

@@ -1,5 +1,8 @@
 #include "pipeline/batch/progress.h"
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,6 +31,25 @@ double share(const std::string& stage) {
 std::string sentence(const Json& note) {
   const std::string place = note.value("place", "");
   return note.value("code", "") + (place.empty() ? "" : " at " + place) + ": " + note.value("text", "");
+}
+
+/// Columns of the terminal behind standard output; 80 where nobody knows.
+std::size_t terminal_columns() {
+  winsize size{};
+  return ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+/// The end of a UTF-8 text that takes at most so many columns, "..." in front where something is missing.
+std::string last_columns(const std::string& text, std::size_t columns) {
+  const auto begins = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; };
+  if (static_cast<std::size_t>(std::count_if(text.begin(), text.end(), begins)) <= columns) return text;
+  if (columns < 4) return "";
+  std::size_t at = text.size();
+  for (std::size_t left = columns - 3; at > 0 && left > 0; --left) {
+    do --at;
+    while (at > 0 && !begins(text[at]));
+  }
+  return "..." + text.substr(at);
 }
 
 }  // namespace
@@ -126,8 +148,12 @@ void Progress::event(std::size_t model, const std::string& json_line) {
   const std::string stage = e.value("stage", "");
   if (event == "stage-started") {
     running_[model].stage = stage;
+  } else if (event == "stage-progress") {
+    running_[model].partial[stage] =
+        share(stage) * models_[model].weight * std::clamp(e.value("fraction", 0.0), 0.0, 1.0);
   } else if (event == "stage-finished") {
     const double part = share(stage) * models_[model].weight;
+    running_[model].partial.erase(stage);
     running_[model].fraction += part;
     done_weight_ += part;
     if (verbose_ && e.value("result", "") == "ran")
@@ -211,21 +237,23 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
     if (times > 1) line(fmt::format("cache: {} more times: {}", times - 1, text));
   const auto recalled =
       std::count_if(reports.begin(), reports.end(), [](const WorkerReport& r) { return r.ok() && !r.ran; });
+  const bool says_all = explain_ && recalled == models;
   if (explain_ && recalled > 0 && mode_ != OutputMode::kQuiet)
-    out_ << fmt::format("{} of {} models are up to date: no input, option or tool has changed\n", recalled,
-                        models);
-  else if (models >= 2 || cancelled > 0)
-    if (mode_ != OutputMode::kQuiet || failed + cancelled > 0)
-      out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}\n", ok, same, failed,
-                          cancelled ? fmt::format(", {} cancelled", cancelled) : "", format_seconds(seconds));
+    out_ << recalled_text(recalled, reports.size()) << '\n';
+  if (!says_all && (models >= 2 || cancelled > 0) && (mode_ != OutputMode::kQuiet || failed + cancelled > 0))
+    out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}\n", ok, same, failed,
+                        cancelled ? fmt::format(", {} cancelled", cancelled) : "", format_seconds(seconds));
   out_ << std::flush;
 }
 
 void Progress::forecast_summary(std::size_t to_look_at, std::size_t models) {
   if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
-  line(fmt::format(
-      "{} of {} models are up to date: no input, option or tool has changed. Nothing was written.",
-      models - to_look_at, models));
+  line(recalled_text(static_cast<std::ptrdiff_t>(models - to_look_at), models) + ". Nothing was written.");
+}
+
+std::string Progress::recalled_text(std::ptrdiff_t recalled, std::size_t models) const {
+  return fmt::format("{} of {} models are up to date{}", recalled, models,
+                     recalled > 0 ? ": no input, option or tool has changed" : "");
 }
 
 void Progress::line(const std::string& text) {
@@ -233,7 +261,10 @@ void Progress::line(const std::string& text) {
 }
 
 double Progress::done_fraction() const {
-  return total_weight_ > 0 ? std::clamp(done_weight_ / total_weight_, 0.0, 1.0) : 1;
+  double done = done_weight_;
+  for (const auto& [model, running] : running_)
+    for (const auto& [stage, part] : running.partial) done += part;
+  return total_weight_ > 0 ? std::clamp(done / total_weight_, 0.0, 1.0) : 1;
 }
 
 std::string Progress::eta() const {
@@ -259,10 +290,12 @@ void Progress::redraw(bool now) {
   drawn_ = time;
   constexpr int kWidth = 24;
   const int filled = static_cast<int>(done_fraction() * kWidth);
-  std::string now_at = slowest();
-  if (now_at.size() > 48) now_at = "..." + now_at.substr(now_at.size() - 45);
-  out_ << fmt::format("\r\033[K[{:=<{}}{:<{}}] {}/{} {}{}", "", filled, "", kWidth - filled, finished_count_,
-                      models_.size(), now_at, eta())
+  const std::string before = fmt::format("[{:=<{}}{:<{}}] {}/{} ", "", filled, "", kWidth - filled,
+                                         finished_count_, models_.size()),
+                    left = eta(), after = running_.empty() && !left.empty() ? left.substr(2) : left;
+  // A line that wraps cannot be drawn over.
+  const std::size_t columns = terminal_columns(), taken = before.size() + after.size() + 1;
+  out_ << "\r\033[K" << before << last_columns(slowest(), columns > taken ? columns - taken : 0) << after
        << std::flush;
 }
 

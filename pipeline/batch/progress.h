@@ -40,11 +40,13 @@ class Progress {
   struct Running {
     std::string stage;
     std::chrono::steady_clock::time_point start;
-    double fraction = 0;  // of its weight
+    double fraction = 0;                    // of its weight: stages that are done
+    std::map<std::string, double> partial;  // and of stages that are not: how far they are
   };
   void line(const std::string& text);  // a lasting line
   void redraw(bool now);
   double done_fraction() const;
+  std::string recalled_text(std::ptrdiff_t recalled, std::size_t models) const;
   std::string eta() const;
   std::string slowest() const;
 

@@ -136,13 +136,19 @@ std::string write_junit(const std::vector<PlannedModel>& models, const std::vect
     const WorkerReport& r = reports[i];
     out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"",
                        xml(utf8(models[i].name)), r.seconds);
-    if (r.ok())
-      out += "/>\n";
-    else if (r.result == ModelResult::kCancelled)
-      out += "><skipped message=\"not reached\"/></testcase>\n";
-    else
-      out += fmt::format("><failure type=\"{}\" message=\"{}\"/></testcase>\n", xml(r.error_kind),
+    out += fmt::format(
+        ">\n<properties><property name=\"result\" value=\"{}\"/><property name=\"output\" value=\"{}\"/>"
+        "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
+        "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
+        "</properties>\n",
+        result_name(r.result), xml(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes,
+        r.stages_ran, r.stages_hit);
+    if (r.result == ModelResult::kCancelled)
+      out += "<skipped message=\"not reached\"/>\n";
+    else if (!r.ok())
+      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", xml(r.error_kind),
                          xml(utf8(r.error_message)));
+    out += "</testcase>\n";
   }
   return out + "</testsuite>\n</testsuites>\n";
 }

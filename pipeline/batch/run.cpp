@@ -1,8 +1,13 @@
 #include "pipeline/batch/run.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <ostream>
 #include <set>
@@ -27,6 +32,19 @@ double seconds_since(Clock::time_point start) {
 
 std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+}
+
+/// A device, a pipe: it is written into, never replaced by a file.
+bool is_special(const std::string& path) {
+  std::error_code ec;
+  const fs::file_status status = fs::status(path, ec);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+void write_into(const std::string& path, const std::string& text) {
+  std::ofstream out(path, std::ios::binary);
+  if (!(out << text << std::flush))
+    throw InputError(path, "", "a file that can be written", "an error on writing");
 }
 
 /// What a model costs that was never compiled: measured on the sample scans, rounded up.
@@ -95,6 +113,7 @@ class Batch {
 
   void recall(std::size_t i, const MemoRecord& record) {
     WorkerReport& r = reports_[i];
+    failure_recalled_ = failure_recalled_ || record.failed;
     r.result = record.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
     r.package_bytes = record.package_bytes;
     if (!settings_.depfile.empty()) r.files = record.files;
@@ -110,7 +129,7 @@ class Batch {
 
   void add_job(std::size_t i, bool remembered) {
     const PlannedModel& m = plan_.models[i];
-    const MemoRecord& record = records_[i];
+    MemoRecord& record = records_[i];
     WorkerJob job;
     job.input = m.input;
     job.output = m.output;
@@ -120,9 +139,11 @@ class Batch {
     job.explain = settings_.explain;
     job.forecast = settings_.dry_run;
     if (remembered) {
-      for (const FileRequest& f : record.files)
-        if (f.found && f.stamp.is_settled(record.looked_at_ns)) job.known.push_back(f);
-      job.earlier_keys = record.keys;
+      for (FileRequest& f : record.files)
+        if (f.found && f.stamp.is_settled(record.looked_at_ns)) job.known.push_back(std::move(f));
+      job.earlier_keys = std::move(record.keys);
+      record.files = {};  // of 100,000 models there is no room for both
+      record.keys = {};
     }
     if (remembered && record.peak_memory_bytes > 0) {
       job.predicted_memory_bytes = record.peak_memory_bytes;
@@ -185,14 +206,17 @@ class Batch {
     };
     const auto on_finish = [&](std::size_t job, const WorkerReport& report) {
       const std::size_t i = model_of_job_[job];
-      remember(i, report);
+      remember(job, report);
       progress_.finished(i, report, jobs_[job].output);
       if (seconds_since(saved) > 30) {  // a killed run then loses little
         memo_.save();
         saved = Clock::now();
       }
     };
-    const auto reports = run_workers(jobs_, settings_.pool, on_event, on_finish);
+    const bool stop = settings_.pool.stop_on_failure && failure_recalled_;
+    std::vector<WorkerReport> reports(jobs_.size());
+    for (WorkerReport& r : reports) r.result = ModelResult::kCancelled;
+    if (!stop) reports = run_workers(jobs_, settings_.pool, on_event, on_finish);
     for (std::size_t job = 0; job < reports.size(); ++job) {
       reports_[model_of_job_[job]] = reports[job];
       wrote_ = wrote_ || reports[job].stages_ran > 0;
@@ -210,7 +234,8 @@ class Batch {
            (r.error_kind == "input" || r.error_kind == "format" || r.error_kind == "stage");
   }
 
-  void remember(std::size_t i, const WorkerReport& report) {
+  void remember(std::size_t job, const WorkerReport& report) {
+    const std::size_t i = model_of_job_[job];
     if (report.files.empty() || (!report.ok() && !is_lasting(report))) return;
     const PlannedModel& m = plan_.models[i];
     MemoRecord record;
@@ -220,17 +245,20 @@ class Batch {
     record.peak_memory_bytes = report.peak_memory_bytes;
     record.seconds = report.seconds;
     record.keys = report.keys;
+    const bool known = records_[i].peak_memory_bytes > 0;
+    // A run that found everything in the cache, or that failed on the way, says little about what the model
+    // costs, and a failure nothing about what the stages that it did not reach would run with.
+    if (known && (!report.ok() || report.stages_hit > report.stages_ran)) {
+      record.peak_memory_bytes = records_[i].peak_memory_bytes;
+      record.seconds = records_[i].seconds;
+    }
+    if (!report.ok()) record.keys.insert(jobs_[job].earlier_keys.begin(), jobs_[job].earlier_keys.end());
     if (report.ok()) {
       const auto stamp = stamp_of(m.output);
       if (!stamp) return;
       record.package_stamp = *stamp;
       record.package_digest = report.package_digest;
       record.package_bytes = report.package_bytes;
-      // A run that found everything in the cache says little about what the model costs.
-      if (report.stages_hit > report.stages_ran && records_[i].peak_memory_bytes > 0) {
-        record.peak_memory_bytes = records_[i].peak_memory_bytes;
-        record.seconds = records_[i].seconds;
-      }
     } else {
       record.error = {report.error_kind,     report.error_file,  report.error_place,
                       report.error_expected, report.error_found, report.error_message};
@@ -252,18 +280,27 @@ class Batch {
 
   void write_text(const std::string& path, const std::string& text) const {
     if (path.empty()) return;
+    if (is_special(path)) return write_into(path, text);
     remove_stale_temporaries(fs::path(path).parent_path().string(), fs::path(path).filename().string());
     if (!file_holds(path, bytes_of(text))) write_file_atomically(path, bytes_of(text));
   }
 
-  void write_reports() const {
-    write_text(settings_.summary,
-               settings_.summary.empty() ? "" : write_summary(plan_.models, reports_, seconds_));
-    write_text(settings_.junit, settings_.junit.empty() ? "" : write_junit(plan_.models, reports_, seconds_));
-    write_text(settings_.trace, settings_.trace.empty() ? "" : write_trace(plan_.models, reports_));
+  /// Each report on its own: one that cannot be written keeps no other from being.
+  void write_reports() {
+    const auto write = [&](const std::string& path, auto&& text) {
+      try {
+        if (!path.empty()) write_text(path, text());
+      } catch (const InputError& e) {
+        std::cerr << "texmesh compile: " << e.what() << '\n';
+        report_missing_ = true;
+      }
+    };
+    write(settings_.summary, [&] { return write_summary(plan_.models, reports_, seconds_); });
+    write(settings_.junit, [&] { return write_junit(plan_.models, reports_, seconds_); });
+    write(settings_.trace, [&] { return write_trace(plan_.models, reports_); });
     if (settings_.statistics && settings_.mode != OutputMode::kJson) std::cout << write_statistics(reports_);
     if (!settings_.depfile.empty() && reports_[0].ok())
-      write_text(settings_.depfile, write_depfile(plan_.models[0].output, dependencies()));
+      write(settings_.depfile, [&] { return write_depfile(plan_.models[0].output, dependencies()); });
   }
 
   std::vector<std::string> dependencies() const {
@@ -276,7 +313,7 @@ class Batch {
   }
 
   int exit_code() const {
-    int code = kExitOk;
+    int code = report_missing_ ? kExitModelFailed : kExitOk;
     for (const WorkerReport& r : reports_) {
       if (r.result == ModelResult::kInternal) return kExitInternal;
       if (!r.ok()) code = kExitModelFailed;
@@ -296,10 +333,24 @@ class Batch {
   std::string request_seed_;
   Progress progress_;
   double seconds_ = 0;
-  bool wrote_ = false;
+  bool wrote_ = false, failure_recalled_ = false, report_missing_ = false;
 };
 
+void check_report(const std::string& path) {
+  if (path.empty() || is_special(path)) return;
+  const std::string folder = fs::path(path).parent_path().string();
+  if (fs::is_directory(path) || ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    throw InputError(path, "", "a file that can be written",
+                     fs::is_directory(path) ? "a folder" : std::strerror(errno));
+}
+
 }  // namespace
+
+void check_reports(const BatchPlan& plan, const RunSettings& settings) {
+  for (const std::string* path : {&settings.summary, &settings.junit, &settings.trace, &settings.depfile})
+    check_report(*path);
+  if (!settings.depfile.empty()) write_depfile(plan.models.at(0).output, {plan.models[0].input});
+}
 
 int run_batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out) {
   return Batch(plan, settings, out).run();

@@ -138,8 +138,6 @@ RunSettings run_settings(const CompileArguments& args) {
       std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
   run.pool.memory_bytes = memory_to_use(args.memory);
   run.pool.limits.memory_bytes = parse_bytes(args.model_memory, "--model-memory");
-  if (!args.memory.empty() && run.pool.memory_bytes > 0)  // no single model may use more than all together
-    run.pool.limits.memory_bytes = std::min(run.pool.limits.memory_bytes, run.pool.memory_bytes);
   if (!args.no_cache) run.cache.folder = default_cache_folder(args.cache);
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
@@ -157,7 +155,7 @@ void add_run_options(CLI::App& c, CompileArguments& args) {
   c.add_option("-j,--jobs", args.jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
   c.add_option("--memory", args.memory,
                "Most memory of all models that run side by side, by what they took before (default: 4/5 of "
-               "the machine's)");
+               "the machine's); one that needs more alone runs alone, see --model-memory");
   c.add_option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
       ->capture_default_str();
   c.add_option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit")
@@ -215,8 +213,8 @@ constexpr const char* kFooter =
     "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
     "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
     "changed.\n"
-    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error. A model that fails leaves no "
-    "package.";
+    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error. A model that fails leaves the "
+    "package that was there before.";
 
 }  // namespace
 
@@ -247,6 +245,7 @@ void add_compile_command(CLI::App& app, int& exit_code) {
       plan = plan_batch(request);
       if (!run.depfile.empty() && plan.models.size() != 1)
         throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
+      check_reports(plan, run);
     } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
       std::cerr << "texmesh compile: " << e.what() << '\n';
       exit_code = kExitUsage;

@@ -78,6 +78,14 @@ TEST(Collection, TheSamePackageTwiceAndWrongOptionsAreRefusedWithTheirPlace) {
             "/models/0/output");
 }
 
+TEST(Collection, PathsWithControlCharactersAreRefused) {
+  const auto read = [](const std::string& model) {
+    return read_collection(R"({"version":1,"models":[)" + model + "]}", "c.json", {}, {});
+  };
+  EXPECT_THROW(read(R"({"input":"a.obj","output":"a\u0000.texmesh"})"), InputError);
+  EXPECT_THROW(read(R"({"input":"a\n.obj"})"), InputError);
+}
+
 TEST(Collection, TooDeepIsRefusedAndBracketsInTextsDoNotCount) {
   std::string deep = R"({"version":1,"models":[{"input":"a.obj","options":)";
   for (int i = 0; i < 20; ++i) deep += "[";

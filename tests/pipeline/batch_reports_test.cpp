@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <thread>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>
@@ -121,9 +122,13 @@ TEST(Junit, IsWellFormedAndCountsAsTheSummaryDoes) {
   const FakeRun run = ugly_run();
   const std::string xml = write_junit(run.models, run.reports, 2.5);
   const auto elements = elements_of(xml);
-  EXPECT_EQ(elements,
-            (std::map<std::string, int>{
-                {"testsuites", 1}, {"testsuite", 1}, {"testcase", 5}, {"failure", 2}, {"skipped", 1}}))
+  EXPECT_EQ(elements, (std::map<std::string, int>{{"testsuites", 1},
+                                                  {"testsuite", 1},
+                                                  {"testcase", 5},
+                                                  {"failure", 2},
+                                                  {"skipped", 1},
+                                                  {"properties", 5},
+                                                  {"property", 30}}))
       << xml;
   EXPECT_NE(xml.find("tests=\"5\" failures=\"2\" errors=\"0\" skipped=\"1\""), std::string::npos) << xml;
   EXPECT_NE(xml.find("a&lt;b&gt;&amp;&quot;c&quot;.obj"), std::string::npos) << xml;
@@ -233,6 +238,26 @@ TEST(Progress, TheBarEndsWithoutATrace) {
   const std::size_t last_bar = text.rfind("\r\033[K[");
   EXPECT_NE(text.find("\r\033[K", last_bar + 4), std::string::npos) << "the last bar is not wiped";
   EXPECT_EQ(text.back(), '\n');
+}
+
+TEST(Progress, ABarIsNoWiderThanTheTerminal) {
+  std::ostringstream out;  // 80 columns where nobody knows
+  Progress progress(out, OutputMode::kTerminal, false, false);
+  const std::string name = "a/" + std::string(60, 'x') + "/L\xc3\xb6we-" + std::string(60, 'y') + ".obj";
+  progress.begin({{name, 1}});
+  progress.started(0, "a.texmesh");
+  progress.event(0, R"({"event":"stage-started","stage":"simplification"})");
+  std::this_thread::sleep_for(std::chrono::milliseconds(110));
+  progress.event(0, R"({"event":"stage-progress","stage":"simplification","fraction":0.5})");
+  const std::string text = out.str();
+  ASSERT_NE(text.find("..."), std::string::npos) << text;
+  std::size_t columns = 0;
+  for (std::size_t i = text.rfind("\033[K") + 3; i < text.size(); ++i)
+    columns += (static_cast<unsigned char>(text[i]) & 0xc0) != 0x80;
+  EXPECT_LT(columns, 80u);
+  EXPECT_GT(columns, 60u);
+  EXPECT_NE(text.find("[=", text.rfind("\033[K")), std::string::npos)
+      << "half a stage is no progress: " << text;
 }
 
 TEST(Progress, EventsFollowTheirSchema) {

@@ -172,6 +172,64 @@ TEST_F(Collection, FailFastStartsNothingAfterAFailureAndTheNextRunDoesTheRest) {
       << kept_going.output;
 }
 
+TEST_F(Collection, FailFastStopsAtARememberedFailureToo) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  write_text(model("bad.obj"), "f 1 2 3\n");
+  EXPECT_EQ(compile({"--jobs", "1"}).exit_code, 1);
+  for (const char* name : {"a", "b", "c"}) fs::remove(folder_ / ("out/" + std::string(name) + ".texmesh"));
+  EXPECT_EQ(compile({"--fail-fast"}).exit_code, 1);
+  EXPECT_EQ(packages_in(folder_ / "out").size(), 0u);
+}
+
+TEST_F(Collection, AFailureKeepsWhatWasLearnedOfTheModel) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  ASSERT_EQ(compile().exit_code, 0);
+  const std::string good = read_text(model("a.obj"));
+  write_text(model("a.obj"), "f 1 2 3\n");
+  ASSERT_EQ(compile().exit_code, 1);
+  write_text(model("a.obj"), "# another\n" + good);
+  const CommandResult r = compile({"--explain"});
+  EXPECT_EQ(r.exit_code, 0) << r.output;
+  EXPECT_EQ(r.output.find("no earlier run"), std::string::npos) << r.output;
+}
+
+TEST_F(Collection, NamesThatAreNoUtf8AreNamesAsOthers) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  std::string obj = read_text(model("a.obj")), mtl = read_text(model("a.mtl"));
+  const std::string image =
+      mtl.substr(mtl.find("map_Kd ") + 7, mtl.find('\n', mtl.find("map_Kd ")) - mtl.find("map_Kd ") - 7);
+  mtl.replace(mtl.find(image), image.size(), "L\xf6we.jpg");
+  obj.replace(obj.find("a.mtl"), 5, "b.mtl");
+  fs::copy_file(model(image), model("L\xf6we.jpg"));
+  write_text(model("b.mtl"), mtl);
+  write_text(model("\xff.obj"), obj);
+  const CommandResult first = compile();
+  EXPECT_EQ(first.exit_code, 0) << first.output << first.errors;
+  EXPECT_EQ(packages_in(folder_ / "out").size(), 2u);
+  EXPECT_EQ(compile({"--explain"}).output,
+            "2 of 2 models are up to date: no input, option or tool has changed\n");
+  write_text(model("L\xf6we.jpg"), read_text(model("L\xf6we.jpg")) + "more");
+  const auto again = events();
+  EXPECT_EQ(
+      std::count_if(again.begin(), again.end(), [](const Json& e) { return e["event"] == "model-started"; }),
+      1);
+  EXPECT_EQ(compile({"--package.title", "\xff"}).exit_code, 2);
+}
+
+TEST_F(Collection, ReportsGoIntoDevicesAndOneThatCannotBeWrittenIsUsage) {
+  ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
+  EXPECT_EQ(compile({"--summary", folder_ / "none/s.json"}).exit_code, 2);
+  EXPECT_FALSE(fs::exists(folder_ / "out/a.texmesh"));
+  const CommandResult r = compile({"--summary", "/dev/null", "--depfile", "/dev/null"});
+  EXPECT_EQ(r.exit_code, 0) << r.output << r.errors;
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  write_text(folder_ / "in/a;b.obj", read_text(model("a.obj")));
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "compile", folder_ / "in/a;b.obj", "-o", folder_ / "q.texmesh",
+                         "--depfile", folder_ / "d"})
+                .exit_code,
+            2);
+}
+
 TEST_F(Collection, ShardsTogetherMakeEveryPackageOnce) {
   ASSERT_NO_FATAL_FAILURE(add_three());
   std::multiset<std::string> made;

@@ -1,6 +1,8 @@
 #include "pipeline/batch/find_models.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "format/errors.h"
 #include "tests/support/command.h"
@@ -23,6 +25,26 @@ TEST(FindModels, SeveralNeedAFolder) {
   EXPECT_THROW(find_models({"a.glb", "b.glb"}, "out.texmesh"), InputError);
   const auto m = find_models({"a.glb", "x/b.obj"}, "out");
   EXPECT_EQ(m[1].output, "out/b.texmesh");
+}
+
+TEST(FindModels, WaitsForNoPipeAndEntersNoHiddenFolder) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / ".trash");
+  write_text(folder / ".trash/old.glb", "x");
+  write_text(folder / "a.glb", "x");
+  ASSERT_EQ(::mkfifo((folder / "x.json").c_str(), 0600), 0);
+  EXPECT_EQ(list_models(folder.path().string()), std::vector<std::string>{"a.glb"});
+  EXPECT_FALSE(is_range_scan(folder / "x.json"));
+}
+
+TEST(FindModels, AFolderThatCannotBeListedIsAnError) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root lists everything";
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "closed");
+  write_text(folder / "a.glb", "x");
+  ::chmod((folder / "closed").c_str(), 0);
+  EXPECT_THROW(list_models(folder.path().string()), InputError);
+  ::chmod((folder / "closed").c_str(), 0700);
 }
 
 TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {

@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace texmesh {
+
+// File names are bytes, JSON is UTF-8. What is no UTF-8 goes through JSON as U+0001 and the bytes with those
+// that are none, U+0001 and backslashes as \xHH; everything else goes as it is.
+
+bool is_utf8(std::string_view bytes);
+/// UTF-8 that from_wire() gives the same bytes for.
+std::string to_wire(std::string_view bytes);
+std::string from_wire(std::string_view text);
+/// For people and for documents that name files: to_wire() without its mark.
+std::string readable_name(std::string_view bytes);
+
+}  // namespace texmesh
