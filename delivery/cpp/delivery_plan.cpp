@@ -113,14 +113,18 @@ DeliveryPlan plan_at_scale(PackageReader& package, const DeliveryRequest& reques
     if (htc.time_limit_s < 30 * htc.rtt_s)
       plan.warnings.push_back(
           "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
-    plan.textures = simulate(list.offers, htc, shifted(request.network, plan.mesh_s));
+    const NetworkOptions network = without_dead_mirrors(request.network, plan.mesh_s);
+    plan.textures = simulate(list.offers, htc, shifted(network, plan.mesh_s));
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;
   rate_textures(package, list, plan);
   plan.texture_dssim =
       1 - (1 - plan.texture_dssim) * (1 - mip_loss(package, plan.planes, request.displayed_px));
-  plan.ssim = predicted_ssim(package, request.displayed_px, scale, plan.texture_dssim);
+  // Where not even the first picture comes nothing is shown.
+  plan.ssim = std::isfinite(plan.first_picture_s)
+                  ? predicted_ssim(package, request.displayed_px, scale, plan.texture_dssim)
+                  : 0;
   return plan;
 }
 

@@ -12,14 +12,28 @@
 namespace texmesh {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr long kMaxRedirects = 5;
+constexpr double kMostPoll_ms = 250;  // between looks at whether requests are cancelled
+// Error pages are read to their end when they are short, which keeps the connection, but not for long.
+constexpr std::uint64_t kMostErrorBytes = 4096;
+constexpr double kMostError_s = 0.5;
 
 struct Transfer {
-  CURL* handle;
+  CURL* handle = nullptr;
   HttpAnswer answer;
-  std::uint64_t max_bytes;
-  bool wants_range;
+  std::uint64_t max_bytes = 0;
+  std::optional<HttpRange> range;
+  const HttpOptions* options = nullptr;
+  std::optional<Clock::time_point> sent, error_page;  // the request; the first byte of an answer of no use
+  Clock::time_point moved{};                          // when a byte came last, or the request was sent
+  std::uint64_t bytes = 0;                            // by then
 };
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 bool starts_with_name(std::string_view line, std::string_view name, std::string_view& value) {
   if (line.size() <= name.size() || line[name.size()] != ':') return false;
@@ -68,6 +82,9 @@ std::size_t take_header(char* data, std::size_t size, std::size_t count, void* u
     read_content_range(value, transfer.answer);
   } else if (starts_with_name(line, "etag", value) && value.starts_with('"')) {
     transfer.answer.etag = std::string(value.substr(0, 200));
+  } else if (starts_with_name(line, "retry-after", value)) {
+    const auto seconds = number(value);
+    if (seconds && value.empty()) transfer.answer.retry_after_s = static_cast<double>(*seconds);
   }
   return size * count;
 }
@@ -76,8 +93,14 @@ std::size_t take_body(char* data, std::size_t size, std::size_t count, void* use
   auto& transfer = *static_cast<Transfer*>(user);
   long status = 0;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &status);
-  if (status != 200 && status != 206) return size * count;  // an error page
-  if (transfer.wants_range && status == 200) {
+  if (status != 200 && status != 206) {
+    if (!transfer.error_page) transfer.error_page = Clock::now();
+    curl_off_t length = -1;
+    ::curl_easy_getinfo(transfer.handle, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+    const bool is_short = length >= 0 && static_cast<std::uint64_t>(length) <= kMostErrorBytes;
+    return is_short ? size * count : 0;
+  }
+  if (transfer.range && !transfer.range->or_whole && status == 200) {
     transfer.answer.too_long = true;
     return 0;
   }
@@ -88,6 +111,36 @@ std::size_t take_body(char* data, std::size_t size, std::size_t count, void* use
   }
   answer.body.insert(answer.body.end(), data, data + size * count);
   return size * count;
+}
+
+/// Called by curl now and then, whether something came or not: not 0 ends the transfer.
+int look(void* user, curl_off_t, curl_off_t received, curl_off_t, curl_off_t) {
+  auto& transfer = *static_cast<Transfer*>(user);
+  const HttpOptions& options = *transfer.options;
+  if (options.cancelled && options.cancelled()) {
+    transfer.answer.problem = "cancelled";
+    return 1;
+  }
+  if (transfer.error_page && seconds_since(*transfer.error_page) > kMostError_s) return 1;
+  if (!transfer.sent) {  // one that waits for a connection has all the time
+    curl_off_t us = 0;
+    ::curl_easy_getinfo(transfer.handle, CURLINFO_PRETRANSFER_TIME_T, &us);
+    if (us > 0) transfer.sent = transfer.moved = Clock::now();
+    return 0;
+  }
+  // curl's own limit looks at the mean of some seconds, in which a server that has sent something is fast.
+  if (static_cast<std::uint64_t>(received) != transfer.bytes) {
+    transfer.bytes = static_cast<std::uint64_t>(received);
+    transfer.moved = Clock::now();
+  }
+  const bool silent = seconds_since(transfer.moved) > options.stall_timeout_s;
+  const double most_s = options.connect_timeout_s + options.stall_timeout_s +
+                        static_cast<double>(transfer.max_bytes) / options.least_bytes_s;
+  if (!silent && seconds_since(*transfer.sent) <= most_s) return 0;
+  transfer.answer.problem =
+      silent ? "no byte for " + std::to_string(options.stall_timeout_s).substr(0, 3) + " s" : "too slow";
+  transfer.answer.timed_out = true;
+  return 1;
 }
 
 }  // namespace
@@ -110,9 +163,10 @@ void start_curl() {
 }
 
 /// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
-curl_slist* prepare(CURL* h, Transfer& transfer, const std::string& url,
-                    const std::optional<HttpRange>& range, const std::string& if_range_etag,
-                    const HttpOptions& options) {
+curl_slist* prepare(Transfer& transfer, const std::string& url, const std::string& if_range_etag) {
+  CURL* h = transfer.handle;
+  const HttpOptions& options = *transfer.options;
+  const std::optional<HttpRange>& range = transfer.range;
   ::curl_easy_setopt(h, CURLOPT_URL, url.c_str());
   ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
   ::curl_easy_setopt(h, CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
@@ -120,13 +174,14 @@ curl_slist* prepare(CURL* h, Transfer& transfer, const std::string& url,
   ::curl_easy_setopt(h, CURLOPT_MAXREDIRS, kMaxRedirects);
   ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
   ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options.connect_timeout_s * 1000));
-  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_LIMIT, 1L);
-  ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(options.stall_timeout_s)));
   ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
   ::curl_easy_setopt(h, CURLOPT_HEADERFUNCTION, take_header);
   ::curl_easy_setopt(h, CURLOPT_HEADERDATA, &transfer);
   ::curl_easy_setopt(h, CURLOPT_WRITEFUNCTION, take_body);
   ::curl_easy_setopt(h, CURLOPT_WRITEDATA, &transfer);
+  ::curl_easy_setopt(h, CURLOPT_NOPROGRESS, 0L);
+  ::curl_easy_setopt(h, CURLOPT_XFERINFOFUNCTION, look);
+  ::curl_easy_setopt(h, CURLOPT_XFERINFODATA, &transfer);
   // Ranges are of the bytes as stored.
   curl_slist* headers = ::curl_slist_append(nullptr, "Accept-Encoding: identity");
   if (range) {
@@ -141,34 +196,34 @@ curl_slist* prepare(CURL* h, Transfer& transfer, const std::string& url,
 }
 
 void conclude(Transfer& transfer, CURLcode rc) {
-  ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &transfer.answer.status);
-  transfer.answer.complete = rc == CURLE_OK;
-  if (rc != CURLE_OK) transfer.answer.problem = ::curl_easy_strerror(rc);
+  HttpAnswer& answer = transfer.answer;
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &answer.status);
+  answer.complete = rc == CURLE_OK;
+  curl_off_t sent_us = 0, first_us = 0, total_us = 0;
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_PRETRANSFER_TIME_T, &sent_us);
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_STARTTRANSFER_TIME_T, &first_us);
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_TOTAL_TIME_T, &total_us);
+  answer.first_byte_s = 1e-6 * static_cast<double>(std::max<curl_off_t>(0, first_us - sent_us));
+  answer.received_s = 1e-6 * static_cast<double>(std::max<curl_off_t>(0, total_us - sent_us));
+  if (rc == CURLE_OPERATION_TIMEDOUT) {
+    answer.timed_out = true;
+    answer.problem = "no connection in time";
+  }
+  if (rc != CURLE_OK && answer.problem.empty()) answer.problem = ::curl_easy_strerror(rc);
 }
 
 }  // namespace
 
-struct HttpClient::Handle {
-  CURL* curl = nullptr;
-  ~Handle() { ::curl_easy_cleanup(curl); }
-};
-
-HttpClient::HttpClient(const HttpOptions& options) : handle_(std::make_unique<Handle>()), options_(options) {
-  start_curl();
-  handle_->curl = ::curl_easy_init();
+bool may_retry(const HttpAnswer& a) {
+  return a.problem != "cancelled" &&
+         (a.status == 0 || a.status == 408 || a.status == 429 || a.status >= 500 ||
+          ((a.status == 200 || a.status == 206) && !a.complete && !a.too_long));
 }
-HttpClient::~HttpClient() = default;
 
-HttpAnswer HttpClient::get(const std::string& url, const std::optional<Range>& range,
-                           const std::string& if_range_etag, std::uint64_t max_bytes) {
-  CURL* h = handle_->curl;
-  ::curl_easy_reset(h);  // keeps the connection
-  Transfer transfer{h, {}, max_bytes, range.has_value()};
-  curl_slist* headers = prepare(h, transfer, url, range, if_range_etag, options_);
-  const CURLcode rc = ::curl_easy_perform(h);
-  ::curl_slist_free_all(headers);
-  conclude(transfer, rc);
-  return std::move(transfer.answer);
+std::string what_came(const HttpAnswer& a) {
+  if (a.status != 0 && a.status != 200 && a.status != 206) return "status " + std::to_string(a.status);
+  if (!a.problem.empty()) return a.problem;
+  return a.status == 0 ? "no answer" : "status " + std::to_string(a.status);
 }
 
 struct HttpPool::State {
@@ -223,17 +278,27 @@ HttpPool::HttpPool(const HttpOptions& options, int connections_per_server)
 HttpPool::~HttpPool() = default;
 
 void HttpPool::start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
-                     std::uint64_t max_bytes) {
+                     std::uint64_t max_bytes, const std::string& if_range_etag) {
   cancel(number);
   auto running = std::make_unique<State::Running>();
-  running->transfer = {::curl_easy_init(), {}, max_bytes, range.has_value()};
-  running->headers = prepare(running->transfer.handle, running->transfer, url, range, "", state_->options);
+  Transfer& transfer = running->transfer;
+  transfer.handle = ::curl_easy_init();
+  transfer.max_bytes = std::min(max_bytes, state_->options.max_whole_bytes);
+  transfer.range = range;
+  transfer.options = &state_->options;
+  running->headers = prepare(transfer, url, if_range_etag);
   ::curl_multi_add_handle(state_->multi, running->transfer.handle);
   state_->running[number] = std::move(running);
 }
 
 void HttpPool::cancel(std::uint64_t number) { state_->drop(number); }
 bool HttpPool::idle() const { return state_->running.empty(); }
+const HttpOptions& HttpPool::options() const { return state_->options; }
+
+const HttpAnswer* HttpPool::so_far(std::uint64_t number) const {
+  const auto it = state_->running.find(number);
+  return it == state_->running.end() ? nullptr : &it->second->transfer.answer;
+}
 
 std::optional<HttpPool::Ended> HttpPool::wait(double seconds) {
   const auto start = std::chrono::steady_clock::now();
@@ -244,7 +309,8 @@ std::optional<HttpPool::Ended> HttpPool::wait(double seconds) {
     const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
     const double left_ms = 1000 * (seconds - gone.count());
     if (left_ms <= 0 || idle()) return std::nullopt;
-    ::curl_multi_poll(state_->multi, nullptr, 0, static_cast<int>(std::clamp(left_ms, 1.0, 1000.0)), nullptr);
+    ::curl_multi_poll(state_->multi, nullptr, 0, static_cast<int>(std::clamp(left_ms, 1.0, kMostPoll_ms)),
+                      nullptr);
   }
 }
 

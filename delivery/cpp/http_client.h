@@ -10,11 +10,14 @@ namespace texmesh {
 
 /// Limits of what a server may do to us.
 struct HttpOptions {
-  int retries = 3;  // of one request, after cut connections, stalls and statuses 408, 429, 5xx
-  double connect_timeout_s = 10;
-  double stall_timeout_s = 20;                 // without a byte
-  double retry_delay_s = 0.2;                  // before the first retry, doubled for each further one
-  std::uint64_t max_whole_bytes = 1ull << 30;  // of a file from a server that knows no ranges
+  int retries = 3;  // of one request without progress, after cut connections, stalls and 408, 429, 5xx
+  double connect_timeout_s = 8;
+  double stall_timeout_s = 8;     // without a byte
+  double retry_delay_s = 0.2;     // before the first retry, doubled for each further one
+  double most_retry_delay_s = 5;  // whatever Retry-After says
+  double least_bytes_s = 1000;    // a request may take the two timeouts and its bytes at this rate in all
+  std::uint64_t max_whole_bytes = 1ull << 30;  // of one answer, and of a file from a server without ranges
+  std::function<bool()> cancelled;             // asked at least every second while requests are under way
 };
 
 /// http://host/path without user and password, for messages.
@@ -30,46 +33,38 @@ struct HttpAnswer {
   std::string etag;                                 // strong ones only
   std::optional<std::uint64_t> first, last, total;  // of Content-Range
   bool complete = false;                            // the body ended as the server said it would
-  bool too_long = false;                            // there was more than asked for: the transfer was ended
+  bool too_long = false;     // there was more than asked for, or a whole file: the transfer was ended
+  bool timed_out = false;    // silent, or slower than the options allow
+  double retry_after_s = 0;  // as the server says, 0 = not
+  double first_byte_s = 0, received_s = 0;  // from the request's last byte to the answer's first and last
 };
+/// Worth another try.
+bool may_retry(const HttpAnswer& answer);
+/// In a few words, for messages.
+std::string what_came(const HttpAnswer& answer);
 
 /// Bytes first .. first + bytes - 1.
 struct HttpRange {
   std::uint64_t first = 0, bytes = 0;
+  bool or_whole = false;  // a server that knows no ranges may send the whole file instead
 };
 
-/// One connection to one server, kept open between requests. Follows no redirects to other protocols. Not
-/// thread-safe.
-class HttpClient {
- public:
-  using Range = HttpRange;
-  explicit HttpClient(const HttpOptions& options);
-  ~HttpClient();
-  HttpClient(const HttpClient&) = delete;
-  HttpClient& operator=(const HttpClient&) = delete;
-  /// GET of a range (a 206, if the server knows ranges; on a 200 the transfer ends at once and `body` is
-  /// empty), or of the whole file without `range`. One try, no retries.
-  HttpAnswer get(const std::string& url, const std::optional<Range>& range, const std::string& if_range_etag,
-                 std::uint64_t max_bytes);
-
- private:
-  struct Handle;
-  std::unique_ptr<Handle> handle_;
-  HttpOptions options_;
-};
-
-/// Many requests at once, over at most so many connections to each server (more wait); HTTP/2 where a server
-/// offers it. Not thread-safe.
+/// GET requests, many at once, over at most so many connections to each server (more wait), which are kept
+/// open; HTTP/2 where a server offers it. Follows no redirects to other protocols. Not thread-safe.
 class HttpPool {
  public:
   HttpPool(const HttpOptions& options, int connections_per_server);
   ~HttpPool();
   HttpPool(const HttpPool&) = delete;
   HttpPool& operator=(const HttpPool&) = delete;
-  /// As HttpClient::get(); `number` comes back with the answer.
+  /// A range (a 206, if the server knows ranges; on a 200 the transfer ends at once and `body` is empty), or
+  /// the whole file without `range`. One try, no retries; `number` comes back with the answer. Of answers
+  /// that are no content (errors) the body is not kept.
   void start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
-             std::uint64_t max_bytes);
+             std::uint64_t max_bytes, const std::string& if_range_etag = "");
   void cancel(std::uint64_t number);  // no answer will come
+  /// What has come of a request so far; it is gone with cancel().
+  const HttpAnswer* so_far(std::uint64_t number) const;
   struct Ended {
     std::uint64_t number = 0;
     HttpAnswer answer;
@@ -77,6 +72,7 @@ class HttpPool {
   /// The next that has ended, waiting for it at most so long; at once when nothing is under way.
   std::optional<Ended> wait(double seconds);
   bool idle() const;
+  const HttpOptions& options() const;
 
  private:
   struct State;

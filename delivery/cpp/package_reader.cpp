@@ -10,7 +10,20 @@ using Bytes = std::vector<std::uint8_t>;
 
 std::string plane_place(std::size_t plane) { return "texture plane " + std::to_string(plane); }
 
+// Far above what packages have: 10,000 planes with all their rungs, 65,535 fragments each in several.
+constexpr std::uint64_t kMostIndexBytes = 64ull << 20, kMostTablesBytes = 512ull << 20;
+constexpr std::uint64_t kMostDocumentBytes = 64ull << 20, kMostImageBytes = 1ull << 30;
+
 }  // namespace
+
+std::uint64_t most_entry_bytes(const std::string& path) {
+  if (path == kManifestPath) return kBootstrapBytes;
+  if (path == kIndexPath) return kMostIndexBytes;
+  if (path == kTablesPath) return kMostTablesBytes;
+  if (path.ends_with(".json") || path.ends_with("/tables.pack")) return kMostDocumentBytes;
+  if (path.starts_with("preview/")) return kMostDocumentBytes;
+  return path.starts_with("source/") ? kMostImageBytes : ~0ull;
+}
 
 PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::move(store)) {
   const Bytes bytes = store_->read_manifest();
@@ -19,6 +32,10 @@ PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::
 }
 
 Bytes PackageReader::read_all(const EntryRef& ref) {
+  if (ref.bytes > most_entry_bytes(ref.path))
+    throw FormatError(store_->name(), "entry " + ref.path,
+                      "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
+                      std::to_string(ref.bytes));
   Bytes bytes = store_->read(ref, 0, ref.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != ref.digest)
@@ -122,6 +139,10 @@ void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
 
 const PackageTables& PackageReader::tables() {
   if (tables_) return *tables_;
+  std::vector<EntryRef> needed{manifest_.tables};
+  if (!index_) needed.push_back(manifest_.index);
+  if (!textures_) needed.push_back(manifest_.textures);
+  store_->prefetch(needed);
   const Bytes bytes = read_paged(manifest_.tables);
   require_head(manifest_.tables, read_tables_head(bytes).bytes);
   PackageTables tables = read_tables(bytes);
@@ -153,9 +174,11 @@ const QualityTable& PackageReader::quality() {
 
 Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
 
-Bytes PackageReader::scale_glb(int scale) {
+Bytes PackageReader::scale_glb(int scale) { return read_all(scale_entry(scale)); }
+
+const EntryRef& PackageReader::scale_entry(int scale) const {
   for (const ManifestScale& s : manifest_.scales)
-    if (s.scale == scale) return read_all(s.glb);
+    if (s.scale == scale) return s.glb;
   throw FormatError(store_->name(), "scale " + std::to_string(scale), "a scale of the package", "none");
 }
 

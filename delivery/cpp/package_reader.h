@@ -27,11 +27,16 @@ class PackageStore {
   /// entry.path. FormatError when they are not there.
   virtual std::vector<std::uint8_t> read(const EntryRef& entry, std::uint64_t offset,
                                          std::uint64_t bytes) = 0;
+  /// These will be read soon, in whole: a server is asked for all of them at once. Errors as of read().
+  virtual void prefetch(const std::vector<EntryRef>&) {}
   /// What is really there, manifest.json and index.bin included: a container's entries in file order (every
   /// rule of the profile checked), a folder's regular files by path (offsets and CRCs are 0). FormatError on
   /// anything else in it.
   virtual std::vector<ContainerEntry> list() = 0;
 };
+/// The most bytes that an entry of this path may have; what says that it has more is not to be believed.
+/// Meshes and packs are bounded by what the reader's store allows.
+std::uint64_t most_entry_bytes(const std::string& path);
 std::unique_ptr<PackageStore> open_container(std::unique_ptr<ByteSource> source);
 std::unique_ptr<PackageStore> open_folder(
     const std::string& path);  // InputError; no symlinks are followed beneath it
@@ -60,6 +65,7 @@ class PackageReader {
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
   std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
+  const EntryRef& scale_entry(int scale) const;    // FormatError when the package has no such scale
   /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read
   /// with store() or entry(kSplitStreamPath).
   SplitStreamHead split_stream_head();

@@ -51,6 +51,7 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at least
 
 /// A model of a network as a transport.
 class ModelTransport final : public Transport {
@@ -124,8 +125,15 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
   return result;
 }
 
-double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes) {
+NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
+  const auto dead = [now_s](const MirrorModel& m) { return m.dead_from_s + kFoundDead_s <= now_s; };
+  if (!std::ranges::all_of(network.mirrors, dead)) std::erase_if(network.mirrors, dead);
+  return network;
+}
+
+double fetched_s(const NetworkOptions& all, double from_s, std::uint64_t bytes) {
   if (!std::isfinite(from_s)) return kNever;
+  const NetworkOptions network = without_dead_mirrors(all, from_s);
   ModelTransport transport(network);
   transport.move_to(from_s);
   OneRequest source(bytes);

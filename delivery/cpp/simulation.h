@@ -31,6 +31,8 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
 /// Plays the plan over the network model, as transfer() runs it over a network.
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
                           const NetworkOptions& network);
+/// The network without the mirrors that a client has found dead by then, unless that is all of them.
+NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s);
 /// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network, from
 /// whichever of its mirrors answers; +infinity when none does.
 double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes);

@@ -9,6 +9,12 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
+// As delivery/web/src/groups.ts.
+constexpr double kLeastRequest_s = 0.006;  // a request is worth at least so much of the link
+constexpr double kHiddenRtts = 0.6;        // that six connections at once hide
+constexpr double kLeastDecisions = 48;
+constexpr double kGraceShare = 0.1, kLeastGrace_s = 0.5, kGraceRtts = 8;
+
 bool is_incremental(PackageReader& package, std::uint32_t plane) {
   return codec_traits(package.textures()[plane].codec).incremental;
 }
@@ -30,6 +36,14 @@ FragmentOffer above(const FragmentOffer& f, std::int32_t held, bool incremental)
   out.low_rung = less(f.low_rung);
   out.high_rung = less(f.high_rung);
   return out;
+}
+
+/// Two offers of equal rungs as one.
+void join(FragmentOffer& all, const FragmentOffer& one) {
+  for (std::size_t r = 0; r < all.bytes.size(); ++r) all.bytes[r] += one.bytes[r];
+  for (std::size_t r = 0; r < all.loss.size(); ++r) all.loss[r] += one.loss[r];
+  all.eta = std::max(all.eta, one.eta);
+  all.planned_bytes += one.planned_bytes;
 }
 
 /// The upgrades that are left, asked for in order with a few requests in flight.
@@ -96,7 +110,31 @@ class UpgradeSource final : public RequestSource {
   Take take_;
 };
 
+TransferOptions transfer_options(const LoadOptions& options) {
+  TransferOptions how;
+  how.rtt_s = options.htc.rtt_s;
+  how.initial_bytes_s = options.htc.throughput.initial_bytes_s;
+  how.tries = options.tries;
+  how.cancelled = options.cancelled;
+  return how;
+}
+
+LoadReport report_of(const TransferEnd& end) {
+  LoadReport report;
+  report.cancelled = end.cancelled;
+  report.out_of_time = end.out_of_time;
+  report.problems = end.problems;
+  if (end.out_of_time && end.unfinished > 0)
+    report.problems["not there when the time was over"] = end.unfinished;
+  return report;
+}
+
 }  // namespace
+
+double group_bytes(double bytes_s, double rtt_s, double limit_s) {
+  return std::min(bytes_s * std::max(kLeastRequest_s, kHiddenRtts * rtt_s),
+                  bytes_s * limit_s / kLeastDecisions);
+}
 
 TextureLoader::TextureLoader(PackageReader& package, Transport& transport, bool whole_rungs)
     : package_(package), transport_(transport), whole_rungs_(whole_rungs) {
@@ -125,14 +163,44 @@ std::vector<TextureLoader::Wanted> TextureLoader::join_planes(std::vector<Wanted
     if (is_new) continue;
     Wanted& w = it->second;
     if (w.first_rung != f.first_rung) continue;
-    for (std::size_t r = 0; r < w.offer.bytes.size(); ++r) w.offer.bytes[r] += f.offer.bytes[r];
-    for (std::size_t r = 0; r < w.offer.loss.size(); ++r) w.offer.loss[r] += f.offer.loss[r];
-    w.offer.eta = std::max(w.offer.eta, f.offer.eta);
-    w.offer.planned_bytes += f.offer.planned_bytes;
+    join(w.offer, f.offer);
     w.fragments.push_back(f.fragments[0]);
   }
   std::vector<Wanted> out;
   for (auto& [plane, w] : planes) out.push_back(std::move(w));
+  return out;
+}
+
+/// Whether a fragment stands directly behind those of w, in every pack that is offered.
+bool TextureLoader::follows(const Wanted& w, std::uint32_t fragment) {
+  const PlaneTables& t = package_.tables().planes[w.plane];
+  for (auto r = static_cast<std::uint32_t>(w.first_rung); r < t.rung_count(); ++r) {
+    const ByteRange last = package_.fragment_range(w.plane, r, w.fragments.back());
+    if (package_.fragment_range(w.plane, r, fragment).offset != last.offset + last.bytes) return false;
+  }
+  return true;
+}
+
+std::vector<TextureLoader::Wanted> TextureLoader::join_neighbours(std::vector<Wanted> fragments,
+                                                                  double bytes_each, double budget) {
+  double planned = 1;
+  for (const Wanted& f : fragments) planned += f.offer.planned_bytes;
+  std::vector<Wanted> out;
+  double open = 0;  // expected bytes of the last group
+  for (Wanted& f : fragments) {
+    const double expected =
+        std::clamp(f.offer.planned_bytes * budget / planned, static_cast<double>(f.offer.bytes.front()),
+                   static_cast<double>(std::max(f.offer.bytes.front(), f.offer.bytes.back())));
+    if (out.empty() || out.back().plane != f.plane || out.back().first_rung != f.first_rung ||
+        open + expected > bytes_each || !follows(out.back(), f.fragments[0])) {
+      out.push_back(std::move(f));
+      open = expected;
+      continue;
+    }
+    join(out.back().offer, f.offer);
+    out.back().fragments.push_back(f.fragments[0]);
+    open += expected;
+  }
   return out;
 }
 
@@ -141,49 +209,59 @@ std::vector<PackagePart> TextureLoader::parts_of(const Wanted& w, std::int32_t r
   const bool incremental = is_incremental(package_, w.plane);
   const std::vector<EntryRef>& rungs = package_.textures()[w.plane].rungs;
   for (std::int32_t r = incremental ? w.first_rung : rung; r <= rung; ++r) {
-    const EntryRef& pack = rungs[static_cast<std::size_t>(r)];
-    const ByteRange range =
-        whole_rungs_ ? ByteRange{0, pack.bytes}
-                     : package_.fragment_range(w.plane, static_cast<std::uint32_t>(r), w.fragments[0]);
-    if (range.bytes > 0) parts.push_back({pack, range});
+    const auto at = static_cast<std::uint32_t>(r);
+    ByteRange range{0, rungs[at].bytes};
+    if (!whole_rungs_) {
+      range = package_.fragment_range(w.plane, at, w.fragments.front());
+      const ByteRange last = package_.fragment_range(w.plane, at, w.fragments.back());
+      range.bytes = last.offset + last.bytes - range.offset;
+    }
+    if (range.bytes > 0) parts.push_back({rungs[at], range});
   }
   return parts;
 }
 
+/// Keeps the fragments that are as they should be; false when not all of them are.
 bool TextureLoader::take(const Wanted& w, std::int32_t rung, const Transport::Outcome& outcome,
                          const std::function<void(const LoadedFragment&)>& on_fragment) {
   const PlaneTables& t = package_.tables().planes[w.plane];
   const bool incremental = is_incremental(package_, w.plane);
-  std::vector<LoadedFragment> loaded;
-  std::uint64_t bytes = 0;
+  const std::vector<PackagePart> asked = parts_of(w, rung);
+  bool all = true;
   for (const std::uint32_t f : w.fragments) {
     LoadedFragment fragment{w.plane, f, rung, {}};
+    std::uint64_t bytes = 0;
     std::size_t part = 0;
-    for (std::int32_t r = incremental ? w.first_rung : rung; r <= rung; ++r) {
+    bool good = true;
+    for (std::int32_t r = incremental ? w.first_rung : rung; r <= rung && good; ++r) {
       const auto at = static_cast<std::uint32_t>(r);
       const ByteRange range = package_.fragment_range(w.plane, at, f);
       if (range.bytes == 0) continue;
-      if (part >= outcome.parts.size()) return false;
-      std::span<const std::uint8_t> stream(outcome.parts[part++]);
-      if (whole_rungs_)
-        stream =
-            stream.subspan(static_cast<std::size_t>(range.offset), static_cast<std::size_t>(range.bytes));
-      if (truncated(sha256(stream)) != t.digest[at * t.fragment_count() + f]) return false;
+      good = part < outcome.parts.size() && outcome.parts[part].size() == asked[part].range.bytes;
+      if (!good) break;
+      const auto stream = std::span<const std::uint8_t>(outcome.parts[part])
+                              .subspan(static_cast<std::size_t>(range.offset - asked[part].range.offset),
+                                       static_cast<std::size_t>(range.bytes));
+      ++part;
+      good = truncated(sha256(stream)) == t.digest[at * t.fragment_count() + f];
       fragment.streams.emplace_back(stream.begin(), stream.end());
       bytes += stream.size();
     }
-    loaded.push_back(std::move(fragment));
+    all = all && good;
+    if (!good || held_[w.plane][f] >= rung) continue;  // or it came with a try of which the rest was wrong
+    bytes_ += bytes;
+    held_[w.plane][f] = rung;
+    if (on_fragment) on_fragment(fragment);
   }
-  bytes_ += bytes;
-  for (const LoadedFragment& f : loaded) {
-    held_[f.plane][f.fragment] = rung;
-    if (on_fragment) on_fragment(f);
-  }
-  return true;
+  return all;
 }
 
 LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const LoadOptions& options) {
-  const std::vector<Wanted> wanted = this->wanted(planes, options.list);
+  std::vector<Wanted> wanted = this->wanted(planes, options.list);
+  const double initial_bytes_s = options.htc.throughput.initial_bytes_s;
+  if (options.group_bytes > 0 && !whole_rungs_)
+    wanted =
+        join_neighbours(std::move(wanted), options.group_bytes, initial_bytes_s * options.htc.time_limit_s);
   std::vector<FragmentOffer> offers;
   for (const Wanted& w : wanted) offers.push_back(w.offer);
   HarmonicTimePlan plan(std::move(offers), options.htc);
@@ -194,20 +272,40 @@ LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const Loa
       [&](std::uint32_t i, std::int32_t rung, const Transport::Outcome& outcome) {
         return take(wanted[i], wanted[i].first_rung + rung, outcome, options.on_fragment);
       });
-  TransferOptions how;
-  how.rtt_s = options.htc.rtt_s;
-  how.initial_bytes_s = options.htc.throughput.initial_bytes_s;
-  how.tries = options.tries;
-  how.cancelled = options.cancelled;
+  TransferOptions how = transfer_options(options);
+  const double limit_s = options.htc.time_limit_s;
+  const double grace_s =
+      options.grace_s >= 0 ? options.grace_s
+                           : std::max({kLeastGrace_s, kGraceRtts * options.htc.rtt_s, kGraceShare * limit_s});
+  how.until_s = start_s + limit_s + grace_s;
   const TransferEnd end = transfer(source, transport_, how);
-  LoadReport report;
-  report.transfer = result_of(plan, options.htc.time_limit_s, std::max(0.0, end.last_s - start_s));
-  report.cancelled = end.cancelled;
-  report.given_up = end.given_up;
+  LoadReport report = report_of(end);
+  const double end_s = end.out_of_time ? transport_.now_s() : end.last_s;
+  report.transfer = result_of(plan, limit_s, std::max(0.0, end_s - start_s));
+  count_fragments(plan, wanted, report);
   // Rungs as the package counts them.
   for (std::size_t i = 0; i < wanted.size(); ++i)
     report.transfer.rungs[i] = held_[wanted[i].plane][wanted[i].fragments[0]];
   return report;
+}
+
+/// What became of the fragments behind the offers.
+void TextureLoader::count_fragments(const HarmonicTimePlan& plan, const std::vector<Wanted>& wanted,
+                                    LoadReport& report) const {
+  const auto lacking = [&](const Wanted& w) {
+    return static_cast<std::uint32_t>(std::ranges::count_if(
+        w.fragments, [&](std::uint32_t f) { return held_[w.plane][f] < w.first_rung; }));
+  };
+  std::vector<bool> asked(wanted.size(), false);
+  for (const HtcStep& s : plan.steps())
+    if (s.bytes > 0) {
+      asked[s.offer] = true;
+      if (s.rung < 0 && !report.cancelled) report.given_up += lacking(wanted[s.offer]);
+    }
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    report.fragments += static_cast<std::uint32_t>(wanted[i].fragments.size());
+    if (!asked[i]) report.skipped += lacking(wanted[i]);
+  }
 }
 
 LoadReport TextureLoader::refine(const std::vector<PlaneChoice>& planes, const LoadOptions& options,
@@ -238,16 +336,12 @@ LoadReport TextureLoader::refine(const std::vector<PlaneChoice>& planes, const L
         now[i].first_rung = to + 1;
         return true;
       });
-  TransferOptions how;
-  how.rtt_s = options.htc.rtt_s;
-  how.initial_bytes_s = options.htc.throughput.initial_bytes_s;
-  how.tries = options.tries;
-  how.cancelled = options.cancelled;
+  TransferOptions how = transfer_options(options);
   how.until_s = start_s + limits.seconds;
   const TransferEnd end = transfer(source, transport_, how);
-  LoadReport report;
-  report.cancelled = end.cancelled || end.out_of_time;
+  LoadReport report = report_of(end);
   report.given_up = end.given_up;
+  report.fragments = static_cast<std::uint32_t>(wanted.size());
   report.transfer.time_limit_s = limits.seconds;
   report.transfer.end_s = std::max(0.0, end.last_s - start_s);
   report.transfer.bytes = bytes_ - bytes_before;

@@ -8,6 +8,7 @@ namespace texmesh {
 namespace {
 
 constexpr double kRetryFactor = 4, kLeastRetryRtts = 8, kLeastRetry_s = 0.5;
+constexpr double kProgressBytes = 1024;  // a try that brings as much does not count
 constexpr double kAskCancelled_s = 0.1;
 constexpr double kFirstPause_s = 0.1, kMostPause_s = 5;
 
@@ -89,6 +90,7 @@ struct Asked {
   double at_s = 0, patience_s = 0;
   int tries = 0;
   double received = 0;  // when last looked at
+  double kept = 0;      // by the transport, of tries that broke
 };
 
 class Run {
@@ -208,6 +210,10 @@ class Run {
   }
   void again(Asked a, const std::string& why, bool for_good) {
     mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), for_good);
+    if (const double kept = transport_.received(a.request.number); kept >= a.kept + kProgressBytes) {
+      a.kept = kept;
+      a.tries = 0;
+    }
     if (a.tries >= options_.tries) {
       give_up(a, why);
       return;

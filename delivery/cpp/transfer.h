@@ -43,7 +43,7 @@ class Transport {
   virtual void start(const TransferRequest& request, std::uint32_t mirror) = 0;
   /// Outcome or not, the request is over.
   virtual void cancel(std::uint32_t number) = 0;
-  /// Bytes that have come of a request under way.
+  /// Bytes that have come of a request that is under way, or that are kept of one that broke.
   virtual double received(std::uint32_t) { return 0; }
   /// What ends first, or nothing when the time comes before. Nothing, too, when nothing can ever end: at once
   /// where `until_s` is kForEver_s, else when that time comes.
@@ -67,7 +67,8 @@ class RequestSource {
 struct TransferOptions {
   double rtt_s = 0;                 // round trip, told or measured
   double initial_bytes_s = 1e5;     // of each mirror, until it has delivered something
-  int tries = 3;                    // of a request, over all mirrors, before it is given up
+  int tries = 3;                    // of a request, over all mirrors, before it is given up; one that brings
+                                    // something anew begins the count again
   double until_s = kForEver_s;      // nothing is asked for or waited for after this
   std::function<bool()> cancelled;  // asked after every event and every tenth of a second
 };

@@ -41,26 +41,14 @@ double seconds_since(Clock::time_point start) {
 /// What the transfer came to.
 struct Fetched {
   int scale = 0;
-  double rtt_s = 0, mesh_s = 0, end_s = 0;
-  std::uint64_t mesh_bytes = 0, texture_bytes = 0;
+  double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
+  std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
+  HttpPlace place;
+  bool whole_rungs = false;
   LoadReport load;
   std::optional<LoadReport> refined;
   double texture_dssim = 0, ssim = 0;
 };
-
-/// Time of a request for one byte over a connection that is open: what a round trip takes, the server's own
-/// time included.
-double measured_rtt_s(const std::string& url, const HttpOptions& http) {
-  HttpClient client(http);
-  const std::string file = url.ends_with('/') ? url + kManifestPath : url;
-  double least_s = 1e3;
-  for (int i = 0; i < 3; ++i) {
-    const auto start = Clock::now();
-    client.get(file, HttpRange{0, 1}, "", 1);
-    if (i > 0) least_s = std::min(least_s, seconds_since(start));
-  }
-  return least_s;
-}
 
 /// Files as `unpack --fragments files` names them, the best rung of each fragment.
 class FragmentWriter {
@@ -100,53 +88,87 @@ class FragmentWriter {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::int32_t> rungs_;
 };
 
-Fetched fetch(const FetchArguments& a) {
-  const DeliveryRequest request = delivery_request(a.delivery);
-  if (!is_url(a.delivery.package))
-    throw InputError(a.delivery.package, "", "an http or https URL", "another text");
-  TransportOptions options;
-  options.connections = a.delivery.connections;
-  Fetched f;
-  f.rtt_s =
-      request.network.rtt_s > 0 ? request.network.rtt_s : measured_rtt_s(a.delivery.package, options.http);
+/// What has moved so far and in which time, without the round trips.
+struct Moved {
+  // What comes in one burst with an answer's first byte says little of the link.
+  static constexpr double kLeastShare = 0.2;
+  std::uint64_t bytes = 0;
+  double seconds = 0;
+  void add(std::uint64_t n, double s, double rtt_s) {
+    bytes += n;
+    seconds += std::max({1e-4, kLeastShare * s, s - rtt_s});
+  }
+  /// `first`: what the first answer alone shows, when nothing else was asked for.
+  double bytes_s(double first) const {
+    return std::clamp(bytes > 0 ? static_cast<double>(bytes) / seconds : first, 100.0, 1e9);
+  }
+};
 
-  const auto start = Clock::now();
-  PackageReader package(open_url(a.delivery.package, options.http));
+/// Everything that is needed to decide, together with the coarsest mesh: one round trip.
+void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Moved& moved) {
   const Manifest& m = package.manifest();
-  f.scale = wanted_scale(package, request);
-  FragmentWriter writer(package, a.output);
-  const auto mesh_start = Clock::now();
-  const Bytes mesh = package.scale_glb(f.scale);
+  const auto start = Clock::now();
+  std::vector<EntryRef> wanted{m.index, m.tables, m.textures, m.quality, m.scales.back().glb};
+  if (table_streams && !package.store().is_folder())
+    wanted.push_back({"", m.first_picture_offset, m.first_picture_bytes, {}});
+  package.store().prefetch(wanted);
+  std::uint64_t bytes = 0, end = kBootstrapBytes;
+  for (const EntryRef& e : wanted) {
+    f.mesh_bytes += e.path.empty() ? 0 : e.bytes;
+    end = std::max(end, e.offset + e.bytes);
+    bytes += e.path.empty() ? 0 : e.bytes;
+  }
+  if (!package.store().is_folder()) bytes = end - kBootstrapBytes;
+  if (bytes > 0) moved.add(bytes, seconds_since(start), f.rtt_s);
   package.tables();
-  f.mesh_s = seconds_since(start);
-  f.mesh_bytes = mesh.size() + m.index.bytes + m.tables.bytes + m.textures.bytes;
-  writer.write_entry(mesh_path(f.scale), mesh);
+  package.quality();
+  package.scale_glb(m.scales.back().scale);
+}
 
-  std::vector<std::string> mirrors{a.delivery.package};
-  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
-  const auto transport = open_transport(mirrors, options);
-  TextureLoader loader(package, *transport, a.whole_rungs);
-  LoadOptions load;
-  load.list.scale = f.scale;
-  load.htc = request.htc;
-  load.htc.rtt_s = f.rtt_s;
-  load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
-  const double mesh_rate = static_cast<double>(f.mesh_bytes) / std::max(1e-6, seconds_since(mesh_start));
-  load.htc.throughput.initial_bytes_s = request.beta0_bytes_s > 0 ? request.beta0_bytes_s : mesh_rate;
-  const auto budget_bytes =
-      static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
-  const std::vector<PlaneChoice> planes =
-      texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
-  load.cancelled = [] { return interrupted != 0; };
-  load.on_fragment = [&](const LoadedFragment& fragment) { writer.take(fragment); };
-  f.load = loader.load(planes, load);
-  f.end_s = seconds_since(start);
-  if (const double seconds = parse_duration(a.refine, "--refine"); seconds > 0 && !f.load.cancelled)
-    f.refined = loader.refine(planes, load, {seconds, ~0ull});
-  f.texture_bytes = loader.bytes();
-  writer.write();
+/// The scale that looks best in the time, as a plan over such a link says.
+int scale_in_time(PackageReader& package, DeliveryRequest request, double rtt_s, double bytes_s) {
+  request.network.rtt_s = rtt_s;
+  request.network.link = BandwidthTrace::constant(bytes_s);
+  if (request.scale >= 0) return request.scale;
+  return plan_delivery(package, request).scale;
+}
 
-  const FragmentList list = fragment_list(package, planes, load.list);
+Bytes fetch_mesh(PackageReader& package, Fetched& f, Moved& moved) {
+  const EntryRef& entry = package.scale_entry(f.scale);
+  if (f.scale == package.manifest().scales.back().scale) return package.scale_glb(f.scale);
+  const auto start = Clock::now();
+  const Bytes mesh = package.scale_glb(f.scale);
+  moved.add(entry.bytes, seconds_since(start), f.rtt_s);
+  f.mesh_bytes += entry.bytes;
+  return mesh;
+}
+
+HttpOptions http_options(double time_limit_s) {
+  HttpOptions http;
+  http.cancelled = [] { return interrupted != 0; };
+  http.stall_timeout_s = http.connect_timeout_s = std::clamp(time_limit_s, 2.0, 8.0);
+  return http;
+}
+
+/// From where the package is, and its mirrors.
+std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const HttpPlace& place,
+                                              const HttpOptions& http, PackageStore& store) {
+  if (place.in_memory) return open_transport(store);
+  TransportOptions options;
+  options.http = http;
+  options.connections = a.delivery.connections;
+  std::vector<std::string> all{a.delivery.package};
+  all.insert(all.end(), a.mirrors.begin(), a.mirrors.end());
+  std::vector<std::string> mirrors{place.url};
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (i != place.mirror) mirrors.push_back(all[i]);
+  if (!place.etag.empty()) options.etags[place.url] = place.etag;
+  return open_transport(mirrors, options);
+}
+
+void predict(PackageReader& package, const DeliveryRequest& request, const TextureLoader& loader,
+             const std::vector<PlaneChoice>& planes, const ListOptions& options, Fetched& f) {
+  const FragmentList list = fragment_list(package, planes, options);
   double loss = 0;
   for (std::size_t i = 0; i < list.offers.size(); ++i)
     loss += list.offers[i].loss[static_cast<std::size_t>(
@@ -154,6 +176,54 @@ Fetched fetch(const FetchArguments& a) {
   const double shown = list.total_weight > 0 ? 1 - loss / list.total_weight : 1;
   f.texture_dssim = 1 - shown * (1 - mip_loss(package, planes, request.displayed_px));
   f.ssim = predicted_ssim(package, request.displayed_px, f.scale, f.texture_dssim);
+}
+
+Fetched fetch(const FetchArguments& a) {
+  const DeliveryRequest request = delivery_request(a.delivery);
+  const HttpOptions http = http_options(request.time_limit_s);
+  std::vector<std::string> mirrors{a.delivery.package};
+  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
+  Fetched f;
+  Moved moved;
+  const auto start = Clock::now();
+  auto opened = open_urls(mirrors, http);
+  const HttpStore& server = *opened;
+  PackageReader package(std::move(opened));
+  f.place = server.place();
+  f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
+  fetch_documents(package, !a.output.empty(), f, moved);
+  f.first_picture_s = seconds_since(start);
+  f.scale = scale_in_time(package, request, f.rtt_s,
+                          request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s));
+  FragmentWriter writer(package, a.output);
+  writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
+  f.mesh_s = seconds_since(start);
+  f.place = server.place();
+
+  f.whole_rungs = a.whole_rungs || !f.place.ranges;
+  const auto transport = fragment_transport(a, f.place, http, package.store());
+  TextureLoader loader(package, *transport, f.whole_rungs);
+  LoadOptions load;
+  load.list.scale = f.scale;
+  load.htc = request.htc;
+  load.htc.rtt_s = f.rtt_s;
+  load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
+  load.htc.throughput.initial_bytes_s =
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
+  load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
+  const auto budget_bytes =
+      static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
+  const std::vector<PlaneChoice> planes =
+      texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
+  load.cancelled = http.cancelled;
+  load.on_fragment = [&](const LoadedFragment& fragment) { writer.take(fragment); };
+  f.load = loader.load(planes, load);
+  f.end_s = seconds_since(start);
+  if (const double seconds = parse_duration(a.refine, "--refine"); seconds > 0 && !f.load.cancelled)
+    f.refined = loader.refine(planes, load, {seconds, ~0ull});
+  f.texture_bytes = loader.bytes();
+  writer.write();
+  predict(package, request, loader, planes, load.list, f);
   return f;
 }
 
@@ -161,14 +231,19 @@ Json fetch_json(const Fetched& f, double limit_s) {
   Json j{{"version", 1},
          {"scale", f.scale},
          {"rtt_s", f.rtt_s},
+         {"url", shown_url(f.place.url)},
+         {"whole_rungs", f.whole_rungs},
+         {"first_picture_s", f.first_picture_s},
          {"mesh_s", f.mesh_s},
          {"end_s", f.end_s},
          {"deviation_percent", 100 * (limit_s - f.end_s) / limit_s},
          {"mesh_bytes", f.mesh_bytes},
          {"texture_bytes", f.texture_bytes},
-         {"fragments", f.load.transfer.rungs.size()},
-         {"skipped", f.load.transfer.skipped},
+         {"requests", f.load.transfer.steps.size()},
+         {"fragments", f.load.fragments},
+         {"skipped", f.load.skipped},
          {"given_up", f.load.given_up},
+         {"problems", f.load.problems},
          {"cancelled", f.load.cancelled},
          {"texture_ssim", 1 - f.texture_dssim},
          {"ssim", f.ssim}};
@@ -179,16 +254,21 @@ Json fetch_json(const Fetched& f, double limit_s) {
 
 void print(const Fetched& f, double limit_s) {
   std::cout << fmt::format(
-      "S_{} and tables after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
+      "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
       "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
       "given up\n",
-      f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s, f.end_s, 100 * (limit_s - f.end_s) / limit_s,
-      limit_s, grouped(f.load.transfer.bytes), f.load.transfer.rungs.size(), f.load.transfer.skipped,
-      f.load.given_up);
+      shown_url(f.place.url), f.first_picture_s, f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s,
+      f.end_s, 100 * (limit_s - f.end_s) / limit_s, limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
+      f.load.skipped, f.load.given_up);
+  if (f.place.in_memory)
+    std::cout << "the server knows no ranges and has no tree: the whole container was fetched\n";
+  else if (f.whole_rungs)
+    std::cout << "whole rungs: all fragments of a texture at once\n";
+  for (const auto& [why, count] : f.load.problems) std::cout << fmt::format("  {} x {}\n", count, why);
   if (f.refined)
     std::cout << fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->transfer.end_s,
                              grouped(f.refined->transfer.bytes),
-                             f.refined->cancelled ? ", until its time was over" : "");
+                             f.refined->out_of_time ? ", until its time was over" : "");
   std::cout << fmt::format(
       "surface-weighted SSIM of the textures {:.4f}, predicted SSIM of the object {:.4f}{}\n",
       1 - f.texture_dssim, f.ssim, f.load.cancelled ? "; cancelled" : "");
@@ -211,9 +291,10 @@ void add_fetch_command(CLI::App& app, int& exit_code) {
   c->add_option("--policy", d.policy, "htca, guard, price, proportional or static, see simulate")
       ->check(CLI::IsMember({"htca", "guard", "price", "proportional", "static", "htca-guard", "htca-price"}))
       ->capture_default_str();
-  c->add_option("--scale", d.scale, "This scale instead of the one that suits the display")
+  c->add_option("--scale", d.scale, "This scale instead of the one that looks best in the time")
       ->check(CLI::Range(0, 99));
-  c->add_option("--rtt", d.rtt, "Round trip, 40 are milliseconds; 0 = measured first")->capture_default_str();
+  c->add_option("--rtt", d.rtt, "Round trip, 40 are milliseconds; 0 = as the first answer shows it")
+      ->capture_default_str();
   c->add_option("--window", d.window, "Requests in flight; 0 = by throughput and round trip")
       ->check(CLI::Range(0, 64));
   c->add_option("--connections", d.connections, "Connections per server")
@@ -222,23 +303,37 @@ void add_fetch_command(CLI::App& app, int& exit_code) {
   c->add_option("--refine", args->refine, "Go on for so long after the limit, best upgrades first")
       ->capture_default_str();
   c->add_flag("--whole-rungs", args->whole_rungs,
-              "All fragments of a texture at once: for trees on servers without ranges");
+              "All fragments of a texture at once, as for servers without ranges");
   c->add_option("-o,--output", args->output,
                 "Folder for the scale's GLB and the fragments as complete image files");
   c->add_flag("--json", args->json, "One JSON object, for programs");
   c->footer(
       "Every fragment is checked against its digest; what a server fails to deliver is asked of another "
       "one.\n"
+      "The package is read from the first server to answer. One that knows no ranges is asked for whole "
+      "rungs of\n"
+      "the tree beside the container.\n"
       "Examples:\n"
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
   c->callback([args, &exit_code] {
-    std::signal(SIGINT, [](int) { interrupted = 1; });
+    std::signal(SIGINT, [](int) {
+      interrupted = 1;
+      std::signal(SIGINT, SIG_DFL);  // a second one ends the process
+    });
     args->delivery.needs_link = false;
     const double limit_s = parse_duration(args->delivery.time, "--time");
-    const Fetched f = fetch(*args);
+    Fetched f;
+    try {
+      f = fetch(*args);
+    } catch (const InputError&) {
+      if (interrupted == 0) throw;
+      std::cerr << "interrupted\n";
+      exit_code = 130;
+      return;
+    }
     if (args->json)
       std::cout << fetch_json(f, limit_s).dump() << '\n';
     else

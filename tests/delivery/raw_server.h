@@ -27,6 +27,7 @@ struct Request {
 struct Reply {
   std::string bytes;  // head and body, as they go out
   bool close = false;
+  bool trickle = false;  // then a byte every 20 ms without end
 };
 
 inline std::string answer(int status, const std::string& headers, const std::string& body) {
@@ -95,6 +96,10 @@ class RawServer {
         if (sent <= 0) return;
         at += static_cast<std::size_t>(sent);
       }
+      while (reply.trickle && !stop_) {
+        if (::send(connection, "x", 1, MSG_NOSIGNAL) != 1) return;
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
       if (reply.close) return;
     }
   }
@@ -138,7 +143,7 @@ inline std::string ranged(const std::string& file, const Request& r, const std::
 inline HttpOptions quick() {
   HttpOptions o;
   o.retry_delay_s = 0.001;
-  o.stall_timeout_s = 1;
+  o.stall_timeout_s = 0.6;
   o.connect_timeout_s = 2;
   return o;
 }

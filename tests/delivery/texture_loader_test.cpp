@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <map>
+#include <mutex>
 #include <set>
 
 #include "delivery/cpp/http_store.h"
@@ -40,7 +42,7 @@ struct Shown {
 struct Client {
   explicit Client(const std::vector<std::string>& mirrors, bool whole_rungs = false)
       : package(open_url(mirrors[0], quick())),
-        transport(open_transport(mirrors, {quick(), 4})),
+        transport(open_transport(mirrors, {quick(), 4, {}})),
         loader(package, *transport, whole_rungs) {}
   LoadOptions options(double bytes_s = 1e6) {
     LoadOptions o;
@@ -49,6 +51,7 @@ struct Client {
     o.htc.window = 4;
     o.htc.throughput.initial_bytes_s = bytes_s;
     o.htc.hard_limits = true;
+    o.grace_s = 60;  // nor here
     o.on_fragment = [this](const LoadedFragment& f) { shown(f); };
     return o;
   }
@@ -209,9 +212,153 @@ TEST(TextureLoader, WithoutRangesWholeRungsAreTaken) {
   EXPECT_EQ(c.loader.refine(full_size(c.package), c.options(), {}).transfer.bytes, 0u);
 }
 
+TEST(TextureLoader, NeighboursAreAskedForTogether) {
+  RawServer server(good);
+  Client c({server.url("/a.texmesh")});
+  c.package.tables();
+  const std::size_t requests = server.requests().size();
+  LoadOptions o = c.options();
+  o.group_bytes = 1e9;
+  o.list.quality_high = 1;
+  const LoadReport r = c.loader.load(full_size(c.package), o);
+  EXPECT_EQ(server.requests().size() - requests, kPlanes);  // both fragments of a plane
+  EXPECT_EQ(r.transfer.steps.size(), kPlanes);
+  EXPECT_EQ(r.fragments, 2 * kPlanes);
+  EXPECT_EQ(c.shown.rung.size(), 2 * kPlanes);
+  EXPECT_EQ(r.given_up, 0u);
+  c.loader.refine(full_size(c.package), c.options(), {});
+  c.expect_refined();
+}
+
+TEST(TextureLoader, OfAGroupOnlyWhatIsWrongIsLost) {
+  std::uint64_t broken = 0;
+  RawServer server([&](const Request& r) {
+    std::string reply = ranged(package_bytes(), r);
+    if (broken && r.first <= broken && broken <= r.last)
+      reply[reply.size() - static_cast<std::size_t>(r.last - broken) - 1] ^= 1;
+    return Reply{reply};
+  });
+  Client c({server.url("/a.texmesh")});
+  LoadOptions o = c.options();
+  o.list.quality_high = 1;
+  o.group_bytes = 1e9;
+  broken = c.package.textures()[2].rungs[0].offset + c.package.fragment_range(2, 0, 1).offset;
+  const LoadReport r = c.loader.load(full_size(c.package), o);
+  EXPECT_EQ(r.given_up, 1u);
+  EXPECT_EQ(r.problems.at("bytes of another digest"), 3u);
+  EXPECT_EQ(c.shown.rung.size(), 2 * kPlanes - 1);
+  EXPECT_EQ(c.loader.held(2, 0), 0);
+  EXPECT_EQ(c.loader.held(2, 1), -1);
+}
+
+TEST(TextureLoader, CutAnswersAreResumedWhereTheyBroke) {
+  std::atomic<bool> cut{false};
+  std::mutex mutex;
+  std::map<std::uint64_t, int> seen;
+  RawServer server([&](const Request& r) {
+    std::string reply = ranged(package_bytes(), r);
+    const std::lock_guard lock(mutex);
+    if (cut && seen[r.last]++ == 0) return Reply{reply.substr(0, reply.size() - 5), true};
+    return Reply{reply};
+  });
+  Client c({server.url("/a.texmesh")});
+  c.package.tables();
+  cut = true;
+  const std::size_t before = server.requests().size();
+  const LoadReport r = c.loader.load(full_size(c.package), c.options());
+  EXPECT_EQ(r.given_up, 0u);
+  EXPECT_EQ(c.shown.rung.size(), 2 * kPlanes);
+  EXPECT_EQ(r.problems.at("the answer was cut off"), 2 * kPlanes);
+  std::map<std::uint64_t, std::vector<std::uint64_t>> begins;
+  for (std::size_t i = before; i < server.requests().size(); ++i)
+    begins[server.requests()[i].last].push_back(server.requests()[i].first);
+  for (const auto& [last, first] : begins) {
+    ASSERT_EQ(first.size(), 2u);
+    EXPECT_EQ(first[1], last - 4);  // the five bytes that were missing
+  }
+}
+
+TEST(TextureLoader, APackageThatWasReplacedIsSaidToBe) {
+  for (const bool if_range : {true, false}) {
+    std::atomic<bool> replaced{false};
+    RawServer server([&](const Request& r) {
+      const std::string etag = replaced ? "\"two\"" : "\"one\"";
+      if (if_range && replaced && r.if_range != etag)
+        return Reply{answer(200, "ETag: " + etag + "\r\n", "new")};
+      return Reply{ranged(package_bytes(), r, "ETag: " + etag + "\r\n")};
+    });
+    const std::string url = server.url("/a.texmesh");
+    PackageReader package(open_url(url, quick()));
+    package.tables();
+    const auto transport = open_transport({url}, {quick(), 4, {{url, "\"one\""}}});
+    TextureLoader loader(package, *transport);
+    replaced = true;
+    LoadOptions o;
+    o.grace_s = 60;
+    const LoadReport r = loader.load(full_size(package), o);
+    EXPECT_GT(r.given_up, 0u);
+    bool said = false;
+    for (const auto& [why, count] : r.problems) said = said || why.find("replaced") != std::string::npos;
+    EXPECT_TRUE(said);
+    EXPECT_LT(server.requests().size(), 12u);  // and no more is asked
+  }
+}
+
+TEST(TextureLoader, WhyFragmentsAreGivenUpIsSaid) {
+  const auto problem_of = [](const std::function<Reply(const Request&)>& bad) {
+    std::atomic<bool> opened{false};
+    RawServer server([&](const Request& r) { return opened ? bad(r) : good(r); });
+    Client c({server.url("/a.texmesh")});
+    c.package.tables();
+    opened = true;
+    LoadOptions o = c.options();
+    o.tries = 1;
+    const LoadReport r = c.loader.load(full_size(c.package), o);
+    EXPECT_EQ(r.given_up, 2 * kPlanes);
+    std::string all;
+    for (const auto& [why, count] : r.problems) all += why + ";";
+    return all;
+  };
+  EXPECT_NE(problem_of([](auto&&) { return Reply{answer(404, "", "")}; }).find("status 404"),
+            std::string::npos);
+  EXPECT_NE(problem_of([](auto&&) { return Reply{answer(200, "", package_bytes())}; }).find("no ranges"),
+            std::string::npos);
+  EXPECT_NE(problem_of([](auto&&) { return Reply{}; }).find("timeout"), std::string::npos);
+}
+
+TEST(TextureLoader, ASilentServerEndsTheLoadWithItsTime) {
+  std::atomic<bool> opened{false};
+  RawServer server([&](const Request& r) { return opened ? Reply{} : good(r); });
+  Client c({server.url("/a.texmesh")});
+  c.package.tables();
+  opened = true;
+  HttpOptions patient = quick();
+  patient.stall_timeout_s = 60;
+  const auto transport = open_transport({server.url("/a.texmesh")}, {patient, 4, {}});
+  TextureLoader loader(c.package, *transport);
+  LoadOptions o = c.options();
+  o.htc.time_limit_s = 0.2;
+  o.grace_s = 0.2;
+  const LoadReport r = loader.load(full_size(c.package), o);
+  EXPECT_TRUE(r.out_of_time);
+  EXPECT_FALSE(r.cancelled);
+  EXPECT_GT(r.given_up, 0u);
+  EXPECT_EQ(r.given_up + r.skipped, 2 * kPlanes);
+  EXPECT_EQ(r.transfer.bytes, 0u);
+}
+
+TEST(TextureLoader, WhatIsHereNeedsNoNetwork) {
+  PackageReader package(open_container(memory_source(
+      std::span(reinterpret_cast<const std::uint8_t*>(package_bytes().data()), package_bytes().size()))));
+  const auto transport = open_transport(package.store());
+  TextureLoader loader(package, *transport);
+  EXPECT_EQ(loader.load(full_size(package), {}).given_up, 0u);
+  EXPECT_GE(loader.held(0, 0), 0);
+}
+
 TEST(TextureLoader, MirrorsMustBeUrls) {
-  EXPECT_THROW(open_transport({}), InputError);
-  EXPECT_THROW(open_transport({"/tmp/a.texmesh"}), InputError);
+  EXPECT_THROW(open_transport(std::vector<std::string>{}), InputError);
+  EXPECT_THROW(open_transport(std::vector<std::string>{"/tmp/a.texmesh"}), InputError);
 }
 
 }  // namespace

@@ -76,6 +76,8 @@ TEST(FetchedS, ComesFromAMirrorThatAnswersOrNever) {
   EXPECT_TRUE(std::isinf(fetched_s(network({mirror(1e9, 0)}), 0, 1)));
   EXPECT_TRUE(std::isinf(fetched_s(network({mirror(1e9, 0), mirror(1e9, 0)}), 0, 1)));
   EXPECT_TRUE(std::isinf(fetched_s(network({mirror(1e9)}), INFINITY, 1)));
+  // It is not asked again once it is known.
+  EXPECT_NEAR(fetched_s(network({mirror(1e9, 0), mirror(1e9)}), late, 500'000), late + 0.52, 1e-9);
   // A server slower than the link is no dead one.
   EXPECT_NEAR(fetched_s(network({mirror(1e4), mirror(1e9, 0)}), 0, 200'000), 20.02, 1e-6);
 }
