@@ -121,6 +121,11 @@ void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Mov
   if (!package.store().is_folder()) bytes = end - kBootstrapBytes;
   if (bytes > 0) moved.add(bytes, seconds_since(start), f.rtt_s);
   package.tables();
+  if (table_streams && package.store().is_folder()) {
+    std::vector<EntryRef> streams;
+    for (const TextureInfo& t : package.textures()) streams.push_back(t.tables);
+    package.store().prefetch(streams);
+  }
   package.quality();
   package.scale_glb(m.scales.back().scale);
 }
