@@ -213,40 +213,6 @@ TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
   EXPECT_EQ(texmesh({"fetch", kGolden}).exit_code, 1);  // a file needs no fetching
 }
 
-TEST(CliFetch, ADeadMirrorIsNoneAndServersWithoutRangesAreRead) {
-  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden";
-  TemporaryFolder folder;
-  ASSERT_EQ(texmesh({"unpack", golden + "/v1.1-scan.texmesh", folder / "scan"}).exit_code, 0);
-  std::filesystem::copy_file(golden + "/v1.1-scan.texmesh", folder / "scan.texmesh");
-  std::filesystem::copy_file(golden + "/v1.1-scan.texmesh", folder / "alone.texmesh");
-  httplib::Server server;
-  server.set_mount_point("/", folder / "");
-  // Without the header it knows no ranges.
-  server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response&) {
-    if (!request.has_param("ranges")) const_cast<httplib::Request&>(request).ranges.clear();
-    return httplib::Server::HandlerResponse::Unhandled;
-  });
-  const int port = server.bind_to_any_port("127.0.0.1");
-  std::thread thread([&] { server.listen_after_bind(); });
-  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  const std::string host = "http://127.0.0.1:" + std::to_string(port), dead = "http://127.0.0.1:9/a.texmesh";
-  const Json tree = json_of({"fetch", dead, "--mirror", host + "/scan.texmesh", "--time", "1"});
-  const Json alone = json_of({"fetch", host + "/alone.texmesh", "--time", "1"});
-  const Json slash = json_of({"fetch", host + "/scan/", "--time", "1"});
-  const CommandResult none = texmesh({"fetch", dead, "--mirror", dead, "--time", "1"});
-  server.stop();
-  thread.join();
-  for (const Json* j : {&tree, &alone, &slash}) {
-    EXPECT_EQ((*j)["given_up"], 0) << j->dump();
-    EXPECT_GT((*j)["texture_ssim"].get<double>(), 0.9);
-  }
-  EXPECT_TRUE(tree["whole_rungs"].get<bool>());
-  EXPECT_EQ(tree["url"], host + "/scan/");
-  EXPECT_TRUE(slash["whole_rungs"].get<bool>());
-  EXPECT_FALSE(alone["whole_rungs"].get<bool>());
-  EXPECT_EQ(none.exit_code, 1);
-}
-
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
   const std::vector<std::string> base{"check", kGolden, "--time", "10", "--bandwidth", "1MB/s"};
   auto with = [&](std::vector<std::string> more) {
