@@ -22,9 +22,11 @@ struct EnumNames<CollapseOrder> {
 
 struct SimplificationOptions {
   CollapseOrder order = CollapseOrder::kTexmesh;
-  double persistence_weight = 0.05;  // cost x (1 + weight * p)
-  double uv_weight = 0.06;           // of the UV quadric against the geometric one
-  double normal_weight = 0.01;       // of the normals' quadric; one radian counts as a mean edge
+  // Cost x (1 + weight * p). At 0.05 one model of twelve is worse than meshoptimizer's at 10 % of the
+  // vertices.
+  double persistence_weight = 0.035;
+  double uv_weight = 0.06;      // of the UV quadric against the geometric one
+  double normal_weight = 0.01;  // of the normals' quadric; one radian counts as a mean edge
   double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
   double boundary_weight = 3;  // of the border quadrics
   double seam_weight = 1;      // of the same at seams of the texture
