@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "format/errors.h"
 #include "pipeline/library_versions.h"
 
 namespace texmesh {
@@ -52,6 +53,7 @@ struct GraphRun::State {
   };
   struct Node {
     const Stage* stage = nullptr;
+    Sha256 key{};                   // of blobs
     std::vector<StoredBlob> blobs;  // of a stored stage that is up to date
     Notes notes;
     bool done = false;
@@ -62,7 +64,7 @@ struct GraphRun::State {
         StageObserver obs)
       : options(opts), store(st), context(ctx), observer(std::move(obs)) {
     for (std::size_t i = 0; i < stages.size(); ++i) {
-      nodes.push_back({&stages[i], {}, {}, false, nullptr});
+      nodes.push_back({&stages[i], {}, {}, {}, false, nullptr});
       for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
         Slot& slot = slots[stages[i].outputs[k].name];
         slot.producer = i;
@@ -143,16 +145,42 @@ struct GraphRun::State {
     }
     if (slot->producer == kOutside) throw std::logic_error("artefact " + name + " was not given");
     Node& node = nodes[slot->producer];
-    if (node.stage->stored && !node.blobs.empty()) {
-      if (Bytes bytes = store.load(node.blobs.at(slot->output))) {
-        Object object = node.stage->outputs[slot->output].decode(*bytes);
-        const std::lock_guard lock(mutex);
-        return slot->object = std::move(object);
-      }
+    if (Object stored = object_from_store(node, slot->output)) {
+      const std::lock_guard lock(mutex);
+      return slot->object = std::move(stored);
     }
-    execute(node);
+    const bool is_rejected = [&] {
+      const std::lock_guard lock(mutex);
+      return node.stage->stored && node.blobs.empty();
+    }();
+    if (is_rejected) {
+      compute_and_store(node);
+      publish_derived_again();
+    } else {
+      execute(node);
+    }
     const std::lock_guard lock(mutex);
     return slot->object;
+  }
+
+  /// Null where the store has lost it, or holds something else under its key: that is rejected.
+  Object object_from_store(Node& node, std::size_t output) {
+    std::vector<StoredBlob> blobs;
+    {
+      const std::lock_guard lock(mutex);
+      blobs = node.blobs;
+    }
+    if (!node.stage->stored || blobs.empty()) return nullptr;
+    const Bytes bytes = store.load(blobs.at(output));
+    if (!bytes) return nullptr;
+    try {
+      return node.stage->outputs[output].decode(*bytes);
+    } catch (const Error& e) {
+      store.reject(node.key, blobs, e.what());
+      const std::lock_guard lock(mutex);
+      if (node.blobs == blobs) node.blobs.clear();
+      return nullptr;
+    }
   }
 
   /// Runs a stage's function on fetched inputs; leaves its objects in their slots.
@@ -196,27 +224,60 @@ struct GraphRun::State {
     std::unique_ptr<Claim> claim = store.claim(key.digest(), context);
     if (claim && take_from_store(node, key)) return;
     tell_why(stage, key, StageExplanation::Verdict::kRuns);
-    compute_and_store(node, key);
+    compute_and_store(node);
   }
 
   bool take_from_store(Node& node, const Key& key) {
     const Stage& stage = *node.stage;
     auto blobs = store.find(key.digest());
-    if (!blobs || blobs->size() != stage.outputs.size() + 1) return false;
-    const Bytes notes = store.load(blobs->back());
-    if (!notes) return false;
-    node.notes = decode_artefact<Notes>(*notes, stage.name + ".notes");
-    node.blobs = std::move(*blobs);
-    for (std::size_t k = 0; k < stage.outputs.size(); ++k)
-      publish_digest(stage.outputs[k].name, node.blobs[k].digest, node.blobs[k].bytes);
+    if (!blobs) return false;
+    if (blobs->size() != stage.outputs.size() + 1) {
+      store.reject(key.digest(), *blobs, std::to_string(blobs->size()) + " results");
+      return false;
+    }
+    const Bytes bytes = store.load(blobs->back());
+    if (!bytes) return false;
+    Notes notes;
+    try {
+      notes = decode_artefact<Notes>(*bytes, stage.name + ".notes");
+    } catch (const Error& e) {
+      store.reject(key.digest(), *blobs, e.what());
+      return false;
+    }
+    settle_node(node, key, *blobs, notes);
     tell_why(stage, key, StageExplanation::Verdict::kHit);
     notify(stage, StageEvent::kHit);
     return true;
   }
 
-  void compute_and_store(Node& node, const Key& key) {
+  /// What stands for a stage in the keys of those after it.
+  void settle_node(Node& node, const Key& key, std::vector<StoredBlob> blobs, const Notes& notes) {
+    const Stage& stage = *node.stage;
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+      publish_digest(stage.outputs[k].name, blobs[k].digest, blobs[k].bytes);
+    const std::lock_guard lock(mutex);
+    node.key = keys[stage.name] = key.digest();
+    node.blobs = std::move(blobs);
+    node.notes = notes;
+  }
+
+  /// Derived data's keys, after a stage before it has got other digests than it seemed to have.
+  void publish_derived_again() {
+    for (const Node& node : nodes) {
+      const Stage& stage = *node.stage;
+      {
+        const std::lock_guard lock(mutex);
+        if (stage.stored || !slots.at(stage.outputs.front().name).known) continue;
+      }
+      const Sha256 key = key_of(stage).digest();
+      for (const Artefact& a : stage.outputs) publish_digest(a.name, key, 0);
+    }
+  }
+
+  void compute_and_store(Node& node) {
     const Stage& stage = *node.stage;
     StageOutputs outputs = execute(node);
+    const Key key = key_of(stage);  // an input that turned out to be none has another digest now
     std::vector<std::pair<std::string, Bytes>> encoded;
     for (std::size_t k = 0; k < stage.outputs.size(); ++k)
       encoded.emplace_back(stage.outputs[k].name, std::make_shared<const std::vector<std::uint8_t>>(
@@ -224,11 +285,9 @@ struct GraphRun::State {
     encoded.emplace_back(stage.name + ".notes",
                          std::make_shared<const std::vector<std::uint8_t>>(encode_artefact(outputs.notes)));
     store.put(key, encoded);
-    for (std::size_t k = 0; k < stage.outputs.size(); ++k) {
-      const Sha256 digest = sha256(*encoded[k].second);
-      node.blobs.push_back({encoded[k].first, digest, encoded[k].second->size()});
-      publish_digest(stage.outputs[k].name, digest, encoded[k].second->size());
-    }
+    std::vector<StoredBlob> blobs;
+    for (const auto& [name, bytes] : encoded) blobs.push_back({name, sha256(*bytes), bytes->size()});
+    settle_node(node, key, std::move(blobs), outputs.notes);
   }
 
   /// Counts down the uses of a stage's inputs. Derived data holds on to its own inputs until its last use is

@@ -28,6 +28,10 @@ std::optional<std::string> MemoryStore::preimage(const Sha256& key) {
   if (it == preimages_.end()) return std::nullopt;
   return it->second;
 }
+void MemoryStore::reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string&) {
+  const std::lock_guard lock(mutex_);
+  if (const auto it = runs_.find(key); it != runs_.end() && it->second == found) runs_.erase(it);
+}
 std::optional<std::string> MemoryStore::find_note(const Sha256& key) {
   const std::lock_guard lock(mutex_);
   const auto it = notes_.find(key);

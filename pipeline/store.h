@@ -18,6 +18,7 @@ struct StoredBlob {
   std::string name;  // of the artefact, "import.mesh"
   Sha256 digest{};
   std::uint64_t bytes = 0;
+  friend bool operator==(const StoredBlob&, const StoredBlob&) = default;
 };
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
@@ -32,6 +33,7 @@ class Claim {
 struct StoreEvent {
   std::string code;  // "cache-entry-damaged", "cache-layer-unreachable", "cache-not-written"
   std::string text;
+  int layer = -1;  // "cache-layer-unreachable": its number
 };
 
 /// Results of stage runs by key. A lookup never throws for what it finds: an absent, incomplete or damaged
@@ -47,6 +49,10 @@ class Store {
   virtual bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) = 0;
   /// The parts of a key that was put once (Key::preimage), whether its blobs are still there or not.
   virtual std::optional<std::string> preimage(const Sha256& key) = 0;
+  /// What find() gave for the key is sound by its digests, but no result of this stage (`reason`): whoever
+  /// wrote it was wrong. Such an entry is not given again.
+  virtual void reject(const Sha256& /*key*/, const std::vector<StoredBlob>& /*found*/,
+                      const std::string& /*reason*/) {}
   /// Small facts that are not results (which files an import asked for), by key; verified by their own
   /// digest. A later put_note replaces an earlier one.
   virtual std::optional<std::string> find_note(const Sha256& key) = 0;
@@ -76,6 +82,7 @@ class MemoryStore : public Store {
   Bytes load(const StoredBlob& blob) override;
   bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override;
   std::optional<std::string> preimage(const Sha256& key) override;
+  void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override;
   std::optional<std::string> find_note(const Sha256& key) override;
   bool put_note(const Sha256& key, const std::string& text) override;
 

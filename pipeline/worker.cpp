@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "format/errors.h"
 #include "pipeline/atomic_file.h"
@@ -90,18 +91,24 @@ void write_all(int fd, const std::string& text) {
   }
 }
 
+/// The layers of a job; null stands for one that is left out, so that their numbers stay.
+Json layers_of(const CacheSettings& cache, const std::set<std::string>& left_out) {
+  Json layers = Json::array();
+  for (const std::string& place : cache.layers)
+    layers.push_back(left_out.contains(place) ? Json() : Json(to_wire(place)));
+  return layers;
+}
+
 std::string job_text(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits,
-                     int threads) {
+                     int threads, const std::set<std::string>& layers_left_out) {
   Json keys = Json::object();
   for (const auto& [stage, key] : job.earlier_keys) keys[stage] = to_hex(key);
-  Json layers = Json::array();
-  for (const std::string& layer : job.cache.layers) layers.push_back(to_wire(layer));
   return Json{{"input", to_wire(job.input)},
               {"output", to_wire(job.output)},
               {"temporary", to_wire(temporary)},
               {"profile", *job.profile},
               {"cache", to_wire(job.cache.folder)},
-              {"layers", layers},
+              {"layers", layers_of(job.cache, layers_left_out)},
               {"upload", job.cache.upload},
               {"strict", job.strict},
               {"parent", ::getpid()},
@@ -110,12 +117,14 @@ std::string job_text(const WorkerJob& job, const std::string& temporary, const W
               {"known", files_to_json(job.known)},
               {"keys", keys},
               {"threads", threads},
+              {"wall_s", limits.wall_s},
               {"memory_bytes", limits.memory_bytes},
               {"cpu_s", limits.cpu_s}}
       .dump();
 }
 
-Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits, int threads) {
+Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& limits, int threads,
+                  const std::set<std::string>& layers_left_out) {
   static const std::string executable = core_executable();
   Child child;
   child.job = index;
@@ -134,7 +143,7 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, job_text(job, child.temporary, limits, threads));
+  write_all(in.write, job_text(job, child.temporary, limits, threads, layers_left_out));
   ::close(in.write);
   child.out = out.read;
   child.err = err.read;
@@ -175,6 +184,10 @@ bool take_event(const std::string& line, double now_s, WorkerReport& report) {
   const std::string event = e.value("event", "");
   if (event == "inputs") {
     take_inputs(e, report);
+    return false;
+  }
+  if (event == "layer-left-out") {
+    report.layers_left_out.push_back(e.value("layer", -1));
     return false;
   }
   if (event == "stage-started" || event == "stage-finished") {
@@ -325,8 +338,8 @@ class Pool {
     reports_[job].ran = true;
     const std::size_t side_by_side =
         std::min<std::size_t>(static_cast<std::size_t>(processors), children_.size() + 1 + waiting_.size());
-    Child child =
-        start_child(jobs_[job], job, limits_, std::max(1, processors / static_cast<int>(side_by_side)));
+    Child child = start_child(jobs_[job], job, limits_,
+                              std::max(1, processors / static_cast<int>(side_by_side)), layers_left_out_);
     child.lane = free_lane();
     reports_[job].lane = child.lane;
     reports_[job].start_s = now_s();
@@ -348,9 +361,17 @@ class Pool {
     ::poll(fds.data(), fds.size(), fds.empty() ? 5 : 100);
     for (Child& c : children_) {
       read_events(c, reports_[c.job], now_s(), sink_);
+      leave_layers_out(c.job);
       if (c.err >= 0 && !drain(c.err, c.last_words)) close_fd(c.err);
       if (c.last_words.size() > 2000) c.last_words.erase(0, c.last_words.size() - 2000);
     }
+  }
+
+  void leave_layers_out(std::size_t job) {
+    const std::vector<std::string>& layers = jobs_[job].cache.layers;
+    for (const int number : reports_[job].layers_left_out)
+      if (number >= 0 && static_cast<std::size_t>(number) < layers.size())
+        layers_left_out_.insert(layers[static_cast<std::size_t>(number)]);
   }
 
   void enforce_wall_limit() {
@@ -385,6 +406,7 @@ class Pool {
       }
       WorkerReport& report = reports_[c.job];
       read_events(c, report, now_s(), sink_);
+      leave_layers_out(c.job);
       if (c.err >= 0) drain(c.err, c.last_words);
       const bool told = !report.error_kind.empty();
       conclude(c, status, usage, limits_, jobs_[c.job], g_interrupted != 0, report);
@@ -406,6 +428,7 @@ class Pool {
   std::vector<WorkerReport> reports_;
   std::vector<std::size_t> waiting_;
   std::vector<Child> children_;
+  std::set<std::string> layers_left_out_;
   Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> interrupted_at_;
 };

@@ -59,7 +59,8 @@ struct WorkerReport {
   int stages_ran = 0, stages_hit = 0;
   std::vector<FileRequest> files;  // as CompileOutcome; empty after a failure
   StageKeys keys;
-  int lane = 0;  // which of the side-by-side places it ran in, from 0
+  std::vector<int> layers_left_out;  // numbers in CacheSettings::layers of those that did not work
+  int lane = 0;                      // which of the side-by-side places it ran in, from 0
   double start_s = 0;
   std::vector<StageSpan> spans;
   bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
@@ -79,9 +80,10 @@ struct PoolSettings {
 /// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a
 /// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest
 /// start first; at most `processors` run side by side, fewer when their predicted peaks do not fit the memory
-/// (one always runs), and the last ones get the processors that are free as threads. A child that dies, hangs
-/// or outgrows its limits costs its own model only. SIGINT and SIGTERM end all children within two seconds
-/// and leave no temporary file; what had not finished is kCancelled.
+/// (one always runs), and the last ones get the processors that are free as threads. A cache layer that did
+/// not work for one child is not asked by those that start later. A child that dies, hangs or outgrows its
+/// limits costs its own model only. SIGINT and SIGTERM end all children within two seconds and leave no
+/// temporary file; what had not finished is kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished);
 

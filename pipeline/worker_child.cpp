@@ -134,17 +134,24 @@ CompileRequest request_of(const Json& job) {
 std::unique_ptr<Store> store_of(const Json& job) {
   const std::string cache = from_wire(job.at("cache").get<std::string>());
   if (cache.empty()) return std::make_unique<NullStore>();
-  std::unique_ptr<Store> store = open_disk_store(cache);
+  const bool only_look = job.at("forecast").get<bool>();
+  std::unique_ptr<Store> store = only_look ? look_into_disk_store(cache) : open_disk_store(cache);
   std::vector<std::unique_ptr<CacheLayer>> layers;
-  for (const Json& place : job.at("layers"))
-    layers.push_back(open_layer(from_wire(place.get<std::string>())));
+  const LayerPatience patience = patience_within(job.at("wall_s").get<double>());
+  for (const Json& place : job.at("layers"))  // null: another model's process has left it out
+    layers.push_back(place.is_string() ? open_layer(from_wire(place.get<std::string>()), patience) : nullptr);
   if (layers.empty()) return store;
-  return layered_store(std::move(store), std::move(layers), job.at("upload").get<bool>());
+  return layered_store(std::move(store), std::move(layers),
+                       only_look                      ? LayerUse::kLook
+                       : job.at("upload").get<bool>() ? LayerUse::kUpload
+                                                      : LayerUse::kFetch);
 }
 
 void report_store(EventWriter& events, Store& store) {
-  for (const StoreEvent& e : store.take_events())
+  for (const StoreEvent& e : store.take_events()) {
     events.write({{"event", "cache"}, {"code", e.code}, {"text", e.text}});
+    if (e.layer >= 0) events.write({{"event", "layer-left-out"}, {"layer", e.layer}});
+  }
 }
 
 void report_outcome(EventWriter& events, const CompileOutcome& outcome) {
@@ -184,8 +191,15 @@ int compile(const Json& job, EventWriter& events) {
     events.write(
         {{"event", "inputs"}, {"files", files_to_json(files)}, {"package", ""}, {"keys", Json::object()}});
   };
+  // What the store has to say is told while the model is compiled: models that start meanwhile, and those
+  // that follow one that is killed, need not wait for a bad layer again.
+  const StageObserver tell = [&, stages = stage_events(events)](const Stage& stage, StageEvent event,
+                                                                double fraction, double seconds) {
+    report_store(events, *store);
+    stages(stage, event, fraction, seconds);
+  };
   try {
-    report_outcome(events, compile_model(request, *store, context, stage_events(events)));
+    report_outcome(events, compile_model(request, *store, context, tell));
   } catch (...) {
     report_store(events, *store);
     throw;

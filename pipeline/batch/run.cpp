@@ -17,6 +17,7 @@
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/depfile.h"
 #include "pipeline/batch/reports.h"
+#include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/core_path.h"
 
@@ -53,13 +54,15 @@ constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
 
 class Batch {
  public:
-  Batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out)
+  /// `cache_problem`: why there is no cache folder though one was asked for.
+  Batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out, std::string cache_problem)
       : plan_(plan),
         settings_(settings),
         memo_(settings.cache.folder, plan.outputs),
         reports_(plan.models.size()),
         records_(plan.models.size()),
-        progress_(out, settings.mode, settings.verbose, settings.explain || settings.dry_run) {}
+        progress_(out, settings.mode, settings.verbose, settings.explain || settings.dry_run),
+        cache_problem_(std::move(cache_problem)) {}
 
   int run() {
     request_seed_ = tool_seed();
@@ -69,7 +72,7 @@ class Batch {
     remove_leftovers();
     compile();
     write_reports();
-    if (wrote_ && !settings_.cache.folder.empty())
+    if (wrote_ && !was_cancelled() && !settings_.cache.folder.empty())
       prune_now_and_then(settings_.cache.folder, settings_.cache_limits);
     return exit_code();
   }
@@ -182,6 +185,7 @@ class Batch {
     for (std::size_t i = 0; i < plan_.models.size(); ++i) models.push_back({plan_.models[i].name, 0});
     for (std::size_t j = 0; j < jobs_.size(); ++j) models[model_of_job_[j]].weight = jobs_[j].predicted_s;
     progress_.begin(std::move(models));
+    if (!cache_problem_.empty()) progress_.cache_event("cache-not-written", cache_problem_);
     if (memo_.was_damaged())
       progress_.cache_event("cache-entry-damaged",
                             "what earlier runs found out does not have its digest; every model is looked at");
@@ -312,6 +316,11 @@ class Batch {
     return all;
   }
 
+  bool was_cancelled() const {
+    return std::any_of(reports_.begin(), reports_.end(),
+                       [](const WorkerReport& r) { return r.result == ModelResult::kCancelled; });
+  }
+
   int exit_code() const {
     int code = report_missing_ ? kExitModelFailed : kExitOk;
     for (const WorkerReport& r : reports_) {
@@ -332,6 +341,7 @@ class Batch {
   std::map<const std::string*, Sha256> requests_;
   std::string request_seed_;
   Progress progress_;
+  std::string cache_problem_;
   double seconds_ = 0;
   bool wrote_ = false, failure_recalled_ = false, report_missing_ = false;
 };
@@ -353,7 +363,14 @@ void check_reports(const BatchPlan& plan, const RunSettings& settings) {
 }
 
 int run_batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out) {
-  return Batch(plan, settings, out).run();
+  RunSettings own = settings;
+  std::string problem;
+  if (const std::string& folder = own.cache.folder; !folder.empty() && !own.dry_run)
+    if (const std::string reason = make_cache_folder(folder); !reason.empty()) {
+      problem = folder + " cannot be made (" + reason + "): nothing is kept, and nothing is found";
+      own.cache.folder.clear();
+    }
+  return Batch(plan, own, out, std::move(problem)).run();
 }
 
 }  // namespace texmesh

@@ -28,7 +28,8 @@ void check_reports(const BatchPlan& plan, const RunSettings& settings);
 /// Compiles what a plan holds and is not up to date, writes the reports that were asked for, and gives the
 /// exit code of the command. A model is up to date, without a child process, when neither options nor tool
 /// nor any file that it was made from nor its package has changed since the last run with this cache; one
-/// that failed then is not tried again until one of them changes (`retry_failed` tries it).
+/// that failed then is not tried again until one of them changes (`retry_failed` tries it). A cache folder
+/// that cannot be made costs one warning.
 int run_batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out);
 
 }  // namespace texmesh

@@ -64,30 +64,32 @@ bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> by
   }
 }
 
+bool has(const Json& object, const char* member, Json::value_t type) {
+  return object.is_object() && object.contains(member) && object[member].type() == type;
+}
+
 std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, const Sha256* key) {
   const auto body = unseal(bytes);
   if (!body) return std::nullopt;
   const Json j = Json::parse(*body, nullptr, false);
-  if (!j.is_object() || j.value("version", 0) != kRecordVersion || !j.contains("key") ||
-      !j["key"].is_object() || !j.contains("outputs") || !j["outputs"].is_array())
+  if (!j.is_object() || !j.contains("version") || j["version"] != Json(kRecordVersion) ||
+      !j.contains("key") || !j["key"].is_object() || !j.contains("outputs") || !j["outputs"].is_array())
     return std::nullopt;
-  if (key) {
-    std::vector<std::pair<std::string, std::string>> parts;
-    for (const auto& [label, value] : j["key"].items()) {
-      if (!value.is_string()) return std::nullopt;
-      parts.emplace_back(label, value.get<std::string>());
-    }
-    if (digest_of_parts(parts) != *key) return std::nullopt;
+  std::vector<std::pair<std::string, std::string>> parts;
+  for (const auto& [label, value] : j["key"].items()) {
+    if (!value.is_string()) return std::nullopt;
+    parts.emplace_back(label, value.get<std::string>());
   }
+  if (key && digest_of_parts(parts) != *key) return std::nullopt;
   CacheRecord record;
   record.preimage = j["key"].dump(1);
   for (const Json& o : j["outputs"]) {
-    StoredBlob b;
-    if (!o.is_object()) return std::nullopt;
-    b.name = o.value("name", "");
-    b.bytes = o.value("bytes", std::uint64_t{0});
-    if (!from_hex(o.value("sha256", ""), b.digest)) return std::nullopt;
-    record.outputs.push_back(b);
+    if (!has(o, "name", Json::value_t::string) || !has(o, "sha256", Json::value_t::string) ||
+        !has(o, "bytes", Json::value_t::number_unsigned))
+      return std::nullopt;
+    StoredBlob b{o["name"].get<std::string>(), {}, o["bytes"].get<std::uint64_t>()};
+    if (!from_hex(o["sha256"].get<std::string>(), b.digest)) return std::nullopt;
+    record.outputs.push_back(std::move(b));
   }
   return record;
 }

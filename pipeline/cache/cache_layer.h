@@ -25,26 +25,43 @@ class LayerError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// How long a build waits for a server.
+struct LayerPatience {
+  double answer_s = 10;  // of one transfer: this, and a second for every kBytesPerSecond that went through
+  double all_transfers_s = 900;  // of all transfers of this process together
+  static constexpr double kBytesPerSecond = 100'000;
+};
+
+/// What a model may lose to a layer: a quarter of its time limit (seconds, 0 = none).
+LayerPatience patience_within(double limit_s);
+
 /// A folder laid out as a cache folder; nothing is ever written to it.
 std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
 
 /// GET and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote must be
 /// told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http and
-/// https only, no redirects, 5 s to connect, given up when less than 1 kB/s arrive for 10 s. A credential in
-/// the URL (user:password@) never shows up in name() or messages. InputError for what is no such URL.
-std::unique_ptr<CacheLayer> open_http_layer(const std::string& url);
+/// https only, no redirects; a layer that has failed once, or is slower than its patience allows, fails from
+/// then on without being asked. A credential in the URL (user:password@) never shows up in name() or
+/// messages. InputError for what is no such URL.
+std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience = {});
 
 /// InputError for what names no layer, without touching it.
 void check_layer(const std::string& place);
 
 /// http(s)://... or a folder.
-std::unique_ptr<CacheLayer> open_layer(const std::string& place);
+std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience = {});
+
+enum class LayerUse : std::uint8_t {
+  kFetch,   // what a layer gives is kept locally, and found there from then on
+  kUpload,  // that, and results that were computed are put into every HTTP layer
+  kLook,    // what a layer gives is verified and not kept; load() fetches it again
+};
 
 /// The local store with layers behind it, asked in order when the local one misses. What a layer gives is
-/// verified, kept locally, and found there from then on. With `upload`, results that were computed are put
-/// into every HTTP layer. A layer that fails is left out for the rest of the process, with one event.
+/// verified. A layer that fails is left out for the rest of the process, with one event that holds its number
+/// in `layers`; a null one is left out from the beginning.
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
-                                     std::vector<std::unique_ptr<CacheLayer>> layers, bool upload);
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use);
 
 /// The layers that TEXMESH_CACHE_LAYERS names, separated by blanks.
 std::vector<std::string> layers_from_environment();

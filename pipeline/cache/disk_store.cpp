@@ -59,17 +59,22 @@ class RunningBuild {
 
 class DiskStore : public Store {
  public:
-  explicit DiskStore(const std::string& folder)
-      : folder_(make_folders(folder)), running_(folder), start_ns_(wall_clock_ns()) {}
+  DiskStore(const std::string& folder, bool writes)
+      : folder_(folder), writes_(writes), start_ns_(wall_clock_ns()) {
+    if (!writes_) return;
+    if (const std::string reason = make_cache_folder(folder); !reason.empty())
+      throw InputError(folder, "", "a cache folder", reason);
+    running_.emplace(folder);
+  }
 
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
-    const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared);
+    const FileLock gate = pass_gate();
     const std::string path = place("ac", key);
     const auto bytes = read_whole(path);
     if (!bytes) return std::nullopt;
     auto record = read_record(*bytes, key);
     if (!record) {
-      quarantine(path, "the record of a result");
+      quarantine(path, "the record of a result does not have its digest");
       return std::nullopt;
     }
     for (const StoredBlob& b : record->outputs)
@@ -88,7 +93,8 @@ class DiskStore : public Store {
   }
 
   bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
-    const FileLock gate = FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared);
+    if (!writes_) return false;
+    const FileLock gate = pass_gate();
     CacheRecord record{key.preimage(), {}};
     for (const auto& [name, bytes] : outputs) {
       const StoredBlob blob{name, sha256(*bytes), bytes->size()};
@@ -111,6 +117,15 @@ class DiskStore : public Store {
     return record ? std::optional(record->preimage) : std::nullopt;
   }
 
+  void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override {
+    const FileLock gate = pass_gate();
+    const std::string path = place("ac", key);
+    const auto bytes = read_whole(path);
+    const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
+    if (record && record->outputs == found)  // not what somebody else has put in its place meanwhile
+      quarantine(path, "the record of a result names what is none (" + reason + ")");
+  }
+
   std::optional<std::string> find_note(const Sha256& key) override {
     const std::string path = place("notes", key);
     const auto bytes = read_whole(path);
@@ -119,11 +134,12 @@ class DiskStore : public Store {
     if (text)
       touch(path);
     else
-      quarantine(path, "a note");
+      quarantine(path, "a note does not have its digest");
     return text;
   }
 
   bool put_note(const Sha256& key, const std::string& text) override {
+    if (!writes_) return false;
     const std::string path = place("notes", key), sealed = seal(text);
     if (file_holds(path, bytes_of(sealed))) return true;
     std::error_code ec;
@@ -139,6 +155,7 @@ class DiskStore : public Store {
   /// Polls, so that Ctrl-C ends the wait. A prefix of the key is enough: two keys that share a file wait for
   /// each other, which costs time and never more, and the folder stays small.
   std::unique_ptr<Claim> claim(const Sha256& key, const RunContext& context) override {
+    if (!writes_) return nullptr;
     const std::string path = folder_ + "/locks/" + to_hex(key).substr(0, 3);
     for (;;) {
       FileLock lock = FileLock::attempt(path, FileLock::Mode::kExclusive);
@@ -155,13 +172,9 @@ class DiskStore : public Store {
   }
 
  private:
-  static std::string make_folders(const std::string& folder) {
-    std::error_code ec;
-    for (const char* part : {"ac", "cas", "notes", "memo", "locks", "running"}) {
-      fs::create_directories(fs::path(folder) / part, ec);
-      if (ec) throw InputError((fs::path(folder) / part).string(), "", "a cache folder", ec.message());
-    }
-    return folder;
+  /// Nobody prunes while it is held.
+  FileLock pass_gate() const {
+    return writes_ ? FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared) : FileLock();
   }
 
   static std::span<const std::uint8_t> bytes_of(const std::string& s) {
@@ -174,6 +187,7 @@ class DiskStore : public Store {
 
   /// A use moves an entry to the young end of the queue, at most hourly (pruning knows of that hour).
   void touch(const std::string& path) const {
+    if (!writes_) return;
     struct stat s {};
     if (::stat(path.c_str(), &s) == 0 &&
         stamp_of(s).modified_ns < start_ns_ - kTouchInterval_s * 1'000'000'000)
@@ -196,7 +210,7 @@ class DiskStore : public Store {
 
   bool check(const std::string& path, const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
     if (bytes.size() != blob.bytes || sha256(bytes) != blob.digest) {
-      quarantine(path, "the result " + blob.name);
+      quarantine(path, "the result " + blob.name + " does not have its digest");
       return false;
     }
     touch(path);
@@ -208,15 +222,17 @@ class DiskStore : public Store {
   }
 
   void quarantine(const std::string& path, const std::string& what) {
-    std::error_code ec;
-    fs::create_directories(folder_ + "/quarantine", ec);
-    const std::string name = fs::path(path).filename().string();
-    fs::rename(path, folder_ + "/quarantine/" + name, ec);
+    std::string fate = "left where it is";
+    if (writes_) {
+      std::error_code ec;
+      fs::create_directories(folder_ + "/quarantine", ec);
+      const std::string name = fs::path(path).filename().string();
+      fs::rename(path, folder_ + "/quarantine/" + name, ec);
+      fate = (ec ? "it could not be moved away (" + ec.message() + ")" : "moved to quarantine/" + name) +
+             ", computed again";
+    }
     const std::lock_guard lock(mutex_);
-    events_.push_back({"cache-entry-damaged", what + " does not have its digest; " +
-                                                  (ec ? "it could not be moved away (" + ec.message() + ")"
-                                                      : "moved to quarantine/" + name) +
-                                                  ", computed again"});
+    events_.push_back({"cache-entry-damaged", what + "; " + fate});
   }
 
   bool not_written() {
@@ -228,7 +244,8 @@ class DiskStore : public Store {
   }
 
   std::string folder_;
-  RunningBuild running_;
+  bool writes_;
+  std::optional<RunningBuild> running_;
   std::int64_t start_ns_;
   std::mutex mutex_;
   std::map<Sha256, FileStamp> verified_;  // only stamps that prove something
@@ -239,7 +256,20 @@ class DiskStore : public Store {
 }  // namespace
 
 std::unique_ptr<Store> open_disk_store(const std::string& folder) {
-  return std::make_unique<DiskStore>(folder);
+  return std::make_unique<DiskStore>(folder, true);
+}
+
+std::unique_ptr<Store> look_into_disk_store(const std::string& folder) {
+  return std::make_unique<DiskStore>(folder, false);
+}
+
+std::string make_cache_folder(const std::string& folder) {
+  std::error_code ec;
+  for (const char* part : {"ac", "cas", "notes", "memo", "locks", "running"}) {
+    fs::create_directories(fs::path(folder) / part, ec);
+    if (ec) return ec.message();
+  }
+  return "";
 }
 
 std::string default_cache_folder(const std::string& flag) {

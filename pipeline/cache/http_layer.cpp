@@ -1,6 +1,7 @@
 #include <curl/curl.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <mutex>
 
@@ -34,6 +35,21 @@ std::size_t give(char* data, std::size_t size, std::size_t count, void* user) {
   return n;
 }
 
+/// Ends a transfer that takes longer than the layer's patience.
+struct Watch {
+  const LayerPatience& patience;
+  double left_s;  // of the time of all transfers
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+};
+int look_at_watch(void* user, curl_off_t, curl_off_t down, curl_off_t, curl_off_t up) {
+  const auto& watch = *static_cast<const Watch*>(user);
+  const double s = watch.seconds(), bytes = static_cast<double>(down) + static_cast<double>(up);
+  return s > watch.left_s || s > watch.patience.answer_s + bytes / LayerPatience::kBytesPerSecond;
+}
+
 struct Easy {
   CURL* handle = ::curl_easy_init();
   ~Easy() { ::curl_easy_cleanup(handle); }
@@ -41,7 +57,7 @@ struct Easy {
 
 class HttpLayer : public CacheLayer {
  public:
-  explicit HttpLayer(std::string url) : url_(std::move(url)) {
+  HttpLayer(std::string url, const LayerPatience& patience) : url_(std::move(url)), patience_(patience) {
     while (url_.ends_with('/')) url_.pop_back();
     static std::once_flag once;
     std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
@@ -56,12 +72,12 @@ class HttpLayer : public CacheLayer {
     ::curl_easy_setopt(easy_.handle, CURLOPT_HTTPGET, 1L);
     ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, take);
     ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEDATA, &sink);
-    const CURLcode rc = ::curl_easy_perform(easy_.handle);
+    const CURLcode rc = perform();
     const long status = status_code();
-    if (status == 404 || status == 410) return std::nullopt;
+    if (rc != CURLE_ABORTED_BY_CALLBACK && (status == 404 || status == 410)) return std::nullopt;
     if (rc == CURLE_WRITE_ERROR && status == 200) return std::nullopt;  // too long: not what was asked for
-    if (rc != CURLE_OK) throw LayerError(::curl_easy_strerror(rc));
-    if (status != 200) throw LayerError("status " + std::to_string(status));
+    if (rc != CURLE_OK) fail(why(rc));
+    if (status != 200) fail("status " + std::to_string(status));
     return std::move(sink.bytes);
   }
 
@@ -74,14 +90,15 @@ class HttpLayer : public CacheLayer {
     ::curl_easy_setopt(easy_.handle, CURLOPT_READDATA, &upload);
     ::curl_easy_setopt(easy_.handle, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes.size()));
     ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, ignore);
-    const CURLcode rc = ::curl_easy_perform(easy_.handle);
-    if (rc != CURLE_OK) throw LayerError(::curl_easy_strerror(rc));
+    const CURLcode rc = perform();
+    if (rc != CURLE_OK) fail(why(rc));
     if (const long status = status_code(); status < 200 || status > 299)
-      throw LayerError("status " + std::to_string(status) + " for a PUT");
+      fail("status " + std::to_string(status) + " for a PUT");
   }
 
  private:
   void prepare(const char* kind, const Sha256& digest) {
+    if (!problem_.empty()) throw LayerError(problem_);  // another thread has waited for it already
     const bool blob = std::string_view(kind) == "cas";
     const std::string url = url_ + (blob ? "/cas/" : "/ac/") + to_hex(digest);
     CURL* h = easy_.handle;
@@ -90,27 +107,47 @@ class HttpLayer : public CacheLayer {
     ::curl_easy_setopt(h, CURLOPT_PROTOCOLS_STR, "http,https");
     ::curl_easy_setopt(h, CURLOPT_FOLLOWLOCATION, 0L);
     ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
-    ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT, 5L);
-    ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_LIMIT, 1000L);
-    ::curl_easy_setopt(h, CURLOPT_LOW_SPEED_TIME, 10L);
+    ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(1000 * patience_.answer_s / 2) + 1);
     ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
+    ::curl_easy_setopt(h, CURLOPT_NOPROGRESS, 0L);
+    ::curl_easy_setopt(h, CURLOPT_XFERINFOFUNCTION, look_at_watch);
   }
+
+  CURLcode perform() {
+    Watch watch{patience_, patience_.all_transfers_s - spent_s_};
+    ::curl_easy_setopt(easy_.handle, CURLOPT_XFERINFODATA, &watch);
+    const CURLcode rc = ::curl_easy_perform(easy_.handle);
+    spent_s_ += watch.seconds();
+    return rc;
+  }
+
+  static std::string why(CURLcode rc) {
+    return rc == CURLE_ABORTED_BY_CALLBACK ? "too slow" : ::curl_easy_strerror(rc);
+  }
+
+  [[noreturn]] void fail(const std::string& problem) {
+    problem_ = problem;
+    throw LayerError(problem);
+  }
+
   long status_code() const {
     long status = 0;
     ::curl_easy_getinfo(easy_.handle, CURLINFO_RESPONSE_CODE, &status);
     return status;
   }
 
-  std::string url_;
+  std::string url_, problem_;
+  LayerPatience patience_;
+  double spent_s_ = 0;
   std::mutex mutex_;  // one connection
   Easy easy_;
 };
 
 }  // namespace
 
-std::unique_ptr<CacheLayer> open_http_layer(const std::string& url) {
+std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience) {
   check_layer(url);
-  return std::make_unique<HttpLayer>(url);
+  return std::make_unique<HttpLayer>(url, patience);
 }
 
 }  // namespace texmesh

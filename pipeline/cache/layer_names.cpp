@@ -1,4 +1,5 @@
 // What the command line needs to know of layers; apart from them, so that it does not load libcurl.
+#include <algorithm>
 #include <cstdlib>
 #include <sstream>
 
@@ -12,6 +13,14 @@ void check_layer(const std::string& place) {
       !place.starts_with("https://"))
     throw InputError("cache layer", "", "a folder, or a URL that begins with http:// or https://",
                      place.substr(0, place.find("://") + 3) + "...");
+}
+
+LayerPatience patience_within(double limit_s) {
+  LayerPatience patience;
+  if (limit_s <= 0) return patience;
+  patience.all_transfers_s = std::min(patience.all_transfers_s, limit_s / 4);
+  patience.answer_s = std::min(patience.answer_s, patience.all_transfers_s);
+  return patience;
 }
 
 std::vector<std::string> layers_from_environment() {

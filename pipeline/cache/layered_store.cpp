@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <set>
 
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/cache_layer.h"
@@ -29,16 +30,22 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 
 class LayeredStore : public Store {
  public:
-  LayeredStore(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers, bool upload)
-      : local_(std::move(local)), upload_(upload) {
-    for (auto& l : layers) layers_.push_back({std::move(l), true});
+  LayeredStore(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use)
+      : local_(std::move(local)), use_(use) {
+    for (auto& l : layers) {
+      const bool works = l != nullptr;
+      layers_.push_back({std::move(l), works, static_cast<int>(layers_.size())});
+    }
   }
 
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
     if (auto found = local_->find(key)) return found;
+    if (is_rejected(key)) return std::nullopt;
     for (Layer& layer : layers_)
-      if (bring(layer, key))
+      if (auto brought = bring(layer, key)) {
+        if (use_ == LayerUse::kLook) return brought;
         if (auto found = local_->find(key)) return found;
+      }
     return std::nullopt;
   }
 
@@ -52,7 +59,7 @@ class LayeredStore : public Store {
 
   bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
     const bool kept = local_->put(key, outputs);
-    if (!upload_) return kept;
+    if (use_ != LayerUse::kUpload) return kept;
     CacheRecord record{key.preimage(), {}};
     for (const auto& [name, bytes] : outputs) record.outputs.push_back({name, sha256(*bytes), bytes->size()});
     const std::string text = write_record(record);
@@ -67,6 +74,15 @@ class LayeredStore : public Store {
 
   std::optional<std::string> preimage(const Sha256& key) override { return local_->preimage(key); }
 
+  /// No layer is asked for this key again: the one that gave it would give the same.
+  void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override {
+    {
+      const std::lock_guard lock(mutex_);
+      rejected_.insert(key);
+    }
+    local_->reject(key, found, reason);
+  }
+
   std::optional<std::string> find_note(const Sha256& key) override {
     if (auto note = local_->find_note(key)) return note;
     for (Layer& layer : layers_)
@@ -80,7 +96,7 @@ class LayeredStore : public Store {
 
   bool put_note(const Sha256& key, const std::string& text) override {
     const bool kept = local_->put_note(key, text);
-    if (upload_) {
+    if (use_ == LayerUse::kUpload) {
       const std::string sealed = seal(text);
       for (Layer& layer : layers_) guarded(layer, [&] { layer.layer->put("notes", key, bytes_of(sealed)); });
     }
@@ -101,9 +117,15 @@ class LayeredStore : public Store {
 
  private:
   struct Layer {
-    std::unique_ptr<CacheLayer> layer;
+    std::unique_ptr<CacheLayer> layer;  // null: does not work
     bool works = true;
+    int number = 0;
   };
+
+  bool is_rejected(const Sha256& key) {
+    const std::lock_guard lock(mutex_);
+    return rejected_.contains(key);
+  }
 
   static bool is(const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
     return bytes.size() == blob.bytes && sha256(bytes) == blob.digest;
@@ -120,7 +142,8 @@ class LayeredStore : public Store {
     } catch (const LayerError& e) {
       const std::lock_guard lock(mutex_);
       if (std::exchange(layer.works, false))
-        events_.push_back({"cache-layer-unreachable", layer.layer->name() + " is left out: " + e.what()});
+        events_.push_back(
+            {"cache-layer-unreachable", layer.layer->name() + " is left out: " + e.what(), layer.number});
     }
   }
 
@@ -131,35 +154,40 @@ class LayeredStore : public Store {
     return bytes;
   }
 
-  void tell_damaged(const Layer& layer, const std::string& what) {
+  std::nullopt_t tell_damaged(const Layer& layer, const std::string& what) {
     const std::lock_guard lock(mutex_);
-    events_.push_back({"cache-entry-damaged",
-                       what + " from " + layer.layer->name() + " does not have its digest; not used"});
+    events_.push_back({"cache-entry-damaged", what + " from " + layer.layer->name() + "; not used"});
+    return std::nullopt;
   }
 
-  /// Copies a run of a stage from a layer into the local store, if all of it is there and sound.
-  bool bring(Layer& layer, const Sha256& key) {
+  /// Copies a run of a stage from a layer into the local store (unless that is only looked at), if all of it
+  /// is there and sound.
+  std::optional<std::vector<StoredBlob>> bring(Layer& layer, const Sha256& key) {
     const auto bytes = get(layer, "ac", key, kMaxRecordBytes);
-    if (!bytes) return false;
+    if (!bytes) return std::nullopt;
     const auto record = read_record(*bytes, key);
-    if (!record) return tell_damaged(layer, "a record"), false;
+    if (!record) return tell_damaged(layer, "what is no record of its key");
     std::vector<std::pair<std::string, Bytes>> outputs;
     for (const StoredBlob& blob : record->outputs) {
-      if (blob.bytes > kMaxBlobBytes) return false;
+      if (blob.bytes > kMaxBlobBytes) return std::nullopt;
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
-      if (!blob_bytes) return false;
-      if (!is(blob, *blob_bytes)) return tell_damaged(layer, "the result " + blob.name), false;
+      if (!blob_bytes) return std::nullopt;
+      if (!is(blob, *blob_bytes))
+        return tell_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
       outputs.emplace_back(blob.name,
                            std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
     }
+    if (use_ == LayerUse::kLook) return record->outputs;
     const auto original = key_from_preimage(record->preimage);
-    return original && local_->put(*original, outputs);
+    if (!original || !local_->put(*original, outputs)) return std::nullopt;
+    return record->outputs;
   }
 
   std::unique_ptr<Store> local_;
   std::vector<Layer> layers_;
-  bool upload_;
+  LayerUse use_;
   std::mutex mutex_;
+  std::set<Sha256> rejected_;
   std::vector<StoreEvent> events_;
 };
 
@@ -169,13 +197,13 @@ std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder) {
   return std::make_unique<FolderLayer>(folder);
 }
 
-std::unique_ptr<CacheLayer> open_layer(const std::string& place) {
-  return place.find("://") != std::string::npos ? open_http_layer(place) : open_folder_layer(place);
+std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience) {
+  return place.find("://") != std::string::npos ? open_http_layer(place, patience) : open_folder_layer(place);
 }
 
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
-                                     std::vector<std::unique_ptr<CacheLayer>> layers, bool upload) {
-  return std::make_unique<LayeredStore>(std::move(local), std::move(layers), upload);
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use) {
+  return std::make_unique<LayeredStore>(std::move(local), std::move(layers), use);
 }
 
 }  // namespace texmesh

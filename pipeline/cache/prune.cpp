@@ -64,12 +64,16 @@ class Pruning {
   Pruning(const std::string& folder, const CacheLimits& limits)
       : folder_(folder), limits_(limits), now_ns_(wall_clock_ns()), in_use_since_ns_(in_use_since_ns()) {}
 
-  PruneResult run() {
-    read_records();
-    read_blobs();
-    drop_records();
-    drop_orphans();
+  /// `orphans_too`: also where nothing has to go by size or age, look for blobs that no record names.
+  PruneResult run(bool orphans_too) {
+    list_all();
     drop_others();
+    drop_quarantined();
+    if (orphans_too || too_much() || (!records_.empty() && too_old(records_.front().entry))) {
+      read_records();
+      drop_records();
+      drop_orphans();
+    }
     result_.kept_bytes = total_bytes_;
     return result_;
   }
@@ -77,44 +81,54 @@ class Pruning {
  private:
   struct Record {
     Entry entry;
-    std::vector<std::string> blobs;  // names
+    std::vector<std::string> blobs;  // names, each once
   };
   struct Blob {
     Entry entry;
     std::size_t users = 0;
   };
 
-  void read_records() {
-    for (Entry& e : list(folder_, "ac")) {
-      if (!is_object_name(name_of(e))) {
-        strays_.push_back(std::move(e));
-        continue;
-      }
-      Record r{e, {}};
-      if (const auto bytes = read_whole(e.path, 1 << 24))
-        if (const auto record = read_record(*bytes))
-          for (const StoredBlob& b : record->outputs) r.blobs.push_back(to_hex(b.digest));
-      total_bytes_ += e.stamp.bytes;
-      records_.push_back(std::move(r));
-    }
-    std::stable_sort(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
-      return a.entry.stamp.modified_ns < b.entry.stamp.modified_ns;
-    });
-  }
-
-  void read_blobs() {
-    for (Entry& e : list(folder_, "cas")) {
-      if (!is_object_name(name_of(e))) {
-        strays_.push_back(std::move(e));
-        continue;
-      }
-      total_bytes_ += e.stamp.bytes;
+  /// Names, sizes and times: whether anything has to go is known before any file is read.
+  void list_all() {
+    for (Entry& e : objects("ac")) records_.push_back({std::move(e), {}});
+    std::stable_sort(records_.begin(), records_.end(),
+                     [](const Record& a, const Record& b) { return used_before(a.entry, b.entry); });
+    for (Entry& e : objects("cas")) {
       const std::string name = name_of(e);
       blobs_.emplace(name, Blob{std::move(e), 0});
     }
-    for (const Record& r : records_)
-      for (const std::string& b : std::set<std::string>(r.blobs.begin(), r.blobs.end()))
+    notes_ = objects("notes");
+    memos_ = list(folder_, "memo");
+    quarantined_ = list(folder_, "quarantine");
+    for (const std::vector<Entry>* part : {&memos_, &quarantined_})
+      for (const Entry& e : *part) total_bytes_ += e.stamp.bytes;
+  }
+
+  /// The files of a part that are named as objects are; counts them.
+  std::vector<Entry> objects(const char* part) {
+    std::vector<Entry> all;
+    for (Entry& e : list(folder_, part)) {
+      total_bytes_ += e.stamp.bytes;
+      (is_object_name(name_of(e)) ? all : strays_).push_back(std::move(e));
+    }
+    return all;
+  }
+
+  static bool used_before(const Entry& a, const Entry& b) {
+    return a.stamp.modified_ns < b.stamp.modified_ns;
+  }
+
+  /// Which blobs the records name.
+  void read_records() {
+    for (Record& r : records_) {
+      std::set<std::string> names;
+      if (const auto bytes = read_whole(r.entry.path, 1 << 24))
+        if (const auto record = read_record(*bytes))
+          for (const StoredBlob& b : record->outputs) names.insert(to_hex(b.digest));
+      r.blobs.assign(names.begin(), names.end());
+      for (const std::string& b : r.blobs)
         if (const auto it = blobs_.find(b); it != blobs_.end()) ++it->second.users;
+    }
   }
 
   bool too_old(const Entry& e) const {
@@ -152,7 +166,7 @@ class Pruning {
         continue;
       }
       ++result_.records;
-      for (const std::string& b : std::set<std::string>(r.blobs.begin(), r.blobs.end())) {
+      for (const std::string& b : r.blobs) {
         const auto it = blobs_.find(b);
         if (it == blobs_.end() || --it->second.users > 0) continue;
         if (remove_unused(it->second.entry)) ++result_.blobs;
@@ -170,25 +184,26 @@ class Pruning {
   }
 
   void drop_others() {
-    for (const char* part : {"notes", "memo"})
-      for (const Entry& e : list(folder_, part)) {
-        if (remove_stale_temporary(e.path)) {
-          ++result_.others;
-          continue;
-        }
-        total_bytes_ += e.stamp.bytes;
-        if (!is_object_name(name_of(e)) && std::string(part) == "notes")
-          strays_.push_back(e);
-        else if (too_old(e) && remove(e))
-          ++result_.others;
-      }
-    for (const Entry& e : list(folder_, "quarantine")) {
-      total_bytes_ += e.stamp.bytes;
-      if (e.stamp.changed_ns < now_ns_ - 7 * kDay_ns && remove(e)) ++result_.others;
-    }
+    for (const Entry& e : notes_)
+      if (too_old(e) && remove(e)) ++result_.others;
+    for (const Entry& e : memos_)
+      if (drop_temporary(e) || (too_old(e) && remove(e))) ++result_.others;
     for (const Entry& e : strays_)
-      if (remove_stale_temporary(e.path) || (e.stamp.modified_ns < now_ns_ - kDay_ns && remove(e)))
-        ++result_.others;
+      if (drop_temporary(e) || (e.stamp.modified_ns < now_ns_ - kDay_ns && remove(e))) ++result_.others;
+  }
+
+  bool drop_temporary(const Entry& e) {
+    if (!remove_stale_temporary(e.path)) return false;
+    total_bytes_ -= std::min(total_bytes_, e.stamp.bytes);
+    return true;
+  }
+
+  /// What is of no use to a build goes before any result, the oldest first (by the time of the move).
+  void drop_quarantined() {
+    std::stable_sort(quarantined_.begin(), quarantined_.end(),
+                     [](const Entry& a, const Entry& b) { return a.stamp.changed_ns < b.stamp.changed_ns; });
+    for (const Entry& e : quarantined_)
+      if ((too_much() || e.stamp.changed_ns < now_ns_ - 7 * kDay_ns) && remove(e)) ++result_.others;
   }
 
   const std::string& folder_;
@@ -197,7 +212,7 @@ class Pruning {
   std::uint64_t total_bytes_ = 0;
   std::vector<Record> records_;
   std::map<std::string, Blob> blobs_;
-  std::vector<Entry> strays_;
+  std::vector<Entry> notes_, memos_, quarantined_, strays_;
   PruneResult result_;
 };
 
@@ -222,7 +237,7 @@ CacheStatistics cache_statistics(const std::string& folder) {
 }
 
 PruneResult prune_cache(const std::string& folder, const CacheLimits& limits) {
-  return Pruning(folder, limits).run();
+  return Pruning(folder, limits).run(true);
 }
 
 void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
@@ -233,7 +248,7 @@ void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
   if (fd < 0) return;
   ::futimens(fd, nullptr);
   ::close(fd);
-  prune_cache(folder, limits);
+  Pruning(folder, limits).run(false);
 }
 
 namespace {

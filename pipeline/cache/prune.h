@@ -31,15 +31,16 @@ struct PruneResult {
   std::uint64_t kept_in_use = 0;  // records that had to go by size or age but belong to a running build
 };
 
-/// Removes what has not been used for longest until the folder keeps the limits; records before the blobs
-/// that no other record needs; then blobs without a record, notes that are too old, what was quarantined a
-/// week ago, and temporary files of killed processes. Never what a running build has used: those are entries
-/// used later than kTouchInterval_s before the start of the oldest running build. Safe beside builds and
-/// other pruning.
+/// Removes notes that are too old, temporary files of killed processes and what was quarantined a week ago;
+/// then, until the folder keeps the limits, what is quarantined, the oldest first, and what has not been used
+/// for longest; records before the blobs that no other record needs; then blobs without a record. Never what
+/// a running build has used: those are entries used later than kTouchInterval_s before the start of the
+/// oldest running build. Safe beside builds and other pruning.
 PruneResult prune_cache(const std::string& folder, const CacheLimits& limits);
 
 /// prune_cache when the last one is long enough ago (a tenth of an hour) for the folder to have grown; what
-/// builds call when they are done.
+/// builds call when they are done. Where size and ages are within the limits no record is read, and blobs
+/// without a record stay.
 void prune_now_and_then(const std::string& folder, const CacheLimits& limits);
 
 struct CacheDamage {

@@ -175,7 +175,9 @@ void add_run_options(CLI::App& c, CompileArguments& args) {
 }
 
 void add_cache_options(CLI::App& c, CompileArguments& args) {
-  c.add_option("--cache", args.cache, "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)");
+  c.add_option("--cache", args.cache,
+               "Cache folder (default: TEXMESH_CACHE, else the user's cache folder); one that "
+               "cannot be made or written costs a warning, never the build");
   c.add_flag("--no-cache", args.no_cache, "Compute everything, keep nothing");
   c.add_option("--cache-layer", args.layers,
                "Folder or http(s) URL to ask behind the cache folder; may be given several times (also "

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "pipeline/cache/disk_store.h"
 #include "tests/support/small_builds.h"
 
 namespace texmesh::testing {
@@ -132,6 +133,58 @@ TEST_F(SharedCache, EightProcessesBesideEvictionGiveNoWrongByte) {
   EXPECT_LE(ran - keys, evicted * kProcesses);  // whoever was about to load an evicted result
   const CommandResult r = run_command({TEXMESH_BINARY, "cache", "verify", "--cache", cache});
   EXPECT_EQ(r.exit_code, 0) << r.output;
+}
+
+/// Results of other collections, unused for 30 to 129 days.
+void put_old_results(const std::string& cache, int records) {
+  {
+    const auto store = open_disk_store(cache);
+    for (int i = 0; i < records; ++i) {
+      const std::string text = "foreign result " + std::to_string(i);
+      const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end());
+      ASSERT_TRUE(store->put(Key("foreign", 1).add("number", std::to_string(i)), {{"x", bytes}}));
+    }
+  }
+  int days = 0;
+  for (const std::string& f : files_beneath((fs::path(cache) / "ac").string()))
+    fs::last_write_time(fs::path(cache) / "ac" / f,
+                        fs::file_time_type::clock::now() - std::chrono::hours(24 * (30 + days++ % 100)));
+  for (const std::string& f : files_beneath((fs::path(cache) / "cas").string()))
+    fs::last_write_time(fs::path(cache) / "cas" / f,
+                        fs::file_time_type::clock::now() - std::chrono::hours(24 * 30));
+}
+
+/// Eviction has enough to do with what nobody uses: it must leave alone what the builds have put.
+TEST_F(SharedCache, EightProcessesBesideEvictionOfOldResultsComputeEachKeyOnce) {
+  ASSERT_NO_FATAL_FAILURE(prepare(full_sweeps() ? 200 : 2));
+  ASSERT_EQ(compile("reference", "reference-cache").exit_code, 0);
+  const Packages reference = packages_in(folder_ / "reference");
+  const Counts keys = keys_in("reference-cache");
+  const std::string cache = folder_ / "cache";
+  constexpr int kOld = 1000;
+  ASSERT_NO_FATAL_FAILURE(put_old_results(cache, kOld));
+  std::vector<std::string> builds;
+  for (int k = 0; k < kProcesses; ++k)
+    builds.push_back(quoted(command("out" + std::to_string(k), "cache")) + "--jobs 1 >'" +
+                     (folder_ / ("events" + std::to_string(k))) + "'");
+  // A day more each time: some have to go in every round, while the builds run.
+  const std::string evict = "n=$((n + 1)); '" TEXMESH_BINARY
+                            "' cache prune --json --size 0 --age $((n < 100 ? 130 - n : 30))d --cache '" +
+                            cache + "' >>'" + (folder_ / "pruned") + "' 2>/dev/null";
+  EXPECT_EQ(run_command({"bash", "-c", side_by_side(builds, evict)}, {}, "", 3600).exit_code, 0);
+  Counts runs;
+  for (int k = 0; k < kProcesses; ++k) {
+    EXPECT_TRUE(packages_in(folder_ / ("out" + std::to_string(k))) == reference) << "process " << k;
+    add_runs(k, keys, runs);
+  }
+  EXPECT_EQ(runs, keys);
+  Counts left = keys_in("cache");
+  const std::size_t old_left = left["foreign"];
+  left.erase("foreign");
+  EXPECT_EQ(left, keys);
+  EXPECT_LT(old_left, static_cast<std::size_t>(kOld));
+  std::printf("%d processes: %zu stage runs for %zu keys, %zu old results evicted meanwhile\n", kProcesses,
+              sum(runs), sum(keys), kOld - old_left);
 }
 
 /// Files of the cache that hold something.

@@ -175,6 +175,69 @@ TEST(GraphRun, ALostBlobIsComputedAgain) {
   EXPECT_EQ(fake.ran, (Ran{"join", "middle"}));  // middle is never stored
 }
 
+/// Somebody has put what is no result, under the right keys and with the right digests.
+TEST(GraphRun, AResultThatDoesNotDecodeIsComputedAgainAndReplaced) {
+  struct Poisoned : MemoryStore {
+    std::string victim, notes_of;
+    std::multiset<std::string> rejected;
+    bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+      auto wrong = outputs;
+      const auto garbage = std::make_shared<const std::vector<std::uint8_t>>(300, 0x67);
+      if (outputs.front().first == victim) wrong.front().second = garbage;
+      if (outputs.front().first == notes_of) wrong.back().second = garbage;
+      return MemoryStore::put(key, wrong);
+    }
+    void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& why) override {
+      rejected.insert(found.front().name);
+      MemoryStore::reject(key, found, why);
+    }
+  };
+  for (int threads : {1, 8})
+    for (const std::string victim : {"left", "right", "join", "notes of left"}) {
+      Poisoned store;
+      Fake fake;
+      store.victim = victim;
+      if (victim == "notes of left") store.notes_of = "left";
+      fake.run(store, "abc");
+      store.victim = store.notes_of = "";
+      Notes notes;
+      EXPECT_EQ(fake.run(store, "abc", {}, threads, &notes), "aabcR+a") << victim;
+      EXPECT_EQ(notes.size(), 1u);
+      EXPECT_EQ(store.rejected, (std::multiset<std::string>{victim == "notes of left" ? "left" : victim}));
+      const auto rejected = store.rejected;
+      fake.run(store, "abc");  // what was computed meanwhile stands in the right places
+      EXPECT_EQ(fake.run(store, "abc", {}, threads), "aabcR+a") << victim;
+      EXPECT_EQ(fake.ran, Ran{}) << victim;
+      EXPECT_EQ(store.rejected, rejected);
+    }
+}
+
+/// The poisoned result was used by nobody yet: what comes after it gets the key of the right one at once.
+TEST(GraphRun, WhatFollowsAResultThatDoesNotDecodeIsKeptUnderItsRightKey) {
+  MemoryStore store;
+  Fake fake;
+  fake.run(store, "abc");
+  MemoryStore poisoned;
+  const std::vector<Stage> stages = fake.table();
+  const RunContext context;
+  const CompileOptions options;
+  GraphRun graph(stages, options, store, context);
+  graph.give("source", object(Text("abc")), sha256(std::vector<std::uint8_t>{'a', 'b', 'c'}), 3);
+  graph.run("join");
+  const Sha256 left = graph.keys().at("left"), join = graph.keys().at("join");
+  const auto key = key_from_preimage(*store.preimage(left));
+  ASSERT_TRUE(key);
+  const auto bytes = [](const char* s) {
+    return std::make_shared<const std::vector<std::uint8_t>>(s, s + std::char_traits<char>::length(s));
+  };
+  auto outputs = *store.find(left);
+  poisoned.put(*key, {{"left", bytes("no text")}, {"left.notes", store.load(outputs.back())}});
+  EXPECT_EQ(fake.run(poisoned, "abc"), "aabcR+a");
+  EXPECT_TRUE(poisoned.find(join));
+  EXPECT_EQ(fake.run(poisoned, "abc"), "aabcR+a");
+  EXPECT_EQ(fake.ran, Ran{});
+}
+
 TEST(GraphRun, CancelledBeforeAnyWork) {
   Fake fake;
   MemoryStore store;

@@ -68,7 +68,8 @@ class Server {
 std::unique_ptr<Store> store_with(const std::string& url, const std::string& folder, bool upload) {
   std::vector<std::unique_ptr<CacheLayer>> layers;
   layers.push_back(open_layer(url));
-  return layered_store(open_disk_store(folder), std::move(layers), upload);
+  return layered_store(open_disk_store(folder), std::move(layers),
+                       upload ? LayerUse::kUpload : LayerUse::kFetch);
 }
 
 TEST(HttpLayer, WhatOneMachinePutsAnotherFinds) {
@@ -147,6 +148,39 @@ TEST(HttpLayer, NobodyThere) {
   const auto events = store->take_events();
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].text.find("secret"), std::string::npos);
+}
+
+TEST(HttpLayer, AServerThatDripsIsLeftOut) {
+  httplib::Server drips;
+  std::atomic<int> requests{0};
+  drips.Get(".*", [&](const httplib::Request&, httplib::Response& response) {
+    ++requests;
+    response.set_chunked_content_provider("text/plain", [](std::size_t, httplib::DataSink& sink) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      return sink.write("0123456789", 10);  // without end
+    });
+  });
+  const int port = drips.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { drips.listen_after_bind(); });
+  while (!drips.is_running()) std::this_thread::yield();
+  const std::string url = "http://127.0.0.1:" + std::to_string(port);
+  const Sha256 digest = key_of("a").digest();
+  for (const LayerPatience patience : {LayerPatience{0.3, 900}, LayerPatience{10, 0.3}}) {
+    const auto layer = open_layer(url, patience);
+    requests = 0;
+    EXPECT_THROW(layer->get("cas", digest, 12'000'000'000), LayerError);
+    EXPECT_THROW(layer->get("ac", digest, 1000), LayerError);
+    EXPECT_EQ(requests, 1);  // it is not asked a second time
+  }
+  drips.stop();
+  thread.join();
+}
+
+TEST(HttpLayer, AModelLosesAQuarterOfItsTimeToALayer) {
+  EXPECT_EQ(patience_within(12).all_transfers_s, 3);
+  EXPECT_EQ(patience_within(12).answer_s, 3);
+  EXPECT_EQ(patience_within(3600).answer_s, 10);
+  EXPECT_EQ(patience_within(0).answer_s, 10);
 }
 
 TEST(HttpLayer, OnlyHttp) {

@@ -222,6 +222,41 @@ TEST(Prune, NeverWhatARunningBuildHasUsed) {
   EXPECT_FALSE(open_disk_store(folder.path.string())->find(key_of("mine").digest()));
 }
 
+TEST(Prune, WhatIsQuarantinedCountsAndGoesBeforeResultsTheOldestFirst) {
+  const Folder folder;
+  ASSERT_TRUE(open_disk_store(folder.path.string())->put(key_of("a"), {{"x", bytes_of("result")}}));
+  fs::create_directories(folder.path / "quarantine");
+  for (const char* name : {"old", "young"}) {
+    std::ofstream(folder.path / "quarantine" / name) << std::string(3000, 'q');
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // times of files have ticks
+  }
+  PruneResult r = prune_cache(folder.path.string(), {5000, 0});
+  EXPECT_EQ(r.others, 1u);
+  EXPECT_EQ(r.records, 0u);
+  EXPECT_LE(r.kept_bytes, 5000u);
+  EXPECT_GE(r.kept_bytes, 3000u);
+  EXPECT_FALSE(fs::exists(folder.path / "quarantine/old"));
+  EXPECT_TRUE(fs::exists(folder.path / "quarantine/young"));
+  r = prune_cache(folder.path.string(), {2000, 0});
+  EXPECT_FALSE(fs::exists(folder.path / "quarantine/young"));
+  EXPECT_TRUE(open_disk_store(folder.path.string())->find(key_of("a").digest()));
+}
+
+TEST(Prune, NowAndThenReadsNoRecordWhereNothingHasToGo) {
+  const Folder folder;
+  ASSERT_TRUE(open_disk_store(folder.path.string())->put(key_of("a"), {{"x", bytes_of("result")}}));
+  const fs::path orphan = folder.path / object_path("cas", sha256(*bytes_of("orphan")));
+  ASSERT_TRUE(publish_object(orphan.string(), *bytes_of("orphan")));
+  set_age(orphan, 86400);
+  prune_now_and_then(folder.path.string(), {1'000'000, 86400});
+  EXPECT_TRUE(fs::exists(orphan));  // only the records tell that it is one
+  fs::remove(folder.path / "pruned");
+  set_age(folder.path / object_path("ac", key_of("a").digest()), 2 * 86400);
+  prune_now_and_then(folder.path.string(), {1'000'000, 86400});
+  EXPECT_FALSE(open_disk_store(folder.path.string())->find(key_of("a").digest()));
+  EXPECT_FALSE(fs::exists(orphan));
+}
+
 TEST(Prune, ForgetsBuildsThatWereKilled) {
   const Folder folder;
   open_disk_store(folder.path.string());
@@ -269,7 +304,7 @@ TEST(LayeredStore, BringsWhatAFolderHoldsAndNothingDamaged) {
   const auto open = [&] {
     std::vector<std::unique_ptr<CacheLayer>> layers;
     layers.push_back(open_layer(shared));
-    return layered_store(open_disk_store(local), std::move(layers), false);
+    return layered_store(open_disk_store(local), std::move(layers), LayerUse::kFetch);
   };
   auto store = open();
   const auto found = store->find(key_of("a").digest());
@@ -288,6 +323,106 @@ TEST(LayeredStore, BringsWhatAFolderHoldsAndNothingDamaged) {
   ASSERT_EQ(store->take_events().size(), 1u);  // unreachable, said once
   EXPECT_FALSE(store->find(key_of("d").digest()));
   EXPECT_TRUE(store->take_events().empty());
+}
+
+/// A record of key_of("[8]") in which `from` stands as `to`, sealed as it must be.
+std::string lying_record(const std::string& from, const std::string& to) {
+  std::string body = *unseal(
+      *bytes_of(write_record({key_of("[8]").preimage(), {{"ladder", sha256(*bytes_of("rungs")), 5}}})));
+  const auto at = body.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return seal(body.replace(at, from.size(), to));
+}
+
+TEST(DiskStore, ASealedRecordOfWrongTypesIsAMissAndMovedAway) {
+  const Folder folder;
+  auto store = open_disk_store(folder.path.string());
+  const fs::path record = folder.path / object_path("ac", key_of("[8]").digest());
+  for (const auto& [from, to] :
+       std::vector<std::pair<std::string, std::string>>{{"\"version\": 2", "\"version\": \"2\""},
+                                                        {"\"version\": 2", "\"version\": [2]"},
+                                                        {"\"bytes\": 5", "\"bytes\": \"many\""},
+                                                        {"\"bytes\": 5", "\"bytes\": -5"},
+                                                        {"\"bytes\": 5", "\"bytes\": 5.5"},
+                                                        {"\"name\": \"ladder\"", "\"name\": 7"},
+                                                        {"\"sha256\": \"", "\"sha256\": null, \"x\": \""}}) {
+    ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));
+    ASSERT_TRUE(store->find(key_of("[8]").digest()));
+    fs::remove(record);
+    const std::string text = lying_record(from, to);
+    ASSERT_TRUE(publish_object(record.string(), *bytes_of(text)));
+    EXPECT_FALSE(store->preimage(key_of("[8]").digest())) << to;
+    EXPECT_NO_THROW(prune_cache(folder.path.string(), {1, 0})) << to;
+    EXPECT_FALSE(store->find(key_of("[8]").digest())) << to;
+    EXPECT_EQ(store->take_events().size(), 1u) << to;
+    EXPECT_FALSE(fs::exists(record)) << to;
+    EXPECT_TRUE(fs::exists(folder.path / "quarantine" / record.filename())) << to;
+  }
+}
+
+TEST(DiskStore, WhatIsRejectedIsMovedAwayUnlessItWasReplaced) {
+  const Folder folder;
+  auto store = open_disk_store(folder.path.string());
+  const Sha256 key = key_of("[8]").digest();
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("no ladder")}}));
+  const auto wrong = *store->find(key);
+  store->reject(key, wrong, "no ladder");
+  EXPECT_FALSE(store->find(key));
+  ASSERT_EQ(store->take_events().size(), 1u);
+  ASSERT_TRUE(store->put(key_of("[8]"), {{"ladder", bytes_of("rungs")}}));
+  store->reject(key, wrong, "no ladder");  // of somebody who had read it before
+  EXPECT_TRUE(store->find(key));
+  EXPECT_TRUE(store->take_events().empty());
+}
+
+TEST(DiskStore, LookingWritesNothing) {
+  const Folder folder;
+  auto nowhere = look_into_disk_store(folder.path.string());
+  EXPECT_FALSE(nowhere->find(key_of("a").digest()));
+  EXPECT_FALSE(nowhere->put(key_of("a"), {{"x", bytes_of("x")}}));
+  EXPECT_FALSE(nowhere->put_note(key_of("a").digest(), "note"));
+  EXPECT_FALSE(fs::exists(folder.path));
+  ASSERT_TRUE(open_disk_store(folder.path.string())->put(key_of("a"), {{"x", bytes_of("x")}}));
+  const fs::path record = folder.path / object_path("ac", key_of("a").digest());
+  set_age(record, 86400);
+  const auto before = files_in(folder.path);
+  const auto time = fs::last_write_time(record);
+  EXPECT_TRUE(look_into_disk_store(folder.path.string())->find(key_of("a").digest()));
+  std::ofstream(folder.path / object_path("cas", sha256(*bytes_of("x"))), std::ios::trunc) << "y";
+  auto store = look_into_disk_store(folder.path.string());
+  EXPECT_FALSE(store->find(key_of("a").digest()));
+  EXPECT_EQ(store->take_events().size(), 1u);
+  EXPECT_EQ(files_in(folder.path), before);
+  EXPECT_EQ(fs::last_write_time(record), time);
+}
+
+TEST(LayeredStore, LookingKeepsNothingThatALayerGives) {
+  const Folder folder;
+  const std::string shared = (folder.path / "shared").string(), local = (folder.path / "local").string();
+  ASSERT_TRUE(open_disk_store(shared)->put(key_of("a"), {{"x", bytes_of("first")}}));
+  std::vector<std::unique_ptr<CacheLayer>> layers;
+  layers.push_back(open_layer(shared));
+  auto store = layered_store(look_into_disk_store(local), std::move(layers), LayerUse::kLook);
+  const auto found = store->find(key_of("a").digest());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(*store->load(found->front()), *bytes_of("first"));
+  EXPECT_FALSE(fs::exists(local));
+}
+
+TEST(LayeredStore, WhatIsRejectedIsNotBroughtAgain) {
+  const Folder folder;
+  const std::string shared = (folder.path / "shared").string(), local = (folder.path / "local").string();
+  ASSERT_TRUE(open_disk_store(shared)->put(key_of("a"), {{"x", bytes_of("no result")}}));
+  std::vector<std::unique_ptr<CacheLayer>> layers;
+  layers.push_back(nullptr);  // left out before
+  layers.push_back(open_layer(shared));
+  auto store = layered_store(open_disk_store(local), std::move(layers), LayerUse::kFetch);
+  const auto found = store->find(key_of("a").digest());
+  ASSERT_TRUE(found);
+  store->reject(key_of("a").digest(), *found, "no result");
+  EXPECT_FALSE(store->find(key_of("a").digest()));
+  ASSERT_TRUE(store->put(key_of("a"), {{"x", bytes_of("result")}}));
+  EXPECT_EQ(*store->load(store->find(key_of("a").digest())->front()), *bytes_of("result"));
 }
 
 TEST(AtomicFile, ReplacesOrLeavesAlone) {
