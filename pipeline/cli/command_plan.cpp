@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -116,7 +117,7 @@ struct CheckArguments : DeliveryArguments {
 
 /// What check asks for.
 struct Gate {
-  double min_ssim = 0, min_texture_ssim = 0, max_first_picture_s = 1e300;
+  double min_ssim = 0, min_texture_ssim = 0, max_first_picture_s = std::numeric_limits<double>::infinity();
   std::uint64_t max_bytes = ~0ull;
 };
 
