@@ -36,8 +36,8 @@ export interface LoadOptions {
    * Infinity: no limit, everything that the display can show. Default 5.
    */
   time?: number;
-  /** How the time is spent. Default guard. */
-  policy?: Policy;
+  /** How the time is spent; htca is another name of htc. Default guard. */
+  policy?: Policy | 'htca';
   order?: HtcOrder;
   /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
   beta0BytesS?: number;
@@ -164,7 +164,7 @@ export interface LoadedModel {
   update(camera?: Camera): void;
   /** Fetches what the display can show but the time did not allow; resolves when nothing is left to fetch. */
   refine(): Promise<void>;
-  /** Changes what was chosen at loading; takes effect at once. undefined: by the display again. */
+  /** Changes what was chosen at loading; fetches at once, or when the timed part is over. undefined: by the display again. */
   setOverride(override: { scale?: number; rung?: number }): void;
   /** Stops all transfers; what is shown stays. */
   cancel(): void;

@@ -1,6 +1,5 @@
 // What is parsed after the manifest; loaded when it is first needed.
 
-export { readFragmentFiles } from './fragment_files';
 export { readIndex, readIndexHead, readIndexPage } from './index_table';
 export { readQuality } from './quality_table';
 export { readTablesHead, readTablesSection } from './tables';

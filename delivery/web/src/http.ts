@@ -73,6 +73,8 @@ export interface Answer {
   status: number;
   problem: string;
   body: Uint8Array;
+  /** Where it came from: behind redirections. */
+  url: string;
   /** Strong ones only. */
   etag: string;
   /** Of Content-Range, when it may be read. */
@@ -100,8 +102,17 @@ const latencySamples = 7;
 
 /** Seconds of performance.now(). */
 export const nowS = (): number => performance.now() / 1000;
-/** Resolves after so many seconds. */
-export const sleepS = (seconds: number): Promise<void> => new Promise((done) => setTimeout(done, seconds * 1000));
+/** Resolves after so many seconds, or when a signal says so. */
+export const sleepS = (seconds: number, signal?: AbortSignal): Promise<void> =>
+  new Promise((done) => {
+    const end = (): void => {
+      clearTimeout(timer);
+      signal?.removeEventListener('abort', end);
+      done();
+    };
+    const timer = setTimeout(end, seconds * 1000);
+    signal?.addEventListener('abort', end);
+  });
 
 /** https://host/path without user, password and query, for messages. */
 export function shownUrl(url: string): string {
@@ -111,6 +122,12 @@ export function shownUrl(url: string): string {
 /** Whether an error says that somebody cancelled. */
 export function isAbort(error: unknown): boolean {
   return error instanceof Error && error.name === 'AbortError';
+}
+
+/** As the browser names it. */
+export function absolute(url: string): string {
+  const here = globalThis.location?.href;
+  return here && URL.canParse(url, here) ? new URL(url, here).href : url;
 }
 
 function abortError(): Error {
@@ -175,7 +192,7 @@ export class HttpClient {
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
     };
     const answer: Answer = {
-      status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false,
+      url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false,
     };
     const stall = new StallTimer(get.stallTimeoutS ?? this.options.stallTimeoutS, () => abort.abort());
     try {
@@ -214,6 +231,7 @@ export class HttpClient {
     stall.restart();
     record.firstByte = nowS();
     answer.status = response.status;
+    if (response.url) answer.url = response.url;
     const etag = response.headers.get('etag') ?? '';
     answer.etag = etag.startsWith('"') ? etag : '';
     answer.range = contentRange(response.headers.get('content-range'));
@@ -250,7 +268,7 @@ export class HttpClient {
         this.received += value.length;
         if (total > get.maxBytes) answer.tooLong = true;
         else get.onBytes?.(total);
-        await this.holdBack_(value.length, stall);
+        await this.holdBack_(value.length, stall, get.signal);
       }
     } finally {
       // What came before a cut is worth keeping.
@@ -259,12 +277,13 @@ export class HttpClient {
   }
 
   /** Waits as long as the cap wants. */
-  private async holdBack_(bytes: number, stall: StallTimer): Promise<void> {
+  private async holdBack_(bytes: number, stall: StallTimer, signal?: AbortSignal): Promise<void> {
     if (!(this.options.capBytesS > 0)) return;
     const now = nowS();
     this.capFreeS_ = Math.max(now, this.capFreeS_) + bytes / this.options.capBytesS;
     stall.stop();
-    if (this.capFreeS_ > now) await sleepS(this.capFreeS_ - now);
+    if (this.capFreeS_ > now) await sleepS(this.capFreeS_ - now, signal);
+    throwIfAborted(signal);
     stall.restart();
   }
 
@@ -276,7 +295,7 @@ export class HttpClient {
     }
     ++this.requests;
     if (this.requests <= 4 && typeof performance.getEntriesByName === 'function') {
-      const timing = performance.getEntriesByName(url, 'resource').at(-1) as PerformanceResourceTiming | undefined;
+      const timing = performance.getEntriesByName(absolute(url), 'resource').at(-1) as PerformanceResourceTiming | undefined;
       if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit_ = this.options.streams;
     }
     this.onRequest?.(record);
@@ -346,7 +365,7 @@ export class Retries {
   }
   async wait(signal?: AbortSignal): Promise<boolean> {
     if (this.left_-- <= 0) return false;
-    await sleepS(this.delayS_);
+    await sleepS(this.delayS_, signal);
     throwIfAborted(signal);
     this.delayS_ *= 2;
     return true;

@@ -14,6 +14,8 @@ import { WorkerPool } from './worker_pool';
 
 /** A picture that waits for its programs no longer than this. */
 const mostCompileS = 0.5;
+/** A scale that could not be had is not asked for again before. */
+const retryScaleS = 2;
 /** Limits beyond are none: timers and plans end there. */
 const longestS = 1e5;
 
@@ -31,18 +33,22 @@ export class ModelLoad implements LoadedModel {
   private scaleInTransit_ = -1;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
+  private scaleAtS_ = 0;
   private disposed_ = false;
   private readonly offRequest_: () => void;
+  private readonly cancel_ = (): void => this.cancel();
 
   constructor(
     private readonly reader_: PackageReader,
     private readonly scene_: Object3D,
     private readonly options_: LoadOptions,
     startS: number,
+    private readonly forget_: () => void = () => undefined,
   ) {
     this.context_ = this.makeContext_(startS);
     this.object.name = reader_.manifest.title || 'texmesh';
-    options_.signal?.addEventListener('abort', () => this.cancel());
+    options_.signal?.addEventListener('abort', this.cancel_);
+    if (options_.signal?.aborted) this.cancel();
     this.offRequest_ = reader_.onRequest((record) => {
       this.events_.emit('request', record);
       this.progress_();
@@ -81,6 +87,7 @@ export class ModelLoad implements LoadedModel {
       emit: (name, event) => this.events_.emit(name, event),
       fail,
       enter: (phase) => this.enter_(phase),
+      lostScale: (error, scale) => this.lostScale_(error, scale),
       showScale: (scale) => this.loadScale_(scale),
     };
   }
@@ -133,6 +140,7 @@ export class ModelLoad implements LoadedModel {
 
   private async run_(shown: () => void): Promise<void> {
     await Promise.resolve(); // listeners are added after the constructor
+    throwIfAborted(this.abort_.signal);
     const { manifest, client } = this.reader_;
     const coarsest = manifest.scales[manifest.scales.length - 1];
     this.context_.expectedBytes = client.received + coarsest.glb.bytes;
@@ -212,10 +220,13 @@ export class ModelLoad implements LoadedModel {
   private lastView_ = '';
   update(camera: Camera | undefined = this.options_.camera): void {
     if (this.disposed_ || this.context_.signal.aborted) return;
-    if (camera) camera.updateMatrixWorld();
+    camera?.updateMatrixWorld();
+    this.object.updateWorldMatrix(true, false);
     const display = this.readDisplay_(camera);
-    const matrix = camera ? camera.matrixWorld.elements.map((v) => v.toPrecision(4)).join() : '';
-    const key = `${display.heightPx.toPrecision(4)}/${matrix}`;
+    const { heightPx, part } = display;
+    const seen = camera ? [camera.matrixWorld, camera.projectionMatrix, this.object.matrixWorld] : [];
+    const numbers = [heightPx, part?.widthPx ?? 0, part?.heightPx ?? 0, ...seen.flatMap((m) => m.elements)];
+    const key = numbers.map((v) => v.toPrecision(4)).join();
     if (key === this.lastView_) return;
     this.lastView_ = key;
     this.context_.view = { display, camera };
@@ -223,7 +234,8 @@ export class ModelLoad implements LoadedModel {
   }
   setOverride(override: { scale?: number; rung?: number }): void {
     this.context_.override = this.snapped_(override);
-    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
+    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_(true);
+    else this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
   }
 
   /** A scale that the package has, as near as possible. */
@@ -234,20 +246,27 @@ export class ModelLoad implements LoadedModel {
     return { scale: scales.reduce((best, k) => (away(k) < away(best) ? k : best)), rung };
   }
 
-  private follow_(): void {
+  private follow_(always = false): void {
     void this.followScale_();
-    if (this.options_.autoRefine ?? true) void this.refine();
+    if (always || (this.options_.autoRefine ?? true)) void this.refine();
   }
   /** Loads the scale that the view asks for, if it is another one. */
   private async followScale_(): Promise<void> {
     const scale = this.scaleForView_();
-    if (scale === this.context_.wantedScale) return;
+    if (scale === this.context_.wantedScale || nowS() < this.scaleAtS_) return;
     this.context_.wantedScale = scale;
     try {
       await this.loadScale_(scale).shown;
     } catch (error) {
-      this.fail_(error, `scale ${scale}`);
+      this.lostScale_(error, scale);
     }
+  }
+  /** What is shown stays; the scale may be asked for again a little later. */
+  private lostScale_(error: unknown, scale: number): void {
+    this.fail_(error, `scale ${scale}`);
+    if (this.context_.wantedScale === scale) this.context_.wantedScale = this.context_.shownScale;
+    this.lastView_ = ''; // the next frame looks again
+    this.scaleAtS_ = nowS() + retryScaleS;
   }
   /** The scale that the view asks for, by a little more than the last time. */
   private scaleForView_(): number {
@@ -276,17 +295,17 @@ export class ModelLoad implements LoadedModel {
         this.refineAgain_ = false;
         await textures.finerPlanes();
         while (!this.refineAgain_ && (await textures.refineSome()));
+        if (this.refineAgain_) continue;
+        await textures.composed();
+        await scale; // the view may have changed meanwhile
       }
-      await textures.composed();
-      await scale;
-      this.phase_ = 'done';
-      this.events_.emit('done', {});
-      this.progress_();
     } catch (error) {
       if (isAbort(error)) return;
       this.fail_(error, 'refining');
-      this.phase_ = 'done';
     }
+    this.phase_ = 'done';
+    this.events_.emit('done', {});
+    this.progress_();
   }
 
   // ---- end
@@ -303,6 +322,8 @@ export class ModelLoad implements LoadedModel {
     this.disposed_ = true;
     this.cancel();
     this.offRequest_();
+    this.options_.signal?.removeEventListener('abort', this.cancel_);
+    this.forget_();
     this.object.removeFromParent();
     this.object.clear();
     this.context_.scales.dispose();

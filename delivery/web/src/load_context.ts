@@ -31,6 +31,8 @@ export interface LoadContext {
   emit<K extends keyof LoadEvents>(name: K, event: Omit<LoadEvents[K], 'at'>): void;
   fail(error: unknown, what: string): void;
   enter(phase: LoadPhase): void;
+  /** A scale cannot be had for now. */
+  lostScale(error: unknown, scale: number): void;
   /** Loads a scale and shows it. */
   showScale(scale: number): { arrived: ScaleLoad['arrived']; shown: Promise<void> };
 }

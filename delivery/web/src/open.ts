@@ -1,5 +1,6 @@
 import type { Object3D } from 'three';
 import type { LoadOptions, LoadedModel } from './api';
+import { InputError } from './errors';
 import { nowS } from './http';
 import { ModelLoad } from './load';
 import { OpenOptions, PackageReader } from './package_reader';
@@ -8,6 +9,8 @@ export { FormatError, InputError, TexmeshError } from './errors';
 export type * from './reader';
 export type * from './api';
 
+const policies = ['guard', 'htc', 'price', 'proportional', 'static'] as const;
+
 /** A package that can be shown in three.js scenes. */
 export class TexmeshPackage extends PackageReader {
   private readonly loads_ = new Set<LoadedModel>();
@@ -15,10 +18,13 @@ export class TexmeshPackage extends PackageReader {
 
   /**
    * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
-   * counts from the package's first request for the first load, from this call for others.
+   * counts from the package's first request for the first load, from this call for others. InputError: no such policy.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
-    const load = new ModelLoad(this, scene, options, this.loaded_ ? nowS() : this.openedS);
+    const policy = options.policy === 'htca' ? 'htc' : (options.policy ?? 'guard');
+    if (!policies.includes(policy)) throw new InputError('options', 'policy', policies.join(', '), String(policy));
+    const forget = (): void => void this.loads_.delete(load);
+    const load = new ModelLoad(this, scene, { ...options, policy }, this.loaded_ ? nowS() : this.openedS, forget);
     this.loaded_ = true;
     this.loads_.add(load);
     return load;

@@ -3,7 +3,7 @@ import { CodecId, codecTraits, joinFragment } from './codec';
 import { FormatError, InputError } from './errors';
 import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
-import { HttpClient, HttpOptions, RequestKind, RequestRecord, nowS, sleepS } from './http';
+import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS, sleepS } from './http';
 import type { IndexHead } from './index_table';
 import * as layout from './layout';
 import {
@@ -70,14 +70,9 @@ export class PackageReader {
   readonly bytesByKind: Partial<Record<RequestKind, number>> = {};
   private readonly listeners_ = new Set<(record: RequestRecord) => void>();
   private indexPages_ = new Map<number, Promise<Map<string, EntryRef>>>();
-  private indexHead_?: Promise<IndexHead>;
-  private texturesOnce_?: Promise<TextureInfo[]>;
-  private tablesHead_?: Promise<TablesHead>;
+  private readonly once_ = new Map<string, Promise<unknown>>();
   private wholeTables_?: Promise<Uint8Array>;
   private readonly tablesOnce_ = new Map<number, Promise<PlaneTables>>();
-  private qualityOnce_?: Promise<QualityTable>;
-  private firstPictureOnce_?: Promise<void>;
-  private fragmentFilesOnce_?: Promise<FragmentFiles | undefined>;
   private readonly tableStreams_ = new Map<number, Promise<Uint8Array>>();
   private readonly offsets_ = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
 
@@ -148,6 +143,7 @@ export class PackageReader {
   /** Forgets what was read. Loads of this package must be disposed of on their own. */
   dispose(): void {
     this.store.dispose();
+    this.once_.clear();
     this.indexPages_.clear();
     this.tablesOnce_.clear();
     this.tableStreams_.clear();
@@ -155,6 +151,21 @@ export class PackageReader {
     this.wholeTables_ = undefined;
   }
 
+  /** Read once for all who ask; again after a failure, or where it was another asker who cancelled. */
+  private async shared_<T>(name: string, read: () => Promise<T>, signal?: AbortSignal): Promise<T> {
+    const known = this.once_.get(name) as Promise<T> | undefined;
+    const wanted = known ?? read();
+    if (!known) {
+      this.once_.set(name, wanted);
+      wanted.catch(() => this.once_.get(name) === wanted && this.once_.delete(name));
+    }
+    try {
+      return await wanted;
+    } catch (error) {
+      if (known && isAbort(error) && !signal?.aborted) return this.shared_(name, read, signal);
+      throw error;
+    }
+  }
   private fail_(place: string, expected: string, found: string): never {
     throw new FormatError(this.store.name, place, expected, found);
   }
@@ -197,14 +208,16 @@ export class PackageReader {
     return head;
   }
   private async loadIndexPage_(plane: number): Promise<Map<string, EntryRef>> {
-    const head = await (this.indexHead_ ??= this.loadIndexHead_());
+    const head = await this.shared_('index', () => this.loadIndexHead_());
     const page = head.pages.findIndex((p) => p.plane === plane);
     const entries = new Map<string, EntryRef>();
     if (page < 0) return entries;
     const { offset, bytes } = head.pages[page];
-    const got = await this.store.read(this.manifest.index, offset, bytes, { kind: 'index' });
     const { readIndexPage } = await documents();
-    for (const e of await readIndexPage(head, page, got)) entries.set(e.path, e);
+    let read: EntryRef[] = [];
+    const verify = async (got: Uint8Array): Promise<void> => void (read = await readIndexPage(head, page, got));
+    await this.store.read(this.manifest.index, offset, bytes, { kind: 'index', verify });
+    for (const e of read) entries.set(e.path, e);
     if (plane < 0) this.checkManifestRefs_(entries);
     return entries;
   }
@@ -238,7 +251,7 @@ export class PackageReader {
 
   /** The texture planes: full-size ones first, then mips. */
   textures(): Promise<TextureInfo[]> {
-    return (this.texturesOnce_ ??= this.loadTextures_());
+    return this.shared_('textures', () => this.loadTextures_());
   }
   private async loadTextures_(): Promise<TextureInfo[]> {
     const m = this.manifest;
@@ -258,9 +271,11 @@ export class PackageReader {
 
   /** Measured quality of scales and rungs. */
   quality(): Promise<QualityTable> {
-    return (this.qualityOnce_ ??= this.readAll_(this.manifest.quality, { kind: 'quality' }).then(async (bytes) =>
-      (await documents()).readQuality(bytes),
-    ));
+    const read = async (): Promise<QualityTable> => {
+      const bytes = await this.readAll_(this.manifest.quality, { kind: 'quality' });
+      return (await documents()).readQuality(bytes);
+    };
+    return this.shared_('quality', read);
   }
 
   /** What the package was made from and with, as JSON. */
@@ -294,7 +309,7 @@ export class PackageReader {
    * read by one request.
    */
   async tables(planes?: readonly number[]): Promise<(PlaneTables | undefined)[]> {
-    const head = await (this.tablesHead_ ??= this.loadTablesHead_());
+    const head = await this.shared_('tables', () => this.loadTablesHead_());
     const { readTablesSection } = await documents();
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
@@ -304,10 +319,16 @@ export class PackageReader {
     for (const run of this.runsOf_(head, missing)) {
       const begin = head.planes[run[0]].offset;
       const last = head.planes[run[run.length - 1]];
+      const verify = async (got: Uint8Array): Promise<void> => {
+        for (const p of run) {
+          const { offset, bytes: size, sha256: digest } = head.planes[p];
+          await this.digestCheck_(`texture plane ${p}`, digest)(got.subarray(offset - begin, offset - begin + size));
+        }
+      };
       const bytes = (async () =>
         this.wholeTables_
           ? (await this.wholeTables_).subarray(begin)
-          : this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true }))();
+          : this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true, verify }))();
       for (const p of run) {
         const { offset, bytes: size } = head.planes[p];
         const table = bytes
@@ -372,7 +393,7 @@ export class PackageReader {
 
   /** Reads the range of the first picture, so that what it holds needs no further request. */
   firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
-    return (this.firstPictureOnce_ ??= this.loadFirstPicture_(how));
+    return this.shared_('picture', () => this.loadFirstPicture_(how), how.signal);
   }
   private async loadFirstPicture_(how: Partial<ReadOptions>): Promise<void> {
     if (this.form !== 'range') return;
@@ -391,8 +412,9 @@ export class PackageReader {
     const range = this.manifest.previews[plane];
     const path = layout.previewPath(plane);
     // The first picture's digest covers its parts.
-    if (range && this.form === 'range' && this.firstPictureOnce_) {
-      await this.firstPictureOnce_;
+    const picture = this.once_.get('picture');
+    if (range && this.form === 'range' && picture) {
+      await picture;
       return this.store.read({ path, ...range }, 0, range.bytes, { kind: 'preview', signal });
     }
     return this.entry(path, 'preview', signal);
@@ -436,13 +458,13 @@ export class PackageReader {
   }
   /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
   fragmentFiles(): Promise<FragmentFiles | undefined> {
-    return (this.fragmentFilesOnce_ ??= this.loadFragmentFiles_());
+    return this.shared_('files', () => this.loadFragmentFiles_());
   }
   private async loadFragmentFiles_(): Promise<FragmentFiles | undefined> {
     const { store } = this;
     if (!store.extraFile) return undefined;
     const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' });
-    return bytes && (await documents()).readFragmentFiles(bytes);
+    return bytes && (await import('./store_files')).readFragmentFiles(bytes);
   }
   /** A fragment's complete file of such a tree; its digest is the caller's to check. */
   async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
@@ -455,11 +477,15 @@ export class PackageReader {
 
   /** Reads index, tables, textures.json and quality.json by one request, where they are small; false where not. */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
-    const { index, quality } = this.manifest;
+    const { index, tables, textures, quality } = this.manifest;
     const bytes = quality.offset + quality.bytes - index.offset;
     if (bytes > wholeDocumentBytes || bytes <= 0) return false;
     if (this.form !== 'range') return true;
-    await this.store.read({ path: 'documents', offset: index.offset, bytes }, 0, bytes, { kind: 'tables', signal });
+    const verify = async (got: Uint8Array): Promise<void> => {
+      for (const { path, offset, bytes: size, sha256: digest } of [index, tables, textures, quality])
+        await this.digestCheck_(`entry ${path}`, digest)(got.subarray(offset - index.offset).subarray(0, size));
+    };
+    await this.store.read({ path: 'documents', offset: index.offset, bytes }, 0, bytes, { kind: 'tables', signal, verify });
     return true;
   }
 
@@ -483,10 +509,16 @@ export class PackageReader {
 
   /** Head of the vertex-split stream; undefined when the package has none. */
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
+    return (await this.splitStreamStart(0, signal))?.subarray(0, this.manifest.stream!.headBytes);
+  }
+  /** The head and so many bytes behind it (or all there are); the head is checked. */
+  async splitStreamStart(more: number, signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const ref = this.manifest.stream;
     if (!ref) return undefined;
-    const verify = this.digestCheck_(`head of ${layout.splitStreamPath}`, ref.headSha256);
-    return this.store.read({ path: layout.splitStreamPath, ...ref }, 0, ref.headBytes, { kind: 'stream', signal, verify });
+    const check = this.digestCheck_(`head of ${layout.splitStreamPath}`, ref.headSha256);
+    const verify = (got: Uint8Array): Promise<void> => check(got.subarray(0, ref.headBytes));
+    const bytes = Math.min(ref.bytes, ref.headBytes + more);
+    return this.store.read({ path: layout.splitStreamPath, ...ref }, 0, bytes, { kind: 'stream', signal, verify });
   }
   /** Bytes of the vertex-split stream; whoever takes blocks of it checks them by its head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {

@@ -40,6 +40,21 @@ export function texturesOf(material: Material): [string, Texture][] {
   return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
 }
 
+/** Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise. */
+export function requireOwnBytes(glb: Uint8Array): void {
+  const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
+  const length = glb.length >= 20 && view.getUint32(0, true) === 0x46546c67 ? view.getUint32(12, true) : -1;
+  require(length >= 0 && length <= glb.length - 20, 'a GLB');
+  let json: Partial<Record<'buffers' | 'images', { uri?: unknown }[]>>;
+  try {
+    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + length))) as typeof json;
+  } catch {
+    throw new FormatError('mesh', '', 'JSON in its GLB', 'something else');
+  }
+  for (const { uri } of [json?.buffers ?? [], json?.images ?? []].flat())
+    if (uri !== undefined && !/^data:/i.test(String(uri))) throw new FormatError('mesh', 'uri', 'bytes within the file', String(uri).slice(0, 40));
+}
+
 /**
  * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
  * shared with the first scale.
@@ -60,6 +75,7 @@ export async function parseScale(
         return Promise.resolve(texture);
       },
     }));
+  requireOwnBytes(glb);
   const data = glb.byteOffset === 0 && glb.byteLength === glb.buffer.byteLength ? glb.buffer : glb.slice().buffer;
   return (await loader.parseAsync(data as ArrayBuffer, '')) as ParsedGltf;
 }

@@ -35,11 +35,8 @@ export class SplitShapes {
   async open(signal: AbortSignal): Promise<void> {
     const ref = this.reader_.manifest.stream;
     if (!ref) throw new InputError(this.reader_.store.name, 'mesh/stream.bin', 'a stream of vertex splits', 'none');
-    const bytes = Math.min(ref.bytes, ref.headBytes + withHeadBytes);
-    // One request for both; the reader finds the head in it.
-    this.known_ = await this.reader_.splitStream(0, bytes, { signal, once: false });
-    const head = (await this.reader_.splitStreamHead(signal))!;
-    this.info_ = await this.pool_.openSplits(this.key_, head);
+    this.known_ = (await this.reader_.splitStreamStart(withHeadBytes, signal))!;
+    this.info_ = await this.pool_.openSplits(this.key_, this.known_.subarray(0, ref.headBytes));
     this.decoded_ = this.info_.headBytes;
   }
   /** Bytes that a scale still costs; Infinity while the head is not known or the stream does not pass it. */
@@ -175,6 +172,7 @@ export class SplitShapes {
   }
 
   dispose(): void {
+    this.pool_.closeSplits(this.key_);
     for (const mesh of this.meshes_.values()) mesh.geometry.dispose();
     this.meshes_.clear();
     this.attributes_.clear();

@@ -51,10 +51,14 @@ export class Mirror {
   alive = true;
   etag = '';
   total = -1;
+  /** Where its answers come from. */
+  at: string;
   readonly throughput = new Throughput({ ...defaultThroughput });
   owedBytes = 0;
   lastS = 0;
-  constructor(readonly url: string) {}
+  constructor(readonly url: string) {
+    this.at = url;
+  }
 }
 
 /** Which mirror delivers first, by what each has delivered so far and has to deliver yet. */
@@ -146,18 +150,28 @@ class RangeStore implements PackageStore {
     const begin = place.offset + offset;
     if (bytes === 0) return new Uint8Array(0);
     const missing = this.missing_(begin, begin + bytes);
-    if (missing) {
-      const got = await this.fetchRange_(missing.begin, missing.end - missing.begin, how, (part) =>
-        how.verify ? how.verify(this.assemble_(begin, bytes, missing.begin, part)) : Promise.resolve(),
-      );
-      if (how.once) return this.assemble_(begin, bytes, missing.begin, got);
-      const whole = this.assemble_(begin, bytes, missing.begin, got);
-      this.keep_(missing.begin, got);
-      return whole;
+    if (!missing || missing.end - missing.begin < bytes) {
+      const got = missing ? await this.fetchRange_(missing.begin, missing.end - missing.begin, how) : new Uint8Array(0);
+      const whole = this.assemble_(begin, bytes, missing?.begin ?? 0, got);
+      try {
+        await how.verify?.(whole);
+        if (missing && !how.once) this.keep_(missing.begin, got);
+        return whole;
+      } catch (error) {
+        if (!(error instanceof FormatError)) throw error;
+        this.drop_(begin, begin + bytes); // what was known may be what is bad
+      }
     }
-    const whole = this.assemble_(begin, bytes, 0, new Uint8Array(0));
-    await how.verify?.(whole);
-    return whole;
+    const got = await this.fetchRange_(begin, bytes, how, how.verify);
+    if (!how.once) this.keep_(begin, got);
+    return got;
+  }
+  private drop_(begin: number, end: number, within = false): void {
+    for (let i = this.parts_.length - 1; i >= 0; --i) {
+      const p = this.parts_[i];
+      const [first, last] = [p.begin, p.begin + p.bytes.length];
+      if (within ? first >= begin && last <= end : first < end && last > begin) this.parts_.splice(i, 1);
+    }
   }
 
   /** The range from the first to the last byte that is not known; known gaps inside are asked for again. */
@@ -182,6 +196,7 @@ class RangeStore implements PackageStore {
     return out;
   }
   private keep_(begin: number, bytes: Uint8Array): void {
+    this.drop_(begin, begin + bytes.length, true);
     this.parts_.push({ begin, bytes });
     this.parts_.sort((a, b) => a.begin - b.begin);
   }
@@ -218,11 +233,14 @@ class RangeStore implements PackageStore {
     let got: Uint8Array[] = [];
     let have = 0;
     const retries = new Retries(this.client_.options);
+    // Nothing is made room for that cannot come.
+    if (offset > 0 && m.total >= 0 && offset + bytes > m.total)
+      throw new FormatError(this.name, `byte ${offset}`, `a file of ${offset + bytes} bytes`, `${m.total}`);
     for (;;) {
       const before = have;
       const a = await this.client_.get(m.url, {
         range: { offset: offset + have, bytes: bytes - have },
-        ifRange: sameOrigin(m.url) ? m.etag : '',
+        ifRange: sameOrigin(m.at) ? m.etag : '',
         maxBytes: bytes - have,
         kind: how.kind,
         signal: how.signal,
@@ -230,6 +248,7 @@ class RangeStore implements PackageStore {
         onBytes: how.onBytes && ((n) => how.onBytes!(before + n)),
         reload,
       } satisfies GetOptions);
+      m.at = a.url;
       if (a.status === 206) this.checkRange_(m, a, offset + have, bytes - have);
       if (a.status === 206) {
         got.push(a.body);
@@ -271,7 +290,7 @@ class RangeStore implements PackageStore {
     const { range } = a;
     if (!range) {
       // Another origin may keep the header to itself; then only the length tells.
-      if (sameOrigin(m.url)) fail('a Content-Range', 'none that can be read');
+      if (sameOrigin(a.url)) fail('a Content-Range', 'none that can be read');
       return;
     }
     if (m.total >= 0 && range.total !== m.total) fail(`a file of ${m.total} bytes`, `${range.total}`);
@@ -320,6 +339,8 @@ export async function openStore(
   const files = () => import('./store_files');
   if (path.endsWith('/')) return use(new (await files()).TreeStore(urls, client));
   const roots = urls.map(treeUrl).filter((root) => root !== '');
+  if (mode === 'files' && roots.length === 0)
+    throw new InputError(shownUrl(url), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
   if (mode === 'files') return use(new (await files()).TreeStore(roots, client));
   try {
     return await use(new RangeStore(urls, client));
@@ -329,7 +350,8 @@ export async function openStore(
   }
   if (roots.length > 0) {
     try {
-      return await use(new (await files()).TreeStore(roots, client));
+      const found = await use(new (await files()).TreeStore(roots, client));
+      if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
     }

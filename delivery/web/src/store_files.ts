@@ -1,10 +1,12 @@
 import { FormatError, InputError } from './errors';
-import { HttpClient, getWhole, shownUrl } from './http';
+import { HttpClient, getWhole, isAbort, shownUrl } from './http';
 import { isValidEntryPath, manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
 import { Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
 
 // For servers that know no ranges; loaded when one is met.
+
+export { readFragmentFiles } from './fragment_files';
 
 /** Whole files of a tree, beside the container or by itself: for servers without ranges. */
 export class TreeStore implements PackageStore {
@@ -44,7 +46,11 @@ export class TreeStore implements PackageStore {
   /** A file of the tree; a failed one may be asked for again. */
   private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
     const known = this.files_.get(path);
-    if (known) return known;
+    if (known)
+      return known.catch((error: unknown) => {
+        if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload); // another asker's
+        throw error;
+      });
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
     const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
       const { kind, signal, onBytes } = how;

@@ -3,7 +3,7 @@ import type { ComposedPlane } from './api';
 import { fullSizePlanes } from './documents';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
-import { HarmonicTimePlan, HtcOptions, HtcStep, defaultHtcOptions } from './harmonic_time';
+import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
@@ -106,7 +106,8 @@ export class TextureLoad {
     if (scale !== this.load_.shownScale) this.load_.enter('mesh');
     const meshBytes = this.load_.scales.bytesOf(scale);
     const mesh = this.load_.showScale(scale);
-    mesh.shown.catch(() => undefined);
+    // Without it picture and fragments stand all the same.
+    const meshShown = mesh.shown.catch((error: unknown) => this.load_.lostScale(error, scale));
     // Coverage that no material asks for is not fetched.
     const choices = planes.filter(({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base));
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
@@ -115,7 +116,7 @@ export class TextureLoad {
     if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS)
       await Promise.race([mesh.arrived, sleepS(this.leftS_(meshShare))]);
     this.load_.enter('textures');
-    const list = this.listOf_(data, choices, scale);
+    const list = this.listOf_(data, choices.filter(({ base }) => this.textureSet_!.planes.has(base)), scale);
     for (const o of list.offers) this.load_.expectedBytes += o.plannedBytes;
     const leftS = this.load_.limitS - this.load_.elapsedS() - composeS;
     if (this.load_.override.rung !== undefined || !Number.isFinite(leftS)) await this.fetchAll_(list);
@@ -123,7 +124,7 @@ export class TextureLoad {
     await shown;
     await this.composed();
     const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
-    await Promise.race([mesh.shown, sleepS(this.leftS_(1))]);
+    await Promise.race([meshShown, sleepS(this.leftS_(1))]);
     this.load_.emit('deadline', { limit: this.load_.limitS, actual: this.load_.elapsedS(), skipped });
   }
   /** A share of the time left, for timers. */
@@ -158,7 +159,7 @@ export class TextureLoad {
     const defaults = defaultHtcOptions();
     const throughput = { ...defaults.throughput, initialBytesS: Math.max(1, this.load_.beta0) };
     const { latencyS: rttS } = this.load_.reader.client;
-    return { ...defaults, policy: policy ?? 'guard', order: order ?? 'credit', timeLimitS, rttS, throughput };
+    return { ...defaults, policy: policy as Policy, order: order ?? 'credit', timeLimitS, rttS, throughput };
   }
   private skippedOf_(plane: ComposedPlane): number {
     const order = this.data_?.tables[plane.plane]?.order ?? [];
@@ -208,22 +209,27 @@ export class TextureLoad {
       const before = this.textureSet_!.planes.get(base);
       if (before?.plane === plane) continue;
       const info = this.data_!.textures[plane];
+      // A plane that cannot be shown leaves what the mesh brought along.
+      const lost = (error: unknown): void => this.load_.fail(error, `texture plane ${plane}`);
       let preview: ImageBitmap | undefined;
-      if (!before && (info.role === 'alpha' || !this.textureSet_!.isUsed(base))) {
-        const file = await this.load_.reader.preview(base, this.load_.signal);
-        const none = new Uint8Array(0);
-        const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
-        [preview] = await decoded;
+      try {
+        if (!before && (info.role === 'alpha' || !this.textureSet_!.isUsed(base))) preview = await this.preview_(base);
+      } catch (error) {
+        lost(error);
+        continue;
+      } finally {
+        throwIfAborted(this.load_.signal);
       }
-      throwIfAborted(this.load_.signal);
-      shown.push(
-        this.textureSet_!.show(choice, preview).then(() => {
-          preview?.close();
-          this.load_.emit('plane', { base, plane, widthPx: info.widthPx, heightPx: info.heightPx });
-        }),
-      );
+      const tell = (): void => this.load_.emit('plane', { base, plane, widthPx: info.widthPx, heightPx: info.heightPx });
+      shown.push(this.textureSet_!.show(choice, preview).then(tell).catch(lost).finally(() => preview?.close()));
     }
     return { shown: Promise.all(shown) };
+  }
+  private async preview_(base: number): Promise<ImageBitmap> {
+    const file = await this.load_.reader.preview(base, this.load_.signal);
+    const none = new Uint8Array(0);
+    const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
+    return (await decoded)[0];
   }
 
   /** The scale that is enough at a displayed height: by the rule, or finer where that was measured to be seen. */

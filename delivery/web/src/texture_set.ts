@@ -67,7 +67,16 @@ export class TextureSet {
     const views = old.map((texture) => texture && next.view(texture));
     if (slots.length === 0) next.view(new Texture()); // a finer scale may bring the material that wants it
     this.planes.set(base, next);
-    await this.fill_(next, before, preview, old);
+    try {
+      await this.fill_(next, before, preview, old);
+    } catch (error) {
+      for (const work of this.waiting_.get(next) ?? []) work.drop?.();
+      this.waiting_.delete(next);
+      if (before) this.planes.set(base, before);
+      else this.planes.delete(base);
+      next.dispose();
+      throw error;
+    }
     if (this.disposed_) return;
     next.updateMips();
     if (this.planes.get(base) !== next) return; // another has taken its place meanwhile
@@ -136,7 +145,9 @@ export class TextureSet {
   ): Promise<void> {
     const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
     const { widthPx: width, heightPx: height } = next;
-    const bitmaps = await this.pool_.enlarge({ picture, width, height, ...piece, levels: ownLevels });
+    const bitmaps = await this.pool_
+      .enlarge({ picture, width, height, ...piece, levels: ownLevels })
+      .finally(() => picture.close()); // workers have a copy of their own
     const { x0, x1, y0, y1 } = piece;
     await new Promise<void>((done) => {
       const end = (): void => {

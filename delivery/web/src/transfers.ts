@@ -105,7 +105,7 @@ export class Transfers {
     ++this.underWay_; // what has arrived is not decoded before its request has ended
     try {
       const files = wishes.filter((w) => this.filesOf(w.plane).complete);
-      const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, arrived));
+      const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, options, arrived));
       await Promise.all([
         ...files.map((w) => this.fetchFile_(w, options, arrived, failed)),
         ...groupsOf(parts, options).map((g) => this.fetchGroup_(g, options, arrived, failed)),
@@ -115,7 +115,7 @@ export class Transfers {
     }
   }
 
-  private partsOf_(wish: Wish, arrived: (wish: Wish) => void): Part[] {
+  private partsOf_(wish: Wish, options: GroupOptions, arrived: (wish: Wish) => void): Part[] {
     const { tables, offsets } = this.filesOf(wish.plane);
     const n = fragmentCount(tables);
     const incremental = this.incremental_(wish.plane);
@@ -132,7 +132,7 @@ export class Transfers {
     }
     if (parts.length === 0) {
       arrived(wish);
-      void this.decode_(job);
+      void this.decode_(job, options.signal);
     }
     return parts;
   }
@@ -163,7 +163,7 @@ export class Transfers {
       }
       say(Infinity);
       for (const p of group.parts)
-        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job);
+        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job, options.signal);
     } catch (error) {
       for (const p of group.parts) {
         if (p.job.failed) continue;
@@ -183,13 +183,13 @@ export class Transfers {
     try {
       const file = await this.reader_.fragmentFile(wish.plane, wish.rung, wish.fragment, options.signal);
       arrived(wish);
-      void this.decode_({ wish, first: wish.rung, streams: [file], missing: 0, failed: false });
+      void this.decode_({ wish, first: wish.rung, streams: [file], missing: 0, failed: false }, options.signal);
     } catch (error) {
       failed(wish, error);
     }
   }
 
-  private async decode_(job: Job): Promise<void> {
+  private async decode_(job: Job, signal?: AbortSignal): Promise<void> {
     const { plane, fragment } = job.wish;
     ++this.underWay_;
     try {
@@ -201,8 +201,8 @@ export class Transfers {
         this.held_.delete(`${plane}/${fragment}`);
         for (let rung = job.first; rung <= job.wish.rung; ++rung)
           job.streams[rung - job.first] = this.filesOf(plane).complete
-            ? await this.reader_.fragmentFile(plane, rung, fragment)
-            : await this.reader_.fragment(plane, rung, fragment);
+            ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
+            : await this.reader_.fragment(plane, rung, fragment, signal);
         this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       }
     } catch (error) {

@@ -16,6 +16,10 @@ interface Job {
 /** What is posted takes all of its buffer along, be it the whole package: so in one of its own. */
 const alone = (b: Uint8Array): Uint8Array => (b.length < b.buffer.byteLength ? b.slice() : b);
 
+function closeBitmaps(result: unknown): void {
+  if (Array.isArray(result)) for (const b of result) (b as Partial<ImageBitmap>).close?.();
+}
+
 /** Answers requests; a Worker, or the main thread where there is none. */
 interface Helper {
   post(id: number, request: WorkerRequest, transfer: Transferable[]): void;
@@ -106,7 +110,7 @@ export class WorkerPool {
 
   private answered_(answer: WorkerAnswer): void {
     const entry = this.running_.get(answer.id);
-    if (!entry) return;
+    if (!entry) return closeBitmaps(answer.result); // nobody waits for it any more
     this.running_.delete(answer.id);
     --this.load_[entry.worker];
     const { error } = answer;
@@ -148,6 +152,9 @@ export class WorkerPool {
   }
   addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
     return this.ask_({ op: 'split-add', key, blocks: alone(blocks) }, 0) as Promise<SplitUpdate>;
+  }
+  closeSplits(key: number): void {
+    if (!this.ended_) this.ask_({ op: 'split-close', key }, 0).catch(() => undefined);
   }
   /** Requests under way or waiting. */
   get pending(): number {

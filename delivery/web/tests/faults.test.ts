@@ -1,0 +1,235 @@
+import { Scene } from 'three';
+import { describe, expect, it } from 'vitest';
+import type { LoadOptions } from '../src/api';
+import { HttpClient, absolute } from '../src/http';
+import { TexmeshPackage } from '../src/open';
+import { FormatError, InputError, OpenOptions, PackageReader } from '../src/reader';
+import { requireOwnBytes } from '../src/scale_parts';
+import { openStore } from '../src/store';
+import { TreeStore } from '../src/store_files';
+import { WorkerPool } from '../src/worker_pool';
+import type { WorkerRequest } from '../src/worker_protocol';
+import { Fault, FakeServer, fakeServer } from './fake_server';
+import { golden } from './support';
+
+const container = golden('v1.1-scan');
+const url = 'http://host/a/scan.texmesh';
+const quick: OpenOptions = { retryDelayS: 0.001, stallTimeoutS: 0.05, retries: 1 };
+const range = (fault?: Fault): FakeServer => fakeServer({ '/a/scan.texmesh': container }, { fault });
+const openAt = (server: FakeServer, options: OpenOptions = {}): Promise<PackageReader> =>
+  PackageReader.openUrl(url, { fetch: server.fetch, ...quick, ...options });
+const rejection = (what: Promise<unknown>): Promise<Error> =>
+  what.then(() => { throw new Error('it should have failed'); }, (error: Error) => error);
+
+describe('what is read ahead', () => {
+  async function readAll(reader: PackageReader): Promise<void> {
+    await reader.prefetchDocuments();
+    await reader.data();
+    await reader.quality();
+    expect((await reader.splitStreamHead())!.length).toBe(reader.manifest.stream!.headBytes);
+    expect((await reader.index()).length).toBeGreaterThan(5);
+  }
+  it('is fetched again when a bit has turned over', async () => {
+    const server = range(({ number }) => number === 1 && 'flip');
+    await readAll(await openAt(server));
+  });
+  it('is fetched elsewhere when a mirror gives other bytes', async () => {
+    const server = range(({ url: u, number }) => u.startsWith('http://host') && number > 0 && 'flip');
+    await readAll(await openAt(server, { mirrors: ['http://other/a/scan.texmesh'] }));
+  });
+  it('holds what came with the manifest to its digests, too', async () => {
+    const { manifest } = await PackageReader.openBytes(container, 'golden');
+    const refs = [manifest.index, manifest.tables, manifest.textures, manifest.quality, ...manifest.scales.map((s) => s.glb)];
+    const early = refs.find((r) => r.offset < 16384 && r.bytes > 0)!;
+    const server = range();
+    const first: typeof fetch = async (input, init) => {
+      const answer = await server.fetch(input, init);
+      if (server.log.length > 1) return answer;
+      const body = new Uint8Array(await answer.arrayBuffer());
+      body[early.offset] ^= 1;
+      return new Response(body, answer);
+    };
+    const reader = await PackageReader.openUrl(url, { fetch: first, ...quick });
+    const scale = manifest.scales.find((s) => s.glb === early)?.scale;
+    if (scale === undefined) await readAll(reader);
+    else expect((await reader.scaleGlb(scale)).length).toBe(early.bytes);
+  });
+  it('the head of the vertex splits comes from another mirror where it is bad', async () => {
+    const { manifest } = await PackageReader.openBytes(container, 'golden');
+    const server = range(({ url: u, range: r }) => u.startsWith('http://host') && r?.[0] === manifest.stream!.offset && 'flip');
+    const reader = await openAt(server, { mirrors: ['http://other/a/scan.texmesh'] });
+    expect((await reader.splitStreamStart(0))!.length).toBe(manifest.stream!.headBytes);
+  });
+});
+
+describe('a failure', () => {
+  const asked: [string, (r: PackageReader) => Promise<unknown>][] = [
+    ['textures', (r) => r.textures()],
+    ['tables', (r) => r.tables()],
+    ['quality', (r) => r.quality()],
+    ['the first picture', (r) => r.firstPicture()],
+  ];
+  for (const [name, ask] of asked)
+    it(`of ${name} is not for ever`, async () => {
+      let down = false;
+      const reader = await openAt(range(() => down && 'status-500'), { retries: 0 });
+      down = true;
+      expect(await rejection(ask(reader))).toBeInstanceOf(InputError);
+      down = false;
+      await ask(reader);
+    });
+  it('of one asker who cancels is not that of others', async () => {
+    let stalls = true;
+    const reader = await openAt(range(({ number }) => number > 0 && stalls && 'stall'), { stallTimeoutS: 30 });
+    const abort = new AbortController();
+    const one = rejection(reader.firstPicture({ signal: abort.signal }));
+    const other = reader.firstPicture();
+    await new Promise((go) => setTimeout(go, 10));
+    stalls = false;
+    abort.abort();
+    expect((await one).name).toBe('AbortError');
+    await other;
+  });
+  it('nor in a tree of files', async () => {
+    let stalls = true;
+    const server = fakeServer({ '/a/x.bin': new Uint8Array(3000) }, { ranges: false, fault: () => stalls && 'stall' });
+    const store = new TreeStore(['http://host/a/'], new HttpClient({ fetch: server.fetch, stallTimeoutS: 30 }));
+    const abort = new AbortController();
+    const place = { path: 'x.bin', offset: 0, bytes: 3000 };
+    const one = rejection(store.read(place, 0, 10, { kind: 'other', signal: abort.signal }));
+    const other = store.read(place, 0, 10, { kind: 'other' });
+    await new Promise((go) => setTimeout(go, 10));
+    stalls = false;
+    abort.abort();
+    expect((await one).name).toBe('AbortError');
+    expect((await other).length).toBe(10);
+  });
+});
+
+describe('hostile answers', () => {
+  it('a size beyond the end of the file is refused before anything is made room for', async () => {
+    const server = range();
+    const client = new HttpClient({ fetch: server.fetch, ...quick });
+    const { store } = await openStore(url, [], 'range', client);
+    for (const bytes of [3e9, 2 ** 50]) {
+      const place = { path: 'mesh/s00.glb', offset: 20000, bytes };
+      expect(await rejection(store.read(place, 0, bytes, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
+      // Overlapping what is known, too.
+      expect(await rejection(store.read({ ...place, offset: 100 }, 0, bytes, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
+    }
+    expect(server.log.length).toBe(1);
+  });
+  it('a server that gives its front page for everything has the whole container, too', async () => {
+    const page = new TextEncoder().encode('<!doctype html><title>front page</title>'.repeat(20));
+    const files = { '/a/scan.texmesh': container, '/a/scan/manifest.json': page, '/a/scan/fragments.json': page };
+    const reader = await openAt(fakeServer(files, { ranges: false }));
+    expect(reader.form).toBe('whole');
+  });
+  it('mode files wants a URL that has a tree', async () => {
+    const opening = PackageReader.openUrl('http://host/a/scan.zip', { fetch: range().fetch, mode: 'files' });
+    expect(await rejection(opening)).toBeInstanceOf(InputError);
+  });
+  it('a redirection to another origin may keep Content-Range to itself', async () => {
+    const server = range();
+    const redirected: typeof fetch = async (input, init) => {
+      const answer = await server.fetch(input, init);
+      const headers = new Headers(answer.headers);
+      headers.delete('content-range');
+      const other = new Response(answer.body, { status: answer.status, headers });
+      Object.defineProperty(other, 'url', { value: 'https://cdn.example/scan.texmesh' });
+      return other;
+    };
+    const before = Object.getOwnPropertyDescriptor(globalThis, 'location');
+    Object.defineProperty(globalThis, 'location', { value: new URL('http://host/page'), configurable: true });
+    try {
+      const reader = await PackageReader.openUrl(url, { fetch: redirected, ...quick });
+      expect((await reader.textures()).length).toBe(reader.manifest.planeCount);
+      expect(absolute('a.texmesh')).toBe('http://host/a.texmesh');
+    } finally {
+      if (before) Object.defineProperty(globalThis, 'location', before);
+      else Reflect.deleteProperty(globalThis, 'location');
+    }
+  });
+  function glb(json: string): Uint8Array {
+    const text = new TextEncoder().encode(json);
+    const out = new Uint8Array(20 + text.length);
+    const view = new DataView(out.buffer);
+    [0x46546c67, 2, out.length, text.length, 0x4e4f534a].forEach((v, i) => view.setUint32(4 * i, v, true));
+    out.set(text, 20);
+    return out;
+  }
+  it('a GLB that names other hosts is refused', async () => {
+    for (const uri of ['http://evil.example/x.png', '//evil.example/x', 'x.bin', 'blob:y']) {
+      for (const name of ['images', 'buffers'])
+        expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: [{}, { uri }] })))).toThrow(FormatError);
+    }
+    requireOwnBytes(glb(JSON.stringify({ images: [{ uri: 'data:image/png;base64,' }], buffers: [{ byteLength: 3 }] })));
+    const whole = glb('{}');
+    for (let n = 0; n < whole.length; ++n) expect(() => requireOwnBytes(whole.subarray(0, n))).toThrow(FormatError);
+    expect(() => requireOwnBytes(glb('{"images":'))).toThrow(FormatError);
+    const reader = await PackageReader.openBytes(container, 'golden');
+    for (const { scale } of reader.manifest.scales) requireOwnBytes(await reader.scaleGlb(scale));
+  });
+});
+
+describe('a load', () => {
+  const options = { renderer: {}, gltfLoader: () => { throw new Error('not asked for here'); } } as unknown as LoadOptions;
+  const pkg = async (server: FakeServer): Promise<TexmeshPackage> => TexmeshPackage.openUrl(url, { fetch: server.fetch, ...quick });
+  it('takes every policy by its names, and no other', async () => {
+    const opened = await pkg(range());
+    for (const policy of ['guard', 'htc', 'htca', 'price', 'proportional', 'static', undefined] as const)
+      opened.load(new Scene(), { ...options, policy }).dispose();
+    expect(() => opened.load(new Scene(), { ...options, policy: 'foo' as 'htc' })).toThrow(InputError);
+  });
+  it('that was cancelled before it began asks for nothing', async () => {
+    const server = range();
+    const opened = await pkg(server);
+    const model = opened.load(new Scene(), { ...options, signal: AbortSignal.abort() });
+    expect((await rejection(model.done)).name).toBe('AbortError');
+    expect(model.state.phase).toBe('cancelled');
+    expect(server.log.length).toBe(1);
+  });
+  it('that was disposed of is forgotten, and listens to no signal', async () => {
+    const opened = await pkg(range());
+    const { signal } = new AbortController();
+    let listeners = 0;
+    const [add, remove] = [signal.addEventListener.bind(signal), signal.removeEventListener.bind(signal)];
+    signal.addEventListener = (...a: Parameters<typeof add>) => (++listeners, add(...a));
+    signal.removeEventListener = (...a: Parameters<typeof remove>) => (--listeners, remove(...a));
+    const model = opened.load(new Scene(), { ...options, signal });
+    model.dispose();
+    await rejection(model.done);
+    expect(listeners).toBe(0);
+    expect((opened as unknown as { loads_: Set<unknown> }).loads_.size).toBe(0);
+  });
+});
+
+it('a cap does not hold back who cancels', async () => {
+  const abort = new AbortController();
+  const begin = performance.now();
+  const opening = openAt(range(), { capBytesS: 100, signal: abort.signal });
+  setTimeout(() => abort.abort(), 20);
+  expect((await rejection(opening)).name).toBe('AbortError');
+  expect(performance.now() - begin).toBeLessThan(3000);
+});
+
+it('pictures that nobody waits for are closed, and streams are told of their end', async () => {
+  let closed = 0;
+  const heard: WorkerRequest['op'][] = [];
+  const pool = new WorkerPool({
+    decode: async (request) => {
+      heard.push(request.op);
+      await new Promise((go) => setTimeout(go, 5));
+      return [[{ close: () => ++closed }], []];
+    },
+  });
+  const none = new Uint8Array(0);
+  const decoding = rejection(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1 }));
+  pool.closeSplits(3);
+  await Promise.resolve();
+  pool.dispose();
+  expect((await decoding).name).toBe('AbortError');
+  await new Promise((go) => setTimeout(go, 20));
+  expect(closed).toBeGreaterThan(0);
+  expect(heard).toContain('split-close');
+});
