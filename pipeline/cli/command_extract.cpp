@@ -1,4 +1,8 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -22,15 +26,23 @@ struct ExtractArguments {
 std::uint32_t rung_of(const std::string& text) {
   if (text == "max") return kBestRung;
   if (text.empty() || text.size() > 3 || text.find_first_not_of("0123456789") != std::string::npos)
-    throw InputError("--rung", "", "a rung's number (texmesh dump PKG ladder lists them) or max", text);
+    throw UsageError("--rung", "", "a rung's number (texmesh dump PKG ladder lists them) or max", text);
   return static_cast<std::uint32_t>(std::stoul(text));
+}
+
+void check_output(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  if (std::filesystem::is_directory(path))
+    throw InputError(path, "", "a file that can be written", "a folder");
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    throw InputError(path, "", "a file that can be written", std::strerror(errno));
 }
 
 ExtractRequest request_of(const ExtractArguments& a) {
   ExtractRequest r;
   if (!a.bytes.empty()) {
     r.bytes = parse_bytes(a.bytes, "--bytes");
-    if (r.bytes == 0) throw InputError("--bytes", "", "a number above 0", a.bytes);
+    if (r.bytes == 0) throw UsageError("--bytes", "", "a number above 0", a.bytes);
   }
   if (a.scale >= 0) r.scale = a.scale;
   r.rung = rung_of(a.rung);
@@ -62,11 +74,11 @@ void add_extract_command(CLI::App& app, int& exit_code) {
   c->add_option("--display", args->display_px,
                 "Displayed height of the object, device pixels: chooses scale and size of the textures; with "
                 "--bytes the size at which files are compared (default 512)")
-      ->check(CLI::Range(1.0, 1e6));
-  c->add_option(
-       "--image-format", args->images,
-       "auto = webp with --bytes, otherwise jpeg; png is lossless; images with alpha are png where jpeg is "
-       "asked for")
+      ->check(NumberIn(1, 1e6));
+  c->add_option("--image-format", args->images,
+                "auto = with --bytes whichever looks better, otherwise jpeg; png is lossless; images with "
+                "alpha are png where jpeg is "
+                "asked for")
       ->check(CLI::IsMember({"auto", "jpeg", "webp", "png"}))
       ->capture_default_str();
   c->add_flag(
@@ -93,6 +105,7 @@ void add_extract_command(CLI::App& app, int& exit_code) {
       "a file within 2 % below --bytes: the nearest possible file is written then.");
   c->callback([args, &exit_code] {
     const ExtractRequest request = request_of(*args);
+    check_output(args->output);  // not after the search
     RunContext context;
     context.threads =
         args->jobs > 0 ? args->jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));

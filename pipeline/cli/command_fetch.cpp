@@ -290,7 +290,7 @@ void add_fetch_command(CLI::App& app, int& exit_code) {
   c->add_option("--time", d.time, "Time limit from the first request on: 4, 1.5s, 800ms")
       ->capture_default_str();
   c->add_option("--display", d.display_px, "Displayed height of the object, device pixels")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(NumberIn(1, 1e6))
       ->capture_default_str();
   c->add_option("--mirror", args->mirrors, "URL of the same package on another server; may be given again");
   c->add_option("--policy", d.policy, "htca, guard, price, proportional or static, see simulate")

@@ -68,8 +68,10 @@ TEST(CliExtract, FaultsLeaveNoFile) {
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_NE(r.errors.find("texmesh: "), std::string::npos);
   EXPECT_EQ(extract({kGolden, "--scale", "98", "-o", out}).exit_code, 1);
-  EXPECT_EQ(extract({kGolden, "--rung", "best", "-o", out}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "--rung", "best", "-o", out}).exit_code, 2);
   EXPECT_EQ(extract({folder / "none", "-o", out}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "-o", folder / "none/a.glb"}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "-o", out, "--display", "nan"}).exit_code, 2);
   EXPECT_EQ(extract({kGolden}).exit_code, 2);
   EXPECT_EQ(extract({kGolden, "-o", out, "--bytes", "1kB", "--rung", "max"}).exit_code, 2);
   EXPECT_EQ(extract({kGolden, "-o", out, "--image-format", "gif"}).exit_code, 2);
