@@ -1,9 +1,11 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/reader.js
 // (without three.js), dist/worker.js. Each entry stands alone: what it loads later is in parts of its own.
 //   node build.mjs               builds
+//   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
+//   node build.mjs --license     copies the project's LICENSE here, for npm pack
 //   node build.mjs --check-size  builds in memory; fails where an application would pay more than it may
 import { transform } from 'esbuild';
-import { mkdirSync, readFileSync, rmSync } from 'node:fs';
+import { copyFileSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -85,6 +87,20 @@ if (process.argv.includes('--check-size')) {
   console.log(`with what loads while it comes: ${kb(all)} KB of ${kb(most.all)}; fallbacks: ${kb(open.fallback)} KB`);
   console.log(`worker with the decoders: ${kb(decoders)} KB of ${kb(most.worker)}`);
   process.exit(open.first <= most.first && all <= most.all && decoders <= most.worker ? 0 : 1);
+}
+
+if (process.argv.includes('--types')) {
+  const types = join(dist, 'types');
+  for (const name of readdirSync(types).filter((n) => n.endsWith('.d.ts'))) {
+    const text = readFileSync(join(types, name), 'utf8');
+    writeFileSync(join(types, name), text.replace(/((?:from|import\() ?|^import )(['"])(\.\/[\w/]+)\2/gm, '$1$2$3.js$2'));
+  }
+  process.exit(0);
+}
+if (process.argv.includes('--license')) {
+  const license = join(here, '..', '..', 'LICENSE');
+  if (existsSync(license)) copyFileSync(license, join(here, 'LICENSE'));
+  process.exit(existsSync(join(here, 'LICENSE')) ? 0 : 1);
 }
 
 rmSync(dist, { recursive: true, force: true });

@@ -46,8 +46,8 @@ class Site {
   std::optional<SiteFile> open(const std::string& path) const;
   /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
   std::vector<std::string> packages() const;
-  /// `{"packages":[{"url":"packages/bust.texmesh","name":"bust"}, ...]}`, what the viewer offers to choose
-  /// from.
+  /// `{"packages":[{"url":"packages/bust.texmesh"}, ...]}`, what the viewer offers to choose from, by the
+  /// names of the files.
   std::string package_list() const;
 
  private:

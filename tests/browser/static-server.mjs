@@ -36,7 +36,10 @@ export async function serve(roots, {ranges = true, fault = () => undefined, cors
     return null;
   };
   const server = http.createServer(async (request, response) => {
-    const url = decodeURIComponent(request.url.split('?')[0]);
+    let url = request.url.split('?')[0];
+    try {
+      url = decodeURIComponent(url);
+    } catch { /* broken escapes: a file of that name, which is not there */ }
     const record = {method: request.method, path: url, range: request.headers.range, at: performance.now(), status: 0, bytes: 0};
     requests.push(record);
     const wrong = state.fault(record) ?? {};

@@ -361,6 +361,37 @@ test('texmesh view serves a package that the client reads', async () => {
   } finally { view.stop(); }
 });
 
+test('a finer mesh that is not there ends nothing: picture and fragments stand', async () => {
+  const {browser} = await common();
+  const server = await serve({...labRoots}, {ranges: false, fault: (q) => (q.path.endsWith('mesh/s00.glb') ? {status: 404} : undefined)});
+  try {
+    const r = await loaded({browser, url: server.url}, null, `${server.url}/packages/maps.texmesh`,
+      {load: {time: 5, scale: 0, meshes: 'glb', rung: kTop, autoRefine: false}});
+    check(!r.error, JSON.stringify(r.error));
+    check(server.requests.some((q) => q.path.endsWith('mesh/s00.glb')), 'the mesh was not asked for');
+    check(r.state.scale > 0, `S_${r.state.scale}`);
+    check(r.state.planes.length > 0 && r.state.planes.every((p) => [...p.rungs].some((k) => k >= 0)), 'no fragments');
+    await r.page.close();
+  } finally { await server.close(); }
+});
+
+test('a load may be disposed of at any moment', async () => {
+  const b = await common();
+  const page = await labPage(b.browser, b.url);
+  await lab(page, () => window.lab.start({size: 256}));
+  let scales = 0;
+  for (const ms of [0, 15, 40, 80, 150, 300, 600]) {
+    const id = await lab(page, ([u, o]) => window.lab.load(u, o), [`${b.url}/packages/maps.texmesh`, {load: {time: 2}}]);
+    await page.waitForTimeout(ms);
+    scales += await lab(page, (i) => (window.lab.loads[i].model?.state.scale ?? -1) >= 0, id);
+    await lab(page, (i) => window.lab.loads[i].model?.dispose(), id);
+  }
+  check(scales > 0, 'nothing was ever shown');
+  await page.waitForTimeout(300);
+  check(page.said.length === 0, page.said.join('\n'));
+  await page.close();
+});
+
 for (const [what, file] of [['no such package', 'none.texmesh'], ['something else', '../page/lab.mjs']]) {
   test(`an error that says what is wrong: ${what}`, async () => {
     const b = await common();

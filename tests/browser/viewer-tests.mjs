@@ -147,6 +147,77 @@ test('viewer: errors can be read', async () => {
   }
 }, {seconds: 90});
 
+test('viewer: what goes wrong beside the picture can be read', async () => {
+  let lost = 0;
+  const fault = (q) => {
+    const from = Number(/^bytes=(\d+)/.exec(q.range ?? '')?.[1] ?? 0);
+    return q.path.endsWith('large.texmesh') && from > 400000 && ++lost ? {status: 404} : undefined;
+  };
+  await withViewer('?pkg=packages/large.texmesh&time=3&scale=0', async (page) => {
+    await page.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+    await settled(page);
+    check(lost > 0, 'nothing was lost');
+    check(await page.locator('#problem').isVisible(), 'no word of it');
+    check(/404/.test(await page.locator('#problem').textContent()), await page.locator('#problem').textContent());
+    check(await page.locator('#message').isHidden(), 'a message before the picture');
+    await shot(page, 'viewer-problem');
+  }, {quiet: false, fault});
+}, {seconds: 90});
+
+test('viewer: without WebGL, or with no address, it says so', async () => {
+  for (const [name, query, text] of [
+    ['no-address', '?pkg=http://', /could not be loaded/i], ['escape', '?pkg=%25', /no package here|could not be loaded/i],
+  ]) {
+    await withViewer(query, async (page) => {
+      await page.locator('#message').waitFor({state: 'visible', timeout: 20000});
+      check(text.test(await page.locator('#message').textContent()), `${name}: ${await page.locator('#message').textContent()}`);
+    }, {quiet: false});
+  }
+  const {browser} = await common();
+  const server = await serve(viewerRoots);
+  const page = await browser.newPage();
+  listen(page);
+  try {
+    await page.addInitScript(() => { HTMLCanvasElement.prototype.getContext = () => null; });
+    await page.goto(`${server.url}/some/where/index.html?pkg=packages/maps.texmesh`);
+    await page.locator('#message').waitFor({state: 'visible', timeout: 20000});
+    check(/no WebGL/i.test(await page.locator('#message').textContent()), await page.locator('#message').textContent());
+  } finally {
+    await page.close();
+    await server.close();
+  }
+}, {seconds: 90});
+
+test('viewer: the picture comes back with the graphics context', () => withViewer('?pkg=packages/maps.texmesh&time=2&mbit=3&policy=htca', async (page) => {
+  await phase(page, 'done');
+  check(await page.locator('#cap').inputValue() === '375000' && await page.locator('#policy').inputValue() === 'htc', 'choices are not shown');
+  const before = await drawnShare(page);
+  const loss = await page.evaluateHandle(() => window.texmeshViewer.stage.renderer.getContext().getExtension('WEBGL_lose_context'));
+  await loss.evaluate((l) => l.loseContext());
+  await page.locator('#problem').waitFor({state: 'visible', timeout: 5000});
+  await loss.evaluate((l) => l.restoreContext());
+  await page.waitForFunction(() => window.texmeshViewer.session.live.problem === '', null, {timeout: 10000});
+  await phase(page, 'done');
+  await settled(page);
+  await shot(page, 'viewer-restored');
+  const after = await drawnShare(page);
+  check(Math.abs(after / before - 1) < 0.3, `${after} bytes of picture, ${before} before`);
+}, {quiet: false}), {seconds: 90});
+
+test('viewer: the original is opened once, and again with the package', () => withViewer('?pkg=packages/maps.texmesh&time=2', async (page) => {
+  await phase(page, 'done');
+  for (let i = 0; i < 3; i++) await page.locator('#split').click();
+  const ready = () => page.waitForFunction(() => ['refining', 'done'].includes(window.texmeshViewer.session.original?.model.state.phase), null, {timeout: 30000});
+  await ready();
+  check(await page.evaluate(() => window.texmeshViewer.stage.original.children.filter((o) => o.isGroup).length) === 1, 'more than one original');
+  await page.locator('#reload').click();
+  await page.locator('#reload').click();
+  await ready();
+  await phase(page, 'done');
+  check(await page.evaluate(() => window.texmeshViewer.stage.original.children.filter((o) => o.isGroup).length) === 1, 'no original after loading again');
+  check(await page.locator('#message').isHidden() && await page.locator('#problem').isHidden(), 'cancelling is told as an error');
+}), {seconds: 90});
+
 test('viewer: texmesh view of a folder offers its packages', async () => {
   const {browser} = await common();
   const view = await startView(packages);

@@ -62,6 +62,16 @@ export class Blitter {
       }
     });
   }
+  /** Level 0 covers everything. */
+  makeOpaque(texture: WebGLTexture): void {
+    this.with_((gl) => {
+      const mask = gl.getParameter(gl.COLOR_WRITEMASK) as [boolean, boolean, boolean, boolean];
+      gl.framebufferTexture2D(gl.DRAW_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+      gl.colorMask(false, false, false, true);
+      gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
+      gl.colorMask(...mask);
+    });
+  }
   read(texture: WebGLTexture, width: number, height: number): Uint8Array {
     const pixels = new Uint8Array(4 * width * height);
     this.with_((gl) => {
@@ -156,6 +166,7 @@ export class PlaneComposer implements ComposedPlane {
     this.blitter_.copy([
       { from: { texture: from, level: 0 }, to: { texture: to, level: 0 }, source: [0, 0, widthPx, heightPx], target },
     ]);
+    this.blitter_.makeOpaque(to); // coverage has a texture of its own
     this.halve_(to, 0);
   }
 

@@ -4,6 +4,7 @@ import { fullSizePlanes } from './documents';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
+import { InputError } from './errors';
 import { isAbort, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
@@ -28,6 +29,7 @@ const refineRequests = 4;
 const mostPending = 48;
 /** Of the time left when a mesh is asked for: textures do not wait longer for it. */
 const meshShare = 0.5;
+const mostPreviewPx = 4096;
 const longestTimerS = 1e6;
 /** Less of the limit than this, beside a round trip, is not worth another request. */
 const leastRest = 0.004;
@@ -95,6 +97,20 @@ export class TextureLoad {
     return this.load_.options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
   }
 
+  /** Planes that the GPU can hold: a smaller one where it cannot; where there is none, what the mesh brought along stays. */
+  private fitting_({ textures }: PackageData, choices: readonly PlaneChoice[]): PlaneChoice[] {
+    const { maxTextureSize: most } = this.load_.options.renderer.capabilities;
+    const fits = (p: number): boolean => Math.max(textures[p].widthPx, textures[p].heightPx) <= most;
+    return choices.flatMap(({ base, plane }) => {
+      const mips = [...textures.keys()].filter((p) => textures[p].mip > 0 && textures[p].base === base && fits(p));
+      const largest = mips.sort((a, b) => textures[a].mip - textures[b].mip)[0];
+      const taken = fits(plane) ? plane : largest;
+      if (taken !== undefined) return [{ base, plane: taken }];
+      this.load_.fail(new InputError('GPU', `texture plane ${plane}`, `at most ${most} px`, 'more'), 'textures');
+      return [];
+    });
+  }
+
   /** Scale and textures within the time. */
   async timedPart(data: PackageData): Promise<void> {
     this.data_ = data;
@@ -109,7 +125,7 @@ export class TextureLoad {
     // Without it picture and fragments stand all the same.
     const meshShown = mesh.shown.catch((error: unknown) => this.load_.lostScale(error, scale));
     // Coverage that no material asks for is not fetched.
-    const choices = planes.filter(({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base));
+    const choices = this.fitting_(data, planes).filter(({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base));
     const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
     // A mesh that is only waited for leaves the link to the textures.
     // One that takes longer than it should has coarser scales to show on its way.
@@ -228,7 +244,7 @@ export class TextureLoad {
   private async preview_(base: number): Promise<ImageBitmap> {
     const file = await this.load_.reader.preview(base, this.load_.signal);
     const none = new Uint8Array(0);
-    const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1 });
+    const decoded = this.load_.pool.decode({ codec: 'jpeg', tables: none, streams: [file], digests: [], complete: true, levels: 1, most: [mostPreviewPx, mostPreviewPx] });
     return (await decoded)[0];
   }
 
@@ -346,10 +362,10 @@ export class TextureLoad {
   async finerPlanes(): Promise<void> {
     const base = this.data_!;
     const wanted = this.planesFor_(base, this.load_.view.display.heightPx / hysteresis);
-    const finer = wanted.filter((c) => {
-      const shown = this.textureSet_!.planes.get(c.base);
-      return shown && shown.widthPx < base.textures[c.plane].widthPx;
-    });
+    const { planes: there } = this.textureSet_!;
+    const finer = this.fitting_(base, wanted.filter((c) => there.has(c.base))).filter(
+      (c) => there.get(c.base)!.widthPx < base.textures[c.plane].widthPx,
+    );
     if (finer.length === 0) return;
     const planes = [...this.textureSet_!.planes.values()].map((p) => p.plane);
     this.data_ = await this.load_.reader.data([...planes, ...finer.map((c) => c.plane)]);

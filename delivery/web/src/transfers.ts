@@ -215,17 +215,18 @@ export class Transfers {
     const { plane, fragment, rung } = job.wish;
     const { tables, complete } = this.filesOf(plane);
     const streams = job.streams as Uint8Array[];
-    const { codec } = this.textures_[plane];
+    const { codec, fragmentWidthPx, fragmentHeightPx } = this.textures_[plane];
+    const most: [number, number] = [fragmentWidthPx, fragmentHeightPx];
     if (complete) {
       const digests = [complete[rung].get(fragment)!.sha256];
-      return this.pool_.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true, levels: ownLevels });
+      return this.pool_.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true, levels: ownLevels, most });
     }
     const digests = streams.map((_, i) => {
       const at = 8 * ((job.first + i) * fragmentCount(tables) + fragment);
       return tables.digest.slice(at, at + 8);
     });
     const levels = await this.pool_.decode({
-      codec, tables: await this.reader_.tableStream(plane, job.first), streams, digests, complete: false, levels: ownLevels,
+      codec, tables: await this.reader_.tableStream(plane, job.first), streams, digests, complete: false, levels: ownLevels, most,
     });
     if (this.incremental_(plane)) this.held_.set(`${plane}/${fragment}`, streams);
     return levels;

@@ -76,6 +76,7 @@ export class WorkerPool {
   private readonly queue_: Job[] = [];
   private readonly running_ = new Map<number, { job: Job; worker: number }>();
   private readonly load_: number[] = [];
+  private readonly broken_ = new Set<number>(); // whose workers broke once
   private nextId_ = 1;
   private ended_ = false;
 
@@ -99,11 +100,12 @@ export class WorkerPool {
   private startMain_(): Helper {
     return startHere(this.options_.decode, (a) => this.answered_(a));
   }
-  /** A worker that cannot be loaded gives its jobs to the main thread. */
+  /** A worker that breaks gives its jobs to another one; where that breaks, too, to the main thread. */
   private replace_(index: number): void {
     if (this.ended_) return;
     this.helpers_[index].end();
-    this.helpers_[index] = this.startMain_();
+    this.helpers_[index] = this.broken_.has(index) ? this.startMain_() : this.start_(index);
+    this.broken_.add(index);
     for (const [id, r] of this.running_)
       if (r.worker === index) this.helpers_[index].post(id, r.job.request, []);
   }

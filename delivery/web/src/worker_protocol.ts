@@ -13,6 +13,8 @@ export interface DecodeRequest {
   complete: boolean;
   /** Mip levels to make, itself included. */
   levels: number;
+  /** Width and height that it may have, at most. */
+  most: [number, number];
 }
 /** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
 export interface EnlargeRequest {

@@ -7,6 +7,7 @@ import { FormatError, InputError, OpenOptions, PackageReader } from '../src/read
 import { requireOwnBytes } from '../src/scale_parts';
 import { openStore } from '../src/store';
 import { TreeStore } from '../src/store_files';
+import { handle, imageSize } from '../src/worker';
 import { WorkerPool } from '../src/worker_pool';
 import type { WorkerRequest } from '../src/worker_protocol';
 import { Fault, FakeServer, fakeServer } from './fake_server';
@@ -224,7 +225,7 @@ it('pictures that nobody waits for are closed, and streams are told of their end
     },
   });
   const none = new Uint8Array(0);
-  const decoding = rejection(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1 }));
+  const decoding = rejection(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }));
   pool.closeSplits(3);
   await Promise.resolve();
   pool.dispose();
@@ -232,4 +233,61 @@ it('pictures that nobody waits for are closed, and streams are told of their end
   await new Promise((go) => setTimeout(go, 20));
   expect(closed).toBeGreaterThan(0);
   expect(heard).toContain('split-close');
+});
+
+describe('pictures', () => {
+  it('say how large they are before they are decoded', async () => {
+    const reader = await PackageReader.openBytes(container, 'golden');
+    const [info] = await reader.textures();
+    for (const f of (await reader.planeTables(0)).order.slice(0, 8)) {
+      const [w, h] = imageSize(await reader.completeFragment(0, 0, f));
+      expect(w > 0 && w <= info.fragmentWidthPx && h > 0 && h <= info.fragmentHeightPx).toBe(true);
+    }
+    const riff = (kind: string, at: number, data: number[]): Uint8Array => {
+      const b = new Uint8Array(40);
+      b.set(new TextEncoder().encode(`RIFF    WEBP${kind}`));
+      b.set(data, at);
+      return b;
+    };
+    expect(imageSize(riff('VP8 ', 26, [0x80, 0, 0x40, 1]))).toEqual([128, 320]);
+    expect(imageSize(riff('VP8L', 20, [0x2f, 0x7f, 0xc0, 0x4f, 0]))).toEqual([128, 320]);
+    expect(imageSize(riff('VP8X', 24, [0x7f, 0, 0, 0x3f, 1, 0]))).toEqual([128, 320]);
+    for (const none of [[], [0xff], [0xff, 0xd8], [0xff, 0xd8, 0xff, 0xe0, 0, 0], [1, 2, 3]]) expect(imageSize(Uint8Array.from(none))).toEqual([0, 0]);
+  });
+  it('that are larger than their fragment are refused', async () => {
+    const bomb = Uint8Array.from([0xff, 0xd8, 0xff, 0xc0, 0, 17, 8, 0xff, 0xff, 0xff, 0xff, 3]);
+    expect(imageSize(bomb)).toEqual([65535, 65535]);
+    const none = new Uint8Array(0);
+    const request = { op: 'decode', codec: 'jpeg', tables: none, streams: [bomb], digests: [], complete: true, levels: 1, most: [128, 128] } as const;
+    expect(await rejection(handle(request as unknown as WorkerRequest))).toBeInstanceOf(FormatError);
+  });
+});
+
+it('a worker that breaks is replaced once, then its jobs go to the main thread', async () => {
+  const started: { onerror?: (e: { preventDefault(): void }) => void; posted: number }[] = [];
+  class Broken {
+    onerror?: (e: { preventDefault(): void }) => void;
+    posted = 0;
+    constructor() {
+      started.push(this);
+    }
+    postMessage(): void {
+      ++this.posted;
+    }
+    terminate(): void {}
+  }
+  const before = Object.getOwnPropertyDescriptor(globalThis, 'Worker');
+  Object.defineProperty(globalThis, 'Worker', { value: Broken, configurable: true });
+  try {
+    const pool = new WorkerPool({ workers: 1 });
+    const job = rejection(pool.openSplits(1, new Uint8Array(4)));
+    started[0].onerror!({ preventDefault: () => undefined });
+    expect(started.map((w) => w.posted)).toEqual([1, 1]);
+    started[1].onerror!({ preventDefault: () => undefined });
+    expect((await job).message).toContain('decode');
+    expect(started.length).toBe(2);
+  } finally {
+    if (before) Object.defineProperty(globalThis, 'Worker', before);
+    else Reflect.deleteProperty(globalThis, 'Worker');
+  }
 });

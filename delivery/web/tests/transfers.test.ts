@@ -202,7 +202,7 @@ it('workers are sent the bytes that they need, not the package that they lie in'
   const pool = new WorkerPool({ decode: async (request) => (sent.push(request), [[], []]) });
   const whole = Uint8Array.from({ length: 1000 }, (_, i) => i & 255);
   const [tables, stream] = [whole.subarray(0, 10), whole.subarray(500, 540)];
-  await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1 });
+  await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1, most: [9, 9] });
   await pool.addSplits(1, stream);
   const [decode, splits] = sent as [WorkerRequest & { op: 'decode' }, WorkerRequest & { op: 'split-add' }];
   for (const [found, expected] of [[decode.tables, tables], [decode.streams[0], stream], [splits.blocks, stream]]) {

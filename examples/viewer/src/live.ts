@@ -43,13 +43,16 @@ export interface Live {
   skipped: Map<number, Set<number>>;
   turns: Turn[];
   transfers: Transfer[];
+  /** The last thing that went wrong without ending the load (or ended it with a picture on the screen), and how many did. */
+  problem: string;
+  problems: number;
 }
 
 export function emptyLive(): Live {
   return {
     manifest: null, textures: [], tables: [], packageBytes: 0, title: '', phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
     firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedSsim: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
-    rungs: new Map(), skipped: new Map(), turns: [], transfers: [],
+    rungs: new Map(), skipped: new Map(), turns: [], transfers: [], problem: '', problems: 0,
   };
 }
 

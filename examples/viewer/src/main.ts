@@ -1,31 +1,14 @@
 import './style.css';
+import { choicesFromAddress, readable } from './choices';
 import { warmDecoders } from './decoders';
 import { byId } from './dom';
 import * as format from './format';
 import type { Live } from './live';
 import { hideMessage, offerPackages, showError } from './message';
 import { Panel } from './panel';
-import type { Choices } from './panel';
 import { Session } from './session';
 import { Stage } from './stage';
 import { startTheme, toggleTheme } from './theme';
-
-/** Choices may stand in the address, so that what one sees can be sent to somebody. */
-function choicesFromAddress(query: URLSearchParams): Choices {
-  const number = (name: string): number | null => {
-    const v = query.get(name);
-    return v !== null && v !== '' && Number.isFinite(Number(v)) ? Number(v) : null;
-  };
-  const time = number('time');
-  const mbit = number('mbit');
-  return {
-    timeS: query.get('time') === 'none' ? Infinity : time !== null && time > 0 ? time : 4,
-    capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
-    policy: query.get('policy') ?? 'guard',
-    scale: number('scale'),
-    rung: number('rung'),
-  };
-}
 
 const kPhases: Record<string, string> = {
   opening: 'Opening', 'first-picture': 'First picture', tables: 'Tables', mesh: 'Mesh', textures: 'Textures', refining: 'Refining', done: '',
@@ -52,13 +35,18 @@ function showStatus(live: Live): void {
   bar.hidden = !busy;
   bar.setAttribute('aria-valuenow', (100 * share).toFixed(0));
   (bar.firstElementChild as HTMLElement).style.width = `${(100 * share).toFixed(1)}%`;
+  byId('phase').textContent = busy ? phase : live.phase === 'done' ? 'Complete' : phase; // what screen readers say
+  const problem = byId('problem');
+  problem.hidden = live.problem === '';
+  const said = live.problems > 1 ? `${live.problems} problems, the last: ${live.problem}` : live.problem;
+  if (problem.textContent !== said) problem.textContent = said;
   byId('status').textContent = [phase, live.bytes > 0 ? `${format.bytes(live.bytes)} in ${live.requests} requests` : '',
     Number.isFinite(live.doneS) && !busy ? `complete after ${format.seconds(live.doneS)}` : ''].filter(Boolean).join(' · ');
 }
 
 const query = new URLSearchParams(location.search);
 const packageUrl = query.get('pkg') ?? '';
-const shortName = (): string => decodeURIComponent(packageUrl.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
+const shortName = (): string => readable(packageUrl.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
 
 function wideAtFirst(): boolean {
   return query.get('panel') === '0';
@@ -69,12 +57,17 @@ function start(): void {
   const stage = new Stage(byId<HTMLCanvasElement>('view'));
   const session = new Session(stage, new URL(packageUrl, document.baseURI).href);
   const choices = choicesFromAddress(query);
+  const divider = byId('divider');
   const panel = new Panel(byId('panel'), choices, {
     choose: (c) => {
       Object.assign(choices, c);
       session.override(choices);
     },
-    reload: () => { hideMessage(); void session.start(choices); },
+    reload: () => {
+      hideMessage();
+      void session.start(choices);
+      if (!divider.hidden) void session.showOriginal(true).catch(session.onError);
+    },
     refine: () => { void session.refine(); },
   }, session.live);
   let asked = false;
@@ -90,7 +83,7 @@ function start(): void {
   session.onError = (error) => {
     // What is on the screen stays there: a message in front of it would hide more than it tells.
     if (session.live.scale === null) showError(error, packageUrl);
-    else byId('status').textContent = error instanceof Error ? error.message : String(error);
+    else session.problem(error);
   };
   stage.onView = () => {
     const m = session.live.manifest;
@@ -101,6 +94,13 @@ function start(): void {
   };
   wireTools(stage, session);
   document.body.classList.toggle('wide', wideAtFirst());
+  byId('toggle').setAttribute('aria-expanded', String(!wideAtFirst()));
+  stage.onLost = () => session.problem('The graphics context was lost; waiting for it to come back');
+  stage.onRestored = () => {
+    hideMessage();
+    void session.start(choices);
+    if (!divider.hidden) void session.showOriginal(true).catch(session.onError);
+  };
   Object.assign(window, { texmeshViewer: { stage, session, choices } });
   if (packageUrl === '') {
     document.body.classList.add('wide'); // there is nothing to say about no package
@@ -157,4 +157,10 @@ function wireTools(stage: Stage, session: Session): void {
   });
 }
 
-start();
+try {
+  start();
+} catch (error) {
+  byId('status').textContent = '';
+  byId('phase').textContent = 'Failed';
+  showError(error, packageUrl); // no WebGL, or an address that is none
+}

@@ -1,4 +1,5 @@
 import { FormatError } from 'texmesh';
+import { readable } from './choices';
 import { byId, make } from './dom';
 
 /** What stands in the middle of the picture when there is no object: an error, or a choice of packages. */
@@ -20,12 +21,15 @@ export function showError(error: unknown, url: string): void {
 
 function headline(error: unknown, text: string): string {
   if (error instanceof FormatError) return 'This is not a package that can be shown';
+  if (/webgl/i.test(text)) return 'There is no WebGL here';
   if (/404|not found/i.test(text)) return 'There is no package here';
   return 'The package could not be loaded';
 }
 
 function advice(error: unknown, text: string, url: string): string {
-  const elsewhere = new URL(url, document.baseURI).origin !== location.origin;
+  const elsewhere = URL.canParse(url, document.baseURI) && new URL(url, document.baseURI).origin !== location.origin;
+  if (/webgl/i.test(text)) return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
+  if (!URL.canParse(url, document.baseURI)) return 'Look at the address behind ?pkg= in the address bar.';
   if (error instanceof FormatError) return 'The file may be damaged, or is of a later version. texmesh verify says more.';
   if (/404|not found/i.test(text)) return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
   if (elsewhere) return 'It stands on another server, which must be reachable and allow this page to read (CORS: Access-Control-Allow-Origin).';
@@ -47,7 +51,7 @@ export async function offerPackages(): Promise<boolean> {
     // no list, or none that can be read: the address has to say
   }
   const items = list.filter((p) => typeof p.url === 'string').map((p) => {
-    const name = p.name ?? decodeURIComponent(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
+    const name = p.name ?? readable(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
     return make('li', {}, make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, name));
   });
   if (items.length) box().replaceChildren(make('h2', {}, 'Packages'), make('ul', {}, ...items));

@@ -1,5 +1,7 @@
 import { stepFunction } from 'texmesh';
 import type { Manifest, PlaneTables } from 'texmesh';
+import { capsWith, kPolicies, kTimes } from './choices';
+import type { Choices } from './choices';
 import { make } from './dom';
 import { FragmentMap } from './fragment-map';
 import type { ColourBy } from './fragment-map';
@@ -8,30 +10,11 @@ import { bytesByKind, kKinds } from './live';
 import type { Live } from './live';
 import { Plot } from './plots';
 
-/** What a person may choose; null or Infinity: as the library thinks best. */
-export interface Choices {
-  timeS: number;
-  capBytesPerSecond: number;
-  policy: string;
-  scale: number | null;
-  rung: number | null;
-}
-
 export interface PanelActions {
   choose: (choices: Choices) => void;
   reload: () => void;
   refine: () => void;
 }
-
-const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
-const kCaps: [string, number][] = [
-  ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
-  ['50 Mbit/s', 6.25e6],
-];
-const kPolicies: [string, string][] = [
-  ['htca', 'harmonic time (HTCA)'], ['guard', 'harmonic, guarded'], ['price', 'price of bytes'], ['proportional', 'proportional'],
-  ['static', 'static'],
-];
 
 /** The panel: figures, controls, plots. `update` may be called at any rate; it draws what is open, a few times a second. */
 export class Panel {
@@ -170,8 +153,8 @@ export class Panel {
       e.value = value;
       return e;
     };
-    const cap = choose('cap', kCaps.map(([text, v]) => [String(v), text]), String(c.capBytesPerSecond), (v) => { c.capBytesPerSecond = Number(v); });
-    const policy = choose('policy', kPolicies, c.policy, (v) => { c.policy = v; });
+    const cap = choose('cap', capsWith(c.capBytesPerSecond).map(([text, v]) => [String(v), text]), String(c.capBytesPerSecond), (v) => { c.capBytesPerSecond = Number(v); });
+    const policy = choose('policy', kPolicies, c.policy, (v) => { c.policy = v as Choices['policy']; });
     this.scaleSelect.append(make('option', { value: '' }, 'by displayed size'));
     this.rungSelect.append(make('option', { value: '' }, 'by time and importance'));
     this.scaleSelect.addEventListener('change', () => { c.scale = this.scaleSelect.value === '' ? null : Number(this.scaleSelect.value); changed(); });
@@ -180,6 +163,7 @@ export class Panel {
       make('label', { for: 'time' }, 'Time limit'), make('div', { class: 'row' }, range, out),
       make('label', { for: 'cap' }, 'Bandwidth'), cap,
       make('label', { for: 'policy' }, 'Policy'), policy,
+      make('p', { class: 'note' }, 'Time, bandwidth and policy count from the next load on.'),
       make('label', { for: 'scale' }, 'Mesh scale'), this.scaleSelect,
       make('label', { for: 'rung' }, 'Texture'), this.rungSelect,
       make('div', { class: 'buttons' },
@@ -212,7 +196,7 @@ export class Panel {
         { label: 'just noticeable', colour: 'k3', kind: 'dashes', value: triangles },
         { label: 'one pixel', colour: 'k4', kind: 'dashes', value: triangles },
       ],
-      mark: () => (this.live.displayedPx > 0 ? { x: this.live.displayedPx, label: this.live.scale === null ? 'now' : `now S${this.live.scale}` } : null),
+      mark: () => (this.live.displayedPx > 0 ? { x: this.live.displayedPx, label: this.live.scale === null ? 'now' : `S${this.live.scale}` } : null),
     }, () => (this.live.manifest ? stepData(this.live.manifest) : null));
   }
 

@@ -1,9 +1,9 @@
 import { equivalentQuality, open, predictedSsim, surfaceWeights } from 'texmesh';
-import type { DecisionEvent, LoadedModel, LoadOptions, Policy, TexmeshPackage } from 'texmesh';
+import type { DecisionEvent, LoadedModel, LoadOptions, TexmeshPackage } from 'texmesh';
 import { gltfLoader } from './decoders';
 import { emptyLive } from './live';
 import type { Live } from './live';
-import type { Choices } from './panel';
+import type { Choices } from './choices';
 import type { Stage } from './stage';
 
 /** One package on the stage: opens it, loads it as chosen, and keeps in `live` what the panel shows. */
@@ -19,6 +19,7 @@ export class Session {
   private abort = new AbortController();
   /** Loads that were overtaken by a newer one say nothing any more. */
   private turn = 0;
+  private openingOriginal = -1; // turn of the original that is being opened
 
   constructor(
     private readonly stage: Stage,
@@ -61,9 +62,10 @@ export class Session {
   }
 
   async refine(): Promise<void> {
+    if (!this.model) return;
     try {
       this.changed('refining');
-      await this.model?.refine();
+      await this.model.refine();
     } catch (error) {
       this.failed(error);
     }
@@ -71,9 +73,20 @@ export class Session {
 
   /** S_0 with the highest rungs of full-size textures, into the second scene. */
   async showOriginal(on: boolean): Promise<void> {
-    if (!on || this.original) return;
-    const turn = this.turn;
-    const pkg = await open(this.url, { signal: this.abort.signal });
+    const { turn } = this;
+    if (!on || this.original || this.openingOriginal === turn) return;
+    this.openingOriginal = turn;
+    const { signal } = this.abort;
+    let pkg: TexmeshPackage;
+    try {
+      pkg = await open(this.url, { signal });
+    } catch (error) {
+      if (turn === this.turn && !signal.aborted) throw error;
+      return;
+    } finally {
+      if (this.openingOriginal === turn) this.openingOriginal = -1;
+    }
+    if (turn !== this.turn) return pkg.dispose();
     const model = pkg.load(this.stage.original, {
       ...this.common(), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,
     });
@@ -83,7 +96,7 @@ export class Session {
     try {
       await model.done;
     } catch (error) {
-      if (turn === this.turn && !this.abort.signal.aborted) this.onError(error);
+      if (turn === this.turn && !signal.aborted) this.onError(error);
     }
   }
 
@@ -108,7 +121,7 @@ export class Session {
 
   private options(c: Choices): LoadOptions {
     return {
-      ...this.common(), time: c.timeS, policy: c.policy as Policy, meshes: 'auto',
+      ...this.common(), time: c.timeS, policy: c.policy, meshes: 'auto',
       scale: this.scaleThatIs(c.scale), rung: c.rung ?? undefined,
     };
   }
@@ -194,8 +207,11 @@ export class Session {
       l.doneS = e.actual;
       l.limitS = e.limit;
     });
-    on('done', () => { l.phase = 'done'; });
-    on('error', (e) => { if (e.fatal) this.failed(e.error); });
+    on('done', () => {
+      l.phase = 'done';
+      if (this.pkg) void this.predict(this.pkg, model, turn).catch(() => {}); // refining has made it better
+    });
+    on('error', (e) => { if (e.fatal) this.failed(e.error); else this.problem(e.error); });
   }
 
   private decision(e: DecisionEvent, origin: number): void {
@@ -203,7 +219,7 @@ export class Session {
     if (e.skipped) {
       let set = l.skipped.get(e.plane);
       if (!set) l.skipped.set(e.plane, (set = new Set()));
-      set.add(e.fragment);
+      for (const f of e.fragments) set.add(f);
       return;
     }
     if (e.done === undefined) return;
@@ -239,6 +255,13 @@ export class Session {
     }
     const quality = weight > 0 ? equivalentQuality(data, planes, loss / weight) : 100;
     this.live.predictedSsim = predictedSsim(table, model.state.scale, quality);
+    this.changed();
+  }
+
+  /** Says what went wrong beside what is shown. */
+  problem(error: unknown): void {
+    this.live.problem = error instanceof Error ? error.message : String(error);
+    this.live.problems++;
     this.changed();
   }
 

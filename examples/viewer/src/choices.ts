@@ -1,0 +1,53 @@
+import type { Policy } from 'texmesh';
+
+/** What a person may choose; null or Infinity: as the library thinks best. */
+export interface Choices {
+  timeS: number;
+  capBytesPerSecond: number;
+  policy: Policy;
+  scale: number | null;
+  rung: number | null;
+}
+
+export const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
+const kCaps: [string, number][] = [
+  ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
+  ['50 Mbit/s', 6.25e6],
+];
+export const kPolicies: [Policy, string][] = [
+  ['htc', 'harmonic time (HTCA)'], ['guard', 'harmonic, guarded'], ['price', 'price of bytes'], ['proportional', 'proportional'],
+  ['static', 'static'],
+];
+
+/** The links to choose from; one that an address asks for is among them. */
+export function capsWith(bytesPerSecond: number): [string, number][] {
+  if (kCaps.some(([, v]) => v === bytesPerSecond)) return kCaps;
+  return [...kCaps, [`${Number((bytesPerSecond / 125000).toPrecision(3))} Mbit/s`, bytesPerSecond]];
+}
+
+/** Choices may stand in the address, so that what one sees can be sent to somebody. What is no choice is left out. */
+export function choicesFromAddress(query: URLSearchParams): Choices {
+  const number = (name: string): number | null => {
+    const v = query.get(name);
+    return v !== null && v !== '' && Number.isFinite(Number(v)) ? Number(v) : null;
+  };
+  const time = number('time');
+  const mbit = number('mbit');
+  const named = query.get('policy') === 'htca' ? 'htc' : query.get('policy');
+  return {
+    timeS: query.get('time') === 'none' ? Infinity : time !== null && time > 0 ? time : 4,
+    capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
+    policy: kPolicies.find(([p]) => p === named)?.[0] ?? 'guard',
+    scale: number('scale'),
+    rung: number('rung'),
+  };
+}
+
+/** A URL as people read it; one with broken escapes as it stands. */
+export function readable(url: string): string {
+  try {
+    return decodeURIComponent(url);
+  } catch {
+    return url;
+  }
+}
