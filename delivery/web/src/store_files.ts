@@ -2,7 +2,7 @@ import { FormatError, InputError } from './errors';
 import { HttpClient, getWhole, isAbort, shownUrl } from './http';
 import { isValidEntryPath, manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
-import { Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
+import { Mirror, Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
 
 // For servers that know no ranges; loaded when one is met.
 
@@ -13,6 +13,7 @@ export class TreeStore implements PackageStore {
   readonly form = 'files';
   private readonly files_ = new Map<string, Promise<Uint8Array>>();
   private readonly mirrors_: Mirrors;
+  private readonly from_ = new Map<string, Mirror>(); // who was asked last
 
   constructor(
     roots: readonly string[],
@@ -35,13 +36,18 @@ export class TreeStore implements PackageStore {
       await how.verify?.(part);
       return part;
     };
-    try {
-      return await take(false);
-    } catch (error) {
-      if (!(error instanceof FormatError)) throw error;
-      this.files_.delete(place.path);
-      return take(true); // damaged on the way, perhaps: once more, past caches
-    }
+    for (let again = false; ; again = true)
+      try {
+        return await take(again);
+      } catch (error) {
+        if (!(error instanceof FormatError)) throw error;
+        this.files_.delete(place.path);
+        // Damaged on the way, perhaps: elsewhere, or once more, past caches.
+        const elsewhere = this.mirrors_.alive > 1;
+        const from = this.from_.get(place.path);
+        if (elsewhere && from) this.mirrors_.failed(from, 0);
+        else if (again) throw error;
+      }
   }
   /** A file of the tree; a failed one may be asked for again. */
   private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
@@ -54,6 +60,7 @@ export class TreeStore implements PackageStore {
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
     const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
       const { kind, signal, onBytes } = how;
+      this.from_.set(path, m);
       return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload });
     });
     if (how.once) return wanted;

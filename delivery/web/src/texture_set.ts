@@ -96,7 +96,8 @@ export class TextureSet {
     const shown = old.find((texture) => pictureOf(texture));
     const image = preview ?? pictureOf(shown);
     if (!image) return void (next.filled = true);
-    if (shown && !(await isSoftware(this.renderer_))) return next.fillFromTexture(shown, image.width, image.height);
+    // A preview of its own is that of coverage, beside which the colours are shown.
+    if (!preview && shown && !(await isSoftware(this.renderer_))) return next.fillFromTexture(shown, image.width, image.height);
     try {
       await this.enlarge_(next, image);
     } catch (error) {

@@ -107,6 +107,19 @@ describe('a failure', () => {
   });
 });
 
+it('a tree whose files are others is left for a mirror', async () => {
+  const file = Uint8Array.from({ length: 500 }, (_, i) => i & 255);
+  const server = fakeServer({ '/a/x.bin': file }, { ranges: false, fault: ({ url: u }) => u.startsWith('http://host') && 'flip' });
+  const verify = async (got: Uint8Array): Promise<void> => {
+    if (got.some((b, i) => b !== file[i])) throw new FormatError('x.bin', '', 'these bytes', 'others');
+  };
+  const read = (roots: string[]): Promise<Uint8Array> =>
+    new TreeStore(roots, new HttpClient({ fetch: server.fetch, ...quick })).read({ path: 'x.bin', offset: 0, bytes: 500 }, 0, 500, { kind: 'other', verify });
+  expect((await read(['http://host/a/', 'http://other/a/'])).length).toBe(500);
+  expect(await rejection(read(['http://host/a/']))).toBeInstanceOf(FormatError);
+  expect(server.log.length).toBe(4);
+});
+
 describe('hostile answers', () => {
   it('a size beyond the end of the file is refused before anything is made room for', async () => {
     const server = range();
