@@ -8,15 +8,20 @@ namespace {
 
 constexpr double kMostBytes = 1e18, kMost_s = 1e6, kMostRate = 1e12;
 
+/// The number that a text begins with; `end` is where it stops, 0 when there is none.
+double leading_number(const std::string& text, std::size_t& end) {
+  try {
+    return std::stod(text, &end);
+  } catch (const std::exception&) {
+    end = 0;
+    return 0;
+  }
+}
+
 double parse(const std::string& text, const std::string& flag, const std::map<std::string, double>& units,
              const char* expected, double most) {
   std::size_t end = 0;
-  double v = 0;
-  try {
-    v = std::stod(text, &end);
-  } catch (const std::exception&) {
-    end = 0;
-  }
+  const double v = leading_number(text, end);
   const auto unit = units.find(text.substr(end));
   if (end == 0 || unit == units.end() || !(v >= 0 && v * unit->second <= most))
     throw UsageError(flag, "", expected, text);
@@ -27,13 +32,8 @@ double parse(const std::string& text, const std::string& flag, const std::map<st
 
 std::string NumberIn::operator()(const std::string& text) const {
   std::size_t end = 0;
-  double v = 0;
-  try {
-    v = std::stod(text, &end);
-  } catch (const std::exception&) {
-    end = 0;
-  }
-  if (end == text.size() && v >= least_ && v <= most_) return "";
+  const double v = leading_number(text, end);
+  if (end > 0 && end == text.size() && v >= least_ && v <= most_) return "";
   return fmt::format("expected a number from {:g} to {:g}, found {}", least_, most_, text);
 }
 
