@@ -1,124 +1,34 @@
 // The texture stages against plain libjpeg on the same pixels in the same run. Counters:
 //   cpu_ratio    CPU of the stage / CPU of ten whole-image encodes with standard tables (one thread); target
-//   <= 1.5 bytes_ratio  bytes of the ladder, tables included / bytes of those ten files; target <= 1.0
+//                <= 1.5
+//   bytes_ratio  bytes of the ladder, tables included / bytes of those ten files; target <= 1.0
 //   speedup      wall with one thread / wall with two
 #include <benchmark/benchmark.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <ctime>
-
-#include <jpeglib.h>
-
-#include <algorithm>
-#include <chrono>
+#include <cstdint>
 #include <vector>
 
 #include "stages/lut.h"
+#include "tests/bench/bench_texture.h"
 
 namespace texmesh {
 namespace {
 
-double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-double wall_seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-std::uint32_t hash(std::uint32_t x, std::uint32_t y, std::uint32_t c) {
-  std::uint32_t h = x * 0x9e3779b1u ^ y * 0x85ebca77u ^ c * 0xc2b2ae3du;
-  h = (h ^ h >> 15) * 0x2c1b3c6du;
-  return (h ^ h >> 12) * 0x297a2d39u >> 16;
-}
-
-/// Bilinear noise of one octave, 0..65535.
-std::uint32_t octave(std::uint32_t x, std::uint32_t y, std::uint32_t c, std::uint32_t step) {
-  const std::uint32_t u = x / step, v = y / step, a = x % step, b = y % step;
-  const std::uint64_t top = std::uint64_t{hash(u, v, c)} * (step - a) + std::uint64_t{hash(u + 1, v, c)} * a;
-  const std::uint64_t low =
-      std::uint64_t{hash(u, v + 1, c)} * (step - a) + std::uint64_t{hash(u + 1, v + 1, c)} * a;
-  return static_cast<std::uint32_t>((top * (step - b) + low * b) / (std::uint64_t{step} * step));
-}
-
-/// A spectrum like a photograph's: amplitude falls with frequency; colours vary slowly.
-Pixels photo_like(std::uint32_t size) {
-  Pixels out{size, size, 3, {}};
-  out.data.resize(std::size_t{size} * size * 3);
-  std::uint8_t* to = out.data.data();
-  for (std::uint32_t y = 0; y < size; ++y)
-    for (std::uint32_t x = 0; x < size; ++x) {
-      std::uint32_t grey = 0;
-      for (std::uint32_t step = 128, weight = 64; step >= 1; step /= 2, weight = weight * 5 / 9)
-        grey += octave(x, y, step, step) * weight >> 16;
-      for (std::uint32_t c = 0; c < 3; ++c)
-        *to++ = static_cast<std::uint8_t>(std::min(255u, 10 + grey + (octave(x, y, 200 + c, 64) * 60 >> 16)));
-    }
-  return out;
-}
-
-struct Scene {
-  Fragments fragments;
-  std::vector<Pixels> pixels;
-};
-
-Scene make_scene(std::uint32_t size, std::uint32_t side) {
-  Scene scene;
-  TexturePlane p;
-  p.channels = 3;
-  p.width_px = p.height_px = size;
-  p.fragment_width_px = p.fragment_height_px = side;
-  p.columns = p.rows = size / side;
-  p.coverage.assign(std::size_t{size} / 8 * size, 0xff);
-  p.covered_texels.assign(p.fragment_count(), side * side);
-  p.surface_fraction.assign(p.fragment_count(), 1.0f / static_cast<float>(p.fragment_count()));
-  p.features.assign(p.fragment_count(), 1);
-  p.eta.assign(p.fragment_count(), 0);
-  scene.fragments.planes = {p};
-  scene.pixels = {photo_like(size)};
-  return scene;
-}
-
-/// Plain libjpeg as any program calls it: one file, standard Huffman tables. Returns its bytes.
-std::size_t plain_encode(const Pixels& pixels, int quality) {
-  jpeg_compress_struct info;
-  jpeg_error_mgr errors;
-  info.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&info);
-  unsigned char* out = nullptr;
-  unsigned long size = 0;
-  jpeg_mem_dest(&info, &out, &size);
-  info.image_width = pixels.width_px;
-  info.image_height = pixels.height_px;
-  info.input_components = 3;
-  info.in_color_space = JCS_RGB;
-  jpeg_set_defaults(&info);
-  jpeg_set_quality(&info, quality, TRUE);
-  jpeg_start_compress(&info, TRUE);
-  while (info.next_scanline < info.image_height) {
-    JSAMPROW row = const_cast<JSAMPROW>(pixels.at(0, info.next_scanline));
-    jpeg_write_scanlines(&info, &row, 1);
-  }
-  jpeg_finish_compress(&info);
-  jpeg_destroy_compress(&info);
-  std::free(out);
-  return size;
-}
-
-RunContext threads(int count) {
-  RunContext context;
-  context.threads = count;
-  return context;
+/// A made texture of argument 0 px in fragments of argument 1 px.
+Scene made_scene(const benchmark::State& state) {
+  return make_scene(made_texture(static_cast<std::uint32_t>(state.range(0))),
+                    static_cast<std::uint32_t>(state.range(1)));
 }
 
 void encode_ladder_bench(benchmark::State& state) {
-  const Scene scene =
-      make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
+  const Scene scene = made_scene(state);
   const LadderOptions options;
   double plain = 0, ours = 0, one = 0, two = 0;
   std::size_t plain_bytes = 0, our_bytes = 0;
   for (auto _ : state) {
     double start = cpu_seconds();
     plain_bytes = 0;
-    for (int quality : options.rungs) plain_bytes += plain_encode(scene.pixels[0], quality);
+    for (int quality : options.rungs) plain_bytes += plain_encode(scene.pixels[0], quality, false);
     plain += cpu_seconds() - start;
     start = cpu_seconds();
     double wall = wall_seconds();
@@ -144,15 +54,14 @@ BENCHMARK(encode_ladder_bench)
     ->MinTime(1);
 
 void build_tables_bench(benchmark::State& state) {
-  const Scene scene =
-      make_scene(static_cast<std::uint32_t>(state.range(0)), static_cast<std::uint32_t>(state.range(1)));
+  const Scene scene = made_scene(state);
   const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, threads(2));
   const Predictors predictors = predict_quality(scene.fragments, scene.pixels, {}, threads(2));
   double plain = 0, ours = 0, one = 0, two = 0;
   for (auto _ : state) {
     double start = cpu_seconds();
     for (int quality : LadderOptions{}.rungs)
-      benchmark::DoNotOptimize(plain_encode(scene.pixels[0], quality));
+      benchmark::DoNotOptimize(plain_encode(scene.pixels[0], quality, false));
     plain += cpu_seconds() - start;
     start = cpu_seconds();
     double wall = wall_seconds();
@@ -171,7 +80,7 @@ BENCHMARK(build_tables_bench)->Args({2048, 256})->Unit(benchmark::kMillisecond)-
 /// Half of the texture uncovered, in discs as charts leave gaps.
 void fill_bench(benchmark::State& state) {
   const auto size = static_cast<std::uint32_t>(state.range(0));
-  const Pixels source = photo_like(size);
+  const Pixels source = made_texture(size);
   std::vector<std::uint8_t> coverage(std::size_t{size} / 8 * size);
   for (std::uint32_t y = 0; y < size; ++y)
     for (std::uint32_t x = 0; x < size; ++x) {
