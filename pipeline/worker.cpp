@@ -155,17 +155,19 @@ Child start_child(const WorkerJob& job, std::size_t index, const WorkerLimits& l
 void take_stage(const Json& e, double now_s, WorkerReport& report) {
   const std::string stage = e.value("stage", "");
   if (e.value("event", "") == "stage-started") {
-    report.spans.push_back({stage, now_s, now_s, false});
+    report.spans.push_back({stage, now_s, now_s, false, true});
     return;
   }
   const bool hit = e.value("result", "") == "hit";
   ++(hit ? report.stages_hit : report.stages_ran);
   const auto open = std::find_if(report.spans.rbegin(), report.spans.rend(),
                                  [&](const StageSpan& s) { return s.stage == stage; });
-  if (hit || open == report.spans.rend())
+  if (hit || open == report.spans.rend()) {
     report.spans.push_back({stage, now_s, now_s, hit});
-  else
+  } else {
     open->end_s = now_s;
+    open->running = false;
+  }
 }
 
 void take_inputs(const Json& e, WorkerReport& report) {
@@ -230,12 +232,25 @@ void read_events(Child& child, WorkerReport& report, double now_s, const EventSi
   }
 }
 
+/// Ends the spans of stages that will not end any more; returns them as the place of an error: `running ssf,
+/// zim`.
+std::string end_running_stages(WorkerReport& report) {
+  std::string names;
+  for (StageSpan& s : report.spans)
+    if (s.running) {
+      s.end_s = report.start_s + report.seconds;
+      names += (names.empty() ? "running " : ", ") + s.stage;
+    }
+  return names;
+}
+
 void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& job, std::string expected,
                std::string found) {
-  const InputError e(std::filesystem::path(job.input).filename().string(), "", std::move(expected),
-                     std::move(found));
+  const InputError e(std::filesystem::path(job.input).filename().string(), end_running_stages(report),
+                     std::move(expected), std::move(found));
   report.error_kind = kind;
   report.error_file = e.file();
+  report.error_place = e.place();
   report.error_expected = e.expected();
   report.error_found = e.found();
   report.error_message = e.what();

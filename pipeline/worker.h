@@ -46,6 +46,7 @@ struct StageSpan {
   std::string stage;
   double start_s = 0, end_s = 0;
   bool hit = false;
+  bool running = false;  // the model ended, by a limit or a crash, before the stage did
 };
 
 /// What became of a model.
