@@ -93,6 +93,22 @@ std::string_view without_temporary_ending(std::string_view name) {
   return name.substr(0, at);
 }
 
+/// Follows symbolic links, dangling ones too. More than 40 of them lead nowhere, as for open().
+std::string behind_links(const std::string& path) {
+  std::filesystem::path at = path;
+  std::error_code ec;
+  for (int i = 0; i < 40 && std::filesystem::is_symlink(at, ec); ++i) {
+    const std::filesystem::path there = std::filesystem::canonical(at, ec);
+    if (!ec) return there.string();
+    at = at.parent_path() / std::filesystem::read_symlink(at, ec);
+  }
+  if (std::filesystem::is_symlink(at, ec)) {
+    errno = ELOOP;
+    fail(path, "open");
+  }
+  return at.string();
+}
+
 }  // namespace
 
 std::string temporary_name(const std::string& path, std::size_t number) {
@@ -118,6 +134,27 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
     throw;
   }
   sync_folder(path);
+}
+
+bool is_special_file(const std::string& path) {
+  // /dev/stdout is a link to what may be a regular file, which somebody else holds open.
+  for (const char* folder : {"/dev/", "/proc/"})
+    if (path.starts_with(folder) && !path.starts_with("/dev/shm/")) return true;
+  std::error_code ec;
+  const std::filesystem::file_status status = std::filesystem::status(path, ec);
+  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
+         !std::filesystem::is_directory(status);
+}
+
+void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
+                       const std::string& temporary) {
+  if (is_special_file(path)) {
+    const Descriptor d{::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
+    if (d.fd < 0) fail(path, "open");
+    return write_all(d.fd, bytes, path);
+  }
+  const std::string target = behind_links(path);
+  write_file_atomically(target, bytes, target == path ? temporary : "");
 }
 
 bool remove_stale_temporary(const std::string& path) {

@@ -15,6 +15,15 @@ namespace texmesh {
 void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
                            const std::string& temporary = "");
 
+/// A device, a pipe, a socket, a link to one, or a name beneath /dev or /proc: it is written into, never
+/// replaced by a file.
+bool is_special_file(const std::string& path);
+
+/// Writes a file that a user has named: where a special file stands, into it; where a symbolic link stands,
+/// what it leads to (atomically, and the link stays); else as write_file_atomically.
+void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
+                       const std::string& temporary = "");
+
 /// The name of a temporary sibling of `path`; `number` tells those of one process apart.
 std::string temporary_name(const std::string& path, std::size_t number);
 

@@ -230,7 +230,7 @@ CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Sto
   if (request.strict) refuse_warnings(outcome.notes, request.input);
   if (request.output.empty()) return outcome;
   outcome.unchanged = file_holds(request.output, bytes);
-  if (!outcome.unchanged) write_file_atomically(request.output, bytes, request.temporary);
+  if (!outcome.unchanged) write_output_file(request.output, bytes, request.temporary);
   return outcome;
 }
 

@@ -35,19 +35,6 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
 }
 
-/// A device, a pipe: it is written into, never replaced by a file.
-bool is_special(const std::string& path) {
-  std::error_code ec;
-  const fs::file_status status = fs::status(path, ec);
-  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
-}
-
-void write_into(const std::string& path, const std::string& text) {
-  std::ofstream out(path, std::ios::binary);
-  if (!(out << text << std::flush))
-    throw InputError(path, "", "a file that can be written", "an error on writing");
-}
-
 /// What a model costs that was never compiled: measured on the sample scans, rounded up.
 constexpr std::uint64_t kBaseMemory_bytes = 300'000'000, kMemoryPerByte = 10;
 constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
@@ -284,9 +271,9 @@ class Batch {
 
   void write_text(const std::string& path, const std::string& text) const {
     if (path.empty()) return;
-    if (is_special(path)) return write_into(path, text);
+    if (is_special_file(path)) return write_output_file(path, bytes_of(text));
     remove_stale_temporaries(fs::path(path).parent_path().string(), fs::path(path).filename().string());
-    if (!file_holds(path, bytes_of(text))) write_file_atomically(path, bytes_of(text));
+    if (!file_holds(path, bytes_of(text))) write_output_file(path, bytes_of(text));
   }
 
   /// Each report on its own: one that cannot be written keeps no other from being.
@@ -347,7 +334,7 @@ class Batch {
 };
 
 void check_report(const std::string& path) {
-  if (path.empty() || is_special(path)) return;
+  if (path.empty() || is_special_file(path)) return;
   const std::string folder = fs::path(path).parent_path().string();
   if (fs::is_directory(path) || ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
     throw InputError(path, "", "a file that can be written",

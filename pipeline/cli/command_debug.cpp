@@ -113,9 +113,9 @@ DebugView make_view(const Arguments& args, const CompileOptions& options, Notes&
 void run(const Arguments& args, const CompileOptions& options) {
   Notes notes;
   const DebugView view = make_view(args, options, notes);
-  write_file_atomically(args.output, is_png(args.output)
-                                         ? write_debug_png(view, static_cast<std::uint32_t>(args.size_px))
-                                         : write_debug_glb(view));
+  write_output_file(args.output, is_png(args.output)
+                                     ? write_debug_png(view, static_cast<std::uint32_t>(args.size_px))
+                                     : write_debug_glb(view));
   if (args.json)
     print_json(args, view.legend, notes);
   else

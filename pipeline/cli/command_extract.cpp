@@ -111,7 +111,7 @@ void add_extract_command(CLI::App& app, int& exit_code) {
         args->jobs > 0 ? args->jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     PackageReader package(open_store(args->package));
     const Extracted extracted = extract_model(package, request, context);
-    write_file_atomically(args->output, extracted.glb);
+    write_output_file(args->output, extracted.glb);
     const std::string file = std::filesystem::path(args->output).filename().string();
     std::cout << (args->json ? extract_json(extracted, request, file) + "\n"
                              : extract_text(extracted, request, file));

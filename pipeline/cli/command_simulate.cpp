@@ -246,7 +246,7 @@ void simulate_package(const SimulateArguments& a) {
     const std::string svg = simulation_svg(plan.textures, qualities, link,
                                            fmt::format("{}: S_{}, textures within {:.2f} s, {}", a.package,
                                                        plan.scale, plan.textures.time_limit_s, a.policy));
-    write_file_atomically(a.plot, std::span(reinterpret_cast<const std::uint8_t*>(svg.data()), svg.size()));
+    write_output_file(a.plot, std::span(reinterpret_cast<const std::uint8_t*>(svg.data()), svg.size()));
   }
   if (a.csv) {
     std::cout << steps_csv(plan, list, qualities);

@@ -148,7 +148,7 @@ void run_fragments(const FragmentArguments& args) {
     std::cout << Json{{"fragments", list}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
   if (!args.csv.empty()) {
     const std::string csv = fragment_csv(studied);
-    write_file_atomically(args.csv, {reinterpret_cast<const std::uint8_t*>(csv.data()), csv.size()});
+    write_output_file(args.csv, {reinterpret_cast<const std::uint8_t*>(csv.data()), csv.size()});
   }
 }
 
@@ -325,7 +325,7 @@ void add_quality(CLI::App& study, int& exit_code) {
       return;
     }
     const Choices choices = study_model(*args);
-    if (!args->output.empty()) write_file_atomically(args->output, side_by_side(choices));
+    if (!args->output.empty()) write_output_file(args->output, side_by_side(choices));
     std::cout << (args->json ? quality_json(choices).dump() + "\n" : quality_text(choices));
     exit_code = kExitOk;
   });

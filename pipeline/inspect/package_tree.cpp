@@ -234,7 +234,7 @@ void pack_folder(const std::string& folder, const std::string& package_path) {
   }
   writer.finish();
   check_first_picture(package.manifest(), container);
-  write_file_atomically(package_path, container);
+  write_output_file(package_path, container);
 }
 
 }  // namespace texmesh

@@ -1,6 +1,7 @@
 #include "pipeline/cache/disk_store.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -439,6 +440,30 @@ TEST(AtomicFile, ReplacesOrLeavesAlone) {
   fs::create_directories(folder.path / "d" / "inside");
   EXPECT_THROW(write_file_atomically((folder.path / "d").string(), *bytes_of("x")), InputError);
   EXPECT_EQ(files_in(folder.path).size(), 1u);  // nothing but "a"
+}
+
+TEST(OutputFile, PipesAreWrittenIntoAndLinksStay) {
+  const Folder folder;
+  fs::create_directories(folder.path / "there");
+  const std::string pipe = (folder.path / "pipe").string(), link = (folder.path / "link").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::string read;
+  std::thread reader([&] { std::getline(std::ifstream(pipe), read); });
+  write_output_file(pipe, *bytes_of("through the pipe"));
+  reader.join();
+  EXPECT_EQ(read, "through the pipe");
+  EXPECT_TRUE(fs::is_fifo(pipe));
+
+  fs::create_symlink("there/file", link);  // leads to nothing yet
+  for (const char* text : {"one", "two"}) {
+    write_output_file(link, *bytes_of(text));
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_TRUE(file_holds((folder.path / "there/file").string(), *bytes_of(text)));
+  }
+  fs::create_symlink("loop", folder.path / "loop");
+  EXPECT_THROW(write_output_file((folder.path / "loop").string(), *bytes_of("x")), InputError);
+  EXPECT_TRUE(is_special_file("/dev/stdout"));
+  EXPECT_FALSE(is_special_file(link));
 }
 
 TEST(AtomicFile, AFullDiskLeavesNothing) {
