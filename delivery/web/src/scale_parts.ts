@@ -40,19 +40,27 @@ export function texturesOf(material: Material): [string, Texture][] {
   return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
 }
 
-/** Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise. */
+/**
+ * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise, and where
+ * loaders may find other JSON than is looked at here: in a second chunk of it, or under numbers of what is no list.
+ */
 export function requireOwnBytes(glb: Uint8Array): void {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
-  const length = glb.length >= 20 && view.getUint32(0, true) === 0x46546c67 ? view.getUint32(12, true) : -1;
-  require(length >= 0 && length <= glb.length - 20, 'a GLB');
+  const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
+  const end = 20 + at(12);
+  const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
+  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'a GLB of JSON and bytes');
   let json: Partial<Record<'buffers' | 'images', { uri?: unknown }[]>>;
   try {
-    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + length))) as typeof json;
+    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end))) as typeof json;
   } catch {
     throw new FormatError('mesh', '', 'JSON in its GLB', 'something else');
   }
-  for (const { uri } of [json?.buffers ?? [], json?.images ?? []].flat())
-    if (uri !== undefined && !/^data:/i.test(String(uri))) throw new FormatError('mesh', 'uri', 'bytes within the file', String(uri).slice(0, 40));
+  for (const list of [json?.buffers ?? [], json?.images ?? []]) {
+    require(Array.isArray(list), 'a list of buffers or images');
+    for (const item of list)
+      require(item && (item.uri === undefined || (typeof item.uri === 'string' && /^data:/i.test(item.uri))), 'bytes within the file');
+  }
 }
 
 /**
@@ -81,7 +89,7 @@ export async function parseScale(
 }
 
 function require(good: unknown, what: string): asserts good {
-  if (!good) throw new FormatError('mesh', '', what, 'none');
+  if (!good) throw new FormatError('mesh', '', what, 'none or another');
 }
 
 /** All meshes beneath an object. */

@@ -164,14 +164,37 @@ describe('hostile answers', () => {
       else Reflect.deleteProperty(globalThis, 'location');
     }
   });
-  function glb(json: string): Uint8Array {
-    const text = new TextEncoder().encode(json);
-    const out = new Uint8Array(20 + text.length);
+  const [jsonChunk, binChunk] = [0x4e4f534a, 0x004e4942];
+  /** A GLB of these chunks. */
+  function glb(...chunks: (string | [number, string])[]): Uint8Array {
+    const all = chunks.map((c): [number, Uint8Array] =>
+      typeof c === 'string' ? [jsonChunk, new TextEncoder().encode(c)] : [c[0], new TextEncoder().encode(c[1])]);
+    const out = new Uint8Array(all.reduce((n, [, text]) => n + 8 + text.length, 12));
     const view = new DataView(out.buffer);
-    [0x46546c67, 2, out.length, text.length, 0x4e4f534a].forEach((v, i) => view.setUint32(4 * i, v, true));
-    out.set(text, 20);
+    [0x46546c67, 2, out.length].forEach((v, i) => view.setUint32(4 * i, v, true));
+    let at = 12;
+    for (const [type, text] of all) {
+      view.setUint32(at, text.length, true);
+      view.setUint32(at + 4, type, true);
+      out.set(text, at + 8);
+      at += 8 + text.length;
+    }
     return out;
   }
+  it('a GLB whose JSON loaders may read otherwise is refused', () => {
+    const nice = '{"buffers":[{"byteLength":1}]}';
+    const evil = '{"buffers":[{"uri":"http://evil.example/"}]}';
+    requireOwnBytes(glb(nice, [binChunk, 'bytes']));
+    for (const chunks of [[nice, evil], [[1, nice], evil], [nice, [binChunk, 'a'], evil], [nice, [1, 'a']], [[binChunk, 'a'], nice]])
+      expect(() => requireOwnBytes(glb(...(chunks as string[])))).toThrow(FormatError);
+    for (const name of ['buffers', 'images'])
+      for (const list of [{ 0: { uri: 'http://evil.example/' } }, [null], 'http://evil.example/', [{ uri: ['data:'] }], [{ uri: null }]])
+        expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: list })))).toThrow(FormatError);
+    const [longer, shorter] = [glb(nice), glb(nice)]; // than the file says it is
+    new DataView(longer.buffer).setUint32(8, longer.length + 4, true);
+    new DataView(shorter.buffer).setUint32(8, shorter.length - 4, true);
+    for (const bad of [longer, shorter]) expect(() => requireOwnBytes(bad)).toThrow(FormatError);
+  });
   it('a GLB that names other hosts is refused', async () => {
     for (const uri of ['http://evil.example/x.png', '//evil.example/x', 'x.bin', 'blob:y']) {
       for (const name of ['images', 'buffers'])
