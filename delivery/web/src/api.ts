@@ -164,7 +164,10 @@ export interface LoadedModel {
   update(camera?: Camera): void;
   /** Fetches what the display can show but the time did not allow; resolves when nothing is left to fetch. */
   refine(): Promise<void>;
-  /** Changes what was chosen at loading; fetches at once, or when the timed part is over. undefined: by the display again. */
+  /**
+   * Changes what was chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place of
+   * higher ones, too. undefined: by the display again. InputError: a rung that is none.
+   */
   setOverride(override: { scale?: number; rung?: number }): void;
   /** Stops all transfers; what is shown stays. */
   cancel(): void;

@@ -1,4 +1,4 @@
-import { InputError } from './errors';
+import { FormatError, InputError } from './errors';
 
 /** What bytes are for; of request events and of the bytes counted by kind. */
 export type RequestKind =
@@ -348,6 +348,11 @@ export function mayRetry(a: Answer): boolean {
   const { status } = a;
   if (status === 0 || status === 408 || status === 429 || status >= 500) return true;
   return (status === 200 || status === 206) && !a.complete && !a.tooLong;
+}
+
+/** Whether what could not be had will not be there later on, either. */
+export function isForGood(error: unknown): boolean {
+  return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
 }
 
 /** For messages. */

@@ -1,6 +1,7 @@
 import { Camera, Group, Material, Object3D, Scene } from 'three';
 import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedModel } from './api';
 import { displayOf } from './camera';
+import { InputError } from './errors';
 import { Emitter } from './events';
 import { gpuIdle } from './gpu';
 import { isAbort, nowS, sleepS, throwIfAborted } from './http';
@@ -14,8 +15,8 @@ import { WorkerPool } from './worker_pool';
 
 /** A picture that waits for its programs no longer than this. */
 const mostCompileS = 0.5;
-/** A scale that could not be had is not asked for again before. */
-const retryScaleS = 2;
+/** A scale that could not be had is asked for again after so long, and twice as long each time. */
+const retryScaleS = { first: 2, most: 60 };
 /** Limits beyond are none: timers and plans end there. */
 const longestS = 1e5;
 
@@ -33,7 +34,8 @@ export class ModelLoad implements LoadedModel {
   private scaleInTransit_ = -1;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
-  private scaleAtS_ = 0;
+  private scaleRetry_?: { scale: number; timer: ReturnType<typeof setTimeout> };
+  private scaleRetryS_ = retryScaleS.first;
   private disposed_ = false;
   private readonly offRequest_: () => void;
   private readonly cancel_ = (): void => this.cancel();
@@ -68,6 +70,7 @@ export class ModelLoad implements LoadedModel {
     const { reader_: reader, options_: options, materialSet_: materials, object } = this;
     const fail = (error: unknown, what: string): void => this.fail_(error, what);
     const pool = new WorkerPool(options);
+    pool.onNone = (error) => this.fail_(error, 'workers');
     return {
       reader,
       options,
@@ -119,6 +122,7 @@ export class ModelLoad implements LoadedModel {
     this.phase_ = cancelled ? 'cancelled' : 'failed';
     if (!cancelled) this.fail_(error, 'load', true);
     this.abort_.abort();
+    this.endRetry_();
     this.context_.pool.dispose();
   }
   private fail_(error: unknown, what: string, fatal = false): void {
@@ -230,16 +234,19 @@ export class ModelLoad implements LoadedModel {
     if (key === this.lastView_) return;
     this.lastView_ = key;
     this.context_.view = { display, camera };
-    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_();
+    if (this.resting_) this.follow_();
   }
   setOverride(override: { scale?: number; rung?: number }): void {
     this.context_.override = this.snapped_(override);
-    if (this.phase_ === 'refining' || this.phase_ === 'done') this.follow_(true);
+    this.endRetry_();
+    if (this.resting_) this.follow_(true);
     else this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
   }
 
-  /** A scale that the package has, as near as possible. */
+  /** A scale that the package has, as near as possible. InputError: no such rung. */
   private snapped_({ scale, rung }: { scale?: number; rung?: number }): { scale?: number; rung?: number } {
+    if (rung !== undefined && !(Number.isInteger(rung) && rung >= 0))
+      throw new InputError('options', 'rung', 'a whole number from 0 on', String(rung));
     if (scale === undefined) return { rung };
     const away = (k: number): number => Math.abs(k - scale);
     const scales = this.reader_.manifest.scales.map((s) => s.scale);
@@ -250,23 +257,36 @@ export class ModelLoad implements LoadedModel {
     void this.followScale_();
     if (always || (this.options_.autoRefine ?? true)) void this.refine();
   }
+  private get resting_(): boolean {
+    return this.phase_ === 'refining' || this.phase_ === 'done';
+  }
   /** Loads the scale that the view asks for, if it is another one. */
-  private async followScale_(): Promise<void> {
-    const scale = this.scaleForView_();
-    if (scale === this.context_.wantedScale || nowS() < this.scaleAtS_) return;
+  private async followScale_(scale = this.scaleForView_()): Promise<void> {
+    if (scale === this.context_.wantedScale || scale === this.scaleRetry_?.scale) return;
     this.context_.wantedScale = scale;
     try {
       await this.loadScale_(scale).shown;
+      this.scaleRetryS_ = retryScaleS.first;
     } catch (error) {
       this.lostScale_(error, scale);
     }
   }
-  /** What is shown stays; the scale may be asked for again a little later. */
+  /** What is shown stays; the scale, or what is wanted by then, is asked for again a little later. */
   private lostScale_(error: unknown, scale: number): void {
     this.fail_(error, `scale ${scale}`);
     if (this.context_.wantedScale === scale) this.context_.wantedScale = this.context_.shownScale;
-    this.lastView_ = ''; // the next frame looks again
-    this.scaleAtS_ = nowS() + retryScaleS;
+    if (this.abort_.signal.aborted) return;
+    this.endRetry_();
+    const timer = setTimeout(() => {
+      this.endRetry_();
+      void this.followScale_(this.resting_ ? undefined : scale);
+    }, 1000 * this.scaleRetryS_);
+    this.scaleRetry_ = { scale, timer };
+    this.scaleRetryS_ = Math.min(2 * this.scaleRetryS_, retryScaleS.most);
+  }
+  private endRetry_(): void {
+    clearTimeout(this.scaleRetry_?.timer);
+    this.scaleRetry_ = undefined;
   }
   /** The scale that the view asks for, by a little more than the last time. */
   private scaleForView_(): number {
@@ -283,16 +303,29 @@ export class ModelLoad implements LoadedModel {
 
   refine(): Promise<void> {
     this.refineAgain_ = true;
-    return (this.refining_ ??= this.refineAll_().finally(() => (this.refining_ = undefined)));
+    return (this.refining_ ??= this.refineAll_());
   }
   private async refineAll_(): Promise<void> {
-    if (this.phase_ !== 'refining' && this.phase_ !== 'done') await this.done;
+    try {
+      if (!this.resting_) await this.done;
+      await this.refineRounds_();
+    } finally {
+      this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own
+    }
+    if (this.abort_.signal.aborted) return;
+    if (this.refineAgain_) return this.refine();
+    this.phase_ = 'done';
+    this.events_.emit('done', {});
+    this.progress_();
+  }
+  private async refineRounds_(): Promise<void> {
     this.phase_ = 'refining';
     const textures = this.textures_!;
     const scale = this.followScale_(); // the time may have allowed a coarser one only
     try {
       while (this.refineAgain_) {
         this.refineAgain_ = false;
+        textures.forgetLosses();
         await textures.finerPlanes();
         while (!this.refineAgain_ && (await textures.refineSome()));
         if (this.refineAgain_) continue;
@@ -300,12 +333,8 @@ export class ModelLoad implements LoadedModel {
         await scale; // the view may have changed meanwhile
       }
     } catch (error) {
-      if (isAbort(error)) return;
       this.fail_(error, 'refining');
     }
-    this.phase_ = 'done';
-    this.events_.emit('done', {});
-    this.progress_();
   }
 
   // ---- end
@@ -315,6 +344,7 @@ export class ModelLoad implements LoadedModel {
   }
   cancel(): void {
     this.abort_.abort();
+    this.endRetry_();
     if (this.phase_ !== 'failed') this.phase_ = 'cancelled';
   }
   dispose(): void {

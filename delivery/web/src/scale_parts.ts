@@ -40,26 +40,47 @@ export function texturesOf(material: Material): [string, Texture][] {
   return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
 }
 
-/**
- * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise, and where
- * loaders may find other JSON than is looked at here: in a second chunk of it, or under numbers of what is no list.
- */
-export function requireOwnBytes(glb: Uint8Array): void {
+/** With its picture, which GLTFLoader decoded and nobody closes. */
+export function disposeTexture(texture: Texture): void {
+  texture.dispose();
+  (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
+}
+
+const [glbMagic, jsonChunk, bytesChunk] = [0x46546c67, 0x4e4f534a, 0x004e4942];
+
+/** The JSON of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
+function jsonOfGlb(glb: Uint8Array): Record<string, unknown> {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
-  const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
-  const end = 20 + at(12);
-  const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
-  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'a GLB of JSON and bytes');
-  let json: Partial<Record<'buffers' | 'images', { uri?: unknown }[]>>;
-  try {
-    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end))) as typeof json;
-  } catch {
-    throw new FormatError('mesh', '', 'JSON in its GLB', 'something else');
+  require(glb.length >= 20 && view.getUint32(0, true) === glbMagic && view.getUint32(8, true) === glb.length, 'a GLB');
+  const ends = [12];
+  while (ends[0] < glb.length) {
+    const at = ends[0];
+    const type = [jsonChunk, bytesChunk][ends.length - 1];
+    require(at + 8 <= glb.length && view.getUint32(at + 4, true) === type, 'a chunk of JSON, then at most one of bytes');
+    ends.unshift(at + 8 + view.getUint32(at, true));
   }
-  for (const list of [json?.buffers ?? [], json?.images ?? []]) {
-    require(Array.isArray(list), 'a list of buffers or images');
-    for (const item of list)
-      require(item && (item.uri === undefined || (typeof item.uri === 'string' && /^data:/i.test(item.uri))), 'bytes within the file');
+  require(ends[0] === glb.length, 'chunks that fill the file');
+  let json: unknown;
+  try {
+    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + view.getUint32(12, true))));
+  } catch {
+    // told below
+  }
+  require(typeof json === 'object' && json && !Array.isArray(json), 'JSON in its GLB');
+  return json as Record<string, unknown>;
+}
+
+/** Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise. */
+export function requireOwnBytes(glb: Uint8Array): void {
+  const json = jsonOfGlb(glb);
+  for (const list of [json.buffers ?? [], json.images ?? []]) {
+    require(Array.isArray(list), 'lists of buffers and images');
+    for (const item of list as unknown[]) {
+      require(typeof item === 'object' && item, 'buffers and images that are objects');
+      const { uri } = item as { uri?: unknown };
+      const own = uri === undefined || (typeof uri === 'string' && /^data:/i.test(uri));
+      if (!own) throw new FormatError('mesh', 'uri', 'bytes within the file', String(uri).slice(0, 40));
+    }
   }
 }
 
@@ -89,7 +110,7 @@ export async function parseScale(
 }
 
 function require(good: unknown, what: string): asserts good {
-  if (!good) throw new FormatError('mesh', '', what, 'none or another');
+  if (!good) throw new FormatError('mesh', '', what, 'something else');
 }
 
 /** All meshes beneath an object. */
@@ -149,7 +170,7 @@ export class MaterialSet {
 
   dispose(): void {
     for (const material of this.byKey_.values()) {
-      for (const [, texture] of texturesOf(material)) texture.dispose();
+      for (const [, texture] of texturesOf(material)) disposeTexture(texture);
       material.dispose();
     }
     this.byKey_.clear();

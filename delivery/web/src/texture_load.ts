@@ -5,7 +5,7 @@ import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesF
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
 import { InputError } from './errors';
-import { isAbort, sleepS, throwIfAborted } from './http';
+import { isAbort, isForGood, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
@@ -13,7 +13,7 @@ import { Slot, meshesOf } from './scale_parts';
 import { TextureSet } from './texture_set';
 import { TimedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
-import { upgradesInOrder } from './upgrades';
+import { RefusedRung, upgradesInOrder } from './upgrades';
 import { VisiblePart, selectScale } from './viewing';
 import { VisibleSurface } from './visibility';
 import type { TextureInfo } from './textures';
@@ -39,6 +39,10 @@ const gapBytes = 1024;
 const tellsApart = 0.003;
 /** What the camera does not see is worth this much of what it sees. */
 const unseen = 1e-3;
+/** Refining ends where so many rounds have brought nothing. */
+const mostBarren = 3;
+
+const keyOf = (f: { plane: number; fragment: number }, rung: number): string => `${f.plane}/${f.fragment}/${rung}`;
 
 /**
  * What a load does once the first picture stands: decides what to fetch, fetches it in time, refines. In a part of its
@@ -52,8 +56,9 @@ export class TextureLoad {
   private quality_?: QualityTable;
   private surface_?: VisibleSurface;
   private surfaceScale_ = -1;
-  private readonly gaveUp_ = new Set<string>();
-  private readonly asked_ = new Map<string, number>(); // rungs under way while refining
+  private readonly gaveUp_ = new Map<string, boolean>(); // by keyOf: whether for good
+  private readonly underWay_ = new Map<string, number[]>(); // rungs, by plane/fragment
+  private barren_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(private readonly load_: LoadContext) {}
 
@@ -81,6 +86,7 @@ export class TextureLoad {
 
   /** Reads what decisions are made from. */
   async documents(): Promise<PackageData> {
+    this.load_.pool.start();
     const [whole] = await Promise.all([
       this.load_.reader.prefetchDocuments(this.load_.signal),
       this.load_.scales.openStream(this.load_.signal),
@@ -136,7 +142,7 @@ export class TextureLoad {
     for (const o of list.offers) this.load_.expectedBytes += o.plannedBytes;
     const leftS = this.load_.limitS - this.load_.elapsedS() - composeS;
     if (this.load_.override.rung !== undefined || !Number.isFinite(leftS)) await this.fetchAll_(list);
-    else if (leftS > 0 && list.offers.length > 0) await this.fetchInTime_(list, leftS);
+    else if (leftS > 0 && !this.load_.pool.none && list.offers.length > 0) await this.fetchInTime_(list, leftS);
     await shown;
     await this.composed();
     const skipped = [...(this.textureSet_?.planes.values() ?? [])].reduce((n, p) => n + this.skippedOf_(p), 0);
@@ -202,16 +208,40 @@ export class TextureLoad {
   private upload_(wish: Wish, levels: Levels): void {
     const { base, mip } = this.data_!.textures[wish.plane];
     const plane = this.textureSet_?.planes.get(mip > 0 ? base : wish.plane);
-    if (this.load_.signal.aborted || !plane || plane.plane !== wish.plane) return levels.forEach((b) => b.close());
-    const { fragment, rung } = wish;
-    this.textureSet_!.upload(plane, levels, fragment, rung, () =>
-      this.load_.emit('fragment', { plane: wish.plane, fragment, rung }),
-    );
+    if (this.load_.signal.aborted || !plane || plane.plane !== wish.plane) {
+      this.ended_(wish);
+      return levels.forEach((b) => b.close());
+    }
+    const { fragment, rung, replaces } = wish;
+    const better = (there: number): boolean => rung > there || (!!replaces && this.load_.override.rung !== undefined);
+    this.textureSet_!.upload(plane, levels, wish, better, (uploaded) => {
+      this.ended_(wish);
+      if (uploaded) this.load_.emit('fragment', { plane: wish.plane, fragment, rung });
+    });
+  }
+  private began_(f: { plane: number; fragment: number }, rung: number): void {
+    const key = `${f.plane}/${f.fragment}`;
+    this.underWay_.set(key, [...(this.underWay_.get(key) ?? []), rung]);
+  }
+  private ended_(wish: Wish): void {
+    const key = `${wish.plane}/${wish.fragment}`;
+    const left = (this.underWay_.get(key) ?? []).filter((rung) => rung !== wish.rung);
+    if (left.length > 0) this.underWay_.set(key, left);
+    else this.underWay_.delete(key);
   }
   private lost_(wish: Wish, error: unknown): void {
-    if (isAbort(error)) return;
-    this.gaveUp_.add(`${wish.plane}/${wish.fragment}/${wish.rung}`);
+    this.ended_(wish);
+    if (isAbort(error) || this.load_.pool.none) return;
+    this.gaveUp_.set(keyOf(wish, wish.rung), isForGood(error));
     this.load_.fail(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
+  }
+  /** What could not be had for a while may be asked for again. */
+  forgetLosses(): void {
+    for (const [key, forGood] of this.gaveUp_) if (!forGood) this.gaveUp_.delete(key);
+  }
+  /** Rungs of a list that were given up. */
+  private refusedOf_({ fragments }: FragmentList): RefusedRung | undefined {
+    return this.gaveUp_.size > 0 ? (offer, rung) => this.gaveUp_.has(keyOf(fragments[offer], rung)) : undefined;
   }
 
   /**
@@ -271,30 +301,38 @@ export class TextureLoad {
     return this.load_.reader.form === 'files' && first !== undefined && !this.transfers_!.filesOf(first.plane).complete;
   }
 
-  /** Every fragment at its override's rung, or the highest. */
+  /** Every fragment at its override's rung, or the highest; at the next below where that one cannot be had. */
   private async fetchAll_(list: FragmentList): Promise<void> {
-    const wishes = list.offers.flatMap((o, i) => {
-      const rung = Math.min(this.load_.override.rung ?? Infinity, o.bytes.length - 1);
-      return rung < 0 ? [] : [{ ...list.fragments[i], rung, offer: i }];
-    });
-    const missing = wishes.filter((w) => this.rungOf_(w) !== w.rung);
-    await this.fetchWishes_(missing);
+    const { override } = this.load_;
+    const replaces = override.rung !== undefined;
+    for (let lost = -1; lost < this.gaveUp_.size && !this.load_.pool.none; ) {
+      await this.composed(); // nothing comes behind what replaces it
+      lost = this.gaveUp_.size;
+      const wishes = list.fragments.map((f, offer): Wish => {
+        let rung = Math.min(override.rung ?? Infinity, list.offers[offer].bytes.length - 1);
+        while (this.gaveUp_.has(keyOf(f, rung))) --rung;
+        return { ...f, rung, offer, replaces };
+      });
+      const there = (w: Wish): boolean => (replaces ? this.rungOf_(w) === w.rung : this.rungOf_(w) >= w.rung);
+      await this.fetchWishes_(wishes.filter((w) => w.rung >= 0 && !there(w)));
+      await this.composed();
+    }
   }
   private rungOf_(wish: { plane: number; fragment: number }): number {
     for (const p of this.textureSet_?.planes.values() ?? []) if (p.plane === wish.plane) return p.rungs[wish.fragment];
     return -1;
   }
-  private async fetchWishes_(wishes: readonly Wish[], signal = this.load_.signal): Promise<void> {
-    await this.transfers_!.fetch(
-      wishes,
-      { gapBytes, mostBytes: refineBytes, signal },
-      () => undefined,
-      (wish, error) => {
-        this.asked_.delete(`${wish.plane}/${wish.fragment}`);
-        this.lost_(wish, error);
-      },
-    );
+  /** The rung of each fragment when all that is under way has come. */
+  private rungsOf_(list: FragmentList): number[] {
+    return list.fragments.map((f) => Math.max(this.rungOf_(f), ...(this.underWay_.get(`${f.plane}/${f.fragment}`) ?? [])));
+  }
+  /** How many have come. */
+  private async fetchWishes_(wishes: readonly Wish[], signal = this.load_.signal): Promise<number> {
+    for (const w of wishes) this.began_(w, w.rung);
+    let arrived = 0;
+    await this.transfers_!.fetch(wishes, { gapBytes, mostBytes: refineBytes, signal }, () => ++arrived, (wish, error) => this.lost_(wish, error));
     throwIfAborted(this.load_.signal);
+    return arrived;
   }
 
   /** Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
@@ -305,13 +343,13 @@ export class TextureLoad {
     const plan = new HarmonicTimePlan(list.offers, this.htc_(limitS));
     this.plan_ = plan;
     const fetch = new TimedFetch(plan, list, this.transfers_!, this.load_.signal, {
-      decided: (step) => this.tell_(list, step),
+      decided: (step) => {
+        if (step.doneS < 0) for (const f of list.groups[step.offer]) this.began_(f, step.rung);
+        this.tell_(list, step);
+      },
       lost: (wish, error) => this.lost_(wish, error),
     });
     await fetch.run(limitS + mostLate * this.load_.limitS);
-    plan.rungs().forEach((rung, i) => {
-      for (const f of list.groups[i]) if (rung >= 0) this.asked_.set(`${f.plane}/${f.fragment}`, rung);
-    });
     if (!this.wholeRungs_) await this.spendRest_(fragments, plan);
   }
   /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */
@@ -322,11 +360,10 @@ export class TextureLoad {
       const leftS = limitS - composeS - this.load_.elapsedS();
       const bytes = certain * plan.throughputBytesS() * (leftS - latencyS);
       if (leftS < latencyS + leastRest * limitS) return;
-      const rungs = list.fragments.map((f) => this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1);
       const taken = new Map<number, Wish>();
       const full = new Set<number>();
       let left = bytes;
-      for (const u of upgradesInOrder(list.offers, rungs)) {
+      for (const u of upgradesInOrder(list.offers, this.rungsOf_(list), false, this.refusedOf_(list))) {
         const before = taken.get(u.offer);
         const more = u.bytes - (before ? list.offers[u.offer].bytes[before.rung] : 0);
         // What is too large leaves room for smaller ones; more requests at once would wait for connections.
@@ -336,9 +373,8 @@ export class TextureLoad {
         taken.set(u.offer, { ...list.fragments[u.offer], rung: u.rung, offer: u.offer });
       }
       if (taken.size === 0) return;
-      for (const w of taken.values()) this.asked_.set(`${w.plane}/${w.fragment}`, w.rung);
-      const late = AbortSignal.timeout(1000 * (leftS + mostLate * limitS));
-      await this.fetchWishes_([...taken.values()], AbortSignal.any?.([late, this.load_.signal]) ?? late);
+      const late = AbortSignal.timeout(Math.ceil(1000 * (leftS + mostLate * limitS)));
+      if ((await this.fetchWishes_([...taken.values()], AbortSignal.any?.([late, this.load_.signal]) ?? late)) === 0) return;
     }
   }
   private tell_(list: GroupedList, s: HtcStep): void {
@@ -385,9 +421,8 @@ export class TextureLoad {
     }
     if (this.wholeRungs_) return this.refineRung_(list);
     const seen = await this.seen_(choices);
-    const wishes: Wish[] = [];
     let bytes = 0;
-    const rungs = list.fragments.map((f) => Math.max(this.rungOf_(f), this.asked_.get(`${f.plane}/${f.fragment}`) ?? -1));
+    const rungs = this.rungsOf_(list);
     list.offers.forEach((o, i) => {
       const { plane, fragment } = list.fragments[i];
       const weight = seen?.get(plane)?.[fragment] ?? 1;
@@ -398,35 +433,35 @@ export class TextureLoad {
       if (weight === 0) rungs[i] = o.bytes.length - 1; // not to be seen: not to be fetched
     });
     const taken = new Map<number, number>();
-    for (const u of upgradesInOrder(list.offers, rungs)) {
-      const { plane, fragment } = list.fragments[u.offer];
-      if (this.gaveUp_.has(`${plane}/${fragment}/${u.rung}`)) continue;
+    for (const u of upgradesInOrder(list.offers, rungs, false, this.refusedOf_(list))) {
       if (bytes > 0 && bytes + u.bytes > refineBytes * refineRequests) break;
       bytes += u.bytes;
       taken.set(u.offer, u.rung);
     }
-    for (const [offer, rung] of taken) {
-      const { plane, fragment } = list.fragments[offer];
-      wishes.push({ plane, fragment, rung, offer });
-      this.asked_.set(`${plane}/${fragment}`, rung);
-    }
-    if (wishes.length === 0) return false;
-    await this.fetchWishes_(wishes);
-    await this.composed(mostPending);
-    return true;
+    return this.round_([...taken].map(([offer, rung]) => ({ ...list.fragments[offer], rung, offer })), mostPending);
   }
   /** The next rung of the first plane that lacks some. */
   private async refineRung_(list: FragmentList): Promise<boolean> {
-    const lacking = list.fragments.map((f, i) => ({ ...f, rung: this.rungOf_(f) + 1, offer: i }));
-    const open = lacking.filter(
-      (w) => w.rung < list.offers[w.offer].bytes.length && !this.gaveUp_.has(`${w.plane}/${w.fragment}/${w.rung}`),
-    );
+    const open: Wish[] = [];
+    list.fragments.forEach((f, offer) => {
+      let rung = this.rungOf_(f) + 1;
+      while (this.gaveUp_.has(keyOf(f, rung))) ++rung;
+      if (rung < list.offers[offer].bytes.length) open.push({ ...f, rung, offer });
+    });
     const least = open.reduce((rung, w) => Math.min(rung, w.rung), Infinity);
     const wishes = open.filter((w) => w.rung === least && w.plane === open.find((o) => o.rung === least)!.plane);
-    if (wishes.length === 0) return false;
-    await this.fetchWishes_(wishes);
-    await this.composed();
-    return true;
+    return this.round_(wishes, 0);
+  }
+  /** Fetches, until so many or fewer wait to be shown; false when there is no use in going on. */
+  private async round_(wishes: readonly Wish[], mostWaiting: number): Promise<boolean> {
+    if (this.load_.pool.none) return false;
+    const lost = this.gaveUp_.size;
+    if (wishes.length > 0) this.barren_ = (await this.fetchWishes_(wishes)) > 0 ? 0 : this.barren_ + 1;
+    await this.composed(wishes.length > 0 ? mostWaiting : 0);
+    // What was lost on the way leaves lower rungs to ask for.
+    if (wishes.length > 0 ? this.barren_ < mostBarren : this.gaveUp_.size > lost) return true;
+    this.barren_ = 0;
+    return false;
   }
 
   /** The lowest rung of a fragment that nobody can tell from the source. */

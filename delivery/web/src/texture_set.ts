@@ -190,19 +190,27 @@ export class TextureSet {
     }
   }
 
-  /** Queues a fragment; `done` when it is in its texture. */
-  upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, done: () => void): void {
-    const close = (): void => levels.forEach((b) => b.close());
+  /** Queues a fragment; `done` when it is in its texture, or was not better than the rung there by then. */
+  upload(
+    plane: PlaneComposer,
+    levels: Levels,
+    { fragment, rung }: { fragment: number; rung: number },
+    better: (there: number) => boolean,
+    done: (uploaded: boolean) => void,
+  ): void {
+    const end = (uploaded: boolean): void => {
+      levels.forEach((b) => b.close());
+      done(uploaded);
+    };
     const work: Work = {
       pixels: levels[0].width * levels[0].height,
       fragment,
       run: () => {
-        const current = this.planes.get(plane.base) === plane;
-        if (current && rung > plane.rungs[fragment]) plane.uploadFragment(levels, fragment, rung);
-        close();
-        done();
+        const wanted = this.planes.get(plane.base) === plane && better(plane.rungs[fragment]);
+        if (wanted) plane.uploadFragment(levels, fragment, rung);
+        end(wanted);
       },
-      drop: close,
+      drop: () => end(false),
     };
     if (plane.filled && !this.waiting_.has(plane)) return this.enqueue_(work);
     this.waiting_.set(plane, [...(this.waiting_.get(plane) ?? []), work]);

@@ -1,5 +1,5 @@
 import { codecTraits } from './codec';
-import { isAbort } from './http';
+import { FormatError } from './errors';
 import { PackageReader, PlaneFiles } from './package_reader';
 import { bytesToShow } from './allocation';
 import { fragmentCount } from './tables';
@@ -15,6 +15,8 @@ export interface Wish {
   rung: number;
   /** Index into the caller's list. */
   offer: number;
+  /** Shown in place of a higher rung, too. */
+  replaces?: boolean;
 }
 /** What becomes of wishes. Bytes arrive first; the picture follows when it is decoded. */
 export interface TransferHooks {
@@ -196,7 +198,7 @@ export class Transfers {
       try {
         this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       } catch (error) {
-        if (isAbort(error) || job.failed) throw error;
+        if (!(error instanceof FormatError)) throw error;
         // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
         this.held_.delete(`${plane}/${fragment}`);
         for (let rung = job.first; rung <= job.wish.rung; ++rung)

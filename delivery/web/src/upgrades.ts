@@ -8,12 +8,16 @@ export interface Upgrade {
   gainPerByte: number;
 }
 
+/** Rungs that are not to be had. */
+export type RefusedRung = (offer: number, rung: number) => boolean;
+
 /** The upgrade that saves most loss per byte, from this rung on; gain 0 when none saves any. */
-function bestUpgrade(f: FragmentOffer, offer: number, rung: number, incremental: boolean): Upgrade {
+function bestUpgrade(f: FragmentOffer, offer: number, rung: number, incremental: boolean, refused?: RefusedRung): Upgrade {
   let best: Upgrade = { offer, rung, bytes: 0, gainPerByte: 0 };
   let bytes = 0;
   for (let r = rung + 1; r < f.bytes.length; ++r) {
     bytes = incremental ? bytes + f.bytes[r] : f.bytes[r];
+    if (refused?.(offer, r)) continue;
     const gainPerByte = (f.loss[rung + 1] - f.loss[r + 1]) / bytes;
     if (gainPerByte > best.gainPerByte) best = { offer, rung: r, bytes, gainPerByte };
   }
@@ -64,10 +68,11 @@ export function upgradesInOrder(
   offers: readonly FragmentOffer[],
   rungs: readonly number[],
   incremental = false,
+  refused?: RefusedRung,
 ): Upgrade[] {
   const heap = new Heap();
   const push = (offer: number, rung: number): void => {
-    const u = bestUpgrade(offers[offer], offer, rung, incremental);
+    const u = bestUpgrade(offers[offer], offer, rung, incremental, refused);
     if (u.gainPerByte > 0) heap.push(u);
   };
   offers.forEach((_, i) => push(i, rungs[i]));

@@ -45,14 +45,11 @@ function startWorker(url: string | URL | undefined, onAnswer: OnAnswer, onBroken
   };
 }
 
-function startHere(handle: DecodeHere | undefined, onAnswer: OnAnswer): Helper {
-  const missing = (): never => {
-    throw new Error('workers cannot be had here: give `decode`, the `handle` of texmesh/worker');
-  };
+function startHere(handle: DecodeHere, onAnswer: OnAnswer): Helper {
   return {
     post: (id, request) => {
       Promise.resolve(request)
-        .then(handle ?? missing)
+        .then(handle)
         .then(
           ([result]) => onAnswer({ id, result }),
           (error: unknown) => onAnswer({ id, failed: error }),
@@ -79,6 +76,9 @@ export class WorkerPool {
   private readonly broken_ = new Set<number>(); // whose workers broke once
   private nextId_ = 1;
   private ended_ = false;
+  /** Nothing can be decoded: there are no workers, and no `decode`. `onNone` hears of it, once. */
+  none = false;
+  onNone?: (error: Error) => void;
 
   constructor(private readonly options_: PoolOptions = {}) {
     const cores = globalThis.navigator?.hardwareConcurrency ?? 2;
@@ -98,7 +98,17 @@ export class WorkerPool {
     }
   }
   private startMain_(): Helper {
-    return startHere(this.options_.decode, (a) => this.answered_(a));
+    return startHere(this.options_.decode ?? (() => this.missing_()), (a) => this.answered_(a));
+  }
+  private missing_(): never {
+    const error = new Error('workers cannot be had here: give `decode`, the `handle` of texmesh/worker');
+    if (!this.none) this.onNone?.(error);
+    this.none = true;
+    throw error;
+  }
+  /** Finds out early whether there is anything that decodes. */
+  start(): void {
+    this.closeSplits(0);
   }
   /** A worker that breaks gives its jobs to another one; where that breaks, too, to the main thread. */
   private replace_(index: number): void {

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
-import { PackageReader } from '../src/reader';
+import { InputError, PackageReader } from '../src/reader';
 import { fakeServer } from './fake_server';
-import { loading, until } from './loading';
+import { Loading, loading, until } from './loading';
 import { golden } from './support';
 
 const container = golden('v1.1-scan');
@@ -9,6 +9,14 @@ const url = 'http://host/a/scan.texmesh';
 const files = { '/a/scan.texmesh': container };
 const reader = await PackageReader.openBytes(container, 'golden');
 const planes = await reader.textures();
+
+const rungsOf = (l: Loading, base = 0): number[] => [...l.model.state.planes.find((p) => p.base === base)!.rungs];
+/** Requests for bytes of these entries. */
+const askedFor = (l: Loading, ...refs: { offset: number; bytes: number }[]): number =>
+  l.pkg.requests.filter((q) => refs.some((r) => q.offset < r.offset + r.bytes && q.offset + q.bytes > r.offset)).length;
+const packs = (await reader.planeFiles(0)).packs;
+const within = (range: [number, number] | undefined, e: { offset: number; bytes: number }): boolean =>
+  range !== undefined && range[0] < e.offset + e.bytes && range[1] >= e.offset;
 
 describe('a load', () => {
   it('shows everything that there is', async () => {
@@ -18,6 +26,106 @@ describe('a load', () => {
     expect(l.model.state.planes.length).toBe(planes.filter((p) => p.mip === 0).length);
     expect(l.count('fragment')).toBe(l.uploads.length);
     expect(l.model.state.scale).toBe(0);
+    l.dispose();
+  });
+  it('does not ask again and again for what cannot be had', async () => {
+    const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
+    const l = await loading(url, server, { time: 1 });
+    await l.model.done;
+    await l.model.refine();
+    expect(Math.max(...rungsOf(l))).toBe(-1);
+    expect(askedFor(l, ...packs)).toBeLessThan(200); // 47 fragments of three rungs
+    const ranges = l.pkg.requests.filter((q) => packs.some((p) => q.offset >= p.offset && q.offset < p.offset + p.bytes)).map((q) => `${q.offset}+${q.bytes}`);
+    expect(new Set(ranges).size).toBe(ranges.length);
+    l.dispose();
+  });
+  for (const [what, fault] of [['damaged', 'flip'], ['missing', 'status-404']] as const)
+    it(`shows lower rungs where higher ones are ${what} for ever`, async () => {
+      for (const time of [2, Infinity]) {
+        const server = fakeServer(files, { fault: ({ range }) => within(range, packs[2]) && fault });
+        const l = await loading(url, server, { time });
+        await l.model.done;
+        await l.model.refine();
+        const rungs = rungsOf(l).filter((r) => r >= 0);
+        expect(rungs.length).toBeGreaterThan(40);
+        expect(rungs).not.toContain(fault === 'flip' ? -1 : 2);
+        const before = server.log.length;
+        await l.model.refine();
+        expect(server.log.length).toBe(before);
+        l.dispose();
+      }
+    });
+  it('asks again for what could not be had for a while', async () => {
+    let down = true;
+    const server = fakeServer(files, { fault: ({ range }) => down && packs.some((p) => within(range, p)) && 'status-500' });
+    const l = await loading(url, server, { autoRefine: false });
+    await l.model.done;
+    expect(Math.max(...rungsOf(l))).toBe(-1);
+    down = false;
+    await l.model.refine();
+    expect(Math.max(...rungsOf(l))).toBe(2);
+    l.dispose();
+  });
+  it('shows the rung of an override in place of a higher one, and asks once', async () => {
+    const server = fakeServer(files);
+    const l = await loading(url, server);
+    await l.model.done;
+    const highest = rungsOf(l);
+    l.events.length = 0;
+    l.model.setOverride({ rung: 0 });
+    await l.model.refine();
+    expect(rungsOf(l)).toEqual(highest.map((r) => Math.min(r, 0)));
+    expect(l.count('fragment')).toBe(highest.filter((r) => r > 0).length);
+    const before = server.log.length;
+    await l.model.refine();
+    expect(server.log.length).toBe(before);
+    l.model.setOverride({});
+    await l.model.refine();
+    expect(Math.max(...rungsOf(l))).toBe(2);
+    l.dispose();
+  });
+  it('takes no rung that is none', async () => {
+    const server = fakeServer(files);
+    for (const rung of [1.5, -1, NaN, Infinity])
+      await expect(loading(url, server, { rung })).rejects.toThrow(InputError);
+    const l = await loading(url, server, { autoRefine: false });
+    expect(() => l.model.setOverride({ rung: 0.5 })).toThrow(InputError);
+    l.dispose();
+  });
+  it('does what is asked for when it says that it is done', async () => {
+    const l = await loading(url, fakeServer(files), { rung: 0 });
+    let asked: Promise<void> | undefined;
+    l.model.on('done', () => {
+      if (asked) return;
+      l.model.setOverride({ rung: 2 });
+      asked = l.model.refine();
+    });
+    await until(() => asked !== undefined);
+    await asked;
+    expect(Math.max(...rungsOf(l))).toBe(2);
+    expect(l.model.state.phase).toBe('done');
+    l.dispose();
+  });
+  it('asks for a scale again that could not be had, though nothing moves', async () => {
+    const [finest] = reader.manifest.scales;
+    let times = 0;
+    const server = fakeServer(files, { fault: ({ range }) => within(range, finest.glb) && ++times === 1 && 'status-404' });
+    const l = await loading(url, server);
+    await l.model.done;
+    await l.model.refine();
+    expect(l.model.state.scale).toBe(reader.manifest.scales.at(-1)!.scale);
+    expect(await until(() => l.model.state.scale === finest.scale)).toBe(true);
+    expect(times).toBe(2);
+    l.dispose();
+  });
+  it('without workers says so once, and fetches no fragment for nothing', async () => {
+    const server = fakeServer(files);
+    const l = await loading(url, server, { decode: undefined, workers: 1 }); // Node.js has no Worker of the web's kind
+    await l.model.done;
+    await l.model.refine();
+    const errors = l.events.flatMap((e) => (e.name === 'error' ? [e.event] : []));
+    expect(errors.map((e) => e.what)).toEqual(['workers']);
+    expect(askedFor(l, ...packs)).toBe(0);
     l.dispose();
   });
 });
