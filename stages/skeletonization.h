@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 3;
+inline constexpr int kSkeletonizationVersion = 4;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs and a saxophone no neck; at 80 the wrap takes 1.6 times as long.

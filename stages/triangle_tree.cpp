@@ -152,19 +152,24 @@ double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
   return best;
 }
 
-TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
-  OnTriangle best;
+struct TriangleTree::Found {
+  OnTriangle on;
   std::uint32_t triangle = 0;
+};
+
+TriangleTree::Found TriangleTree::search(Vec3d p, double limit2) const {
+  Found best;
+  best.on.distance2 = limit2;
   std::array<std::uint32_t, 40> stack{};
   std::size_t depth = 1;
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Node& n = nodes_[at];
-    if (box_distance2(n.lo, n.hi, p) >= best.distance2) continue;
+    if (box_distance2(n.lo, n.hi, p) >= best.on.distance2) continue;
     if (n.count > 0) {
       for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-        if (const OnTriangle on = closest_on(corners_[i], p); on.distance2 < best.distance2)
-          best = on, triangle = order_[i];
+        if (const OnTriangle on = closest_on(corners_[i], p); on.distance2 < best.on.distance2)
+          best = {on, order_[i]};
       continue;
     }
     std::uint32_t nearer = at + 1, farther = n.first;
@@ -174,7 +179,35 @@ TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
     stack[depth++] = farther;
     stack[depth++] = nearer;
   }
-  return {triangle, best.weight};
+  return best;
+}
+
+TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
+  const Found best = search(p, kInfinity);
+  return {best.triangle, best.on.weight};
+}
+
+double TriangleTree::distance2(Vec3d p, double limit2) const {
+  const double best = search(p, limit2).on.distance2;
+  return best < limit2 ? best : kInfinity;
+}
+
+bool TriangleTree::meets(const Tetrahedron& solid) const {
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (!solid.may_meet_box(n.lo, n.hi)) continue;
+    if (n.count == 0) {
+      stack[depth++] = n.first;
+      stack[depth++] = at + 1;
+      continue;
+    }
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+      if (solid.meets(corners_[i])) return true;
+  }
+  return false;
 }
 
 }  // namespace texmesh

@@ -6,6 +6,7 @@
 
 #include "format/model.h"
 #include "format/vec.h"
+#include "stages/tetrahedron.h"
 
 namespace texmesh {
 
@@ -27,11 +28,22 @@ class TriangleTree {
   };
   Nearest nearest(Vec3d p) const;
 
+  /// Square of the distance to the closest point; infinite when that is not below `limit2`, where the search
+  /// ends.
+  double distance2(Vec3d p, double limit2) const;
+  /// Whether any triangle meets the solid.
+  bool meets(const Tetrahedron& solid) const;
+  /// The box around all triangles.
+  Vec3d lo() const { return nodes_[0].lo; }
+  Vec3d hi() const { return nodes_[0].hi; }
+
  private:
   struct Node {
     Vec3d lo, hi;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
   };
+  struct Found;
+  Found search(Vec3d p, double limit2) const;
   void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
 
   std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_

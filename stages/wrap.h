@@ -15,7 +15,8 @@ struct TriangleSoup {
 /// that enter no hole narrower than alpha, at a distance of about `offset`, decimated to `max_faces`; one
 /// soup for each connected part, every point in use. The wrap shrinks step by step (about 10 per face that
 /// comes out); after `max_steps` it is given up with std::runtime_error, since CGAL promises no end for an
-/// offset that is tiny beside alpha. Throws whatever CGAL throws. Deterministic, single-threaded.
+/// offset that is tiny beside alpha. Distances and overlaps with the soup are in plain double arithmetic
+/// (triangle_tree.h). Throws whatever CGAL throws. Deterministic, single-threaded.
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
                                        std::size_t max_faces, std::size_t max_steps);
 

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "format/portable_math.h"
 #include "stages/shape_thickness.h"
+#include "stages/tetrahedron.h"
 #include "stages/triangle_tree.h"
 #include "tests/support/meshes.h"
 
@@ -76,6 +78,107 @@ TEST(TriangleTree, NearestAgreesWithTryingAll) {
     EXPECT_LE(length(found - p), best + 1e-12);
     EXPECT_GE(length(found - p), best - 0.02);
   }
+}
+
+TEST(TriangleTree, DistancesEndAtTheLimit) {
+  const TriangleSoup soup = soup_of(testing::bumpy_sphere(10, 14, 0.2f));
+  const TriangleTree tree(soup.points, soup.triangles);
+  Random random{4};
+  for (int q = 0; q < 300; ++q) {
+    const Vec3d p{3 * random.uniform() - 1.5, 3 * random.uniform() - 1.5, 3 * random.uniform() - 1.5};
+    const TriangleTree::Nearest at = tree.nearest(p);
+    Vec3d found;
+    for (std::size_t k = 0; k < 3; ++k)
+      found = found + soup.points[soup.triangles[at.triangle][k]] * at.weight[k];
+    const double square = dot(found - p, found - p);
+    EXPECT_NEAR(tree.distance2(p, kInfinity), square, 1e-12);
+    EXPECT_EQ(tree.distance2(p, 1.01 * square), tree.distance2(p, kInfinity));
+    EXPECT_EQ(tree.distance2(p, 0.99 * square), kInfinity);
+  }
+}
+
+Vec3d any_point(Random& random, double reach) {
+  return {reach * (2 * random.uniform() - 1), reach * (2 * random.uniform() - 1),
+          reach * (2 * random.uniform() - 1)};
+}
+
+std::array<Vec3d, 4> any_corners(Random& random, Vec3d at, double size) {
+  std::array<Vec3d, 4> c;
+  for (Vec3d& p : c) p = at + any_point(random, size);
+  if (dot(cross(c[1] - c[0], c[2] - c[0]), c[3] - c[0]) < 0) std::swap(c[0], c[1]);
+  return c;
+}
+
+/// The point of a triangle that is deepest in a tetrahedron, by trying many: > 0 when some point is inside.
+double deepest(const std::array<Vec3d, 4>& c, const std::array<Vec3d, 3>& t) {
+  double best = -kInfinity;
+  constexpr int kSteps = 40;
+  for (int i = 0; i <= kSteps; ++i)
+    for (int j = 0; i + j <= kSteps; ++j) {
+      const Vec3d p = (t[0] * i + t[1] * j + t[2] * (kSteps - i - j)) * (1.0 / kSteps);
+      double inside = kInfinity;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Vec3d a = c[(k + 1) % 4], n = normalized(cross(c[(k + 2) % 4] - a, c[(k + 3) % 4] - a));
+        inside = std::min(inside, dot(n, p - a) * (dot(n, c[k] - a) > 0 ? 1 : -1));
+      }
+      best = std::max(best, inside);
+    }
+  return best;
+}
+
+TEST(Tetrahedron, MeetsWhatHasAPointInIt) {
+  Random random{9};
+  int met = 0, missed = 0;
+  for (int q = 0; q < 1000; ++q) {
+    const std::array<Vec3d, 4> corners = any_corners(random, {}, 1);
+    const Tetrahedron solid(corners);
+    const Vec3d at = any_point(random, 1.2);
+    const std::array<Vec3d, 3> triangle{at + any_point(random, 0.5), at + any_point(random, 0.5),
+                                        at + any_point(random, 0.5)};
+    const double inside = deepest(corners, triangle);
+    if (inside > 0) {
+      EXPECT_TRUE(solid.meets(triangle));
+      ++met;
+    } else if (inside < -0.04) {  // between the points that were tried nothing is deeper
+      EXPECT_FALSE(solid.meets(triangle));
+      ++missed;
+    }
+    if (inside > 0) {
+      Vec3d lo = triangle[0], hi = lo;
+      for (Vec3d p : triangle)
+        for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+      EXPECT_TRUE(solid.may_meet_box(lo, hi));
+    }
+  }
+  EXPECT_GT(met, 30);
+  EXPECT_GT(missed, 100);
+}
+
+TEST(Tetrahedron, KnowsWhatIsAroundItAndWhatItIsAround) {
+  const Tetrahedron unit({Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}});
+  EXPECT_TRUE(unit.meets({Vec3d{0.1, 0.1, 0.1}, Vec3d{0.2, 0.1, 0.1}, Vec3d{0.1, 0.2, 0.1}}));
+  EXPECT_TRUE(unit.meets({Vec3d{-9, -9, 0.1}, Vec3d{9, -9, 0.1}, Vec3d{0, 20, 0.1}}));
+  EXPECT_FALSE(unit.meets({Vec3d{-9, -9, 1.1}, Vec3d{9, -9, 1.1}, Vec3d{0, 20, 1.1}}));
+  EXPECT_TRUE(unit.may_meet_box({-5, -5, -5}, {5, 5, 5}));
+  EXPECT_FALSE(unit.may_meet_box({0.6, 0.6, 0.6}, {1, 1, 1}));  // inside its box, outside its slanted side
+  EXPECT_FALSE(unit.may_meet_box({-1, 0, 0}, {-0.1, 1, 1}));
+}
+
+TEST(TriangleTree, MeetsAgreesWithTryingAll) {
+  const TriangleSoup soup = soup_of(testing::bumpy_sphere(10, 14, 0.2f));
+  const TriangleTree tree(soup.points, soup.triangles);
+  Random random{5};
+  int met = 0, missed = 0;
+  for (int q = 0; q < 400; ++q) {
+    const Tetrahedron solid(any_corners(random, any_point(random, 1.2), 0.3));
+    bool any = false;
+    for (const Triangle& t : soup.triangles)
+      any = any || solid.meets({soup.points[t[0]], soup.points[t[1]], soup.points[t[2]]});
+    EXPECT_EQ(tree.meets(solid), any);
+    ++(any ? met : missed);
+  }
+  EXPECT_GT(met, 50);
+  EXPECT_GT(missed, 50);
 }
 
 TEST(TriangleTree, RaysLeaveTheBox) {
