@@ -377,19 +377,20 @@ export class Retries {
   }
 }
 
-/** A whole file, with retries. */
+/** A whole file; with retries, unless somebody else has it. */
 export async function getWhole(
   client: HttpClient,
   url: string,
   maxBytes: number,
-  how: { kind: RequestKind; signal?: AbortSignal; onBytes?: (n: number) => void; reload?: boolean },
+  how: Pick<GetOptions, 'kind' | 'signal' | 'onBytes' | 'reload' | 'stallTimeoutS'>,
+  elsewhere = false,
 ): Promise<Uint8Array> {
   const retries = new Retries(client.options);
   for (;;) {
     const a = await client.get(url, { maxBytes, ...how });
     if (a.status === 200 && a.complete) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${maxBytes} bytes`, 'more');
-    if (!mayRetry(a) || !(await retries.wait(how.signal)))
+    if (!mayRetry(a) || elsewhere || !(await retries.wait(how.signal)))
       throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
   }
 }

@@ -463,15 +463,20 @@ export class PackageReader {
   private async loadFragmentFiles_(): Promise<FragmentFiles | undefined> {
     const { store } = this;
     if (!store.extraFile) return undefined;
-    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' });
+    // Packs do, too.
+    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' }).catch((error: unknown) => {
+      if (!(error instanceof InputError)) throw error;
+      return undefined;
+    });
     return bytes && (await import('./store_files')).readFragmentFiles(bytes);
   }
-  /** A fragment's complete file of such a tree; its digest is the caller's to check. */
+  /** A fragment's complete file of such a tree, digest checked. */
   async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { extension } = codecTraits((await this.textures())[plane].codec);
     const path = layout.fragmentFilePath(plane, rung, fragment, extension);
-    const bytes = (await this.planeFiles(plane)).complete?.[rung]?.get(fragment)?.bytes ?? 0;
-    const got = await this.store.extraFile?.(path, bytes, { kind: 'texture', signal, once: true });
+    const file = (await this.planeFiles(plane)).complete?.[rung]?.get(fragment);
+    const verify = file && this.digestCheck_(path, file.sha256);
+    const got = file && (await this.store.extraFile?.(path, file.bytes, { kind: 'texture', signal, once: true, verify }));
     return got ?? this.fail_(path, 'a file', 'none');
   }
 

@@ -33,14 +33,14 @@ export interface PackageStore {
   manifest(signal?: AbortSignal): Promise<Uint8Array>;
   /** Exactly these bytes of an entry. */
   read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
-  /** A file of a tree that is no entry; undefined where there is none. */
+  /** A file of a tree that is no entry; undefined where there is none, and nothing to verify that it is. */
   extraFile?(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined>;
   /** Forgets what it remembers. */
   dispose(): void;
 }
 
 /** The server answers whole files only. */
-export class NoRanges extends Error {}
+class NoRanges extends InputError {}
 
 const silenceFactor = 4;
 const leastPatienceRtts = 8;
@@ -118,8 +118,9 @@ export async function fromMirrors<T>(
       mirrors.delivered(m, bytes, started + client.rttS, nowS());
       return result;
     } catch (error) {
-      const elsewhere = error instanceof TexmeshError && !isAbort(error);
-      if (!mirrors.failed(m, bytes) || !elsewhere) throw error;
+      const cancelled = !(error instanceof TexmeshError); // which says nothing of the mirror
+      if (cancelled) m.owedBytes -= bytes;
+      if (cancelled || !mirrors.failed(m, bytes)) throw error;
     }
   }
 }
@@ -129,6 +130,8 @@ class RangeStore implements PackageStore {
   readonly form = 'range';
   private readonly parts_: { begin: number; bytes: Uint8Array }[] = []; // by begin, not overlapping
   private readonly mirrors_: Mirrors;
+  /** What a server said that knows no ranges. */
+  noRanges?: NoRanges;
 
   constructor(
     urls: readonly string[],
@@ -270,7 +273,7 @@ class RangeStore implements PackageStore {
   private refuse_(m: Mirror, a: Answer, offset: number, bytes: number): void {
     const file = shownUrl(m.url);
     if (a.status === 200) {
-      if (m.total < 0) throw new NoRanges();
+      if (m.total < 0) throw (this.noRanges = new NoRanges(file, '', 'a server that answers ranges', 'status 200'));
       throw new FormatError(
         file, '', 'the file that reading began with',
         'status 200: it was replaced, or the server no longer answers ranges',
@@ -342,20 +345,26 @@ export async function openStore(
   if (mode === 'files' && roots.length === 0)
     throw new InputError(shownUrl(url), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
   if (mode === 'files') return use(new (await files()).TreeStore(roots, client));
+  const ranges = new RangeStore(urls, client);
   try {
-    return await use(new RangeStore(urls, client));
+    return await use(ranges);
   } catch (error) {
-    if (!(error instanceof NoRanges)) throw error;
-    if (mode === 'range') throw new InputError(shownUrl(url), '', 'a server that answers ranges', 'status 200');
+    // Whole files are better than nothing, whatever the other mirrors said.
+    if (!ranges.noRanges || isAbort(error)) throw error;
+    if (mode === 'range') throw ranges.noRanges;
   }
+  const { TreeStore, openBytes } = await files();
   if (roots.length > 0) {
     try {
-      const found = await use(new (await files()).TreeStore(roots, client));
+      const found = await use(new TreeStore(roots, client));
       if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
     }
   }
-  const bytes = await getWhole(client, url, client.options.maxWholeBytes, { kind: 'other', signal });
-  return use((await files()).openBytes(bytes, shownUrl(url)));
+  const whole = new Mirrors(urls);
+  return fromMirrors(whole, client, bootstrapBytes, async (m, stallTimeoutS) => {
+    const how = { kind: 'other', signal, stallTimeoutS } as const;
+    return use(openBytes(await getWhole(client, m.url, client.options.maxWholeBytes, how, whole.alive > 1), shownUrl(m.url)));
+  });
 }

@@ -58,24 +58,36 @@ export class TreeStore implements PackageStore {
         throw error;
       });
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
-    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m) => {
-      const { kind, signal, onBytes } = how;
+    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m, patienceS) => {
       this.from_.set(path, m);
-      return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload });
+      return this.ask_(m, path, maxBytes, how, patienceS, reload);
     });
     if (how.once) return wanted;
     this.files_.set(path, wanted);
     wanted.catch(() => this.files_.delete(path));
     return wanted;
   }
-  async extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
-    const { kind, signal } = how;
-    try {
-      return await getWhole(this.client_, joinUrl(this.mirrors_.choose(0).url, path), maxBytes, { kind, signal });
-    } catch (error) {
-      if (error instanceof InputError) return undefined;
-      throw error;
-    }
+  private ask_(m: Mirror, path: string, maxBytes: number, how: ReadOptions, stallTimeoutS: number, reload: boolean): Promise<Uint8Array> {
+    const { kind, signal, onBytes } = how;
+    const elsewhere = this.mirrors_.alive > 1;
+    return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload, stallTimeoutS }, elsewhere);
+  }
+  extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
+    return fromMirrors(this.mirrors_, this.client_, Math.min(maxBytes, bootstrapBytes), async (m, patienceS) => {
+      const take = async (reload: boolean): Promise<Uint8Array> => {
+        const got = await this.ask_(m, path, maxBytes, how, patienceS, reload);
+        await how.verify?.(got);
+        return got;
+      };
+      try {
+        return await take(false);
+      } catch (error) {
+        // Nobody has to have it.
+        if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found)) return undefined;
+        if (!(error instanceof FormatError) || this.mirrors_.alive > 1) throw error;
+        return take(true); // past caches
+      }
+    });
   }
   dispose(): void {
     this.files_.clear();

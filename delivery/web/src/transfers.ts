@@ -198,13 +198,11 @@ export class Transfers {
       try {
         this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       } catch (error) {
-        if (!(error instanceof FormatError)) throw error;
+        if (!(error instanceof FormatError) || this.filesOf(plane).complete) throw error;
         // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
         this.held_.delete(`${plane}/${fragment}`);
         for (let rung = job.first; rung <= job.wish.rung; ++rung)
-          job.streams[rung - job.first] = this.filesOf(plane).complete
-            ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
-            : await this.reader_.fragment(plane, rung, fragment, signal);
+          job.streams[rung - job.first] = await this.reader_.fragment(plane, rung, fragment, signal);
         this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
       }
     } catch (error) {

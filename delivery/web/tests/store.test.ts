@@ -1,5 +1,8 @@
 import { describe, expect, it } from 'vitest';
-import { OpenOptions, PackageReader, TexmeshError } from '../src/reader';
+import { toHex } from '../src/bytes';
+import { fragmentFilePath } from '../src/layout';
+import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
+import { sha256 } from '../src/sha256';
 import { treeUrl } from '../src/store';
 import { Fault, FakeServer, FaultKind, bytesAskedTwice, fakeServer, treeFiles } from './fake_server';
 import { golden } from './support';
@@ -196,5 +199,96 @@ describe('mirrors', () => {
     const server = range(({ number }) => number > 0 && 'refused');
     const error = await failure(openAt(server, { mirrors }).then(readSome));
     expect(error.message).toContain('connection refused');
+  });
+  it('one that was too slow for somebody who cancelled may be asked again', async () => {
+    const server = range(({ url: u, number }) => number === 1 && u.startsWith('http://host') && 'stall');
+    const reader = await openAt(server, { mirrors, stallTimeoutS: 5 });
+    const abort = new AbortController();
+    const error = failure(reader.scaleGlb(0, { signal: abort.signal }));
+    abort.abort();
+    expect((await error).name).toBe('AbortError');
+    await readSome(reader);
+    expect(server.log.filter((r) => r.url.startsWith('http://host')).length).toBeGreaterThan(2);
+  });
+  it('one that knows no ranges leaves them to one that does', async () => {
+    const server = range(({ url: u }) => u.startsWith('http://host') && 'whole');
+    const reader = await openAt(server, { mirrors, mode: 'range' });
+    expect(reader.form).toBe('range');
+    expect(await readSome(reader)).toBe(expected);
+    expect(server.log.filter((r) => r.url.startsWith('http://host')).length).toBe(1);
+  });
+  it('one that knows no ranges is met in the middle', async () => {
+    const server = range(({ url: u, number }) => (u.startsWith('http://host') ? number > 0 && 'refused' : 'whole'));
+    const error = await failure(openAt(server, { mirrors }).then(readSome));
+    expect(error).toBeInstanceOf(InputError);
+    expect(error.message).toContain('answers ranges');
+  });
+  it('a dead one and one without ranges: the whole file of the other', async () => {
+    const server = range(({ url: u, range: r }) => (u.startsWith('http://host') ? 'refused' : r !== undefined && 'whole'));
+    const reader = await openAt(server, { mirrors });
+    expect(reader.form).toBe('whole');
+    expect(await readSome(reader)).toBe(expected);
+  });
+  it('one that has something else instead of the whole file is left alone', async () => {
+    const page = new TextEncoder().encode('<html>');
+    const server = fakeServer({ '/a/scan.texmesh': page, '/b/scan.texmesh': container }, { ranges: false });
+    expect(await readSome(await openAt(server, { mirrors: ['http://other/b/scan.texmesh'] }))).toBe(expected);
+  });
+});
+
+describe('files of fragments', async () => {
+  const mirrors = ['http://other/a/scan.texmesh'];
+  const packed = await PackageReader.openBytes(container, 'golden');
+  const entries = [...(await packed.index()), packed.manifest.index];
+  const files = treeFiles('/a/scan/', container, await packed.store.manifest(), entries);
+  const planes = [];
+  for (const [p, tables] of (await packed.tables()).entries()) {
+    const order = [...tables!.order];
+    const rungs = [];
+    for (let r = 0; r < tables!.rungQuality.length; ++r) {
+      const bytes: number[] = [];
+      const sha: string[] = [];
+      for (const f of order) {
+        const file = await packed.completeFragment(p, r, f);
+        files[`/a/scan/${fragmentFilePath(p, r, f, 'jpg')}`] = file;
+        bytes.push(file.length);
+        sha.push(toHex((await sha256(file)).subarray(0, 8)));
+      }
+      rungs.push({ bytes, sha256: sha });
+    }
+    planes.push({ order, rungs });
+  }
+  files['/a/scan/fragments.json'] = new TextEncoder().encode(JSON.stringify({ version: 1, planes }));
+  const [first, second] = planes[0].order;
+  const wanted = files[`/a/scan/${fragmentFilePath(0, 0, first, 'jpg')}`];
+  const at = (fault?: Fault): FakeServer => fakeServer(files, { ranges: false, fault });
+  const isFragment = (u: string): boolean => /\/r\d\d\/\d+\.jpg$/.test(u);
+
+  for (const kind of ['status-500', 'status-404', 'flip', 'refused'] as const)
+    it(`come from another mirror: ${kind}`, async () => {
+      const server = at(({ url: u }) => u.startsWith('http://host') && isFragment(u) && kind);
+      const reader = await openAt(server, { mirrors, mode: 'files' });
+      expect(await reader.fragmentFile(0, 0, first)).toEqual(wanted);
+      await reader.fragmentFile(0, 0, second);
+      expect(server.log.filter((r) => r.url.startsWith('http://host') && isFragment(r.url)).length).toBe(1);
+    });
+  it('are asked for once more where they were damaged on the way', async () => {
+    let times = 0;
+    const server = at(({ url: u }) => isFragment(u) && ++times === 1 && 'flip');
+    const reader = await openAt(server, { mode: 'files' });
+    expect(await reader.fragmentFile(0, 0, first)).toEqual(wanted);
+    expect(times).toBe(2);
+  });
+  it('that cannot be had say why', async () => {
+    const reader = await openAt(at(({ url: u }) => isFragment(u) && 'status-500'), { mode: 'files' });
+    expect((await failure(reader.fragmentFile(0, 0, first))).message).toContain('status 500');
+    expect((await failure(reader.fragmentFile(0, 99, first))).message).toContain('a file');
+  });
+  it('are not needed where there is no word of them, which is no mistake of a mirror', async () => {
+    const server = at(({ url: u }) => u.endsWith('fragments.json') && (u.startsWith('http://host') ? 'status-404' : 'status-500'));
+    const reader = await openAt(server, { mirrors, mode: 'files' });
+    expect(await reader.fragmentFiles()).toBeUndefined();
+    await readSome(reader);
+    expect(server.log.filter((r) => !r.url.startsWith('http://host')).length).toBe(0);
   });
 });
