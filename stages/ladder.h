@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 4;
+inline constexpr int kLadderVersion = 5;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>
@@ -51,7 +51,8 @@ struct LadderOptions {
     v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
       "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
       "that "
-      "rises by more than this share without it; -1 = store all");
+      "rises by more than this share without it, or where displays of the mip's size need it; -1 = store "
+      "all");
     v("lossless_top", s.lossless_top,
       "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stages/distortion.h"
+#include "stages/jpeg.h"
 #include "stages/parallel.h"
 
 namespace texmesh {
@@ -14,6 +15,14 @@ namespace {
 
 constexpr std::size_t kWindows = 6;
 constexpr std::uint32_t kWindowPx = 128;
+// Where a mip is what the display shows, 1 - SSIM that its best rung must come down to. Scans of 2048 px:
+// 0.02 is quality 86 to 93 and takes 12 % of the full size's bytes for all mips of a colour; 0.01 would take
+// 20 %.
+constexpr double kShownWell = 0.02, kDataShownWell = 0.03;
+// Between the preview and that rung others are stored without which a client loses half more and over:
+// factors of about two in bytes.
+constexpr double kOwnGain = 0.5;
+constexpr std::uint64_t kMostPreviewPixels = 1u << 26;
 
 struct Window {
   std::size_t fragment = 0;
@@ -54,11 +63,12 @@ Window window_in(const TexturePlane& plane, std::size_t fragment) {
   return best;
 }
 
-std::vector<Window> sample_windows(const TexturePlane& plane) {
+/// In every `sparseness`-th covered fragment, up to kWindows.
+std::vector<Window> sample_windows(const TexturePlane& plane, std::size_t sparseness) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
     if (plane.covered_texels[f] > 0) covered.push_back(f);
-  const std::size_t count = std::min(kWindows, (covered.size() + 3) / 4);
+  const std::size_t count = std::min(kWindows, (covered.size() + sparseness - 1) / sparseness);
   std::vector<Window> out;
   for (std::size_t k = 0; k < count; ++k) {
     const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)]);
@@ -104,23 +114,18 @@ Patch decode_patch(const TexturePlane& plane, const Pixels& pixels, const PlaneL
   return patch;
 }
 
-/// The window as a level shows it, scaled up to the full size.
-std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
-                               const PlaneLadder& ladder, std::size_t rung, const Window& window) {
-  const auto places = [](std::uint32_t first, std::uint32_t count, std::uint32_t size, std::uint32_t coarse) {
-    std::vector<Place> out;
-    for (std::uint32_t k = 0; k < count; ++k)
-      out.push_back(place_of(std::min(first + k, size - 1), size, coarse));
-    return out;
-  };
-  const std::vector<Place> across = places(window.x, window.width, full.width_px, plane.width_px);
-  const std::vector<Place> down = places(window.y, window.height, full.height_px, plane.height_px);
-  const Patch patch = decode_patch(plane, pixels, ladder, rung,
-                                   {across.front().first,
-                                    down.front().first,
-                                    across.back().second - across.front().first + 1,
-                                    down.back().second - down.front().first + 1,
-                                    {}});
+/// Of texels `first` and on of a side, where each lies between those of a coarser one.
+std::vector<Place> places(std::uint32_t first, std::uint32_t count, std::uint32_t size,
+                          std::uint32_t coarse) {
+  std::vector<Place> out;
+  for (std::uint32_t k = 0; k < count; ++k)
+    out.push_back(place_of(std::min(first + k, size - 1), size, coarse));
+  return out;
+}
+
+/// Bilinear, as clients scale up.
+std::vector<std::uint8_t> scaled_up(const Patch& patch, const std::vector<Place>& across,
+                                    const std::vector<Place>& down) {
   std::vector<std::uint8_t> out;
   out.reserve(across.size() * down.size());
   for (const Place& v : down) {
@@ -133,6 +138,35 @@ std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& pla
       out.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
     }
   }
+  return out;
+}
+
+/// The window as a level shows it, scaled up to the full size.
+std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
+                               const PlaneLadder& ladder, std::size_t rung, const Window& window) {
+  const std::vector<Place> across = places(window.x, window.width, full.width_px, plane.width_px);
+  const std::vector<Place> down = places(window.y, window.height, full.height_px, plane.height_px);
+  const Patch patch = decode_patch(plane, pixels, ladder, rung,
+                                   {across.front().first,
+                                    down.front().first,
+                                    across.back().second - across.front().first + 1,
+                                    down.back().second - down.front().first + 1,
+                                    {}});
+  return scaled_up(patch, across, down);
+}
+
+/// The window as the preview shows it.
+std::vector<std::uint8_t> show_preview(const TexturePlane& plane, const Patch& preview,
+                                       const Window& window) {
+  return scaled_up(preview, places(window.x, window.width, plane.width_px, preview.width),
+                   places(window.y, window.height, plane.height_px, preview.height));
+}
+
+std::vector<std::uint8_t> source_luma(const Pixels& pixels, const Window& window) {
+  std::vector<std::uint8_t> out;
+  for (std::uint32_t y = 0; y < window.height; ++y)
+    for (std::uint32_t x = 0; x < window.width; ++x)
+      out.push_back(luma_of(pixels.at(window.x + x, window.y + y), pixels.channels));
   return out;
 }
 
@@ -178,11 +212,7 @@ double hull_loss(const std::vector<RungPair>& pairs, const std::vector<std::size
   return pairs[hull.back()].loss;
 }
 
-void keep_rungs(const std::vector<RungPair>& pairs, const std::vector<std::uint8_t>& keep, std::size_t level,
-                PlaneLadder& plane) {
-  std::vector<std::uint8_t> of_rung(plane.rungs.size());
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    if (pairs[k].level == level) of_rung[pairs[k].rung] = keep[k];
+void keep_rungs(std::vector<std::uint8_t> of_rung, PlaneLadder& plane) {
   if (codec_traits(plane.codec).incremental)
     for (std::size_t r = of_rung.size() - 1; r-- > 0;) of_rung[r] |= of_rung[r + 1];
   std::vector<LadderRung> rungs;
@@ -223,6 +253,27 @@ std::size_t nearest_of_level(const std::vector<RungPair>& pairs, const std::vect
   return nearest;
 }
 
+/// The plane's rungs as pairs, losses 0.
+void add_pairs(const PlaneLadder& plane, std::size_t level, std::vector<RungPair>& pairs) {
+  for (std::size_t r = 0; r < plane.rungs.size(); ++r) {
+    std::uint64_t bytes = plane.rungs[r].data.size() + plane.rungs[r].tables.size();
+    if (codec_traits(plane.codec).incremental && r > 0) bytes += pairs.back().bytes;
+    pairs.push_back({level, r, bytes, 0});
+  }
+}
+
+/// `loss` is by window, then pair; each window weighs as much as its fragment's surface.
+void weigh_losses(const TexturePlane& plane, const std::vector<Window>& windows,
+                  const std::vector<double>& loss, std::vector<RungPair>& pairs) {
+  double whole = 0;
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const double weight = std::max(static_cast<double>(plane.surface_fraction[windows[w].fragment]), 1e-9);
+    whole += weight;
+    for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss += weight * loss[w * pairs.size() + k];
+  }
+  for (RungPair& pair : pairs) pair.loss /= std::max(whole, 1e-9);
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, double gain) {
@@ -253,22 +304,14 @@ std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vecto
   const std::vector<std::size_t> chain = chain_of(fragments, base);
   std::vector<RungPair> pairs;
   for (std::size_t level = 0; level < chain.size(); ++level)
-    for (std::size_t r = 0; r < ladder.planes[chain[level]].rungs.size(); ++r) {
-      const LadderRung& rung = ladder.planes[chain[level]].rungs[r];
-      std::uint64_t bytes = rung.data.size() + rung.tables.size();
-      if (codec_traits(ladder.planes[chain[level]].codec).incremental && r > 0) bytes += pairs.back().bytes;
-      pairs.push_back({level, r, bytes, 0});
-    }
-  const std::vector<Window> windows = sample_windows(full);
+    add_pairs(ladder.planes[chain[level]], level, pairs);
+  const std::vector<Window> windows = sample_windows(full, 4);
   std::vector<double> loss(windows.size() * pairs.size());
   parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
       const Window& window = windows[w];
-      std::vector<std::uint8_t> source;
-      for (std::uint32_t y = 0; y < window.height; ++y)
-        for (std::uint32_t x = 0; x < window.width; ++x)
-          source.push_back(luma_of(pixels[base].at(window.x + x, window.y + y), full.channels));
-      const DistortionMeter meter(std::move(source), mask_of(full, window), window.width, window.height);
+      const DistortionMeter meter(source_luma(pixels[base], window), mask_of(full, window), window.width,
+                                  window.height);
       for (std::size_t k = 0; k < pairs.size(); ++k) {
         const std::size_t p = chain[pairs[k].level];
         const auto shown =
@@ -277,13 +320,49 @@ std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vecto
       }
     }
   });
-  double whole = 0;
-  for (std::size_t w = 0; w < windows.size(); ++w) {
-    const double weight = std::max(static_cast<double>(full.surface_fraction[windows[w].fragment]), 1e-9);
-    whole += weight;
-    for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss += weight * loss[w * pairs.size() + k];
-  }
-  for (RungPair& pair : pairs) pair.loss /= std::max(whole, 1e-9);
+  weigh_losses(full, windows, loss, pairs);
+  return pairs;
+}
+
+void keep_for_display(const std::vector<RungPair>& own, double shown_well, double gain,
+                      std::vector<std::uint8_t>& keep) {
+  if (own.size() < 2) return;
+  std::size_t top = 1;
+  while (top + 1 < own.size() && own[top].loss > shown_well) ++top;
+  for (std::size_t k = 1; k < own.size(); ++k)
+    if (own[k].loss >= own[0].loss && k != top) keep[k - 1] = 0;
+  std::vector<RungPair> pairs(own.begin(), own.begin() + static_cast<std::ptrdiff_t>(top) + 1);
+  for (std::size_t k = 0; k <= top; ++k)
+    pairs[k].level = k == 0 || keep[k - 1] ? 0 : 1;  // those of level 0 are not thinned away
+  std::vector<std::size_t> hull = hull_of(pairs);
+  thin_hull(pairs, gain, hull);
+  for (const std::size_t k : hull)
+    if (k > 0) keep[k - 1] = 1;
+  keep[top - 1] = 1;
+}
+
+std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                                  const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
+  const std::vector<Window> windows = sample_windows(plane, 1);
+  if (windows.empty()) return {};
+  const Pixels preview_luma = decode_jpeg_luma(preview_file, kMostPreviewPixels);
+  const Patch preview{0, 0, preview_luma.width_px, preview_luma.height_px, preview_luma.data};
+  std::vector<RungPair> pairs{{0, 0, 0, 0}};
+  add_pairs(ladder, 1, pairs);
+  std::vector<double> loss(windows.size() * pairs.size());
+  parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t w = begin; w < end; ++w) {
+      const Window& window = windows[w];
+      const DistortionMeter meter(source_luma(pixels, window), mask_of(plane, window), window.width,
+                                  window.height);
+      for (std::size_t k = 0; k < pairs.size(); ++k) {
+        const auto shown = k == 0 ? show_preview(plane, preview, window)
+                                  : show(plane, plane, pixels, ladder, pairs[k].rung, window);
+        loss[w * pairs.size() + k] = std::max(meter.against(shown).dssim, 0.0);
+      }
+    }
+  });
+  weigh_losses(plane, windows, loss, pairs);
   return pairs;
 }
 
@@ -294,11 +373,22 @@ void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& 
   for (std::size_t base = 0; base < fragments.planes.size(); ++base) {
     if (fragments.planes[base].mip > 0) break;
     const std::vector<std::size_t> chain = chain_of(fragments, base);
-    if (chain.size() == 1) continue;
+    if (chain.size() == 1 || gain < 0) continue;
     const std::vector<RungPair> pairs = measure_pairs(fragments, pixels, ladder, base, inner);
     const std::vector<std::uint8_t> keep = worth_storing(pairs, gain);
-    for (std::size_t level = 0; level < chain.size(); ++level)
-      keep_rungs(pairs, keep, level, ladder.planes[chain[level]]);
+    auto first = keep.begin();
+    for (std::size_t level = 0; level < chain.size(); ++level) {
+      const std::size_t p = chain[level];
+      PlaneLadder& plane = ladder.planes[p];
+      const auto last = first + static_cast<std::ptrdiff_t>(plane.rungs.size());
+      std::vector<std::uint8_t> of_rung(first, last);
+      first = last;
+      if (level > 0)
+        keep_for_display(
+            measure_own(fragments.planes[p], pixels[p], plane, ladder.planes[base].preview, inner),
+            is_colour(fragments.planes[p].role) ? kShownWell : kDataShownWell, kOwnGain, of_rung);
+      keep_rungs(std::move(of_rung), plane);
+    }
   }
 }
 

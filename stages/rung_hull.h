@@ -30,8 +30,22 @@ std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, doub
 std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
                                     const Ladder& ladder, std::size_t base, const RunContext& context);
 
-/// Removes the rungs of mips that worth_storing() does not keep. Rungs of
-/// incremental codecs lean on those below, so there only rungs above the highest kept are removed.
+/// A mip as a client meets it whose display needs no more texels: the preview (0 bytes), then the plane's
+/// rungs, with the loss against the mip's own `pixels`, the preview scaled up bilinearly from `preview`, a
+/// JPEG. Measured in up to 6 windows as measure_pairs() does. Empty where nothing is covered.
+std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                                  const std::vector<std::uint8_t>& preview, const RunContext& context);
+
+/// Adds to `keep`, by rung, what a mip needs to be shown for itself, given measure_own(): the first rung that
+/// loses at most `shown_well`, else the last, and of those below it the vertices of the lower hull that
+/// begins at the preview, without which the hull would lie higher by more than `gain`. Takes out of `keep`
+/// rungs that show less than the preview does. At least one rung stays. Pure.
+void keep_for_display(const std::vector<RungPair>& own, double shown_well, double gain,
+                      std::vector<std::uint8_t>& keep);
+
+/// Removes the rungs of mips that neither worth_storing() nor keep_for_display() keeps: the one serves
+/// displays that could show more, the other those that show the mip itself. Rungs of incremental codecs lean
+/// on those below, so there only rungs above the highest kept are removed. A negative gain keeps all.
 void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double gain,
                          Ladder& ladder, const RunContext& context);
 
