@@ -223,9 +223,7 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
     if (needed || plan.ssim > best.ssim + kWorthwhileSsim) best = std::move(plan);
     first = false;
   }
-  if (first)
-    throw InputError(package.store().name(), "scale " + std::to_string(wanted), "a scale of the package",
-                     "none");
+  if (first) package.scale_index(wanted);  // says which there are
   if (best.scale != wanted)
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
                             std::to_string(best.scale) + " leaves more for the texture and looks better");
@@ -261,9 +259,7 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
         (fits == best_fits && (fits ? plan.ssim > best->ssim : plan.bytes() < best->bytes())))
       best = std::move(plan);
   }
-  if (!best)
-    throw InputError(package.store().name(), "scale " + std::to_string(wanted), "a scale of the package",
-                     "none");
+  if (!best) package.scale_index(wanted);  // says which there are
   return *best;
 }
 

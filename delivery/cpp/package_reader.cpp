@@ -176,10 +176,13 @@ Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
 
 Bytes PackageReader::scale_glb(int scale) { return read_all(scale_entry(scale)); }
 
-const EntryRef& PackageReader::scale_entry(int scale) const {
-  for (const ManifestScale& s : manifest_.scales)
-    if (s.scale == scale) return s.glb;
-  throw FormatError(store_->name(), "scale " + std::to_string(scale), "a scale of the package", "none");
+std::size_t PackageReader::scale_index(int scale) const {
+  std::string known;
+  for (std::size_t k = 0; k < manifest_.scales.size(); ++k) {
+    if (manifest_.scales[k].scale == scale) return k;
+    known += (k == 0 ? "" : ", ") + std::to_string(manifest_.scales[k].scale);
+  }
+  throw InputError(store_->name(), "", "one of its scales " + known, "scale " + std::to_string(scale));
 }
 
 SplitStreamHead PackageReader::split_stream_head() {

@@ -65,7 +65,9 @@ class PackageReader {
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
   std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
-  const EntryRef& scale_entry(int scale) const;    // FormatError when the package has no such scale
+  /// Index into manifest().scales; InputError that names the scales there are when it is none of them.
+  std::size_t scale_index(int scale) const;
+  const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }
   /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read
   /// with store() or entry(kSplitStreamPath).
   SplitStreamHead split_stream_head();

@@ -43,7 +43,8 @@ class BudgetSearch {
   /// leaner or the other way round, as long as the picture gets better; one that does not is passed over
   /// once.
   MeshKey choose_mesh() {
-    best_ = {source_.request.scale ? index_of(*source_.request.scale) : likely_scale(), kFirstCoding};
+    best_ = {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
+             kFirstCoding};
     least_ = look_closely(best_);
     for (bool again = true; again;) {
       const MeshKey before = best_;
@@ -122,13 +123,6 @@ class BudgetSearch {
           part * static_cast<double>(source_.request.bytes))
         return k;
     return scales().size() - 1;
-  }
-
-  std::size_t index_of(int scale) const {
-    for (std::size_t k = 0; k < scales().size(); ++k)
-      if (scales()[k].scale == scale) return k;
-    throw InputError(source_.package.store().name(), "scale " + std::to_string(scale),
-                     "a scale of the package", "none");
   }
 
   Extracted finish(const MeshCandidate& mesh, const TexturePoint& point) {

@@ -17,10 +17,7 @@ constexpr double kDisplayQuality = 90;  // of images that were made smaller
 constexpr double kTopQuality = 97;      // of images coded anew from planes that say no quality
 
 const ManifestScale& scale_entry(PackageReader& package, int scale) {
-  for (const ManifestScale& s : package.manifest().scales)
-    if (s.scale == scale) return s;
-  throw InputError(package.store().name(), "scale " + std::to_string(scale), "a scale of the package",
-                   "none");
+  return package.manifest().scales[package.scale_index(scale)];
 }
 
 int wanted_scale(PackageReader& package, const ExtractRequest& request) {

@@ -144,7 +144,7 @@ TEST(PackageReader, OneReadBootstrapsAndNothingIsReadUnasked) {
 
 TEST(PackageReader, QuestionsOutOfRangeAreRefused) {
   PackageReader reader = open_memory(make_package(1));
-  EXPECT_THROW(reader.scale_glb(1), FormatError);
+  EXPECT_THROW(reader.scale_glb(1), InputError);
   EXPECT_THROW(reader.preview(1), FormatError);
   EXPECT_THROW(reader.table_stream(0, 2), FormatError);
   EXPECT_THROW(reader.table_stream(1, 0), FormatError);
