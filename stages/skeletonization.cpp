@@ -91,7 +91,7 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOp
         [&] {
           parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
                                static_cast<std::size_t>(options.max_wrap_faces),
-                               static_cast<std::size_t>(options.max_wrap_steps));
+                               static_cast<std::size_t>(options.max_wrap_steps), context);
         },
         [&] {
           if (attempt == kWrapAttempts) throw;

@@ -37,7 +37,8 @@ struct SkeletonizationOptions {
       "is half the local thickness");
     v("limb_ratio", s.limb_ratio, Range{1, 1e9},
       "R is at most this many half thicknesses (thin parts that the skeleton does not reach)");
-    v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9}, "work cap: steps of a wrap before a coarser one");
+    v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9},
+      "work cap: steps of a wrap before a coarser one; they may look at 50 times as many triangles");
     v("max_contractions", s.max_contractions, Range{1, 100000}, "work cap: contractions of a part");
   }
 };
@@ -60,7 +61,8 @@ struct Skeleton {
 };
 
 /// Works for any conditioned mesh (open, several components, one triangle); it never fails (but for Cancelled
-/// and bad_alloc). What falls back says so with a warning: a wrap that takes more than max_wrap_steps is
+/// and bad_alloc). What falls back says so with a warning: a wrap that takes more than max_wrap_steps (or
+/// looks at 50 times as many triangles: thousands of needles around one point) is
 /// tried with twice and four times its alpha ("skeleton-coarser-wrap"); a part of the wrap that cannot be
 /// contracted has its centroid for a skeleton ("skeleton-part-centroid"); where there is no wrap, R is the
 /// distance to the component's centroid ("skeleton-fallback"). Plates and thin limbs give notes

@@ -18,7 +18,8 @@ struct Polygon {
 
 }  // namespace
 
-Tetrahedron::Tetrahedron(const std::array<Vec3d, 4>& corners) : lo_(corners[0]), hi_(corners[0]) {
+Tetrahedron::Tetrahedron(const std::array<Vec3d, 4>& corners)
+    : corners_(corners), lo_(corners[0]), hi_(corners[0]) {
   for (std::size_t s = 0; s < 4; ++s) {
     const Vec3d at = corners[kSides[s][0]];
     planes_[s] = {cross(corners[kSides[s][1]] - at, corners[kSides[s][2]] - at), at};
@@ -40,6 +41,20 @@ bool Tetrahedron::may_meet_box(Vec3d lo, Vec3d hi) const {
 }
 
 bool Tetrahedron::meets(const std::array<Vec3d, 3>& triangle) const {
+  // Most triangles are asked in vain: near a surface cells lie along it, on one side.
+  const Vec3d normal = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  int above = 0, below = 0;
+  for (const Vec3d& c : corners_) {
+    const double h = dot(normal, c - triangle[0]);
+    above += h > 0, below += h < 0;
+  }
+  if (above == 4 || below == 4) return false;
+  for (const Plane& s : planes_)
+    if (s.height(triangle[0]) < 0 && s.height(triangle[1]) < 0 && s.height(triangle[2]) < 0) return false;
+  return clipped(triangle);
+}
+
+bool Tetrahedron::clipped(const std::array<Vec3d, 3>& triangle) const {
   Polygon in;
   in.count = 3;
   std::copy(triangle.begin(), triangle.end(), in.corner.begin());

@@ -22,6 +22,10 @@ class Tetrahedron {
     Vec3d inwards, point;
     double height(Vec3d p) const { return dot(inwards, p - point); }
   };
+  /// Whether the four sides leave anything of a triangle.
+  bool clipped(const std::array<Vec3d, 3>& triangle) const;
+
+  std::array<Vec3d, 4> corners_;
   std::array<Plane, 4> planes_;
   Vec3d lo_, hi_;
 };

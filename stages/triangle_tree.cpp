@@ -157,7 +157,7 @@ struct TriangleTree::Found {
   std::uint32_t triangle = 0;
 };
 
-TriangleTree::Found TriangleTree::search(Vec3d p, double limit2) const {
+TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& tried) const {
   Found best;
   best.on.distance2 = limit2;
   std::array<std::uint32_t, 40> stack{};
@@ -167,6 +167,7 @@ TriangleTree::Found TriangleTree::search(Vec3d p, double limit2) const {
     const Node& n = nodes_[at];
     if (box_distance2(n.lo, n.hi, p) >= best.on.distance2) continue;
     if (n.count > 0) {
+      tried += n.count;
       for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
         if (const OnTriangle on = closest_on(corners_[i], p); on.distance2 < best.on.distance2)
           best = {on, order_[i]};
@@ -183,16 +184,21 @@ TriangleTree::Found TriangleTree::search(Vec3d p, double limit2) const {
 }
 
 TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
-  const Found best = search(p, kInfinity);
+  std::uint64_t tried = 0;
+  return nearest(p, tried);
+}
+
+TriangleTree::Nearest TriangleTree::nearest(Vec3d p, std::uint64_t& tried) const {
+  const Found best = search(p, kInfinity, tried);
   return {best.triangle, best.on.weight};
 }
 
-double TriangleTree::distance2(Vec3d p, double limit2) const {
-  const double best = search(p, limit2).on.distance2;
+double TriangleTree::distance2(Vec3d p, double limit2, std::uint64_t& tried) const {
+  const double best = search(p, limit2, tried).on.distance2;
   return best < limit2 ? best : kInfinity;
 }
 
-bool TriangleTree::meets(const Tetrahedron& solid) const {
+bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
   std::array<std::uint32_t, 40> stack{};
   std::size_t depth = 1;
   while (depth > 0) {
@@ -204,6 +210,7 @@ bool TriangleTree::meets(const Tetrahedron& solid) const {
       stack[depth++] = at + 1;
       continue;
     }
+    tried += n.count;
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
       if (solid.meets(corners_[i])) return true;
   }

@@ -27,12 +27,15 @@ class TriangleTree {
     std::array<double, 3> weight{};  // of its corners, >= 0, summing to 1
   };
   Nearest nearest(Vec3d p) const;
+  /// The same; `tried` grows by the triangles that were looked at: what a query costs, the same on every
+  /// machine.
+  Nearest nearest(Vec3d p, std::uint64_t& tried) const;
 
   /// Square of the distance to the closest point; infinite when that is not below `limit2`, where the search
   /// ends.
-  double distance2(Vec3d p, double limit2) const;
+  double distance2(Vec3d p, double limit2, std::uint64_t& tried) const;
   /// Whether any triangle meets the solid.
-  bool meets(const Tetrahedron& solid) const;
+  bool meets(const Tetrahedron& solid, std::uint64_t& tried) const;
   /// The box around all triangles.
   Vec3d lo() const { return nodes_[0].lo; }
   Vec3d hi() const { return nodes_[0].hi; }
@@ -43,7 +46,7 @@ class TriangleTree {
     std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
   };
   struct Found;
-  Found search(Vec3d p, double limit2) const;
+  Found search(Vec3d p, double limit2, std::uint64_t& tried) const;
   void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
 
   std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_

@@ -11,8 +11,8 @@
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 #include <CGAL/alpha_wrap_3.h>
 
-#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -28,17 +28,39 @@ using Point = Kernel::Point_3;
 using SurfaceMesh = CGAL::Surface_mesh<Point>;
 using PartMap = SurfaceMesh::Property_map<SurfaceMesh::Face_index, std::size_t>;
 
-/// Counts the steps of the wrapping; CGAL calls it before each.
+/// What a wrap may cost. Steps are CGAL's, and all together may look at 50 triangles for each of the most
+/// steps: where thousands of needles meet, every query meets all of them, and a cone of 5,000 took minutes of
+/// few steps. Scans take 25,000 to 100,000 steps and 1 to 4 million triangles.
+class WorkCap {
+ public:
+  WorkCap(std::size_t steps, const RunContext& context)
+      : steps_(steps), triangles_(steps * kTrianglesPerStep), context_(context) {}
+
+  void count_step() {
+    context_.check_cancelled();
+    if (steps_-- == 0 || tried > triangles_) throw std::runtime_error("the wrap takes too many steps");
+  }
+
+  std::uint64_t tried = 0;
+
+ private:
+  static constexpr std::size_t kTrianglesPerStep = 50;
+  std::size_t steps_;
+  std::uint64_t triangles_;
+  const RunContext& context_;
+};
+
+/// CGAL calls it before each step.
 class StepCounter : public aw3::Wrapping_default_visitor {
  public:
-  explicit StepCounter(std::size_t most) : left_(most) {}
+  explicit StepCounter(WorkCap& cap) : cap_(cap) {}
   template <class Wrapper, class Gate>
   void before_facet_treatment(const Wrapper&, const Gate&) {
-    if (left_-- == 0) throw std::runtime_error("the wrap takes too many steps");
+    cap_.count_step();
   }
 
  private:
-  std::size_t left_;
+  WorkCap& cap_;
 };
 
 /// What the wrapping asks of its input. CGAL's own oracle answers with exact predicates; in plain double
@@ -48,7 +70,8 @@ class SoupOracle {
  public:
   using Geom_traits = aw3::Alpha_wrap_AABB_traits<Kernel>;
 
-  explicit SoupOracle(const TriangleSoup& soup) : soup_(soup), tree_(soup.points, soup.triangles) {}
+  SoupOracle(const TriangleSoup& soup, WorkCap& cap)
+      : soup_(soup), tree_(soup.points, soup.triangles), cap_(cap) {}
 
   const Geom_traits& geom_traits() const { return traits_; }
   CGAL::Bbox_3 bbox() const {
@@ -59,17 +82,19 @@ class SoupOracle {
   template <class K>
   bool do_intersect(const aw3::Tetrahedron_with_outside_info<K>& cell) const {
     return tree_.meets(
-        Tetrahedron({vec(cell.m_tet[0]), vec(cell.m_tet[1]), vec(cell.m_tet[2]), vec(cell.m_tet[3])}));
+        Tetrahedron({vec(cell.m_tet[0]), vec(cell.m_tet[1]), vec(cell.m_tet[2]), vec(cell.m_tet[3])}),
+        cap_.tried);
   }
   template <class K>
   bool do_intersect(const aw3::Ball_3<K>& ball) const {
     const double radius2 = ball.boundary().squared_radius();
-    return tree_.distance2(vec(ball.boundary().center()), std::nextafter(radius2, 2 * radius2)) <= radius2;
+    return tree_.distance2(vec(ball.boundary().center()), std::nextafter(radius2, 2 * radius2), cap_.tried) <=
+           radius2;
   }
 
-  double squared_distance(const Point& p) const { return tree_.distance2(vec(p), kInfinity); }
+  double squared_distance(const Point& p) const { return tree_.distance2(vec(p), kInfinity, cap_.tried); }
   Point closest_point(const Point& p) const {
-    const TriangleTree::Nearest at = tree_.nearest(vec(p));
+    const TriangleTree::Nearest at = tree_.nearest(vec(p), cap_.tried);
     Vec3d on;
     for (std::size_t k = 0; k < 3; ++k)
       on = on + soup_.points[soup_.triangles[at.triangle][k]] * at.weight[k];
@@ -89,6 +114,7 @@ class SoupOracle {
 
   const TriangleSoup& soup_;
   TriangleTree tree_;
+  WorkCap& cap_;
   Geom_traits traits_;
 };
 
@@ -123,10 +149,12 @@ std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
 }  // namespace
 
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
-                                       std::size_t max_faces, std::size_t max_steps) {
-  const SoupOracle oracle(soup);
+                                       std::size_t max_faces, std::size_t max_steps,
+                                       const RunContext& context) {
+  WorkCap cap(max_steps, context);
+  const SoupOracle oracle(soup, cap);
   SurfaceMesh wrap;
-  StepCounter counter(max_steps);
+  StepCounter counter(cap);
   aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
   wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
   decimate(wrap, max_faces);

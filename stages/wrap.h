@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "format/model.h"
+#include "stages/run_context.h"
 
 namespace texmesh {
 
@@ -14,10 +15,12 @@ struct TriangleSoup {
 /// The alpha wrap of a triangle soup (Portaneri et al. 2022, CGAL): closed oriented 2-manifolds around it
 /// that enter no hole narrower than alpha, at a distance of about `offset`, decimated to `max_faces`; one
 /// soup for each connected part, every point in use. The wrap shrinks step by step (about 10 per face that
-/// comes out); after `max_steps` it is given up with std::runtime_error, since CGAL promises no end for an
-/// offset that is tiny beside alpha. Distances and overlaps with the soup are in plain double arithmetic
-/// (triangle_tree.h). Throws whatever CGAL throws. Deterministic, single-threaded.
+/// comes out); it is given up with std::runtime_error after `max_steps`, since CGAL promises no end for an
+/// offset that is tiny beside alpha, and when the steps have looked at 50 * max_steps triangles of the soup.
+/// Distances and overlaps are in plain double arithmetic (triangle_tree.h). Stops when cancelled. Throws
+/// whatever CGAL throws. Deterministic, single-threaded.
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
-                                       std::size_t max_faces, std::size_t max_steps);
+                                       std::size_t max_faces, std::size_t max_steps,
+                                       const RunContext& context);
 
 }  // namespace texmesh

@@ -91,9 +91,12 @@ TEST(TriangleTree, DistancesEndAtTheLimit) {
     for (std::size_t k = 0; k < 3; ++k)
       found = found + soup.points[soup.triangles[at.triangle][k]] * at.weight[k];
     const double square = dot(found - p, found - p);
-    EXPECT_NEAR(tree.distance2(p, kInfinity), square, 1e-12);
-    EXPECT_EQ(tree.distance2(p, 1.01 * square), tree.distance2(p, kInfinity));
-    EXPECT_EQ(tree.distance2(p, 0.99 * square), kInfinity);
+    std::uint64_t tried = 0;
+    const double distance2 = tree.distance2(p, kInfinity, tried);
+    EXPECT_NEAR(distance2, square, 1e-12);
+    EXPECT_GT(tried, 0u);
+    EXPECT_EQ(tree.distance2(p, 1.01 * square, tried), distance2);
+    EXPECT_EQ(tree.distance2(p, 0.99 * square, tried), kInfinity);
   }
 }
 
@@ -174,7 +177,9 @@ TEST(TriangleTree, MeetsAgreesWithTryingAll) {
     bool any = false;
     for (const Triangle& t : soup.triangles)
       any = any || solid.meets({soup.points[t[0]], soup.points[t[1]], soup.points[t[2]]});
-    EXPECT_EQ(tree.meets(solid), any);
+    std::uint64_t tried = 0;
+    EXPECT_EQ(tree.meets(solid, tried), any);
+    EXPECT_LE(tried, soup.triangles.size());
     ++(any ? met : missed);
   }
   EXPECT_GT(met, 50);

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "format/archive.h"
 #include "format/portable_math.h"
@@ -217,6 +219,44 @@ TEST(Skeletonization, WorkCapsFallBackStepByStep) {
   expect_sound(none, m.positions.size());
   EXPECT_TRUE(none.fallback_centroid);
   EXPECT_EQ(codes(none), std::vector<std::string>{"skeleton-fallback"});
+}
+
+/// An open cone of needles around one hub.
+Mesh fan(std::uint32_t sides) {
+  std::vector<Vec3f> points{{0, 0.3f, 0}};
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < sides; ++i) {
+    const double a = 2 * portable::kPi * i / sides;
+    points.push_back(to_float(Vec3d{portable::cos(a), 0, portable::sin(a)}));
+    triangles.push_back({0, 1 + i, 1 + (i + 1) % sides});
+  }
+  return bare(std::move(points), std::move(triangles));
+}
+
+TEST(Skeletonization, NeedlesAroundAHubTakeACoarserWrap) {
+  // Steps alone would not say that it takes long: every one of them looks at all needles.
+  const Mesh few = fan(60), many = fan(6000);
+  const SkeletonizationOptions options{.alpha_divisor = 40, .max_wrap_steps = 150000};
+  const Skeleton plain = run(few, options), coarser = run(many, options);
+  expect_sound(plain, few.positions.size());
+  expect_sound(coarser, many.positions.size());
+  EXPECT_TRUE(plain.notes.empty());
+  ASSERT_FALSE(coarser.notes.empty());
+  EXPECT_EQ(coarser.notes[0].severity, Severity::kWarning);
+}
+
+TEST(Skeletonization, AWrapStopsWhenCancelled) {
+  const ConditionedMesh mesh = condition_mesh(fan(3000), true, {}, RunContext{});
+  std::atomic<bool> cancelled = false;
+  RunContext context;
+  context.cancelled = &cancelled;
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    cancelled = true;
+  });
+  // All of it takes many seconds.
+  EXPECT_THROW(skeletonize(mesh, {.alpha_divisor = 400, .max_wrap_steps = 2000000}, context), Cancelled);
+  later.join();
 }
 
 TEST(Skeletonization, AnOpenBaseDoesNotMakeABowl) {
