@@ -45,7 +45,8 @@ double power(double base, double exponent) { return base > 0 ? portable::pow(bas
 /// The profile's tags, every offset checked.
 class IccReader {
  public:
-  IccReader(const std::string& name, Bytes bytes) : name_(name), bytes_(bytes) {
+  IccReader(const std::string& name, Bytes bytes, std::size_t codes)
+      : name_(name), bytes_(bytes), codes_(codes) {
     if (bytes.size() < 132 || text(36) != "acsp") fail("an ICC profile", "other bytes");
     if (u32(128) > 200) fail("at most 200 tags", std::to_string(u32(128)));
   }
@@ -62,10 +63,10 @@ class IccReader {
   }
   bool has(std::string_view tag) const { return find(tag) != 0; }
 
-  /// Light per 8-bit code.
+  /// Light per code.
   std::vector<double> curve(std::string_view tag) const {
     const Bytes data = tag_data(tag);
-    std::vector<double> out(256);
+    std::vector<double> out(codes_);
     const std::string kind = text_of(data);
     if (kind == "curv") {
       fill(out, data);
@@ -116,8 +117,8 @@ class IccReader {
     const std::size_t count = u32_of(data, 8);
     if (count > (data.size() - 12) / 2) fail("a curve that fits its tag", std::to_string(count) + " points");
     const auto point = [&](std::size_t i) { return (data[12 + 2 * i] << 8 | data[13 + 2 * i]) / 65535.0; };
-    for (std::size_t i = 0; i < 256; ++i) {
-      const double x = static_cast<double>(i) / 255;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const double x = static_cast<double>(i) / static_cast<double>(out.size() - 1);
       if (count == 0) {
         out[i] = x;
       } else if (count == 1) {
@@ -146,14 +147,15 @@ class IccReader {
       d = a != 0 ? -b / a : 0;
     }
     if (form == 0) d = 0;
-    for (std::size_t i = 0; i < 256; ++i) {
-      const double x = static_cast<double>(i) / 255;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const double x = static_cast<double>(i) / static_cast<double>(out.size() - 1);
       out[i] = x >= d ? power(a * x + b, g) + e : c * x + f;
     }
   }
 
   const std::string& name_;
   Bytes bytes_;
+  std::size_t codes_;
 };
 
 /// sRGB codes of light, rounded as exactly as with the formula, by a table: the bucket's first code, then up
@@ -188,25 +190,49 @@ const SrgbEncoder& srgb_encoder() {
   return encoder;
 }
 
-void convert_texel(const ColourProfile& profile, const std::uint8_t* in, std::uint8_t* out) {
+template <class Code>  // of std::uint8_t or std::uint16_t, an index of the curves
+double light_of(const std::vector<double>& curve, Code code) {
+  return curve[code];
+}
+double light_of(const std::vector<double>& curve, float value) {
+  if (!(value > 0)) return curve.front();  // NaN too
+  const double at = std::min(1.0, static_cast<double>(value)) * static_cast<double>(curve.size() - 1);
+  const auto k = std::min(static_cast<std::size_t>(at), curve.size() - 2);
+  return curve[k] + (curve[k + 1] - curve[k]) * (at - static_cast<double>(k));
+}
+
+template <class Sample>
+void convert_texel(const ColourProfile& profile, const Sample* in, std::uint8_t* out) {
   const SrgbEncoder& encode = srgb_encoder();
   if (profile.grey) {
-    out[0] = encode(profile.curve[0][in[0]]);
+    out[0] = encode(light_of(profile.curve[0], in[0]));
     return;
   }
-  const double light[3] = {profile.curve[0][in[0]], profile.curve[1][in[1]], profile.curve[2][in[2]]};
+  const double light[3] = {light_of(profile.curve[0], in[0]), light_of(profile.curve[1], in[1]),
+                           light_of(profile.curve[2], in[2])};
   for (std::size_t c = 0; c < 3; ++c) {
     const std::array<double, 3>& row = profile.to_srgb[c];
     out[c] = encode(row[0] * light[0] + row[1] * light[1] + row[2] * light[2]);
   }
 }
 
+template <class Sample>
+void convert_all(const ColourProfile& profile, const Sample* in, Pixels& pixels) {
+  const std::size_t texels = std::size_t{pixels.width_px} * pixels.height_px;
+  std::uint8_t* p = pixels.data.data();
+  std::uint8_t out[3];
+  for (std::size_t i = 0; i < texels; ++i, in += pixels.channels, p += pixels.channels) {
+    convert_texel(profile, in, out);
+    std::memcpy(p, out, profile.grey ? 1 : 3);
+  }
+}
+
 }  // namespace
 
 ColourProfile read_icc_profile(const std::string& name, std::span<const std::uint8_t> bytes,
-                               std::uint32_t channels) {
+                               std::uint32_t channels, std::size_t codes) {
   constexpr const char* kConvert = "RGB primaries with curves, or a grey curve (convert the image to sRGB)";
-  const IccReader icc(name, bytes);
+  const IccReader icc(name, bytes, codes);
   ColourProfile out;
   out.grey = channels <= 2;
   const std::string space = icc.text(16);
@@ -231,11 +257,12 @@ ColourProfile read_icc_profile(const std::string& name, std::span<const std::uin
   return out;
 }
 
-ColourProfile gamma_profile(double gamma, std::uint32_t channels) {
+ColourProfile gamma_profile(double gamma, std::uint32_t channels, std::size_t codes) {
   ColourProfile out;
   out.grey = channels <= 2;
-  std::vector<double> curve(256);
-  for (std::size_t i = 0; i < 256; ++i) curve[i] = power(static_cast<double>(i) / 255, 1 / gamma);
+  std::vector<double> curve(codes);
+  for (std::size_t i = 0; i < codes; ++i)
+    curve[i] = power(static_cast<double>(i) / static_cast<double>(codes - 1), 1 / gamma);
   out.curve = {curve, curve, curve};
   return out;
 }
@@ -243,10 +270,13 @@ ColourProfile gamma_profile(double gamma, std::uint32_t channels) {
 bool is_srgb(const ColourProfile& profile) {
   constexpr int kSame = 2;
   std::uint8_t in[3], out[3];
+  std::size_t codes[3];
+  const std::size_t step = (profile.curve[0].size() - 1) / 255;
   for (int i = 0; i < 256; ++i)  // greys, and the full range of each primary
     for (int kind = 0; kind < (profile.grey ? 1 : 4); ++kind) {
       for (int c = 0; c < 3; ++c) in[c] = static_cast<std::uint8_t>(kind == 0 || kind == c + 1 ? i : 128);
-      convert_texel(profile, in, out);
+      for (int c = 0; c < 3; ++c) codes[c] = in[c] * step;
+      convert_texel(profile, codes, out);
       for (int c = 0; c < (profile.grey ? 1 : 3); ++c)
         if (std::abs(in[c] - out[c]) > kSame) return false;
     }
@@ -254,13 +284,16 @@ bool is_srgb(const ColourProfile& profile) {
 }
 
 void convert_to_srgb(const ColourProfile& profile, Pixels& pixels) {
-  const std::size_t texels = std::size_t{pixels.width_px} * pixels.height_px;
-  std::uint8_t* p = pixels.data.data();
-  std::uint8_t out[3];
-  for (std::size_t i = 0; i < texels; ++i, p += pixels.channels) {
-    convert_texel(profile, p, out);
-    std::memcpy(p, out, profile.grey ? 1 : 3);
-  }
+  convert_all(profile, pixels.data.data(), pixels);
+}
+
+void convert_to_srgb(const ColourProfile& profile, const std::vector<std::uint16_t>& samples,
+                     Pixels& pixels) {
+  convert_all(profile, samples.data(), pixels);
+}
+
+void convert_to_srgb(const ColourProfile& profile, const std::vector<float>& samples, Pixels& pixels) {
+  convert_all(profile, samples.data(), pixels);
 }
 
 }  // namespace texmesh

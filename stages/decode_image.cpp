@@ -67,17 +67,37 @@ WebPBitstreamFeatures read_webp_header(const std::string& name, Bytes bytes) {
   return features;
 }
 
+/// Row by row into memory that is touched as far as there are rows.
+void decode_webp_into(const Image& image, std::uint8_t* pixels, std::size_t size) {
+  const std::unique_ptr<WebPIDecoder, void (*)(WebPIDecoder*)> decoder(
+      WebPINewRGB(image.channels == 4 ? MODE_RGBA : MODE_RGB, pixels, size,
+                  static_cast<int>(image.width_px * image.channels)),
+      WebPIDelete);
+  if (!decoder) throw InputError(image.name, "pixels", "memory for a WebP decoder", "none");
+  const VP8StatusCode status = WebPIUpdate(decoder.get(), image.bytes.data(), image.bytes.size());
+  if (status == VP8_STATUS_OK) return;
+  int row = 0;
+  if (!WebPIDecGetRGB(decoder.get(), &row, nullptr, nullptr, nullptr)) row = 0;
+  throw InputError(image.name, "row " + std::to_string(row) + " of " + std::to_string(image.height_px),
+                   "a whole WebP", status == VP8_STATUS_SUSPENDED ? "a truncated one" : "a damaged one");
+}
+
+constexpr std::size_t kWebpShrinks = 1000;  // more than this pictures with any noise do not
+
 std::vector<std::uint8_t> decode_webp(const Image& image) {
   const WebPBitstreamFeatures features = read_webp_header(image.name, image.bytes);
   const bool alpha = features.has_alpha != 0;
   if (static_cast<std::uint32_t>(features.width) != image.width_px ||
       static_cast<std::uint32_t>(features.height) != image.height_px || image.channels != (alpha ? 4 : 3))
     throw InputError(image.name, "WebP header", "the size that import had found", "another one");
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(image.width_px) * image.height_px * image.channels);
-  const int stride = static_cast<int>(image.width_px * image.channels);
-  const std::uint8_t* end = (alpha ? WebPDecodeRGBAInto : WebPDecodeRGBInto)(
-      image.bytes.data(), image.bytes.size(), out.data(), out.size(), stride);
-  if (!end) throw InputError(image.name, "pixels", "a whole WebP", "a damaged or truncated one");
+  const std::size_t size = static_cast<std::size_t>(image.width_px) * image.height_px * image.channels;
+  if (size / kWebpShrinks > image.bytes.size()) {  // a lie or one colour: shown to be whole before it costs
+    const auto untouched = std::make_unique_for_overwrite<std::uint8_t[]>(size);
+    decode_webp_into(image, untouched.get(), size);
+    return {untouched.get(), untouched.get() + size};
+  }
+  std::vector<std::uint8_t> out(size);
+  decode_webp_into(image, out.data(), size);
   return out;
 }
 
@@ -118,7 +138,17 @@ OpenImage open_image(const std::string& name, ImageFormat format, Bytes bytes) {
   return open;
 }
 
-std::uint32_t colour_channels(const OIIO::ImageSpec& spec) {
+/// Of an EXR, whose channels have names: colours and their alpha come first, then Z, ids and others.
+std::uint32_t exr_channels(const OIIO::ImageSpec& spec) {
+  if (spec.alpha_channel == 1 || spec.alpha_channel == 3)
+    return static_cast<std::uint32_t>(spec.alpha_channel) + 1;
+  const bool grey = spec.nchannels < 3 || (spec.channelnames[0] == "Y" && spec.channelnames[1] != "RY" &&
+                                           spec.channelnames[1] != "BY");
+  return grey ? 1 : 3;
+}
+
+std::uint32_t colour_channels(const OIIO::ImageSpec& spec, ImageFormat format) {
+  if (format == ImageFormat::kExr && spec.nchannels > 0) return exr_channels(spec);
   const auto n = static_cast<std::uint32_t>(std::max(spec.nchannels, 0));
   if (n <= 4) return n;
   return spec.alpha_channel == 3 ? 4 : 3;
@@ -159,7 +189,7 @@ OpenImage open_checked(const Image& image) {
   OpenImage open = open_image(image.name, image.format, image.bytes);
   if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
       static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
-      colour_channels(open.spec) != image.channels)
+      colour_channels(open.spec, image.format) != image.channels)
     throw InputError(image.name, "image header", "the size that import had found", "another one");
   check_plausible(image);
   return open;
@@ -257,11 +287,6 @@ std::vector<T> read_png(const Image& image) {
   return samples;
 }
 
-std::vector<std::uint8_t> decode_png_pixels(const Image& image) {
-  return image.bits_per_channel == 16 ? bytes_from_words(read_png<std::uint16_t>(image))
-                                      : read_png<std::uint8_t>(image);
-}
-
 void check_jpeg_unchanged(const Image& image) {
   const JpegHeader header = read_jpeg_header(image.name, image.bytes);
   if (header.width_px != image.width_px || header.height_px != image.height_px ||
@@ -269,7 +294,19 @@ void check_jpeg_unchanged(const Image& image) {
     throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
 }
 
-Pixels decode_stored(const Image& image, FloatEncoding encoding) {
+void take_words(const std::vector<std::uint16_t>& words, const ColourProfile* profile, Pixels& pixels) {
+  pixels.data = bytes_from_words(words);
+  if (profile) convert_to_srgb(*profile, words, pixels);
+}
+
+void take_floats(const std::vector<float>& values, FloatEncoding encoding, const ColourProfile* profile,
+                 Pixels& pixels) {
+  pixels.data = bytes_from_floats(values, pixels.channels, profile ? FloatEncoding::kAsIs : encoding);
+  if (profile) convert_to_srgb(*profile, values, pixels);
+}
+
+/// Samples of 16 bits and floats go by `profile`, if any, before they are rounded.
+Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourProfile* profile) {
   if (image.format == ImageFormat::kJpeg) {
     check_jpeg_unchanged(image);
     return decode_jpeg_pixels(image);
@@ -281,7 +318,10 @@ Pixels decode_stored(const Image& image, FloatEncoding encoding) {
   }
   if (image.format == ImageFormat::kPng) {
     check_png_unchanged(image);
-    pixels.data = decode_png_pixels(image);
+    if (image.bits_per_channel == 16)
+      take_words(read_png<std::uint16_t>(image), profile, pixels);
+    else
+      pixels.data = read_png<std::uint8_t>(image);
     return pixels;
   }
   OpenImage open = open_checked(image);
@@ -290,28 +330,30 @@ Pixels decode_stored(const Image& image, FloatEncoding encoding) {
       pixels.data = read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
       break;
     case 16:
-      pixels.data = bytes_from_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16));
+      take_words(read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16), profile, pixels);
       break;
     default:
-      pixels.data = bytes_from_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), image.channels,
-                                      encoding);
+      take_floats(read_samples<float>(image, open, OIIO::TypeDesc::FLOAT), encoding, profile, pixels);
   }
   return pixels;
 }
 
-/// Nothing when the image is sRGB anyway.
+/// Nothing when the image is sRGB anyway. Floats that say so are sRGB encoded, the others linear.
 std::optional<ColourProfile> honoured_profile(const Image& image) {
   const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
   std::optional<ColourProfile> profile;
+  const std::size_t codes = image.bits_per_channel > 8 ? kWordCodes : kByteCodes;
+  if (metadata.damaged_profile)
+    throw InputError(image.name, "colour profile", "a whole ICC profile of at most 16 MB", "a damaged one");
   if (!metadata.icc_profile.empty()) {
     if (metadata.cmyk)
       throw InputError(image.name, "colour profile", "an RGB or grey image (convert it to sRGB)",
                        "CMYK with a profile of its own");
-    profile = read_icc_profile(image.name, metadata.icc_profile, image.channels);
+    profile = read_icc_profile(image.name, metadata.icc_profile, image.channels, codes);
   } else if (metadata.gamma > 0) {
-    profile = gamma_profile(metadata.gamma, image.channels);
+    profile = gamma_profile(metadata.gamma, image.channels, codes);
   }
-  if (profile && is_srgb(*profile)) profile.reset();
+  if (profile && image.bits_per_channel <= 16 && is_srgb(*profile)) profile.reset();
   return profile;
 }
 
@@ -398,7 +440,7 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
     check_spec(name, open.spec, limits);
     image.width_px = static_cast<std::uint32_t>(open.spec.width);
     image.height_px = static_cast<std::uint32_t>(open.spec.height);
-    image.channels = static_cast<std::uint8_t>(colour_channels(open.spec));
+    image.channels = static_cast<std::uint8_t>(colour_channels(open.spec, *format));
     image.bits_per_channel = bits_of(open.spec);
   }
   image.name = std::move(name);
@@ -409,8 +451,8 @@ Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const Image
 Pixels decode_image(const Image& image, FloatEncoding encoding) {
   std::optional<ColourProfile> profile;  // found first: one that is refused need not wait for the pixels
   if (encoding == FloatEncoding::kSrgb && image.honour_profile) profile = honoured_profile(image);
-  Pixels pixels = decode_stored(image, encoding);
-  if (profile && image.bits_per_channel <= 16) convert_to_srgb(*profile, pixels);
+  Pixels pixels = decode_stored(image, encoding, profile ? &*profile : nullptr);
+  if (profile && image.bits_per_channel <= 8) convert_to_srgb(*profile, pixels);
   return pixels;
 }
 

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kDecodeImageVersion = 2;
+inline constexpr int kDecodeImageVersion = 3;
 
 /// Decoded pixels, row-major, interleaved, top row first.
 struct Pixels {
@@ -48,8 +48,8 @@ const char* image_extension(ImageFormat format);
 
 /// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and
 /// checks size and channels against the limits before any pixel is read. `name` is for messages. Throws
-/// InputError. Channels beyond the colour (depth, object ids in EXR and TIFF) are left out; CMYK becomes RGB,
-/// palettes RGB or RGBA.
+/// InputError. Channels beyond the colour (depth, object ids in EXR and TIFF) are left out, but a TIFF's
+/// second or fourth that says nothing of itself is its alpha; CMYK becomes RGB, palettes RGB or RGBA.
 Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const ImageLimits& limits);
 
 /// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,

@@ -1,5 +1,6 @@
 #include "stages/decode_jpeg.h"
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdio>
@@ -130,6 +131,16 @@ JBLOCKROW block_row(Decoder& decoder, jvirt_barray_ptr blocks, JDIMENSION row) {
   throw InputError(name, place, "a JPEG that decodes", decoder.message[0] ? decoder.message : "no more data");
 }
 
+/// Where a file that holds its pixels in several scans went wrong before the first row could be given.
+std::string scan_place(const Decoder& decoder) {
+  const jpeg_decompress_struct& info = decoder.info;
+  if (info.input_scan_number == 0 || !info.comps_in_scan) return "JPEG header";
+  const JDIMENSION row = std::min<JDIMENSION>(
+      info.image_height, info.input_iMCU_row * static_cast<JDIMENSION>(info.max_v_samp_factor) * DCTSIZE);
+  return "scan " + std::to_string(info.input_scan_number) + ", row " + std::to_string(row) + " of " +
+         std::to_string(info.image_height);
+}
+
 }  // namespace
 
 JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_t> bytes) {
@@ -148,7 +159,8 @@ void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
   Decoder decoder;
   jpeg_progress_mgr progress{};
   open(decoder, progress, bytes);
-  if (decoder.message[0] || !start(decoder)) fail(name, "JPEG header", decoder);
+  if (decoder.message[0]) fail(name, "JPEG header", decoder);
+  if (!start(decoder)) fail(name, scan_place(decoder), decoder);
   const std::uint32_t width = decoder.info.output_width, height = decoder.info.output_height;
   const bool cmyk = decoder.info.out_color_space == JCS_CMYK;
   std::vector<std::uint8_t> buffer(static_cast<std::size_t>(width) *
@@ -174,7 +186,7 @@ JpegCoefficients::JpegCoefficients(const std::string& name, std::span<const std:
   open(decoder, state_->progress, bytes);
   if (decoder.message[0]) fail(name, "JPEG header", decoder);
   jvirt_barray_ptr* const blocks = read_coefficients(decoder);
-  if (!blocks) fail(name, "coefficients", decoder);
+  if (!blocks) fail(name, scan_place(decoder), decoder);
   for (int c = 0; c < decoder.info.num_components; ++c) {
     const jpeg_component_info& from = decoder.info.comp_info[c];
     Component to;

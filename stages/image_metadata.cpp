@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -35,6 +36,12 @@ std::uint32_t little(Bytes b) {
 
 bool begins(Bytes bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && !std::memcmp(bytes.data(), magic.data(), magic.size());
+}
+
+/// Nothing, or too much, where one should be is a damaged one.
+void take_profile(Bytes profile, ImageMetadata& out) {
+  if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
+  out.damaged_profile = out.icc_profile.empty();
 }
 
 // --- TIFF, which EXIF is too ---------------------------------------------------------------------------
@@ -127,8 +134,7 @@ void read_tiff(Bytes bytes, ImageMetadata& out) {
   read_orientation(bytes, out);
   const Tiff tiff(bytes);
   if (const std::size_t at = tiff.entry(kProfile)) {
-    const Bytes profile = tiff.far_value(at);
-    if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
+    take_profile(tiff.far_value(at), out);
   }
   if (const std::size_t at = tiff.entry(kPhotometric)) {
     const std::uint32_t colours = tiff.short_value(at);
@@ -154,17 +160,23 @@ void read_jpeg(Bytes bytes, ImageMetadata& out) {
     if (length < 2) break;
     const Bytes body = part(bytes, at + 4, length - 2);
     if (marker == 0xe1 && begins(body, "Exif")) read_exif(body, out);
-    if (marker == 0xe2 && begins(body, kIcc) && body.size() > kIcc.size() + 2) {
-      profile[body[kIcc.size()]] = body.subspan(kIcc.size() + 2);
-      pieces = body[kIcc.size() + 1];
+    if (marker == 0xe2 && begins(body, kIcc)) {
+      out.damaged_profile = true;  // until all pieces are there
+      if (body.size() > kIcc.size() + 2) {
+        profile[body[kIcc.size()]] = body.subspan(kIcc.size() + 2);
+        pieces = body[kIcc.size() + 1];
+      }
     }
     const bool frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (frame && body.size() > 5) out.cmyk = body[5] == 4;
     at += 2 + length;
   }
-  if (profile.empty() || profile.size() != pieces || profile.begin()->first != 1) return;
+  if (profile.empty() || profile.size() != pieces || profile.begin()->first != 1 ||
+      profile.rbegin()->first != pieces)
+    return;
   for (const auto& [number, piece] : profile)
     out.icc_profile.insert(out.icc_profile.end(), piece.begin(), piece.end());
+  out.damaged_profile = false;
 }
 
 // --- PNG -----------------------------------------------------------------------------------------------
@@ -199,9 +211,10 @@ void read_png(Bytes bytes, ImageMetadata& out) {
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
     const std::size_t length = big(bytes.subspan(at, 4));
     const Bytes type = bytes.subspan(at + 4, 4), body = part(bytes, at + 8, length);
+    if (body.size() != length && begins(type, "iCCP")) out.damaged_profile = true;
     if (body.size() != length || begins(type, "IDAT") || begins(type, "IEND")) break;
     if (begins(type, "sRGB")) srgb = true;
-    if (begins(type, "iCCP")) out.icc_profile = inflate_profile(body);
+    if (begins(type, "iCCP")) take_profile(inflate_profile(body), out);
     if (begins(type, "eXIf")) read_exif(body, out);
     if (begins(type, "cHRM") && length == 32) out.other_primaries = !srgb_primaries(body);
     if (begins(type, "gAMA") && length == 4) {
@@ -210,6 +223,7 @@ void read_png(Bytes bytes, ImageMetadata& out) {
     }
     at += 12 + length;
   }
+  if (srgb) out.damaged_profile = false;
   if (srgb || !out.icc_profile.empty()) out.gamma = 0, out.other_primaries = false;
 }
 
@@ -219,10 +233,42 @@ void read_webp(Bytes bytes, ImageMetadata& out) {
   for (std::size_t at = 12; at + 8 <= bytes.size();) {
     const std::size_t length = little(bytes.subspan(at + 4, 4));
     const Bytes type = bytes.subspan(at, 4), body = part(bytes, at + 8, length);
+    if (begins(type, "ICCP")) take_profile(body, out);
     if (body.size() != length) break;
-    if (begins(type, "ICCP") && length <= kMaxProfile) out.icc_profile.assign(body.begin(), body.end());
     if (begins(type, "EXIF")) read_exif(body, out);
     at += 8 + length + length % 2;
+  }
+}
+
+// --- EXR -----------------------------------------------------------------------------------------------
+
+/// Text up to a zero byte, which `at` is then behind; nothing where there is none within EXR's 255.
+std::string_view exr_text(Bytes bytes, std::size_t& at) {
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
+  const auto end = std::find(begin, begin + std::min<std::ptrdiff_t>(256, bytes.end() - begin), 0);
+  if (end == bytes.end() || *end != 0) return {};
+  at += static_cast<std::size_t>(end - begin) + 1;
+  return {reinterpret_cast<const char*>(bytes.data()) + (begin - bytes.begin()),
+          static_cast<std::size_t>(end - begin)};
+}
+
+bool rec709_primaries(Bytes chromaticities) {
+  constexpr float kRec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
+  for (std::size_t i = 0; i < 8; ++i)
+    if (!(std::fabs(std::bit_cast<float>(little(chromaticities.subspan(4 * i, 4))) - kRec709[i]) <= 0.005f))
+      return false;
+  return true;
+}
+
+void read_exr(Bytes bytes, ImageMetadata& out) {
+  for (std::size_t at = 8;;) {
+    const std::string_view name = exr_text(bytes, at), type = exr_text(bytes, at);
+    const Bytes size = part(bytes, at, 4);
+    if (name.empty() || type.empty() || size.empty()) return;
+    const Bytes value = part(bytes, at + 4, little(size));
+    if (name == "chromaticities" && type == name && value.size() == 32)
+      out.other_primaries = !rec709_primaries(value);
+    at += 4 + std::size_t{little(size)};
   }
 }
 
@@ -244,6 +290,7 @@ ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8
       read_webp(bytes, out);
       break;
     case ImageFormat::kExr:
+      read_exr(bytes, out);
       break;
   }
   return out;

@@ -52,18 +52,21 @@ void note_foreign_extension(Model& model, const Image& image, const std::string&
 void apply_metadata(Model& model, Image& image, const std::string& place, const ImportOptions& options) {
   const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
   image.honour_profile = options.colour_profiles != ProfilePolicy::kIgnore;
-  const char* what = !metadata.icc_profile.empty() ? "an ICC profile"
-                     : metadata.gamma > 0          ? "a gamma"
-                                                   : nullptr;
+  const char* what = metadata.damaged_profile        ? "a damaged ICC profile"
+                     : !metadata.icc_profile.empty() ? "an ICC profile"
+                     : metadata.gamma > 0            ? "a gamma"
+                                                     : nullptr;
   if (what && !image.honour_profile)
     add_info(model.notes, "colour-profile-ignored", place,
              image.name + " has " + what + " that is ignored: its values are taken as sRGB");
   if (what && image.honour_profile)
     add_info(model.notes, "colour-profile", place,
-             image.name + " has " + what + ": where it gives colours they are converted to sRGB");
+             image.name + " has " + what +
+                 (metadata.damaged_profile ? ": where it gives colours it is refused"
+                                           : ": where it gives colours they are converted to sRGB"));
   if (metadata.other_primaries)
     add_warning(model.notes, "colour-primaries-ignored", place,
-                image.name + " names primaries (cHRM) other than sRGB's without a profile; they are ignored");
+                image.name + " names primaries other than sRGB's without a profile; they are ignored");
   if (metadata.cmyk && metadata.icc_profile.empty())
     add_info(model.notes, "cmyk-image", place,
              image.name + " is CMYK without a profile; its inks are taken as ideal ones");

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "format/errors.h"
 #include "stages/image_metadata.h"
@@ -260,6 +261,75 @@ TEST(ImageMetadata, BigTiffToo) {
   EXPECT_EQ(read_image_metadata(ImageFormat::kTiff, tiff).foreign_colours, "CIE L*a*b*");
   for (std::size_t n = 0; n < tiff.size(); ++n)  // reads nothing beyond, whatever is cut
     read_image_metadata(ImageFormat::kTiff, {tiff.data(), n});
+}
+
+TEST(ImageMetadata, DamagedProfilesAreToldFromNone) {
+  const auto damaged = [](ImageFormat format, const Bytes& file) {
+    const ImageMetadata metadata = read_image_metadata(format, file);
+    EXPECT_TRUE(metadata.icc_profile.empty());
+    return metadata.damaged_profile;
+  };
+  const Bytes jpeg = testing::jpeg_bytes(8, 8, 3), png = testing::png_bytes(8, 8, 3);
+  EXPECT_FALSE(damaged(ImageFormat::kJpeg, jpeg));
+  EXPECT_FALSE(damaged(ImageFormat::kPng, png));
+  Bytes piece{'I', 'C', 'C', '_', 'P', 'R', 'O', 'F', 'I', 'L', 'E', 0, 1, 2, 9, 9};
+  EXPECT_TRUE(damaged(ImageFormat::kJpeg, with_jpeg_segment(jpeg, 0xe2, piece))) << "1 of 2";
+  piece.resize(12);
+  EXPECT_TRUE(damaged(ImageFormat::kJpeg, with_jpeg_segment(jpeg, 0xe2, piece))) << "no number";
+  Bytes half = iccp(adobe_icc());
+  half.resize(half.size() / 2);
+  EXPECT_TRUE(damaged(ImageFormat::kPng, png_with_chunk(png, "iCCP", half)));
+  EXPECT_FALSE(damaged(ImageFormat::kPng, png_with_chunk(png_with_chunk(png, "iCCP", half), "sRGB", {0})));
+  EXPECT_TRUE(damaged(ImageFormat::kPng, png_with_chunk(png, "iCCP", iccp(Bytes((16u << 20) + 1)))));
+  const Bytes webp{'R', 'I', 'F', 'F', 0, 0, 0, 0, 'W', 'E', 'B', 'P', 'I', 'C', 'C', 'P', 9, 0, 0, 0, 1, 2};
+  EXPECT_TRUE(damaged(ImageFormat::kWebp, webp));
+
+  Image image = probe_image("bad.png", png_with_chunk(png, "iCCP", half), {});
+  EXPECT_NO_THROW(decode_image(image, FloatEncoding::kSrgb));
+  image.honour_profile = true;
+  EXPECT_NO_THROW(decode_image(image, FloatEncoding::kAsIs));
+  EXPECT_THROW(decode_image(image, FloatEncoding::kSrgb), InputError);
+}
+
+TEST(DecodeImage, DarkLinearWordsKeepTheirSteps) {
+  std::vector<std::uint16_t> ramp;
+  for (int i = 0; i < 256; ++i) ramp.push_back(static_cast<std::uint16_t>(i * 13));  // to 0.05
+  Bytes gamma;
+  put32(gamma, 100000);
+  Image image = probe_image(
+      "ramp.png",
+      png_with_chunk(testing::encode_image("png", 256, 1, 1, ramp, OIIO::TypeDesc::UINT16), "gAMA", gamma),
+      {});
+  ASSERT_EQ(image.bits_per_channel, 16);
+  image.honour_profile = true;
+  const Bytes codes = decode_image(image, FloatEncoding::kSrgb).data;
+  EXPECT_GT(std::set<int>(codes.begin(), codes.end()).size(), 50u);
+  for (std::size_t i = 0; i < 256; ++i) {
+    const double x = ramp[i] / 65535.0;
+    EXPECT_NEAR(codes[i], 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055), 0.51);
+  }
+}
+
+TEST(DecodeImage, FloatsGoByTheirProfile) {
+  const auto decoded = [](const Bytes& icc, bool honour) {
+    OIIO::ImageSpec attributes;
+    attributes.attribute("ICCProfile", OIIO::TypeDesc(OIIO::TypeDesc::UINT8, static_cast<int>(icc.size())),
+                         icc.data());
+    Image image = probe_image(
+        "f.tif",
+        testing::encode_image("tiff", 2, 1, 3, std::vector<float>{0.5f, 0.5f, 0.5f, 0.8f, -1, NAN},
+                              OIIO::TypeDesc::FLOAT, attributes),
+        {});
+    image.honour_profile = honour;
+    return decode_image(image, FloatEncoding::kSrgb).data;
+  };
+  EXPECT_EQ(decoded(srgb_icc(), false)[0], 188) << "floats are linear unless they say otherwise";
+  const Bytes same = decoded(srgb_icc(), true), want{128, 128, 128, 204, 0, 0};
+  for (std::size_t i = 0; i < want.size(); ++i) EXPECT_NEAR(same[i], want[i], 1) << i;
+  EXPECT_EQ(decoded(rgb_icc(curve_of_points({})), true), decoded(srgb_icc(), false));
+  const Bytes adobe = decoded(adobe_icc(), true);
+  EXPECT_NEAR(adobe[0], 128, 2);
+  EXPECT_GT(adobe[3], 215) << "a redder red than sRGB's";
 }
 
 TEST(DecodeImage, ColoursGoByTheProfileWhereItIsToBeHonoured) {

@@ -428,7 +428,12 @@ Bytes make_tiff(std::uint32_t width, std::uint32_t height, std::uint32_t channel
 TEST(DecodeImage, TruncationNamesTheFileAndTheRow) {
   constexpr std::uint32_t kRgb = 2;
   const Bytes samples = test_picture(64, 200, 3);
+  OIIO::ImageSpec progressive;
+  progressive.attribute("jpeg:progressive", 1);
   const std::pair<const char*, Bytes> files[] = {
+      {": scan ", encode_image("jpeg", 64, 200, 3, samples, OIIO::TypeDesc::UINT8, progressive)},
+      {": row ", webp_bytes(64, 200, 3, samples)},
+      {": row ", webp_bytes(64, 200, 4, test_picture(64, 200, 4))},
       {"row ", encode_image("png", 64, 200, 3, samples, OIIO::TypeDesc::UINT8)},
       {"row ", encode_image("jpeg", 64, 200, 3, samples, OIIO::TypeDesc::UINT8)},
       {"rows ", make_tiff(64, 200, 3, 8, kRgb, samples)}};
@@ -480,6 +485,79 @@ TEST(DecodeImage, SixtyFiveThousandByTheSameCostsNothing) {
   EXPECT_THROW(probe_image("big.jpg", jpeg, {}), InputError) << "beyond the limit of pixels";
   const std::string error = error_of([&] { decode_image(probe_image("big.jpg", jpeg, limits)); });
   EXPECT_NE(error.find("of 65000"), std::string::npos) << error;
+}
+
+TEST(DecodeImage, WebpThatClaimsMoreThanItHasNamesTheRow) {
+  Bytes webp = webp_bytes(8, 8, 3, test_picture(8, 8, 3));
+  ASSERT_EQ(webp[20], 0x2f);
+  const std::uint32_t sides = 16382u | 16382u << 14;  // less 1, 14 bits each
+  for (int i = 0; i < 4; ++i)
+    webp[21 + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(
+        (i == 3 ? webp[24] & 0xf0u : 0u) | (sides >> (8 * i) & (i == 3 ? 0x0fu : 0xffu)));
+  const Image image = probe(webp);
+  ASSERT_EQ(image.width_px, 16383u);
+  const std::string error = error_of([&] { decode_image(image); });
+  EXPECT_NE(error.find("row "), std::string::npos) << error;
+  EXPECT_NE(error.find("of 16383"), std::string::npos) << error;
+}
+
+TEST(DecodeImage, WebpOfOneColourIsSmallAndWhole) {
+  Bytes samples;
+  for (int i = 0; i < 512 * 512; ++i) samples.insert(samples.end(), {10, 20, 30});
+  const Bytes webp = webp_bytes(512, 512, 3, samples);
+  ASSERT_LT(webp.size(), samples.size() / 1000);
+  EXPECT_EQ(decode_image(probe(webp)).data, samples);
+}
+
+/// Channel c is (c + 1) / 8 everywhere.
+Bytes exr_of(const std::vector<std::string>& names, const OIIO::ImageSpec& attributes = {}) {
+  const int n = static_cast<int>(names.size());
+  OIIO::ImageSpec spec(4, 4, n, OIIO::TypeDesc::FLOAT);
+  spec.extra_attribs = attributes.extra_attribs;
+  spec.channelnames = names;
+  std::vector<float> samples;
+  for (int i = 0; i < 16 * n; ++i) samples.push_back(static_cast<float>(i % n + 1) / 8);
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  auto output = OIIO::ImageOutput::create("openexr");
+  output->set_ioproxy(&memory);
+  EXPECT_TRUE(output->open("x.exr", spec) && output->write_image(OIIO::TypeDesc::FLOAT, samples.data()) &&
+              output->close());
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(DecodeImage, DepthOfAnExrIsNoAlpha) {
+  using Names = std::vector<std::string>;
+  for (const auto& [names, channels] : {std::pair{Names{"R", "G", "B", "Z"}, 3},
+                                        {Names{"Y", "Z"}, 1},
+                                        {Names{"R", "G", "B", "A"}, 4},
+                                        {Names{"R", "G", "B", "A", "Z"}, 4},
+                                        {Names{"R", "G", "B"}, 3},
+                                        {Names{"Y"}, 1},
+                                        {Names{"Y", "A"}, 2}}) {
+    const Image image = probe(exr_of(names));
+    EXPECT_EQ(image.channels, channels) << names.size() << names.back();
+    EXPECT_EQ(decode_image(image).data.size(), 16u * static_cast<unsigned>(channels));
+    if (channels % 2 == 1) {
+      EXPECT_EQ(decode_image(image).data[0], 32);
+    }
+  }
+}
+
+TEST(DecodeImage, PrimariesOfAnExrAreSeen) {
+  const auto primaries = [](std::vector<float> c) {
+    OIIO::ImageSpec attributes;
+    attributes.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), c.data());
+    return exr_of({"R", "G", "B"}, attributes);
+  };
+  const Bytes aces = primaries({0.7347f, 0.2653f, 0, 1, 0.0001f, -0.077f, 0.32168f, 0.33767f});
+  EXPECT_TRUE(read_image_metadata(ImageFormat::kExr, aces).other_primaries);
+  EXPECT_FALSE(read_image_metadata(ImageFormat::kExr,
+                                   primaries({0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f}))
+                   .other_primaries);
+  EXPECT_FALSE(read_image_metadata(ImageFormat::kExr, exr_of({"R", "G", "B"})).other_primaries);
+  for (std::size_t n = 0; n < aces.size(); ++n)
+    read_image_metadata(ImageFormat::kExr, std::span(aces).first(n));
 }
 
 TEST(DecodeImage, JpegOfTwelveAndSixteenBitsIsRefused) {
