@@ -9,7 +9,13 @@ export { FormatError, InputError, TexmeshError } from './errors';
 export type * from './reader';
 export type * from './api';
 
-const policies = ['guard', 'htc', 'price', 'proportional', 'static'] as const;
+/** Options with names; what is left out is chosen by the library. */
+const names = {
+  policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static'],
+  order: ['credit', 'beta0', 'finest'],
+  rule: ['measured', 'default', 'jnd', 'error', 'edge'],
+  meshes: ['glb', 'stream', 'auto'],
+} as const;
 
 /** A package that can be shown in three.js scenes. */
 export class TexmeshPackage extends PackageReader {
@@ -18,11 +24,17 @@ export class TexmeshPackage extends PackageReader {
 
   /**
    * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
-   * counts from the package's first request for the first load, from this call for others. InputError: no such policy.
+   * counts from the package's first request for the first load, from this call for others. InputError: options that are none.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
     const policy = options.policy === 'htca' ? 'htc' : (options.policy ?? 'guard');
-    if (!policies.includes(policy)) throw new InputError('options', 'policy', policies.join(', '), String(policy));
+    const { time = 0, display } = options;
+    for (const [name, all] of Object.entries(names)) {
+      const said = options[name as keyof typeof names];
+      if (said !== undefined && !(all as readonly string[]).includes(said)) throw new InputError('options', name, all.join(', '), String(said));
+    }
+    if (!(time >= -Infinity)) throw new InputError('options', 'time', 'seconds', String(time));
+    if (typeof display === 'number' && !(display >= 0)) throw new InputError('options', 'display', 'pixels', String(display));
     const forget = (): void => void this.loads_.delete(load);
     const load = new ModelLoad(this, scene, { ...options, policy }, this.loaded_ ? nowS() : this.openedS, forget);
     this.loaded_ = true;

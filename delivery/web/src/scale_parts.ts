@@ -1,6 +1,7 @@
 import { BufferGeometry, Material, Mesh, Object3D, Texture } from 'three';
 import type { GltfLoaderLike } from './api';
 import { FormatError } from './errors';
+import { imageSize, mostPreviewPx } from './image_size';
 
 /** What this library uses of GLTFLoader's result and parser. */
 export interface ParsedGltf {
@@ -46,41 +47,43 @@ export function disposeTexture(texture: Texture): void {
   (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
 }
 
-const [glbMagic, jsonChunk, bytesChunk] = [0x46546c67, 0x4e4f534a, 0x004e4942];
+/** What of a GLB's JSON makes loaders ask somebody, or make room for pictures. */
+interface Embedding {
+  buffers?: { uri?: unknown }[];
+  images?: { uri?: unknown; bufferView?: number }[];
+  bufferViews?: Record<number, { buffer?: unknown; byteOffset?: number; byteLength?: number; extensions?: unknown } | undefined>;
+}
 
-/** The JSON of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
-function jsonOfGlb(glb: Uint8Array): Record<string, unknown> {
+/** JSON and bytes of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
+function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
-  require(glb.length >= 20 && view.getUint32(0, true) === glbMagic && view.getUint32(8, true) === glb.length, 'a GLB');
-  const ends = [12];
-  while (ends[0] < glb.length) {
-    const at = ends[0];
-    const type = [jsonChunk, bytesChunk][ends.length - 1];
-    require(at + 8 <= glb.length && view.getUint32(at + 4, true) === type, 'a chunk of JSON, then at most one of bytes');
-    ends.unshift(at + 8 + view.getUint32(at, true));
-  }
-  require(ends[0] === glb.length, 'chunks that fill the file');
+  const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
+  const end = 20 + at(12);
+  const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
+  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'a GLB of JSON and bytes');
   let json: unknown;
   try {
-    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + view.getUint32(12, true))));
+    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end)));
   } catch {
     // told below
   }
-  require(typeof json === 'object' && json && !Array.isArray(json), 'JSON in its GLB');
-  return json as Record<string, unknown>;
+  require(typeof json === 'object' && json, 'JSON in its GLB');
+  return { json, bytes: glb.subarray(end + 8) };
 }
 
-/** Nothing but the file itself is read: a URI in it would make pages ask whomever it names. FormatError otherwise. */
+/**
+ * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. Its pictures, which loaders decode, are no
+ * larger than previews. FormatError otherwise.
+ */
 export function requireOwnBytes(glb: Uint8Array): void {
-  const json = jsonOfGlb(glb);
-  for (const list of [json.buffers ?? [], json.images ?? []]) {
-    require(Array.isArray(list), 'lists of buffers and images');
-    for (const item of list as unknown[]) {
-      require(typeof item === 'object' && item, 'buffers and images that are objects');
-      const { uri } = item as { uri?: unknown };
-      const own = uri === undefined || (typeof uri === 'string' && /^data:/i.test(uri));
-      if (!own) throw new FormatError('mesh', 'uri', 'bytes within the file', String(uri).slice(0, 40));
-    }
+  const { json, bytes } = partsOfGlb(glb);
+  for (const list of [json.buffers ?? [], json.images ?? []])
+    require(Array.isArray(list) && list.every((item) => item && item.uri === undefined), 'buffers and images within the file');
+  for (const { bufferView = -1 } of json.images ?? []) {
+    const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
+    require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'pictures as they are');
+    const [width, height] = imageSize(bytes.subarray(at, at + length));
+    require(width > 0 && width <= mostPreviewPx && height > 0 && height <= mostPreviewPx, 'previews');
   }
 }
 

@@ -6,6 +6,7 @@ import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
 import { InputError } from './errors';
 import { isAbort, isForGood, sleepS, throwIfAborted } from './http';
+import { mostPreviewPx } from './image_size';
 import { LoadContext, hysteresis } from './load_context';
 import type { QualityTable } from './quality_table';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
@@ -29,7 +30,6 @@ const refineRequests = 4;
 const mostPending = 48;
 /** Of the time left when a mesh is asked for: textures do not wait longer for it. */
 const meshShare = 0.5;
-const mostPreviewPx = 4096;
 const longestTimerS = 1e6;
 /** Less of the limit than this, beside a round trip, is not worth another request. */
 const leastRest = 0.004;

@@ -24,6 +24,9 @@ export interface TransferHooks {
   /** It cannot be had, or not decoded; the preview stays. */
   lost(wish: Wish, error: unknown): void;
 }
+/** Fragments at a border may reach so far beyond their plane. */
+const beyondPx = 1024;
+
 interface Part {
   wish: Wish;
   rung: number;
@@ -215,8 +218,9 @@ export class Transfers {
     const { plane, fragment, rung } = job.wish;
     const { tables, complete } = this.filesOf(plane);
     const streams = job.streams as Uint8Array[];
-    const { codec, fragmentWidthPx, fragmentHeightPx } = this.textures_[plane];
-    const most: [number, number] = [fragmentWidthPx, fragmentHeightPx];
+    const { codec, fragmentWidthPx, fragmentHeightPx, widthPx, heightPx } = this.textures_[plane];
+    // A plane that the GPU can hold says how much room there is; the sides of its only fragment may say anything.
+    const most: [number, number] = [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)];
     if (complete) {
       const digests = [complete[rung].get(fragment)!.sha256];
       return this.pool_.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true, levels: ownLevels, most });

@@ -1,6 +1,7 @@
 import { samePrefix } from './bytes';
 import { codecTraits, joinFragment } from './codec';
 import { FormatError, TexmeshError } from './errors';
+import { imageSize } from './image_size';
 import { sha256 } from './sha256';
 import { SplitStreamReader } from './split_stream';
 import { splitInfo, splitUpdate } from './split_update';
@@ -10,25 +11,6 @@ import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest
 // worker can be had.
 
 const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
-
-/** Width and height that a JPEG or WebP file says it has, before anybody makes room for them; 0, 0 where it is neither. */
-export function imageSize(b: Uint8Array): [number, number] {
-  const at = (i: number): number => b[i] ?? 0;
-  const be = (i: number): number => at(i) * 256 + at(i + 1);
-  const le = (i: number): number => at(i) + at(i + 1) * 256;
-  if (be(0) === 0xffd8)
-    for (let i = 2; i < b.length && at(i) === 0xff; ) {
-      const marker = at(i + 1);
-      if (marker === 0xff) ++i;
-      else if (marker >= 0xc0 && marker <= 0xcf && marker !== 0xc4 && marker !== 0xc8 && marker !== 0xcc) return [be(i + 7), be(i + 5)];
-      else i += 2 + Math.max(2, be(i + 2));
-    }
-  const kind = String.fromCharCode(...b.subarray(8, 16));
-  if (kind === 'WEBPVP8 ') return [le(26) & 0x3fff, le(28) & 0x3fff];
-  if (kind === 'WEBPVP8L') return [1 + (le(21) & 0x3fff), 1 + ((le(22) >> 6) | ((at(24) & 15) << 10))];
-  if (kind === 'WEBPVP8X') return [1 + le(24) + at(26) * 65536, 1 + le(27) + at(29) * 65536];
-  return [0, 0];
-}
 
 async function decode(request: DecodeRequest): Promise<Levels> {
   for (const [i, digest] of request.digests.entries())

@@ -92,6 +92,21 @@ describe('transfers', () => {
     expect(failed.every((w) => w.plane === 0)).toBe(true);
     expect(t.decoded.length).toBe(wishes.length - failed.length);
   });
+  it('no picture may be much larger than its plane, whatever is said of fragments', async () => {
+    const s = await setUp();
+    const most: number[] = [];
+    const watch = async (request: WorkerRequest): Promise<[unknown, Transferable[]]> => {
+      if (request.op === 'decode') most.push(...request.most);
+      return decode(request);
+    };
+    const textures = s.data.textures.map((t) => ({ ...t, fragmentWidthPx: 1 << 20, fragmentHeightPx: 1 << 20 }));
+    const transfers = new Transfers(s.reader, textures, new WorkerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
+    await transfers.prepare([0]);
+    await transfers.fetch(wishesOf(s.list, 0).slice(0, 1), { gapBytes: 0, mostBytes: Infinity }, () => undefined, () => undefined);
+    while (transfers.pending > 0) await new Promise((go) => setTimeout(go, 1));
+    expect(most.length).toBe(2);
+    expect(Math.max(...most)).toBeLessThan(2048);
+  });
   it('cancelling fails what is under way', async () => {
     const s = await setUp();
     const abort = new AbortController();
