@@ -306,7 +306,7 @@ export class TextureLoad {
     const { override } = this.load_;
     const replaces = override.rung !== undefined;
     for (let lost = -1; lost < this.gaveUp_.size && !this.load_.pool.none; ) {
-      await this.composed(); // nothing comes behind what replaces it
+      if (this.underWay_.size > 0) await this.composed(); // nothing comes behind what replaces it
       lost = this.gaveUp_.size;
       const wishes = list.fragments.map((f, offer): Wish => {
         let rung = Math.min(override.rung ?? Infinity, list.offers[offer].bytes.length - 1);
