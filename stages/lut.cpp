@@ -7,7 +7,7 @@
 
 #include "format/portable_math.h"
 #include "format/sha256.h"
-#include "stages/distortion.h"
+#include "stages/fragment_meter.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
 
@@ -50,21 +50,19 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     fail("quality_min", "at most quality_max", std::to_string(options.quality_min));
 }
 
-/// One value of 8 bits per texel of a fragment: what the distortion is measured on. Luma as JPEG defines it.
-std::vector<std::uint8_t> fragment_luma(const TexturePlane& plane, const Pixels& pixels,
-                                        std::size_t fragment) {
+/// What the distortion of a fragment is measured on.
+Samples fragment_samples(const TexturePlane& plane, const Pixels& pixels, std::size_t fragment) {
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * w;
   const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * h;
-  std::vector<std::uint8_t> out(std::size_t{w} * h);
-  std::uint8_t* to = out.data();
-  for (std::uint32_t y = 0; y < h; ++y) {
-    const std::uint8_t* p = pixels.at(left, top + y);
-    for (std::uint32_t x = 0; x < w; ++x, p += plane.channels)
-      *to++ = plane.channels == 1
-                  ? p[0]
-                  : static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
-  }
+  const std::size_t measured = measured_channels(plane);
+  Samples out(measured, std::vector<std::uint8_t>(std::size_t{w} * h));
+  for (std::size_t c = 0; c < measured; ++c)
+    for (std::uint32_t y = 0; y < h; ++y) {
+      const std::uint8_t* p = pixels.at(left, top + y);
+      for (std::uint32_t x = 0; x < w; ++x, p += plane.channels)
+        out[c][std::size_t{y} * w + x] = measured_value(p, plane.channels, measured, c);
+    }
   return out;
 }
 
@@ -82,30 +80,38 @@ std::vector<std::uint8_t> fragment_mask(const TexturePlane& plane, std::size_t f
   return out;
 }
 
-/// A fragment's luma as the preview shows it: bilinear, in 1/256 of a preview's texel.
-class PreviewLuma {
+/// A fragment's samples as the preview shows them: bilinear, in 1/256 of a preview's texel.
+class PreviewSamples {
  public:
-  PreviewLuma(const TexturePlane& plane, const std::vector<std::uint8_t>& jpeg)
-      : plane_(plane), preview_(decode_jpeg_luma(jpeg, 1u << 26)) {}
+  PreviewSamples(const TexturePlane& plane, const std::vector<std::uint8_t>& jpeg)
+      : plane_(plane), measured_(measured_channels(plane)) {
+    constexpr std::uint64_t kMostPixels = 1u << 26;
+    const Pixels preview =
+        measured_ > 1 ? decode_jpeg(jpeg, kMostPixels) : decode_jpeg_luma(jpeg, kMostPixels);
+    width_ = preview.width_px;
+    height_ = preview.height_px;
+    preview_ = split_samples(preview, measured_);
+  }
 
-  std::vector<std::uint8_t> fragment(std::size_t fragment) const {
+  Samples fragment(std::size_t fragment) const {
     const std::uint32_t w = plane_.fragment_width_px, h = plane_.fragment_height_px;
     const auto left = static_cast<std::uint32_t>(fragment % plane_.columns) * w;
     const auto top = static_cast<std::uint32_t>(fragment / plane_.columns) * h;
     std::vector<Place> across;
-    for (std::uint32_t x = 0; x < w; ++x)
-      across.push_back(place(left + x, plane_.width_px, preview_.width_px));
-    std::vector<std::uint8_t> out;
-    out.reserve(std::size_t{w} * h);
-    for (std::uint32_t y = 0; y < h; ++y) {
-      const Place v = place(top + y, plane_.height_px, preview_.height_px);
-      const std::uint8_t *a = preview_.at(0, v.first), *b = preview_.at(0, v.second);
-      for (const Place& u : across) {
-        const std::uint32_t upper = a[u.first] * (256 - u.part) + a[u.second] * u.part;
-        const std::uint32_t lower = b[u.first] * (256 - u.part) + b[u.second] * u.part;
-        out.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+    for (std::uint32_t x = 0; x < w; ++x) across.push_back(place(left + x, plane_.width_px, width_));
+    Samples out(measured_);
+    for (std::size_t c = 0; c < measured_; ++c)
+      for (std::uint32_t y = 0; y < h; ++y) {
+        const Place v = place(top + y, plane_.height_px, height_);
+        const std::uint8_t *a = preview_[c].data() + std::size_t{v.first} * width_,
+                           *b = preview_[c].data() + std::size_t{v.second} * width_;
+        for (const Place& u : across) {
+          const std::uint32_t upper = a[u.first] * (256 - u.part) + a[u.second] * u.part;
+          const std::uint32_t lower = b[u.first] * (256 - u.part) + b[u.second] * u.part;
+          out[c].push_back(
+              static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+        }
       }
-    }
     return out;
   }
 
@@ -122,25 +128,27 @@ class PreviewLuma {
   }
 
   const TexturePlane& plane_;
-  Pixels preview_;
+  std::size_t measured_;
+  std::uint32_t width_ = 0, height_ = 0;
+  Samples preview_;
 };
 
 /// Sizes, digests and distortions of one fragment at every rung, and of what the preview shows of it.
 void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
-                      const PreviewLuma& preview, std::size_t fragment, PlaneTables& out) {
-  const DistortionMeter meter(fragment_luma(plane, pixels, fragment), fragment_mask(plane, fragment),
-                              plane.fragment_width_px, plane.fragment_height_px);
+                      const PreviewSamples& preview, std::size_t fragment, PlaneTables& out) {
+  const FragmentMeter meter(fragment_samples(plane, pixels, fragment), fragment_mask(plane, fragment),
+                            plane.fragment_width_px, plane.fragment_height_px);
   out.skip_dssim[fragment] =
       static_cast<float>(std::max(meter.against(preview.fragment(fragment)).dssim, 0.0));
   const std::uint64_t texels = std::uint64_t{plane.fragment_width_px} * plane.fragment_height_px;
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const auto stream = fragment_stream(ladder.rungs[r], fragment);
     const std::size_t at = r * plane.fragment_count() + fragment;
-    const Pixels decoded = decode_fragment_luma(ladder, r, fragment, texels);
-    if (decoded.width_px != plane.fragment_width_px || decoded.height_px != plane.fragment_height_px)
+    const Samples decoded = decode_samples(ladder, r, fragment, texels, measured_channels(plane));
+    if (decoded[0].size() != texels)
       throw StageError("lut", "fragment " + std::to_string(fragment), std::to_string(texels) + " texels",
-                       std::to_string(decoded.data.size()));
-    const Distortion distortion = meter.against(decoded.data);
+                       std::to_string(decoded[0].size()));
+    const Distortion distortion = meter.against(decoded);
     out.size_bytes[at] = static_cast<std::uint32_t>(stream.size());
     out.digest[at] = truncated(sha256(stream));
     out.mse[at] = static_cast<float>(distortion.mse);
@@ -263,7 +271,7 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
                            const RunContext& context) {
   check(fragments, pixels, predictors, ladder, options);
   PackageTables out;
-  std::vector<PreviewLuma> previews;
+  std::vector<PreviewSamples> previews;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];  // a mip is skipped for its full-size plane's preview
     previews.emplace_back(plane, ladder.planes[plane.mip > 0 ? plane.base : p].preview);

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "stages/distortion.h"
+#include "stages/fragment_meter.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
 
@@ -29,11 +29,6 @@ struct Window {
   std::uint32_t x = 0, y = 0, width = 0, height = 0;  // within the full-size plane's padded pixels
   std::uint64_t covered = 0;
 };
-
-std::uint8_t luma_of(const std::uint8_t* p, std::uint32_t channels) {
-  if (channels == 1) return p[0];
-  return static_cast<std::uint8_t>((19595 * p[0] + 38470 * p[1] + 7471 * p[2] + 32768) >> 16);
-}
 
 std::vector<std::uint8_t> mask_of(const TexturePlane& plane, const Window& w) {
   const std::size_t stride = (std::size_t{plane.width_px} + 7) / 8;
@@ -89,27 +84,31 @@ Place place_of(std::uint32_t at, std::uint32_t size, std::uint32_t coarse) {
   return {clamped / 256, std::min(clamped / 256 + 1, coarse - 1), clamped % 256};
 }
 
-/// Luma of a rectangle of a plane as one rung shows it; of the source where no fragment is stored.
+/// A rectangle of a plane as one rung shows it; as the source does where no fragment is stored.
 struct Patch {
   std::uint32_t x, y, width, height;
-  std::vector<std::uint8_t> luma;
+  Samples samples;
 };
 
 Patch decode_patch(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
                    std::size_t rung, Patch patch) {
-  patch.luma.resize(std::size_t{patch.width} * patch.height);
+  const std::size_t measured = measured_channels(plane);
+  patch.samples.assign(measured, std::vector<std::uint8_t>(std::size_t{patch.width} * patch.height));
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   for (std::uint32_t row = patch.y / h; row <= (patch.y + patch.height - 1) / h; ++row)
     for (std::uint32_t column = patch.x / w; column <= (patch.x + patch.width - 1) / w; ++column) {
       const std::size_t f = std::size_t{row} * plane.columns + column;
       const bool stored = !fragment_stream(ladder.rungs[rung], f).empty();
-      const Pixels decoded = stored ? decode_fragment_luma(ladder, rung, f, std::uint64_t{w} * h) : Pixels{};
-      for (std::uint32_t y = std::max(patch.y, row * h); y < std::min(patch.y + patch.height, (row + 1) * h);
-           ++y)
-        for (std::uint32_t x = std::max(patch.x, column * w);
-             x < std::min(patch.x + patch.width, (column + 1) * w); ++x)
-          patch.luma[std::size_t{y - patch.y} * patch.width + x - patch.x] =
-              stored ? *decoded.at(x - column * w, y - row * h) : luma_of(pixels.at(x, y), pixels.channels);
+      const Samples decoded =
+          stored ? decode_samples(ladder, rung, f, std::uint64_t{w} * h, measured) : Samples{};
+      for (std::size_t c = 0; c < measured; ++c)
+        for (std::uint32_t y = std::max(patch.y, row * h);
+             y < std::min(patch.y + patch.height, (row + 1) * h); ++y)
+          for (std::uint32_t x = std::max(patch.x, column * w);
+               x < std::min(patch.x + patch.width, (column + 1) * w); ++x)
+            patch.samples[c][std::size_t{y - patch.y} * patch.width + x - patch.x] =
+                stored ? decoded[c][std::size_t{y - row * h} * w + x - column * w]
+                       : measured_value(pixels.at(x, y), pixels.channels, measured, c);
     }
   return patch;
 }
@@ -124,26 +123,28 @@ std::vector<Place> places(std::uint32_t first, std::uint32_t count, std::uint32_
 }
 
 /// Bilinear, as clients scale up.
-std::vector<std::uint8_t> scaled_up(const Patch& patch, const std::vector<Place>& across,
-                                    const std::vector<Place>& down) {
-  std::vector<std::uint8_t> out;
-  out.reserve(across.size() * down.size());
-  for (const Place& v : down) {
-    const std::uint8_t* a = patch.luma.data() + std::size_t{v.first - patch.y} * patch.width;
-    const std::uint8_t* b = patch.luma.data() + std::size_t{v.second - patch.y} * patch.width;
-    for (const Place& u : across) {
-      const std::uint32_t l = u.first - patch.x, r = u.second - patch.x;
-      const std::uint32_t upper = a[l] * (256 - u.part) + a[r] * u.part;
-      const std::uint32_t lower = b[l] * (256 - u.part) + b[r] * u.part;
-      out.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+Samples scaled_up(const Patch& patch, const std::vector<Place>& across, const std::vector<Place>& down) {
+  Samples out;
+  for (const std::vector<std::uint8_t>& samples : patch.samples) {
+    std::vector<std::uint8_t>& to = out.emplace_back();
+    to.reserve(across.size() * down.size());
+    for (const Place& v : down) {
+      const std::uint8_t* a = samples.data() + std::size_t{v.first - patch.y} * patch.width;
+      const std::uint8_t* b = samples.data() + std::size_t{v.second - patch.y} * patch.width;
+      for (const Place& u : across) {
+        const std::uint32_t l = u.first - patch.x, r = u.second - patch.x;
+        const std::uint32_t upper = a[l] * (256 - u.part) + a[r] * u.part;
+        const std::uint32_t lower = b[l] * (256 - u.part) + b[r] * u.part;
+        to.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+      }
     }
   }
   return out;
 }
 
 /// The window as a level shows it, scaled up to the full size.
-std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
-                               const PlaneLadder& ladder, std::size_t rung, const Window& window) {
+Samples show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
+             const PlaneLadder& ladder, std::size_t rung, const Window& window) {
   const std::vector<Place> across = places(window.x, window.width, full.width_px, plane.width_px);
   const std::vector<Place> down = places(window.y, window.height, full.height_px, plane.height_px);
   const Patch patch = decode_patch(plane, pixels, ladder, rung,
@@ -156,17 +157,18 @@ std::vector<std::uint8_t> show(const TexturePlane& full, const TexturePlane& pla
 }
 
 /// The window as the preview shows it.
-std::vector<std::uint8_t> show_preview(const TexturePlane& plane, const Patch& preview,
-                                       const Window& window) {
+Samples show_preview(const TexturePlane& plane, const Patch& preview, const Window& window) {
   return scaled_up(preview, places(window.x, window.width, plane.width_px, preview.width),
                    places(window.y, window.height, plane.height_px, preview.height));
 }
 
-std::vector<std::uint8_t> source_luma(const Pixels& pixels, const Window& window) {
-  std::vector<std::uint8_t> out;
-  for (std::uint32_t y = 0; y < window.height; ++y)
-    for (std::uint32_t x = 0; x < window.width; ++x)
-      out.push_back(luma_of(pixels.at(window.x + x, window.y + y), pixels.channels));
+Samples source_samples(const TexturePlane& plane, const Pixels& pixels, const Window& window) {
+  const std::size_t measured = measured_channels(plane);
+  Samples out(measured);
+  for (std::size_t c = 0; c < measured; ++c)
+    for (std::uint32_t y = 0; y < window.height; ++y)
+      for (std::uint32_t x = 0; x < window.width; ++x)
+        out[c].push_back(measured_value(pixels.at(window.x + x, window.y + y), pixels.channels, measured, c));
   return out;
 }
 
@@ -310,8 +312,8 @@ std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vecto
   parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
       const Window& window = windows[w];
-      const DistortionMeter meter(source_luma(pixels[base], window), mask_of(full, window), window.width,
-                                  window.height);
+      const FragmentMeter meter(source_samples(full, pixels[base], window), mask_of(full, window),
+                                window.width, window.height);
       for (std::size_t k = 0; k < pairs.size(); ++k) {
         const std::size_t p = chain[pairs[k].level];
         const auto shown =
@@ -345,16 +347,18 @@ std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixel
                                   const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
   const std::vector<Window> windows = sample_windows(plane, 1);
   if (windows.empty()) return {};
-  const Pixels preview_luma = decode_jpeg_luma(preview_file, kMostPreviewPixels);
-  const Patch preview{0, 0, preview_luma.width_px, preview_luma.height_px, preview_luma.data};
+  const std::size_t measured = measured_channels(plane);
+  const Pixels file = measured > 1 ? decode_jpeg(preview_file, kMostPreviewPixels)
+                                   : decode_jpeg_luma(preview_file, kMostPreviewPixels);
+  const Patch preview{0, 0, file.width_px, file.height_px, split_samples(file, measured)};
   std::vector<RungPair> pairs{{0, 0, 0, 0}};
   add_pairs(ladder, 1, pairs);
   std::vector<double> loss(windows.size() * pairs.size());
   parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
       const Window& window = windows[w];
-      const DistortionMeter meter(source_luma(pixels, window), mask_of(plane, window), window.width,
-                                  window.height);
+      const FragmentMeter meter(source_samples(plane, pixels, window), mask_of(plane, window), window.width,
+                                window.height);
       for (std::size_t k = 0; k < pairs.size(); ++k) {
         const auto shown = k == 0 ? show_preview(plane, preview, window)
                                   : show(plane, plane, pixels, ladder, pairs[k].rung, window);

@@ -25,7 +25,8 @@ std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, doub
 
 /// The pairs of the plane `base` and its mips, by (level, rung). Loss is measured in up to 6 windows of up to
 /// 128 px in covered fragments evenly spread in index order: the decoded texels, scaled up bilinearly as a
-/// client does, against `pixels` of the full size, luma over covered texels. Each window weighs as much as
+/// client does, against `pixels` of the full size, luma, or
+/// every channel of data, over covered texels. Each window weighs as much as
 /// its fragment's surface. Same result for any thread count.
 std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
                                     const Ladder& ladder, std::size_t base, const RunContext& context);

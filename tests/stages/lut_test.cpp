@@ -116,6 +116,30 @@ TEST(Lut, DistortionIsMeasuredAndFallsWithTheRung) {
   }
 }
 
+TEST(Lut, NoChannelOfDataStandsForAnother) {
+  Scene s = make_scene();
+  for (std::size_t k = 0; k < s.pixels[0].data.size(); k += 3)
+    s.pixels[0].data[k] = s.pixels[0].data[k + 1] = 128;
+  const auto measured = [&](TextureRole role) {  // only blue varies: luma has 1/77 of its square error
+    s.fragments.planes[0].role = role;
+    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+    return build(s).planes[0];
+  };
+  const PlaneTables data = measured(TextureRole::kOcclusionRoughnessMetallic);
+  const Pixels decoded = decode_fragment(s.ladder.planes[0], 0, 0, 1 << 20);
+  const TexturePlane& plane = s.fragments.planes[0];
+  double error = 0;
+  for (std::uint32_t y = 0; y < 48; ++y)
+    for (std::uint32_t x = 0; x < 32; ++x)
+      if (plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1)
+        for (std::size_t c = 0; c < 3; ++c)
+          error += std::pow(s.pixels[0].at(x, y)[c] - decoded.at(x, y)[c], 2) / 3 / plane.covered_texels[0];
+  EXPECT_NEAR(data.mse[0], error, error / 500);
+  EXPECT_GT(data.mse[0], 10);
+  const PlaneTables normal = measured(TextureRole::kNormal);
+  EXPECT_GT(normal.dssim[0], 0.05) << "not a third of it: the constant channels say nothing";
+}
+
 TEST(Lut, OrderQualityAndTotals) {
   const Scene s = make_scene();
   for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis, Allocation::kRd}) {

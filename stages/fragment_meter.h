@@ -1,0 +1,42 @@
+#pragma once
+// Inside stages only: what the distortion of a fragment is measured on.
+#include <cstdint>
+#include <vector>
+
+#include "stages/distortion.h"
+#include "stages/ladder.h"
+
+namespace texmesh {
+
+/// Values of 8 bits by channel, then texel.
+using Samples = std::vector<std::vector<std::uint8_t>>;
+
+/// 1: luma of colours, as JPEG defines it, or the grey of a single channel. Else all of them: data have their
+/// channels coded apart, and none stands for another.
+std::size_t measured_channels(const TexturePlane& plane);
+
+/// Channel `c` of `measured` of a texel with `channels`.
+std::uint8_t measured_value(const std::uint8_t* texel, std::uint32_t channels, std::size_t measured,
+                            std::size_t c);
+
+/// The measured channels of pixels that have as many, or 1 or 3.
+Samples split_samples(const Pixels& pixels, std::size_t measured);
+
+/// A fragment's as a rung shows them. FormatError as decode_fragment.
+Samples decode_samples(const PlaneLadder& ladder, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels, std::size_t measured);
+
+/// DistortionMeter for every channel: MSE is the mean of them; 1 - SSIM that of those which vary in covered
+/// texels, because a constant one is kept by any rung and would hide what the others lose.
+class FragmentMeter {
+ public:
+  FragmentMeter(Samples source, const std::vector<std::uint8_t>& mask, std::uint32_t width,
+                std::uint32_t height);
+  Distortion against(const Samples& shown) const;
+
+ private:
+  std::vector<DistortionMeter> meters_;
+  std::vector<double> weights_;  // of 1 - SSIM
+};
+
+}  // namespace texmesh
