@@ -13,8 +13,8 @@ namespace texmesh {
 inline constexpr int kSkeletonizationVersion = 4;
 
 struct SkeletonizationOptions {
-  // At 40 a turtle has no hind legs and a saxophone no neck; at 80 the wrap takes 1.6 times as long.
-  int alpha_divisor = 60;      // alpha = diagonal / this
+  // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
+  int alpha_divisor = 80;      // alpha = diagonal / this
   int offset_divisor = 600;    // offset = diagonal / this
   int max_wrap_faces = 8000;   // the wrap is decimated to this before contraction
   double radius_floor = 0.25;  // R_eff = max(R, floor * median R)
