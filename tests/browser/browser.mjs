@@ -27,14 +27,15 @@ export const viewerRoots = {'/some/where/packages/': packages, '/some/where/': e
 export const launch = () => chromium.launch({
   executablePath: process.env.TEXMESH_CHROMIUM ?? '/usr/bin/chromium', timeout: 60000,
   args: ['--headless=new', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
-    '--disable-sync', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+    '--disable-sync', '--host-resolver-rules=MAP plain.test 127.0.0.1', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
     '--enable-precise-memory-info', '--js-flags=--expose-gc', '--disable-dev-shm-usage'],
 });
 
-/** A page of the laboratory; what the console says is kept in `page.said`. */
-export async function labPage(browser, origin) {
+/** A page of the laboratory; what the console says is kept in `page.said`. `before` runs in the page before anything else. */
+export async function labPage(browser, origin, before) {
   const page = await browser.newPage({viewport: {width: 920, height: 920}, ignoreHTTPSErrors: true});
   listen(page);
+  if (before) await page.addInitScript(before);
   await page.goto(`${origin}/index.html`);
   await page.waitForFunction('window.ready', null, {timeout: 20000}).catch((e) => { throw new Error(`${e.message}\n${page.said.join('\n')}`); });
   return page;

@@ -13,6 +13,8 @@ const kPackages = {
   // The source's own coefficients on top, other sources as files.
   lossless: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--lossless-top']},
   webp: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'webp', '--rungs', '20,60']},
+  // Meshes that three.js decodes without a worker.
+  meshopt: {scan: ['--triangles', '3000', '--texture', '512', '--charts', '8'], options: ['--rungs', '20,60,85', '--mesh-codec', 'meshopt']},
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };

@@ -21,9 +21,9 @@ function requestedRange(header, size) {
 /**
  * Serves the folders of `roots` ({'/prefix/': folder}) on loopback. Every request is kept in `requests` as {method, path, range,
  * status, bytes}; `fault(request)` may return what goes wrong with one: {status}, {flip: byte of the body}, {cut: bytes after which
- * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}.
+ * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}. `policy`: the pages' Content-Security-Policy.
  */
-export async function serve(roots, {ranges = true, fault = () => undefined, cors = true} = {}) {
+export async function serve(roots, {ranges = true, fault = () => undefined, cors = true, policy = ''} = {}) {
   const requests = [];
   const sockets = new Set();
   const state = {fault};
@@ -78,6 +78,7 @@ export async function serve(roots, {ranges = true, fault = () => undefined, cors
       // Pages and decoders are kept as everywhere; packages are not, so that every load shows on the line.
       'Cache-Control': /packages|figures|data/.test(url) ? 'no-store' : 'max-age=600',
     });
+    if (policy && url.endsWith('.html')) headers['Content-Security-Policy'] = policy;
     if (range) headers['Content-Range'] = `bytes ${first}-${last - 1}/${stat.size}`;
     if (ranges) headers['Accept-Ranges'] = 'bytes';
     response.writeHead(record.status, headers);

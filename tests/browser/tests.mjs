@@ -1,46 +1,16 @@
 // The client library in a real browser: what it shows is what the compiler stored, whatever the server does.
 import {
-  PNG, check, closeCommon, common, env, fs, lab, labPage, labRoots, near, packages, path, pictures, roundTrips, run, serve, startView,
+  check, closeCommon, common, lab, labPage, labRoots, near, packages, path, pictures, roundTrips, serve, startView,
 } from './browser.mjs';
 import {runAll, test} from './harness.mjs';
 import {startLink} from './link.mjs';
 import {makePackages} from './make-packages.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
+import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
+import './display-tests.mjs';
+import './limits-tests.mjs';
 import './viewer-tests.mjs';
 
-const kTop = 99; // clipped to the highest rung there is
-const kEverything = {time: 1e9, scale: 0, rung: kTop, fullSize: true, autoRefine: false};
-
-/** Loads one package on a new page and gives its report. */
-async function loaded(browser, page_, url, options = {}) {
-  const page = page_ ?? await labPage(browser.browser, browser.url);
-  if (page_ === null) await lab(page, () => window.lab.start({size: 256}));
-  const id = await lab(page, ([u, o]) => window.lab.load(u, o), [url, options]);
-  return {page, id, ...await lab(page, (i) => window.lab.finished(i), id)};
-}
-
-/** Differences of a composed plane from the C++ reconstruction, over stored fragments. */
-async function comparePlane(page, id, base, name, quality) {
-  const got = await lab(page, ([i, b]) => window.lab.plane(i, b), [id, base]);
-  const file = path.join(env.work, `${name}-${got.plane}-${quality}.png`);
-  run(env.compose, path.join(packages, `${name}.texmesh`), String(got.plane), String(quality), file);
-  const wanted = PNG.sync.read(fs.readFileSync(file));
-  check(wanted.width === got.widthPx && wanted.height === got.heightPx, `plane ${got.plane} is ${got.widthPx} x ${got.heightPx}, not ${wanted.width} x ${wanted.height}`);
-  const data = Buffer.from(got.base64, 'base64');
-  let [most, sum, n] = [0, 0, 0];
-  for (let i = 0; i < wanted.data.length; i += 4) {
-    if (wanted.data[i + 3] === 0) continue; // not stored
-    for (let c = 0; c < 3; c++) {
-      const d = Math.abs(wanted.data[i + c] - data[i + c]);
-      most = Math.max(most, d);
-      sum += d;
-      n++;
-    }
-  }
-  return {most, mean: n ? sum / n : 0, n};
-}
-
-const kTopQuality = 100;
 /** Of the limit: figures.mjs measures what a quiet machine keeps, one that runs tests does other things, too. */
 const kLate = 1.06;
 for (const [name, form] of [['maps', 'highest'], ['maps', 'lowest'], ['progressive', 'highest'], ['webp', 'highest'], ['lossless', 'highest']]) {
@@ -82,15 +52,6 @@ for (const meshes of ['glb', 'stream'])
     if (meshes === 'stream') check((await lab(r.page, (i) => window.lab.report(i), r.id)).requests.some((q) => q.kind === 'stream'), 'no stream was read');
     await r.page.close();
   });
-
-/** A load whose texture must be right in the end, from a server of the given kind. */
-async function rightFrom(b, origin, file, {page = null, options = {}} = {}) {
-  const r = await loaded({browser: b.browser, url: origin}, page, `${origin}/packages/${file}`, {load: kEverything, ...options});
-  check(!r.error, JSON.stringify(r.error));
-  const d = await comparePlane(r.page, r.id, r.state.planes[0].base, path.basename(file.replace(/\/$/, '').replace(/\.texmesh$/, '')), kTopQuality);
-  check(d.most <= 3, `texture differs by ${d.most}`);
-  return r;
-}
 
 test('nginx with ranges, HTTP/1.1', async ({skip}) => {
   if (nginxMissing(false)) skip(nginxMissing(false));
@@ -144,24 +105,6 @@ test('nothing is fetched twice', async () => {
 });
 
 const kFirst = ['manifest', 'first-picture', 'mesh', 'preview', 'stream'];
-
-/** `body` gets a page whose origin is behind a link of 2 Mbit/s and 40 ms, or as `options` say, from now on. */
-async function throttled(options, body) {
-  const b = await common();
-  const server = await serve(labRoots);
-  const link = await startLink({target: server.port});
-  let page;
-  try {
-    page = await labPage(b.browser, link.url);
-    await lab(page, async () => { await window.lab.draco.preload().decoderPending; window.lab.start({size: 900}); });
-    await link.set({bytesPerSecond: 250000, rttMs: 40, ...options});
-    await body(page, link, `${link.url}/packages/large.texmesh`);
-  } finally {
-    await page?.close();
-    link.close();
-    await server.close();
-  }
-}
 
 test('the first picture takes two round trips', () => throttled({}, async (page, link, url) => {
   const r = await loaded(null, page, url, {load: {time: 3, autoRefine: false}});

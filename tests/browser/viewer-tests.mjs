@@ -1,8 +1,11 @@
 // The viewer as people use it: its build in a folder of its own, the package somewhere beneath, a screenshot of every state.
+import {createRequire} from 'node:module';
 import {check, common, env, fs, listen, path, pictures, serve, startView, viewerRoots, packages} from './browser.mjs';
 import {test} from './harness.mjs';
 import {startLink} from './link.mjs';
 
+/** Looks at a page's names, roles, labels and contrasts. */
+const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const kDesktop = {width: 1280, height: 800};
 const kPhone = {width: 390, height: 844};
 
@@ -163,6 +166,54 @@ test('viewer: what goes wrong beside the picture can be read', async () => {
     await shot(page, 'viewer-problem');
   }, {quiet: false, fault});
 }, {seconds: 90});
+
+test('viewer: the server dies midway: the picture stays, and a line says why', () => withViewer('?pkg=packages/large.texmesh&time=8&scale=0', async (page, server, link) => {
+  await page.waitForFunction(() => [...window.texmeshViewer?.session.live.rungs.values() ?? []].some((r) => r.some((k) => k >= 0)), null, {timeout: 60000});
+  const before = await drawnShare(page);
+  await link.die();
+  await page.locator('#problem').waitFor({state: 'visible', timeout: 30000});
+  await phase(page, 'done', 40000).catch(() => {});
+  await page.waitForTimeout(1500);
+  check(await page.locator('#problem').isVisible(), 'the line is gone');
+  check(/127\.0\.0\.1/.test(await page.locator('#problem').textContent()), await page.locator('#problem').textContent());
+  check(await page.locator('#message').isHidden(), 'a message before the picture');
+  const after = await drawnShare(page);
+  check(after > 8000 && after > 0.6 * before, `${after} bytes of picture, ${before} before`);
+  await shot(page, 'viewer-dead-server');
+}, {quiet: false, through: {bytesPerSecond: 200000, rttMs: 20}}), {seconds: 120});
+
+test('viewer: map and ladder fill while the bytes come', () => withViewer('?pkg=packages/large.texmesh&time=12', async (page) => {
+  await page.waitForFunction(() => [...window.texmeshViewer?.session.live.rungs.values() ?? []].some((r) => r.filter((k) => k >= 0).length > 4), null, {timeout: 60000});
+  await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
+  const painted = () => page.evaluate(() => {
+    const c = document.querySelector('.map canvas');
+    const colours = new Set();
+    const {data} = c.getContext('2d').getImageData(0, 0, c.width, c.height);
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] === 255) colours.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
+    return {colours: colours.size, ladder: document.querySelectorAll('.plot canvas').length, over: Number.isFinite(window.texmeshViewer.session.live.doneS)};
+  });
+  let now;
+  for (let t = 0; t < 40 && !(now?.colours > 1 && now.ladder >= 3); t++) {
+    await page.waitForTimeout(100);
+    now = await painted();
+  }
+  check(!now.over, 'the load was over before');
+  check(now.colours > 1 && now.ladder >= 3, JSON.stringify(now));
+  await shot(page, 'viewer-filling');
+}, {through: {bytesPerSecond: 250000, rttMs: 40}}), {seconds: 90});
+
+for (const [name, options] of [['light', {}], ['dark', {dark: true}], ['phone', {viewport: kPhone, touch: true}]])
+  test(`viewer: names, roles, contrast and labels by axe (${name})`, () => withViewer('?pkg=packages/maps.texmesh&time=2', async (page) => {
+    await phase(page, 'done');
+    await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
+    await page.locator('#split').click();
+    await settled(page);
+    await page.evaluate(axe);
+    const {violations, passes} = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations', 'passes']}));
+    check(passes.length > 10, `${passes.length} rules were looked at`);
+    const said = violations.map((v) => `${v.id} (${v.impact}): ${v.nodes.slice(0, 3).map((n) => `${n.target} ${n.failureSummary}`).join('; ')}`);
+    check(violations.length === 0, said.join('\n'));
+  }, options), {seconds: 90});
 
 test('viewer: without WebGL, or with no address, it says so', async () => {
   for (const [name, query, text] of [

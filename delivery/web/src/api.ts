@@ -109,6 +109,11 @@ export interface LoadEvents {
   progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
   /** The timed part is over: limit and what it took, seconds from the same start. */
   deadline: { at: number; limit: number; actual: number; skipped: number };
+  /**
+   * The renderer's context was lost, or is there again: then textures begin with their previews, and what they had is fetched again; `done`
+   * tells the end of it.
+   */
+  context: { at: number; lost: boolean };
   /** Something went wrong; fatal: the load has ended. */
   error: { at: number; fatal: boolean; message: string; what: string; error: unknown };
   /** Nothing is left to fetch for what the display can show now. */

@@ -39,6 +39,8 @@ export class ModelLoad implements LoadedModel {
   private disposed_ = false;
   private readonly offRequest_: () => void;
   private readonly cancel_ = (): void => this.cancel();
+  private readonly contextLost_ = (): void => this.events_.emit('context', { lost: true });
+  private readonly contextRestored_ = (): void => void this.restore_();
 
   constructor(
     private readonly reader_: PackageReader,
@@ -51,6 +53,9 @@ export class ModelLoad implements LoadedModel {
     this.object.name = reader_.manifest.title || 'texmesh';
     options_.signal?.addEventListener('abort', this.cancel_);
     if (options_.signal?.aborted) this.cancel();
+    const { domElement: canvas } = options_.renderer;
+    canvas?.addEventListener('webglcontextlost', this.contextLost_);
+    canvas?.addEventListener('webglcontextrestored', this.contextRestored_);
     this.offRequest_ = reader_.onRequest((record) => {
       this.events_.emit('request', record);
       this.progress_();
@@ -243,10 +248,10 @@ export class ModelLoad implements LoadedModel {
     else this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
   }
 
-  /** A scale that the package has, as near as possible. InputError: no such rung. */
+  /** A scale that the package has, as near as possible. InputError: no numbers of scale or rung. */
   private snapped_({ scale, rung }: { scale?: number; rung?: number }): { scale?: number; rung?: number } {
-    if (rung !== undefined && !(Number.isInteger(rung) && rung >= 0))
-      throw new InputError('options', 'rung', 'a whole number from 0 on', String(rung));
+    for (const [name, v] of Object.entries({ scale, rung }))
+      if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
     if (scale === undefined) return { rung };
     const away = (k: number): number => Math.abs(k - scale);
     const scales = this.reader_.manifest.scales.map((s) => s.scale);
@@ -337,6 +342,25 @@ export class ModelLoad implements LoadedModel {
     }
   }
 
+  /** three.js makes geometries and pictures of its own anew; what was composed is gone. */
+  private async restore_(): Promise<void> {
+    this.events_.emit('context', { lost: false });
+    if (this.abort_.signal.aborted) return;
+    const over = this.resting_;
+    if (over) this.enter_('refining');
+    try {
+      await this.textures_?.restore();
+    } catch (error) {
+      if (isAbort(error)) return;
+      this.fail_(error, 'textures after a lost context');
+    }
+    if (!over) return;
+    if (this.options_.autoRefine ?? true) return void this.refine();
+    this.phase_ = 'done';
+    this.events_.emit('done', {});
+    this.progress_();
+  }
+
   // ---- end
 
   readPlane(base: number): Uint8Array {
@@ -353,6 +377,9 @@ export class ModelLoad implements LoadedModel {
     this.cancel();
     this.offRequest_();
     this.options_.signal?.removeEventListener('abort', this.cancel_);
+    const { domElement: canvas } = this.options_.renderer;
+    canvas?.removeEventListener('webglcontextlost', this.contextLost_);
+    canvas?.removeEventListener('webglcontextrestored', this.contextRestored_);
     this.forget_();
     this.object.removeFromParent();
     this.object.clear();

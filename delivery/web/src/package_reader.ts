@@ -69,11 +69,9 @@ export class PackageReader {
   /** Bytes received by kind. */
   readonly bytesByKind: Partial<Record<RequestKind, number>> = {};
   private readonly listeners_ = new Set<(record: RequestRecord) => void>();
-  private indexPages_ = new Map<number, Promise<Map<string, EntryRef>>>();
   private readonly once_ = new Map<string, Promise<unknown>>();
   private wholeTables_?: Promise<Uint8Array>;
-  private readonly tablesOnce_ = new Map<number, Promise<PlaneTables>>();
-  private readonly tableStreams_ = new Map<number, Promise<Uint8Array>>();
+  private readonly tables_ = new Map<number, PlaneTables>();
   private readonly offsets_ = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
 
   constructor(
@@ -144,9 +142,7 @@ export class PackageReader {
   dispose(): void {
     this.store.dispose();
     this.once_.clear();
-    this.indexPages_.clear();
-    this.tablesOnce_.clear();
-    this.tableStreams_.clear();
+    this.tables_.clear();
     this.offsets_.clear();
     this.wholeTables_ = undefined;
   }
@@ -199,16 +195,16 @@ export class PackageReader {
     return (await documents()).readIndex(bytes);
   }
 
-  private async loadIndexHead_(): Promise<IndexHead> {
+  private async loadIndexHead_(signal?: AbortSignal): Promise<IndexHead> {
     const ref = this.manifest.index;
     const small = ref.bytes <= wholeDocumentBytes || this.form !== 'range';
-    const bytes = small ? await this.readPaged_(ref, { kind: 'index' }) : await this.readHead_(ref, { kind: 'index' });
+    const bytes = await (small ? this.readPaged_(ref, { kind: 'index', signal }) : this.readHead_(ref, { kind: 'index', signal }));
     const head = (await documents()).readIndexHead(bytes);
     this.requireHead_(ref, head.bytes);
     return head;
   }
-  private async loadIndexPage_(plane: number): Promise<Map<string, EntryRef>> {
-    const head = await this.shared_('index', () => this.loadIndexHead_());
+  private async loadIndexPage_(plane: number, signal?: AbortSignal): Promise<Map<string, EntryRef>> {
+    const head = await this.shared_('index', () => this.loadIndexHead_(signal), signal);
     const page = head.pages.findIndex((p) => p.plane === plane);
     const entries = new Map<string, EntryRef>();
     if (page < 0) return entries;
@@ -216,7 +212,7 @@ export class PackageReader {
     const { readIndexPage } = await documents();
     let read: EntryRef[] = [];
     const verify = async (got: Uint8Array): Promise<void> => void (read = await readIndexPage(head, page, got));
-    await this.store.read(this.manifest.index, offset, bytes, { kind: 'index', verify });
+    await this.store.read(this.manifest.index, offset, bytes, { kind: 'index', signal, verify });
     for (const e of read) entries.set(e.path, e);
     if (plane < 0) this.checkManifestRefs_(entries);
     return entries;
@@ -230,33 +226,28 @@ export class PackageReader {
     }
   }
   /** An entry of the index, of which only the page that has it is read. */
-  async find(path: string): Promise<EntryRef> {
+  async find(path: string, signal?: AbortSignal): Promise<EntryRef> {
     const plane = layout.planeOfPath(path);
-    let page = this.indexPages_.get(plane);
-    if (!page) {
-      page = this.loadIndexPage_(plane);
-      this.indexPages_.set(plane, page);
-      page.catch(() => this.indexPages_.delete(plane));
-    }
-    const entry = (await page).get(path);
+    const page = await this.shared_(`index/${plane}`, () => this.loadIndexPage_(plane, signal), signal);
+    const entry = page.get(path);
     if (!entry) return this.fail_(`entry ${path}`, 'an entry of the index', 'none');
     return entry;
   }
   /** The bytes of an entry. */
   async entry(path: string, kind: RequestKind = 'other', signal?: AbortSignal): Promise<Uint8Array> {
-    return this.readAll_(await this.find(path), { kind, signal });
+    return this.readAll_(await this.find(path, signal), { kind, signal });
   }
 
   // ---- documents
 
   /** The texture planes: full-size ones first, then mips. */
-  textures(): Promise<TextureInfo[]> {
-    return this.shared_('textures', () => this.loadTextures_());
+  textures(signal?: AbortSignal): Promise<TextureInfo[]> {
+    return this.shared_('textures', () => this.loadTextures_(signal), signal);
   }
-  private async loadTextures_(): Promise<TextureInfo[]> {
+  private async loadTextures_(signal?: AbortSignal): Promise<TextureInfo[]> {
     const m = this.manifest;
     const { fullSizePlanes, missingFeature, readTextures } = await documents();
-    const textures = readTextures(await this.readAll_(m.textures, { kind: 'textures' }));
+    const textures = readTextures(await this.readAll_(m.textures, { kind: 'textures', signal }));
     if (textures.length !== m.planeCount) this.fail_(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
     const feature = missingFeature(textures, m.requiredFeatures);
     if (feature !== '') this.fail_('/requiredFeatures', feature, 'a codec without it');
@@ -270,12 +261,12 @@ export class PackageReader {
   }
 
   /** Measured quality of scales and rungs. */
-  quality(): Promise<QualityTable> {
+  quality(signal?: AbortSignal): Promise<QualityTable> {
     const read = async (): Promise<QualityTable> => {
-      const bytes = await this.readAll_(this.manifest.quality, { kind: 'quality' });
+      const bytes = await this.readAll_(this.manifest.quality, { kind: 'quality', signal });
       return (await documents()).readQuality(bytes);
     };
-    return this.shared_('quality', read);
+    return this.shared_('quality', read, signal);
   }
 
   /** What the package was made from and with, as JSON. */
@@ -284,12 +275,12 @@ export class PackageReader {
     return JSON.parse(new TextDecoder().decode(bytes));
   }
 
-  private async loadTablesHead_(): Promise<TablesHead> {
+  private async loadTablesHead_(signal?: AbortSignal): Promise<TablesHead> {
     const ref = this.manifest.tables;
     if (ref.bytes <= wholeDocumentBytes || this.form !== 'range')
-      this.wholeTables_ = this.readPaged_(ref, { kind: 'tables' });
+      this.wholeTables_ = this.readPaged_(ref, { kind: 'tables', signal });
     const { readTablesHead } = await documents();
-    const head = readTablesHead(await (this.wholeTables_ ?? this.readHead_(ref, { kind: 'tables' })));
+    const head = readTablesHead(await (this.wholeTables_ ?? this.readHead_(ref, { kind: 'tables', signal })));
     this.requireHead_(ref, head.bytes);
     if (head.planes.length !== this.manifest.planeCount)
       this.fail_(layout.tablesPath, `${this.manifest.planeCount} planes`, `${head.planes.length}`);
@@ -300,50 +291,59 @@ export class PackageReader {
   }
 
   /** Tables of one plane. */
-  async planeTables(plane: number): Promise<PlaneTables> {
-    return (await this.tables([plane]))[plane]!;
+  async planeTables(plane: number, signal?: AbortSignal): Promise<PlaneTables> {
+    return (await this.tables([plane], signal))[plane]!;
   }
 
   /**
    * Tables by plane number: of these planes (and of those read before), or of all. Sections that stand together are
    * read by one request.
    */
-  async tables(planes?: readonly number[]): Promise<(PlaneTables | undefined)[]> {
-    const head = await this.shared_('tables', () => this.loadTablesHead_());
-    const { readTablesSection } = await documents();
+  async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
+    const head = await this.shared_('tables', () => this.loadTablesHead_(signal), signal);
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
       if (!(p >= 0 && p < head.planes.length))
         throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
-    const missing = wanted.filter((p) => !this.tablesOnce_.has(p));
+    const read = (p: number, run: readonly number[], bytes?: Promise<Uint8Array>): Promise<PlaneTables> =>
+      this.shared_(`tables/${p}`, () => this.readSection_(head, p, run[0], bytes ?? this.readRun_(head, run, signal), signal), signal);
+    const missing = wanted.filter((p) => !this.once_.has(`tables/${p}`));
     for (const run of this.runsOf_(head, missing)) {
-      const begin = head.planes[run[0]].offset;
-      const last = head.planes[run[run.length - 1]];
-      const verify = async (got: Uint8Array): Promise<void> => {
-        for (const p of run) {
-          const { offset, bytes: size, sha256: digest } = head.planes[p];
-          await this.digestCheck_(`texture plane ${p}`, digest)(got.subarray(offset - begin, offset - begin + size));
-        }
-      };
-      const bytes = (async () =>
-        this.wholeTables_
-          ? (await this.wholeTables_).subarray(begin)
-          : this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true, verify }))();
-      for (const p of run) {
-        const { offset, bytes: size } = head.planes[p];
-        const table = bytes
-          .then(async (b) => {
-            await sleepS(0); // a turn of the page for each
-            return readTablesSection(head, p, b.subarray(offset - begin, offset - begin + size));
-          })
-          .then(async (t) => (await this.checkPlane_(p, t), t));
-        this.tablesOnce_.set(p, table);
-        table.catch(() => this.tablesOnce_.delete(p));
-      }
+      const bytes = this.readRun_(head, run, signal);
+      for (const p of run) read(p, run, bytes).catch(() => undefined); // told below
     }
-    const all: (PlaneTables | undefined)[] = new Array<undefined>(head.planes.length).fill(undefined);
-    await Promise.all([...this.tablesOnce_].map(async ([p, t]) => (all[p] = await t)));
-    return all;
+    // Where another asker has cancelled, each plane by a request of its own.
+    await Promise.all(wanted.map((p) => read(p, [p])));
+    return head.planes.map((_, p) => this.tables_.get(p));
+  }
+  /** From the first byte of the run's first plane on. */
+  private async readRun_(head: TablesHead, run: readonly number[], signal?: AbortSignal): Promise<Uint8Array> {
+    const begin = head.planes[run[0]].offset;
+    if (this.wholeTables_) return (await this.wholeTables_).subarray(begin);
+    const last = head.planes[run[run.length - 1]];
+    const verify = async (got: Uint8Array): Promise<void> => {
+      for (const p of run) {
+        const { offset, bytes, sha256: digest } = head.planes[p];
+        await this.digestCheck_(`texture plane ${p}`, digest)(got.subarray(offset - begin, offset - begin + bytes));
+      }
+    };
+    return this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true, signal, verify });
+  }
+  private async readSection_(
+    head: TablesHead,
+    p: number,
+    first: number,
+    run: Promise<Uint8Array>,
+    signal?: AbortSignal,
+  ): Promise<PlaneTables> {
+    const [{ readTablesSection }, got] = await Promise.all([documents(), run]);
+    await sleepS(0); // a turn of the page for each
+    const { offset, bytes } = head.planes[p];
+    const begin = offset - head.planes[first].offset;
+    const table = await readTablesSection(head, p, got.subarray(begin, begin + bytes));
+    await this.checkPlane_(p, table, signal);
+    this.tables_.set(p, table);
+    return table;
   }
   private runsOf_(head: TablesHead, planes: readonly number[]): number[][] {
     const runs: number[][] = [];
@@ -356,8 +356,8 @@ export class PackageReader {
     return runs;
   }
   /** Tables, textures.json and index speak of the same fragments and bytes. */
-  private async checkPlane_(plane: number, t: PlaneTables): Promise<void> {
-    const info = (await this.textures())[plane];
+  private async checkPlane_(plane: number, t: PlaneTables, signal?: AbortSignal): Promise<void> {
+    const info = (await this.textures(signal))[plane];
     const place = `texture plane ${plane}`;
     const sameRungs =
       t.rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === t.rungQuality[r]);
@@ -366,7 +366,7 @@ export class PackageReader {
     if (t.incremental !== codecTraits(info.codec).incremental)
       this.fail_(place, 'tables of the codec in textures.json', 'others');
     const requireSum = async (path: string, bytes: number): Promise<void> => {
-      const entry = await this.find(path);
+      const entry = await this.find(path, signal);
       if (entry.bytes !== bytes) this.fail_(`entry ${path}`, `${bytes} bytes, as tables.bin adds up`, `${entry.bytes}`);
     };
     await requireSum(layout.tableStreamsPath(plane), sum(t.tableBytes));
@@ -384,8 +384,8 @@ export class PackageReader {
   }
 
   /** What decisions about textures are made from, with the tables of these planes. */
-  async data(planes?: readonly number[]): Promise<PackageData> {
-    const [textures, tables] = [await this.textures(), await this.tables(planes)];
+  async data(planes?: readonly number[], signal?: AbortSignal): Promise<PackageData> {
+    const [textures, tables] = [await this.textures(signal), await this.tables(planes, signal)];
     return { manifest: this.manifest, textures, tables };
   }
 
@@ -420,18 +420,14 @@ export class PackageReader {
     return this.entry(path, 'preview', signal);
   }
   /** What the fragments of a rung have in common. */
-  async tableStream(plane: number, rung: number): Promise<Uint8Array> {
-    const t = await this.planeTables(plane);
+  async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
+    const t = await this.planeTables(plane, signal);
     if (!(rung >= 0 && rung < rungCount(t)))
       throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${rungCount(t)}`, `${rung}`);
-    let streams = this.tableStreams_.get(plane);
-    if (!streams) {
-      streams = this.entry(layout.tableStreamsPath(plane), 'texture');
-      this.tableStreams_.set(plane, streams);
-      streams.catch(() => this.tableStreams_.delete(plane));
-    }
+    const read = (): Promise<Uint8Array> => this.entry(layout.tableStreamsPath(plane), 'texture', signal);
+    const streams = await this.shared_(`streams/${plane}`, read, signal);
     const begin = sum(t.tableBytes, 0, rung);
-    return (await streams).subarray(begin, begin + t.tableBytes[rung]);
+    return streams.subarray(begin, begin + t.tableBytes[rung]);
   }
 
   /** Where a fragment's stream stands within its rung's entry; bytes 0 = not stored. */
@@ -449,22 +445,22 @@ export class PackageReader {
     return t.digest.subarray(at, at + 8);
   }
   /** Tables, packs and offsets of a plane. */
-  async planeFiles(plane: number): Promise<PlaneFiles> {
-    const tables = await this.planeTables(plane);
+  async planeFiles(plane: number, signal?: AbortSignal): Promise<PlaneFiles> {
+    const tables = await this.planeTables(plane, signal);
     const paths = Array.from({ length: rungCount(tables) }, (_, r) => layout.rungPath(plane, r));
-    const packs = await Promise.all(paths.map((path) => this.find(path)));
-    const complete = (await this.fragmentFiles())?.[plane];
+    const packs = await Promise.all(paths.map((path) => this.find(path, signal)));
+    const complete = (await this.fragmentFiles(signal))?.[plane];
     return { tables, packs, offsets: this.offsets_.get(plane)!, complete };
   }
   /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
-  fragmentFiles(): Promise<FragmentFiles | undefined> {
-    return this.shared_('files', () => this.loadFragmentFiles_());
+  fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
+    return this.shared_('files', () => this.loadFragmentFiles_(signal), signal);
   }
-  private async loadFragmentFiles_(): Promise<FragmentFiles | undefined> {
+  private async loadFragmentFiles_(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
     const { store } = this;
     if (!store.extraFile) return undefined;
     // Packs do, too.
-    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index' }).catch((error: unknown) => {
+    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
       if (!(error instanceof InputError)) throw error;
       return undefined;
     });
@@ -472,9 +468,9 @@ export class PackageReader {
   }
   /** A fragment's complete file of such a tree, digest checked. */
   async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const { extension } = codecTraits((await this.textures())[plane].codec);
+    const { extension } = codecTraits((await this.textures(signal))[plane].codec);
     const path = layout.fragmentFilePath(plane, rung, fragment, extension);
-    const file = (await this.planeFiles(plane)).complete?.[rung]?.get(fragment);
+    const file = (await this.planeFiles(plane, signal)).complete?.[rung]?.get(fragment);
     const verify = file && this.digestCheck_(path, file.sha256);
     const got = file && (await this.store.extraFile?.(path, file.bytes, { kind: 'texture', signal, once: true, verify }));
     return got ?? this.fail_(path, 'a file', 'none');
@@ -497,7 +493,7 @@ export class PackageReader {
   /** A fragment's stream at a rung, digest checked. */
   async fragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
     const range = await this.fragmentRange(plane, rung, fragment);
-    const pack = await this.find(layout.rungPath(plane, rung));
+    const pack = await this.find(layout.rungPath(plane, rung), signal);
     const place = `fragment ${fragment} of ${pack.path}`;
     if (range.bytes === 0) this.fail_(place, 'a stored fragment', 'none');
     const verify = this.digestCheck_(place, await this.fragmentDigest(plane, rung, fragment));
@@ -505,11 +501,11 @@ export class PackageReader {
   }
   /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
   async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const codec: CodecId = (await this.textures())[plane].codec;
+    const codec: CodecId = (await this.textures(signal))[plane].codec;
     const first = codecTraits(codec).incremental ? 0 : rung;
     const streams: Uint8Array[] = [];
     for (let r = first; r <= rung; ++r) streams.push(await this.fragment(plane, r, fragment, signal));
-    return joinFragment(codec, await this.tableStream(plane, first), streams);
+    return joinFragment(codec, await this.tableStream(plane, first, signal), streams);
   }
 
   /** Head of the vertex-split stream; undefined when the package has none. */

@@ -22,6 +22,7 @@ export interface ScaleLoad {
 /** The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
+  private readonly underWay_ = new Map<number, ScaleLoad>();
   private splits_?: SplitShapes;
   private splitsOpen_ = false;
   private coarsestFile_?: Promise<Uint8Array>;
@@ -95,11 +96,19 @@ export class ScaleSource {
   load(scale: number, signal: AbortSignal, passed: (scale: number) => void): ScaleLoad {
     const known = this.shapes_.get(scale);
     if (known) return { arrived: Promise.resolve(), shape: Promise.resolve(known) };
+    const asked = this.underWay_.get(scale);
+    if (asked) return asked;
     let arrive: () => void = () => undefined;
     const arrived = new Promise<void>((done) => (arrive = done));
     const shape = this.load_(scale, signal, arrive, passed);
-    shape.then(arrive, arrive);
-    return { arrived, shape };
+    const load = { arrived, shape };
+    this.underWay_.set(scale, load);
+    const end = (): void => {
+      this.underWay_.delete(scale);
+      arrive();
+    };
+    shape.then(end, end);
+    return load;
   }
   private async load_(
     scale: number,

@@ -1,7 +1,10 @@
 import { BufferAttribute, BufferGeometry, Material, Mesh } from 'three';
-import { InputError } from './errors';
+import { samePrefix } from './bytes';
+import { FormatError, InputError } from './errors';
+import { concat } from './http';
 import type { PackageReader } from './package_reader';
 import { MaterialSet, ParsedGltf, Slot, materialFor } from './scale_parts';
+import { sha256 } from './sha256';
 import type { WorkerPool } from './worker_pool';
 import type { SplitInfo, SplitUpdate } from './worker_protocol';
 
@@ -108,12 +111,29 @@ export class SplitShapes {
     });
   }
   private async bytes_(from: number, to: number, signal: AbortSignal): Promise<Uint8Array> {
-    if (to <= this.known_.length) return this.known_.subarray(from, to);
-    if (from >= this.known_.length) return this.reader_.splitStream(from, to - from, { signal });
-    const out = new Uint8Array(to - from);
-    out.set(this.known_.subarray(from));
-    out.set(await this.reader_.splitStream(this.known_.length, to - this.known_.length, { signal }), this.known_.length - from);
-    return out;
+    const verify = (got: Uint8Array): Promise<void> => this.verify_(from, got);
+    const known = this.known_.subarray(from, to);
+    if (known.length > 0)
+      try {
+        const rest = to - from - known.length;
+        const more = rest > 0 ? await this.reader_.splitStream(from + known.length, rest, { signal }) : known.subarray(0, 0);
+        const all = concat([known, more], to - from);
+        await verify(all);
+        return all;
+      } catch (error) {
+        if (!(error instanceof FormatError)) throw error; // damaged on the way, perhaps with the head
+      }
+    return this.reader_.splitStream(from, to - from, { signal, verify });
+  }
+  /** Whole blocks from a place on have the digests that the head says. */
+  private async verify_(from: number, bytes: Uint8Array): Promise<void> {
+    const { headBytes, blockBytes, digests } = this.info_!;
+    for (let b = 0, at = headBytes; b < blockBytes.length; at += blockBytes[b++]) {
+      if (at < from || at + blockBytes[b] > from + bytes.length) continue;
+      const digest = await sha256(bytes.subarray(at - from, at - from + blockBytes[b]));
+      if (!samePrefix(digest, digests.subarray(8 * b, 8 * b + 8)))
+        throw new FormatError('mesh/stream.bin', `block ${b}`, 'bytes of the digest in the head', 'others');
+    }
   }
 
   private async add_(scale: number, update: SplitUpdate, gltf: ParsedGltf): Promise<Mesh> {

@@ -15,7 +15,9 @@ export function splitInfo(head: SplitStreamHead): SplitInfo {
     kind,
     components: kind === 'normal' ? 3 : components,
   }));
-  return { headBytes: head.bytes, scales, attributes, groups: head.groups };
+  const digests = new Uint8Array(8 * head.blocks.length);
+  head.blocks.forEach((b, i) => digests.set(b.digest, 8 * i));
+  return { headBytes: head.bytes, scales, attributes, groups: head.groups, blockBytes: head.blocks.map((b) => b.bytes), digests };
 }
 
 function gridValues(

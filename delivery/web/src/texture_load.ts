@@ -91,13 +91,14 @@ export class TextureLoad {
       this.load_.reader.prefetchDocuments(this.load_.signal),
       this.load_.scales.openStream(this.load_.signal),
     ]);
-    if (whole) return this.load_.reader.data();
-    const textures = await this.load_.reader.textures();
+    const { reader, signal } = this.load_;
+    if (whole) return reader.data(undefined, signal);
+    const textures = await reader.textures(signal);
     const base = Array.from({ length: fullSizePlanes(textures) }, (_, p) => p);
-    const shown = this.planesFor_(await this.load_.reader.data(base));
+    const shown = this.planesFor_(await reader.data(base, signal));
     // With the mips below, which a short time may ask for.
     const among = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= textures[c.plane].mip);
-    return this.load_.reader.data([...base, ...textures.flatMap((t, p) => (among(t) ? [p] : []))]);
+    return reader.data([...base, ...textures.flatMap((t, p) => (among(t) ? [p] : []))], signal);
   }
   private planesFor_(data: PackageData, displayedPx = this.load_.view.display.heightPx): PlaneChoice[] {
     return this.load_.options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
@@ -120,7 +121,7 @@ export class TextureLoad {
   /** Scale and textures within the time. */
   async timedPart(data: PackageData): Promise<void> {
     this.data_ = data;
-    this.quality_ = await this.load_.reader.quality();
+    this.quality_ = await this.load_.reader.quality(this.load_.signal);
     this.load_.beta0 = this.load_.options.beta0BytesS || throughputOf(this.load_.reader.requests, this.load_.reader.client.latencyS);
     const transfers = this.startTextures_(data);
     const { scale, planes } = await this.choice_(data);
@@ -132,7 +133,7 @@ export class TextureLoad {
     const meshShown = mesh.shown.catch((error: unknown) => this.load_.lostScale(error, scale));
     // Coverage that no material asks for is not fetched.
     const choices = this.fitting_(data, planes).filter(({ base }) => data.textures[base].role !== 'alpha' || this.textureSet_!.isUsed(base));
-    const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane))]);
+    const [{ shown }] = await Promise.all([this.showPlanes_(choices), transfers.prepare(choices.map((c) => c.plane), this.load_.signal)]);
     // A mesh that is only waited for leaves the link to the textures.
     // One that takes longer than it should has coarser scales to show on its way.
     if (meshBytes > this.load_.beta0 * this.load_.reader.client.latencyS)
@@ -248,7 +249,7 @@ export class TextureLoad {
    * Shows textures by these planes; those that the first GLB does not show begin with the package's preview. Fragments may come from
    * then on; `shown` resolves when the scene has changed.
    */
-  private async showPlanes_(choices: readonly PlaneChoice[]): Promise<{ shown: Promise<unknown> }> {
+  private async showPlanes_(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
     const shown: Promise<void>[] = [];
     for (const choice of choices) {
       const { base, plane } = choice;
@@ -259,7 +260,7 @@ export class TextureLoad {
       const lost = (error: unknown): void => this.load_.fail(error, `texture plane ${plane}`);
       let preview: ImageBitmap | undefined;
       try {
-        if (!before && (info.role === 'alpha' || !this.textureSet_!.isUsed(base))) preview = await this.preview_(base);
+        if (!before && (anew || info.role === 'alpha' || !this.textureSet_!.isUsed(base))) preview = await this.preview_(base);
       } catch (error) {
         lost(error);
         continue;
@@ -270,6 +271,18 @@ export class TextureLoad {
       shown.push(this.textureSet_!.show(choice, preview).then(tell).catch(lost).finally(() => preview?.close()));
     }
     return { shown: Promise.all(shown) };
+  }
+  /** The GPU has lost everything: previews, then the fragments that there were. */
+  async restore(): Promise<void> {
+    if (!this.textureSet_ || !this.data_) return; // the mesh and its previews are three.js's own
+    const { options, materials, pool } = this.load_;
+    const before = [...this.textureSet_.planes.values()];
+    this.textureSet_.dispose();
+    this.textureSet_ = new TextureSet(options.renderer, this.data_.textures, materials, pool);
+    await (await this.showPlanes_(before.map(({ base, plane }) => ({ base, plane })), true)).shown;
+    const wishes = before.flatMap(({ plane, rungs }) => [...rungs].flatMap((rung, fragment) => (rung >= 0 ? [{ plane, fragment, rung, offer: 0 }] : [])));
+    await this.fetchWishes_(wishes);
+    await this.composed();
   }
   private async preview_(base: number): Promise<ImageBitmap> {
     const file = await this.load_.reader.preview(base, this.load_.signal);
@@ -404,8 +417,8 @@ export class TextureLoad {
     );
     if (finer.length === 0) return;
     const planes = [...this.textureSet_!.planes.values()].map((p) => p.plane);
-    this.data_ = await this.load_.reader.data([...planes, ...finer.map((c) => c.plane)]);
-    await this.transfers_!.prepare(finer.map((c) => c.plane));
+    this.data_ = await this.load_.reader.data([...planes, ...finer.map((c) => c.plane)], this.load_.signal);
+    await this.transfers_!.prepare(finer.map((c) => c.plane), this.load_.signal);
     await (await this.showPlanes_(finer)).shown;
   }
 

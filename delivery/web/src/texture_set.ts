@@ -1,8 +1,9 @@
 import { Texture, WebGLRenderer } from 'three';
-import { Blitter, PlaneComposer, ownLevels } from './composer';
+import { Blitter, PlaneComposer } from './composer';
+import type { Work } from './enlarge';
 import type { PlaneChoice } from './fragment_list';
 import { isSoftware } from './gpu';
-import { MaterialSet, Slot } from './scale_parts';
+import { MaterialSet, Slot, disposeTexture } from './scale_parts';
 import type { TextureInfo } from './textures';
 import type { WorkerPool } from './worker_pool';
 import type { Levels } from './worker_protocol';
@@ -10,9 +11,6 @@ import type { Levels } from './worker_protocol';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;
 const slicePx = 1 << 19;
-/** Of a piece of an enlarged preview, which is uploaded in one go; and pieces under way. */
-const stripPx = 1 << 18;
-const mostPieces = 4;
 /**
  * Pixels that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn.
  * How many those are shows when one has waited. It is not waited for longer than longestFenceMs.
@@ -23,14 +21,6 @@ const waitedMs = 20;
 const longestFenceMs = 250;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
-
-/** Something for the GPU to do, and how many pixels it is. */
-interface Work {
-  pixels: number;
-  fragment?: number;
-  run(): void;
-  drop?(): void;
-}
 
 /** The composed textures of a model, one per image (and one for its alpha), and the uploads to them. */
 export class TextureSet {
@@ -82,7 +72,7 @@ export class TextureSet {
     if (this.planes.get(base) !== next) return; // another has taken its place meanwhile
     views.forEach((view, i) => view && this.put_(slots[i], base, view));
     if (before) before.dispose();
-    else if (this.textures_[base].role !== 'alpha') new Set(old).forEach((texture) => texture?.dispose());
+    else if (this.textures_[base].role !== 'alpha') new Set(old).forEach((texture) => texture && disposeTexture(texture));
     for (const work of this.waiting_.get(next) ?? []) this.enqueue_(work);
     this.waiting_.delete(next);
   }
@@ -106,60 +96,13 @@ export class TextureSet {
       next.fillFromTexture(shown, image.width, image.height);
     }
   }
-  /**
-   * Enlarged off the main thread, piece by piece: GPUs that are none take seconds for a large texture. Fragments that have come
-   * meanwhile need no preview.
-   */
   private async enlarge_(next: PlaneComposer, image: ImageBitmap | HTMLImageElement): Promise<void> {
-    const running = new Set<Promise<void>>();
-    for (const piece of this.pieces_(next)) {
-      const done = this.enlargePiece_(next, image, piece).finally(() => running.delete(done));
-      done.catch(() => undefined); // the first to fail is told
-      running.add(done);
-      if (running.size >= mostPieces) await Promise.race(running);
-      if (this.disposed_) break;
-    }
-    await Promise.all(running);
-    next.filled = true;
-  }
-  /** Runs of neighbours that have not come when it is their turn. */
-  private *pieces_(next: PlaneComposer): Generator<{ x0: number; x1: number; y0: number; y1: number }> {
-    const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
-    const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));
-    const most = Math.max(1, Math.floor(stripPx / (width * rise)));
-    for (let row = 0; row < rows; ++row)
-      for (let y = row * height; y < Math.min((row + 1) * height, next.heightPx); y += rise)
-        for (let from = 0, to = 0; from < columns; from = to) {
-          const come = new Set(this.waiting_.get(next)?.map((work) => work.fragment));
-          const lacks = (column: number): boolean => column < columns && !come.has(row * columns + column);
-          to = from + 1;
-          if (!lacks(from)) continue;
-          while (to - from < most && lacks(to)) ++to;
-          const [x1, y1] = [Math.min(to * width, next.widthPx), Math.min(y + rise, (row + 1) * height, next.heightPx)];
-          yield { x0: from * width, x1, y0: y, y1 };
-        }
-  }
-  private async enlargePiece_(
-    next: PlaneComposer,
-    image: ImageBitmap | HTMLImageElement,
-    piece: { x0: number; x1: number; y0: number; y1: number },
-  ): Promise<void> {
-    const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
-    const { widthPx: width, heightPx: height } = next;
-    const bitmaps = await this.pool_
-      .enlarge({ picture, width, height, ...piece, levels: ownLevels })
-      .finally(() => picture.close()); // workers have a copy of their own
-    const { x0, x1, y0, y1 } = piece;
-    await new Promise<void>((done) => {
-      const end = (): void => {
-        bitmaps.forEach((b) => b.close());
-        done();
-      };
-      const run = (): void => {
-        next.upload(bitmaps, x0, y0);
-        end();
-      };
-      this.enqueue_({ pixels: (x1 - x0) * (y1 - y0), run, drop: end });
+    const { enlarge } = await import('./enlarge');
+    await enlarge(next, image, {
+      pool: this.pool_,
+      come: () => new Set(this.waiting_.get(next)?.map((work) => work.fragment)),
+      enqueue: (work) => this.enqueue_(work),
+      ended: () => this.disposed_,
     });
   }
   /** Whether a material that is there shows this plane. */

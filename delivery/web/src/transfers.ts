@@ -78,10 +78,10 @@ export class Transfers {
     return this.underWay_;
   }
   /** Must have been called for the planes of all wishes. */
-  async prepare(planes: readonly number[]): Promise<void> {
+  async prepare(planes: readonly number[], signal?: AbortSignal): Promise<void> {
     await Promise.all(
       planes.map(async (p) => {
-        if (!this.planes_.has(p)) this.planes_.set(p, await this.reader_.planeFiles(p));
+        if (!this.planes_.has(p)) this.planes_.set(p, await this.reader_.planeFiles(p, signal));
       }),
     );
   }
@@ -199,14 +199,14 @@ export class Transfers {
     ++this.underWay_;
     try {
       try {
-        this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
+        this.hooks_.decoded(job.wish, await this.decodeStreams_(job, signal));
       } catch (error) {
         if (!(error instanceof FormatError) || this.filesOf(plane).complete) throw error;
         // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
         this.held_.delete(`${plane}/${fragment}`);
         for (let rung = job.first; rung <= job.wish.rung; ++rung)
           job.streams[rung - job.first] = await this.reader_.fragment(plane, rung, fragment, signal);
-        this.hooks_.decoded(job.wish, await this.decodeStreams_(job));
+        this.hooks_.decoded(job.wish, await this.decodeStreams_(job, signal));
       }
     } catch (error) {
       this.hooks_.lost(job.wish, error);
@@ -214,7 +214,7 @@ export class Transfers {
       --this.underWay_;
     }
   }
-  private async decodeStreams_(job: Job): Promise<Levels> {
+  private async decodeStreams_(job: Job, signal?: AbortSignal): Promise<Levels> {
     const { plane, fragment, rung } = job.wish;
     const { tables, complete } = this.filesOf(plane);
     const streams = job.streams as Uint8Array[];
@@ -230,7 +230,7 @@ export class Transfers {
       return tables.digest.slice(at, at + 8);
     });
     const levels = await this.pool_.decode({
-      codec, tables: await this.reader_.tableStream(plane, job.first), streams, digests, complete: false, levels: ownLevels, most,
+      codec, tables: await this.reader_.tableStream(plane, job.first, signal), streams, digests, complete: false, levels: ownLevels, most,
     });
     if (this.incremental_(plane)) this.held_.set(`${plane}/${fragment}`, streams);
     return levels;

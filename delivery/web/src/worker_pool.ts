@@ -74,6 +74,7 @@ export class WorkerPool {
   private readonly running_ = new Map<number, { job: Job; worker: number }>();
   private readonly load_: number[] = [];
   private readonly broken_ = new Set<number>(); // whose workers broke once
+  private works_ = false; // a worker has answered
   private nextId_ = 1;
   private ended_ = false;
   /** Nothing can be decoded: there are no workers, and no `decode`. `onNone` hears of it, once. */
@@ -110,19 +111,24 @@ export class WorkerPool {
   start(): void {
     this.closeSplits(0);
   }
-  /** A worker that breaks gives its jobs to another one; where that breaks, too, to the main thread. */
+  /** A worker that breaks gives its jobs to another one; where that breaks, too, they fail, or there are no workers here at all. */
   private replace_(index: number): void {
     if (this.ended_) return;
+    const again = this.broken_.has(index);
     this.helpers_[index].end();
-    this.helpers_[index] = this.broken_.has(index) ? this.startMain_() : this.start_(index);
+    this.helpers_[index] = again && !this.works_ ? this.startMain_() : this.start_(index);
     this.broken_.add(index);
-    for (const [id, r] of this.running_)
-      if (r.worker === index) this.helpers_[index].post(id, r.job.request, []);
+    for (const [id, r] of this.running_) {
+      if (r.worker !== index) continue;
+      if (again && this.works_) this.answered_({ id, failed: new Error('a worker broke') });
+      else this.helpers_[index].post(id, r.job.request, []);
+    }
   }
 
   private answered_(answer: WorkerAnswer): void {
     const entry = this.running_.get(answer.id);
     if (!entry) return closeBitmaps(answer.result); // nobody waits for it any more
+    this.works_ ||= !answer.failed;
     this.running_.delete(answer.id);
     --this.load_[entry.worker];
     const { error } = answer;

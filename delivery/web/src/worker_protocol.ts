@@ -58,6 +58,9 @@ export interface SplitInfo {
   scales: { scale: number; blocks: number; wedges: number; end: number }[];
   attributes: { kind: SplitKind; components: number }[];
   groups: { material: number; part: number }[];
+  /** Of each block, which stand one after the other behind the head; 8 bytes of SHA-256 each. */
+  blockBytes: number[];
+  digests: Uint8Array;
 }
 
 /** What has been added to a split mesh, and its triangles now. */

@@ -3,7 +3,7 @@ export interface Fault {
   /** By number of the request, from 0 on; false: all is well. */
   (request: { number: number; url: string; range?: [number, number] }): FaultKind | false;
 }
-export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short' | 'long' | 'whole' | 'flip' | 'wrong-range' | 'other-etag';
+export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short' | 'long' | 'whole' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -47,6 +47,10 @@ export function fakeServer(files: Record<string, Uint8Array>, options: { ranges?
     if (kind === 'flip') {
       body = body.slice();
       body[body.length >> 1] ^= 0x10;
+    }
+    if (kind === 'flip-last') {
+      body = body.slice();
+      body[body.length - 1] ^= 0x10;
     }
     headers.set('Content-Length', String(body.length));
     if (kind === 'short') body = body.subarray(0, body.length - 1);

@@ -92,6 +92,25 @@ describe('a failure', () => {
     expect((await one).name).toBe('AbortError');
     await other;
   });
+  it('nor of one who cancels while tables and index come', async () => {
+    for (const ask of [
+      (r: PackageReader, s?: AbortSignal) => r.data(undefined, s), (r: PackageReader, s?: AbortSignal) => r.planeFiles(0, s),
+      (r: PackageReader, s?: AbortSignal) => r.quality(s), (r: PackageReader, s?: AbortSignal) => r.tableStream(0, 0, s),
+    ]) {
+      let stalls = true;
+      const server = range(({ number }) => number > 0 && stalls && 'stall');
+      const reader = await openAt(server, { stallTimeoutS: 30 });
+      const abort = new AbortController();
+      const one = rejection(ask(reader, abort.signal));
+      const other = ask(reader);
+      await new Promise((go) => setTimeout(go, 10));
+      expect(server.log.length).toBeGreaterThan(1);
+      stalls = false;
+      abort.abort();
+      expect((await one).name).toBe('AbortError');
+      await other;
+    }
+  });
   it('nor in a tree of files', async () => {
     let stalls = true;
     const server = fakeServer({ '/a/x.bin': new Uint8Array(3000) }, { ranges: false, fault: () => stalls && 'stall' });
@@ -215,6 +234,21 @@ describe('hostile answers', () => {
       for (const name of ['images', 'buffers'])
         expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: [{}, { uri }] })))).toThrow(FormatError);
     }
+    const evil = JSON.stringify({ buffers: [{ uri: 'http://evil.example/x' }] });
+    const chunk = (type: number, json: string): Uint8Array => Uint8Array.from([...new Uint8Array(Uint32Array.of(json.length, type).buffer), ...new TextEncoder().encode(json)]);
+    const chunks = (...parts: Uint8Array[]): Uint8Array => {
+      const body = parts.flatMap((p) => [...p]);
+      return Uint8Array.from([...new Uint8Array(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), ...body]);
+    };
+    const [json, bin] = [0x4e4f534a, 0x004e4942];
+    requireOwnBytes(chunks(chunk(json, '{}'), chunk(bin, 'abcd')));
+    const others = [
+      chunks(chunk(json, '{}'), chunk(json, evil)), chunks(chunk(0x12345678, '{}'), chunk(json, evil)),
+      chunks(chunk(json, '{}'), chunk(bin, 'abcd'), chunk(json, evil)), chunks(chunk(json, '{}'), chunk(bin, 'a'), chunk(bin, 'b')),
+      glb('{"buffers":{"0":{"uri":"http://evil.example/x"}}}'), glb('{"images":{"0":{"uri":"http://evil.example/x"},"length":1}}'),
+      glb('{"buffers":[null]}'), glb('{"buffers":[{"uri":["data:"]}]}'), glb('{"images":[3]}'), glb('[]'), glb('null'), glb('{"images":"x"}'),
+    ];
+    for (const other of others) expect(() => requireOwnBytes(other)).toThrow(FormatError);
     requireOwnBytes(glb(JSON.stringify({ images: [], buffers: [{ byteLength: 3 }] })));
     const whole = glb('{}');
     for (let n = 0; n < whole.length; ++n) expect(() => requireOwnBytes(whole.subarray(0, n))).toThrow(FormatError);
@@ -239,6 +273,15 @@ describe('a load', () => {
     opened.load(new Scene(), { ...options, ...good }).dispose();
     for (const bad of [{ order: 'foo' }, { rule: 'foo' }, { meshes: '' }, { time: NaN }, { time: 'soon' }, { display: NaN }, { display: -5 }])
       expect(() => opened.load(new Scene(), { ...options, ...(bad as Partial<LoadOptions>) })).toThrow(InputError);
+  });
+  it('takes whole numbers for scale and rung', async () => {
+    const opened = await pkg(range());
+    for (const v of [1.5, -1, NaN, Infinity, '1' as unknown as number])
+      for (const name of ['scale', 'rung']) expect(() => opened.load(new Scene(), { ...options, [name]: v })).toThrow(InputError);
+    const model = opened.load(new Scene(), { ...options, rung: 99, scale: 0 });
+    expect(() => model.setOverride({ rung: 0.5 })).toThrow(InputError);
+    model.setOverride({});
+    model.dispose();
   });
   it('that was cancelled before it began asks for nothing', async () => {
     const server = range();
@@ -327,10 +370,11 @@ describe('pictures', () => {
   });
 });
 
-it('a worker that breaks is replaced once, then its jobs go to the main thread', async () => {
-  const started: { onerror?: (e: { preventDefault(): void }) => void; posted: number }[] = [];
+it('a worker that breaks is replaced once, then there are none', async () => {
+  const started: Broken[] = [];
   class Broken {
     onerror?: (e: { preventDefault(): void }) => void;
+    onmessage?: (e: { data: unknown }) => void;
     posted = 0;
     constructor() {
       started.push(this);
@@ -350,6 +394,15 @@ it('a worker that breaks is replaced once, then its jobs go to the main thread',
     started[1].onerror!({ preventDefault: () => undefined });
     expect((await job).message).toContain('decode');
     expect(started.length).toBe(2);
+    // One that has worked does not make all useless: what it broke on fails, and another takes its place.
+    const other = new WorkerPool({ workers: 1 });
+    const fine = other.openSplits(1, new Uint8Array(4));
+    started[2].onmessage!({ data: { id: 1, result: 7 } });
+    expect(await fine).toBe(7);
+    const lost = rejection(other.openSplits(2, new Uint8Array(4)));
+    for (const k of [2, 3]) started[k].onerror!({ preventDefault: () => undefined });
+    expect((await lost).message).toContain('broke');
+    expect(started.length).toBe(5);
   } finally {
     if (before) Object.defineProperty(globalThis, 'Worker', before);
     else Reflect.deleteProperty(globalThis, 'Worker');

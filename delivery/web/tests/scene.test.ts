@@ -11,6 +11,7 @@ import { SplitShapes } from '../src/split_shape';
 import { VisibleSurface } from '../src/visibility';
 import { handle } from '../src/worker';
 import { WorkerPool } from '../src/worker_pool';
+import { Fault, fakeServer } from './fake_server';
 import { golden } from './support';
 
 const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
@@ -117,6 +118,22 @@ describe('scales out of the vertex-split stream', () => {
     box.max.toArray().forEach((v, i) => expect(Math.abs(v - manifest.boundsMax[i])).toBeLessThan(slack));
     expect(finest.material as Material).toBe(material);
     expect(passed.get(1)!.geometry.getAttribute('position')).toBe(finest.geometry.getAttribute('position'));
+  });
+  it('damaged blocks are fetched again, from another mirror where there is one', async () => {
+    for (const mirrors of [[], ['http://other/a.texmesh']]) {
+      const { stream } = manifest;
+      let damaged = 0;
+      const fault: Fault = ({ url, range }) =>
+        url.startsWith('http://host') && range?.[0] === stream!.offset && (mirrors.length > 0 || damaged === 0) && ++damaged > 0 && 'flip-last';
+      const server = fakeServer({ '/a.texmesh': golden('v1.1-scan') }, { fault });
+      const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
+      const splits = new SplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined);
+      const { signal } = new AbortController();
+      await splits.open(signal);
+      const mesh = await splits.load(0, gltf, signal, () => undefined, () => undefined);
+      expect(mesh.geometry.index!.count / 3).toBe(manifest.scales[0].triangles);
+      expect(damaged).toBeGreaterThan(0);
+    }
   });
   it('a scale that is there costs nothing', async () => {
     const { splits, signal } = await shapes();

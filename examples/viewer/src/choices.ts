@@ -31,6 +31,10 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
     const v = query.get(name);
     return v !== null && v !== '' && Number.isFinite(Number(v)) ? Number(v) : null;
   };
+  const whole = (name: string): number | null => {
+    const v = number(name);
+    return v !== null && Number.isInteger(v) && v >= 0 ? v : null;
+  };
   const time = number('time');
   const mbit = number('mbit');
   const named = query.get('policy') === 'htca' ? 'htc' : query.get('policy');
@@ -38,8 +42,8 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
     timeS: query.get('time') === 'none' ? Infinity : time !== null && time > 0 ? time : 4,
     capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
     policy: kPolicies.find(([p]) => p === named)?.[0] ?? 'guard',
-    scale: number('scale'),
-    rung: number('rung'),
+    scale: whole('scale'),
+    rung: whole('rung'),
   };
 }
 

@@ -23,7 +23,8 @@ export interface Transfer {
 export interface Live {
   manifest: Manifest | null;
   textures: TextureInfo[];
-  tables: PlaneTables[];
+  /** Of those planes that were read. */
+  tables: (PlaneTables | undefined)[];
   packageBytes: number;
   title: string;
   phase: string;

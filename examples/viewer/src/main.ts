@@ -95,12 +95,6 @@ function start(): void {
   wireTools(stage, session);
   document.body.classList.toggle('wide', wideAtFirst());
   byId('toggle').setAttribute('aria-expanded', String(!wideAtFirst()));
-  stage.onLost = () => session.problem('The graphics context was lost; waiting for it to come back');
-  stage.onRestored = () => {
-    hideMessage();
-    void session.start(choices);
-    if (!divider.hidden) void session.showOriginal(true).catch(session.onError);
-  };
   Object.assign(window, { texmeshViewer: { stage, session, choices } });
   if (packageUrl === '') {
     document.body.classList.add('wide'); // there is nothing to say about no package

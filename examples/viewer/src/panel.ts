@@ -117,7 +117,7 @@ export class Panel {
       return make('option', { value: String(p) }, `${image?.role ?? t.role} ${t.image}, ${size}${t.mip ? ` (1/${2 ** t.mip})` : ''}`);
     });
     this.planeSelect.replaceChildren(...names);
-    const qualities = [...(this.live.tables[0]?.rungQuality ?? [])];
+    const qualities = [...(this.live.tables.find((t) => t)?.rungQuality ?? [])];
     this.rungSelect.replaceChildren(make('option', { value: '' }, 'by time and importance'),
       ...qualities.map((q, r) => make('option', { value: String(r) }, `rung ${r} · quality ${q}`)));
     this.rungSelect.value = this.choices.rung === null ? '' : String(this.choices.rung);

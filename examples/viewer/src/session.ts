@@ -47,9 +47,10 @@ export class Session {
       const model = pkg.load(this.stage.current, this.options(choices));
       this.model = model;
       this.listen(model, turn);
-      this.readTables(pkg, turn);
       await model.done;
-      if (turn === this.turn) await this.predict(pkg, model, turn);
+      if (turn !== this.turn) return;
+      await this.readTables(pkg, turn);
+      await this.predict(pkg, model, turn);
     } catch (error) {
       if (turn === this.turn && !this.abort.signal.aborted) this.failed(error);
     }
@@ -154,18 +155,18 @@ export class Session {
     this.live.requests++;
   }
 
-  /** The panel's tables: the library reads what it needs itself, and nothing is read twice. */
-  private readTables(pkg: TexmeshPackage, turn: number): void {
-    const model = this.model;
-    const wait = model ? model.done.catch(() => {}) : Promise.resolve();
-    void wait.then(async () => {
-      if (turn !== this.turn) return;
-      const [textures, tables] = [await pkg.textures(), await pkg.tables()];
+  /** The panel's tables: of the planes that are shown as soon as the load has read them, of all when its time is over. Nothing is read twice. */
+  private async readTables(pkg: TexmeshPackage, turn: number, planes?: number[]): Promise<void> {
+    const { signal } = this.abort;
+    try {
+      const [textures, tables] = [await pkg.textures(signal), await pkg.tables(planes, signal)];
       if (turn !== this.turn) return;
       this.live.textures = textures;
-      this.live.tables = tables.map((t) => t!);
+      this.live.tables = tables;
       this.changed();
-    }).catch(() => {});
+    } catch (error) {
+      if (turn === this.turn && !signal.aborted) this.problem(error);
+    }
   }
 
   private listen(model: LoadedModel, turn: number): void {
@@ -189,6 +190,7 @@ export class Session {
     });
     on('plane', (e) => {
       l.shownPlane.set(e.base, e.plane);
+      if (this.pkg) void this.readTables(this.pkg, turn, [e.plane]);
       this.stage.draw();
     });
     on('fragment', (e) => {
@@ -210,6 +212,12 @@ export class Session {
     on('done', () => {
       l.phase = 'done';
       if (this.pkg) void this.predict(this.pkg, model, turn).catch(() => {}); // refining has made it better
+    });
+    // The library makes anew what the GPU has lost; until then there is nothing to be seen.
+    on('context', (e) => {
+      if (e.lost) this.problem(new Error('The graphics context was lost; waiting for it to come back'));
+      else this.solved();
+      this.stage.draw();
     });
     on('error', (e) => { if (e.fatal) this.failed(e.error); else this.problem(e.error); });
   }
@@ -262,6 +270,12 @@ export class Session {
   problem(error: unknown): void {
     this.live.problem = error instanceof Error ? error.message : String(error);
     this.live.problems++;
+    this.changed();
+  }
+
+  private solved(): void {
+    this.live.problem = '';
+    this.live.problems = 0;
     this.changed();
   }
 

@@ -21,9 +21,6 @@ export class Stage {
   onFrame: () => void = () => {};
   /** Called when the camera, or the size of the picture, has changed. */
   onView: () => void = () => {};
-  /** The GPU has dropped everything; later it may be used again. */
-  onLost: () => void = () => {};
-  onRestored: () => void = () => {};
 
   private readonly controls: OrbitControls;
   private readonly lamps: DirectionalLight[];
@@ -47,9 +44,7 @@ export class Stage {
     });
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement ?? canvas);
     canvas.addEventListener('keydown', (e) => this.key(e));
-    canvas.addEventListener('webglcontextlost', () => this.onLost());
-    // What was composed on the GPU is gone: whoever made it has to make it again.
-    canvas.addEventListener('webglcontextrestored', () => this.onRestored());
+    canvas.addEventListener('webglcontextrestored', () => this.draw());
     this.resize();
   }
 

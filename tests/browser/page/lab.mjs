@@ -1,5 +1,6 @@
 // The page that tests and figures drive: the client library alone, a fixed camera, and everything that happens written down.
 import {TexmeshPackage, open} from 'texmesh';
+import {handle} from 'texmesh/worker';
 import {Box3, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer} from 'three';
 import {DRACOLoader} from 'three/addons/loaders/DRACOLoader.js';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
@@ -16,7 +17,7 @@ new PerformanceObserver((list) => {
 }).observe({type: 'longtask', buffered: true});
 
 /** A canvas of `size` px and a camera that sees a box of the object whole; by default that of make_scan's objects. */
-function start({size = 512, min = [-0.13, -0.18, -0.13], max = [0.13, 0.18, 0.18], azimuth = 30, elevation = 15, zoom = 1} = {}) {
+function start({size = 512, min = [-0.13, -0.18, -0.13], max = [0.13, 0.18, 0.18], azimuth = 30, elevation = 15, zoom = 1, background = 0x808080} = {}) {
   stage?.renderer.dispose();
   document.body.replaceChildren();
   const renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
@@ -24,7 +25,7 @@ function start({size = 512, min = [-0.13, -0.18, -0.13], max = [0.13, 0.18, 0.18
   renderer.setSize(size, size);
   document.body.append(renderer.domElement);
   const scene = new Scene();
-  scene.background = new Color(0x808080);
+  scene.background = new Color(background);
   const box = new Box3(new Vector3(...min), new Vector3(...max));
   const centre = box.getCenter(new Vector3());
   const radius = box.getSize(new Vector3()).length() / 2 || 1;
@@ -56,10 +57,11 @@ function pixels() {
 /**
  * Opens and loads a package; events, requests and, with `frames`, pictures are kept. Comes back at once with a number;
  * `finished` waits. `load` takes LoadOptions without renderer, loader and camera; `follow` gives the camera, too. With `memory`,
- * all of it is fetched before the clock starts; with `still`, nothing is drawn before the end.
+ * all of it is fetched before the clock starts; with `still`, nothing is drawn before the end. `here`: no workers. `px`: displayed height, which
+ * may be changed later.
  */
-function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false, still = false} = {}) {
-  const run = {events: [], requests: [], frames: [], error: null, t0: performance.now(), pkg: null, model: null, abort: new AbortController()};
+function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false, still = false, here = false, px} = {}) {
+  const run = {events: [], requests: [], frames: [], error: null, t0: performance.now(), pkg: null, model: null, px, abort: new AbortController()};
   loads.push(run);
   let dirty = true;
   let over = false;
@@ -70,7 +72,7 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
   };
   const tick = () => {
     if (over === 'yes') return;
-    if (run.model) run.model.update(stage.camera);
+    if (run.model) run.model.update(px ? undefined : stage.camera);
     const now = performance.now();
     if (dirty && (!still || over) && (!frames || now - lastFrame >= frames || over)) {
       dirty = false;
@@ -92,10 +94,11 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
       run.requests.push(...pkg.requests);
       pkg.onRequest((r) => run.requests.push(r));
       const model = pkg.load(stage.scene, {
-        renderer: stage.renderer, gltfLoader, ...(follow ? {camera: stage.camera} : {}), signal: run.abort.signal, ...loadOptions,
+        renderer: stage.renderer, gltfLoader, ...(follow && !px ? {camera: stage.camera} : {}), ...(here ? {decode: handle} : {}),
+        ...(px ? {display: () => run.px} : {}), signal: run.abort.signal, ...loadOptions,
       });
       run.model = model;
-      for (const name of ['first-picture', 'scale', 'plane', 'fragment', 'decision', 'progress', 'deadline', 'error', 'done'])
+      for (const name of ['first-picture', 'scale', 'plane', 'fragment', 'decision', 'progress', 'deadline', 'context', 'error', 'done'])
         model.on(name, note(name));
       requestAnimationFrame(tick);
       await model.done;
@@ -135,6 +138,42 @@ function plane(id, base) {
   const run = loads[id];
   const shown = run.model.state.planes.find((p) => p.base === base);
   return {...toBase64(run.model.readPlane(base)), widthPx: shown.widthPx, heightPx: shown.heightPx, plane: shown.plane, rungs: [...shown.rungs]};
+}
+
+/** Each mip level of a composed plane against the mean of four texels of the level before: mean and greatest difference of 8-bit values. */
+function levels(id, base) {
+  const shown = loads[id].model.state.planes.find((p) => p.base === base);
+  const gl = stage.renderer.getContext();
+  const {__webglTexture: texture} = stage.renderer.properties.get(shown.textures[0]);
+  const frame = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  const out = [];
+  let before;
+  for (let level = 0, [w, h] = [shown.widthPx, shown.heightPx]; ; level++, w = Math.max(1, w >> 1), h = Math.max(1, h >> 1)) {
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level);
+    if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) break;
+    const data = new Uint8Array(4 * w * h);
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    if (before) {
+      let [most, sum] = [0, 0];
+      const at = (x, y, c) => before.data[4 * (Math.min(y, before.h - 1) * before.w + Math.min(x, before.w - 1)) + c];
+      for (let y = 0; y < h; y++)
+        for (let x = 0; x < w; x++)
+          for (let c = 0; c < 4; c++) {
+            const mean = (at(2 * x, 2 * y, c) + at(2 * x + 1, 2 * y, c) + at(2 * x, 2 * y + 1, c) + at(2 * x + 1, 2 * y + 1, c)) / 4;
+            const d = Math.abs(data[4 * (y * w + x) + c] - mean);
+            most = Math.max(most, d);
+            sum += d;
+          }
+      out.push({level, w, h, most, mean: sum / (4 * w * h)});
+    }
+    before = {w, h, data};
+    if (w === 1 && h === 1) break;
+  }
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.deleteFramebuffer(frame);
+  stage.renderer.resetState();
+  return out;
 }
 
 function toBase64(bytes) {
@@ -317,7 +356,7 @@ const gl = () => stage.renderer.getContext();
 Object.assign(window, {
   lab: {
     start, draw, pixels, load, finished, report, plane, dispose, loadGlb, clear, keepReference, qualityOverTime, memory, loads, longTasks, gl,
-    gltfLoader, toBase64, ssim, wholeJpeg, settle, compareMesh, stage: () => stage, draco, open,
+    gltfLoader, toBase64, ssim, wholeJpeg, settle, compareMesh, levels, stage: () => stage, draco, open,
   },
   ready: true,
 });
