@@ -159,7 +159,8 @@ test('a graphics context that is lost during a load', () => throttled({bytesPerS
   check(!r.error, JSON.stringify(r.error));
   await lab(page, (i) => window.lab.loads[i].model.refine(), id);
   const {state} = await lab(page, (i) => window.lab.report(i), id);
-  check(state.planes.length > 0 && state.planes.every((p) => p.rungs.some((k) => k === 3)), JSON.stringify(state.planes.map((p) => p.rungs)));
+  const errors = r.events.filter((e) => e.name === 'error').map((e) => e.message);
+  check(state.planes.length > 0 && state.planes.every((p) => p.rungs.some((k) => k === 3)), JSON.stringify([errors, state.planes.map((p) => p.rungs)]));
   const levels = await lab(page, ([i, p]) => window.lab.levels(i, p), [id, state.planes[0].base]);
   check(levels[0].mean < 1.5, `mip level 1 differs by ${levels[0].mean} in the mean`);
 }), {seconds: 90});

@@ -36,11 +36,12 @@ export class ModelLoad implements LoadedModel {
   private refineAgain_ = false;
   private scaleRetry_?: { scale: number; timer: ReturnType<typeof setTimeout> };
   private scaleRetryS_ = retryScaleS.first;
+  private restoring_?: Promise<void>;
   private disposed_ = false;
   private readonly offRequest_: () => void;
   private readonly cancel_ = (): void => this.cancel();
   private readonly contextLost_ = (): void => this.events_.emit('context', { lost: true });
-  private readonly contextRestored_ = (): void => void this.restore_();
+  private readonly contextRestored_ = (): void => void (this.restoring_ = this.restore_());
 
   constructor(
     private readonly reader_: PackageReader,
@@ -313,6 +314,7 @@ export class ModelLoad implements LoadedModel {
   private async refineAll_(): Promise<void> {
     try {
       if (!this.resting_) await this.done;
+      await this.restoring_;
       await this.refineRounds_();
     } finally {
       this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own

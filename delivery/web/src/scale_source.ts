@@ -75,7 +75,7 @@ export class ScaleSource {
       this.splitsOpen_ = true;
     } catch (error) {
       if (isAbort(error)) throw error;
-      this.problem_(error, 'vertex splits'); // GLB files do, too
+      if (!this.pool_.none) this.problem_(error, 'vertex splits'); // GLB files do, too
     }
   }
   private glbBytes_(scale: number): number {
