@@ -234,21 +234,6 @@ describe('hostile answers', () => {
       for (const name of ['images', 'buffers'])
         expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: [{}, { uri }] })))).toThrow(FormatError);
     }
-    const evil = JSON.stringify({ buffers: [{ uri: 'http://evil.example/x' }] });
-    const chunk = (type: number, json: string): Uint8Array => Uint8Array.from([...new Uint8Array(Uint32Array.of(json.length, type).buffer), ...new TextEncoder().encode(json)]);
-    const chunks = (...parts: Uint8Array[]): Uint8Array => {
-      const body = parts.flatMap((p) => [...p]);
-      return Uint8Array.from([...new Uint8Array(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), ...body]);
-    };
-    const [json, bin] = [0x4e4f534a, 0x004e4942];
-    requireOwnBytes(chunks(chunk(json, '{}'), chunk(bin, 'abcd')));
-    const others = [
-      chunks(chunk(json, '{}'), chunk(json, evil)), chunks(chunk(0x12345678, '{}'), chunk(json, evil)),
-      chunks(chunk(json, '{}'), chunk(bin, 'abcd'), chunk(json, evil)), chunks(chunk(json, '{}'), chunk(bin, 'a'), chunk(bin, 'b')),
-      glb('{"buffers":{"0":{"uri":"http://evil.example/x"}}}'), glb('{"images":{"0":{"uri":"http://evil.example/x"},"length":1}}'),
-      glb('{"buffers":[null]}'), glb('{"buffers":[{"uri":["data:"]}]}'), glb('{"images":[3]}'), glb('[]'), glb('null'), glb('{"images":"x"}'),
-    ];
-    for (const other of others) expect(() => requireOwnBytes(other)).toThrow(FormatError);
     requireOwnBytes(glb(JSON.stringify({ images: [], buffers: [{ byteLength: 3 }] })));
     const whole = glb('{}');
     for (let n = 0; n < whole.length; ++n) expect(() => requireOwnBytes(whole.subarray(0, n))).toThrow(FormatError);
