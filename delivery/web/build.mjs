@@ -118,7 +118,7 @@ if (process.argv.includes('--types')) {
   process.exit(0);
 }
 if (process.argv.includes('--license')) {
-  const license = join(here, '..', '..', 'LICENSE');
+  const license = join(process.env.TEXMESH_ROOT ?? join(here, '..', '..'), 'LICENSE');
   if (existsSync(license)) copyFileSync(license, join(here, 'LICENSE'));
   process.exit(existsSync(join(here, 'LICENSE')) ? 0 : 1);
 }
