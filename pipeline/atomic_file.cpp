@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "format/errors.h"
 #include "pipeline/resource_error.h"
 
 namespace texmesh {
@@ -144,6 +145,17 @@ bool is_special_file(const std::string& path) {
   const std::filesystem::file_status status = std::filesystem::status(path, ec);
   return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
          !std::filesystem::is_directory(status);
+}
+
+void check_output_file(const std::string& path) {
+  const std::filesystem::path file(path);
+  std::error_code error;
+  if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
+  if (std::filesystem::is_directory(file, error))
+    throw InputError(path, "", "a file that can be written", "a folder");
+  const std::string folder = file.parent_path().string();
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    throw InputError(path, "", "a file that can be written", std::strerror(errno));
 }
 
 void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,

@@ -24,6 +24,10 @@ bool is_special_file(const std::string& path);
 void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
                        const std::string& temporary = "");
 
+/// Throws InputError when write_output_file() could not write there: for commands that work long before they
+/// do.
+void check_output_file(const std::string& path);
+
 /// The name of a temporary sibling of `path`; `number` tells those of one process apart.
 std::string temporary_name(const std::string& path, std::size_t number);
 

@@ -44,9 +44,10 @@ CutImage cut_image(const Pixels& pixels, std::uint32_t grid) {
   const auto side = [&](std::uint32_t size) { return (size + grid * kBlock - 1) / (grid * kBlock) * kBlock; };
   plane.fragment_width_px = side(pixels.width_px);
   plane.fragment_height_px = side(pixels.height_px);
-  plane.columns = plane.rows = grid;
-  plane.width_px = plane.fragment_width_px * grid;
-  plane.height_px = plane.fragment_height_px * grid;
+  plane.columns = (pixels.width_px + plane.fragment_width_px - 1) / plane.fragment_width_px;
+  plane.rows = (pixels.height_px + plane.fragment_height_px - 1) / plane.fragment_height_px;
+  plane.width_px = plane.fragment_width_px * plane.columns;
+  plane.height_px = plane.fragment_height_px * plane.rows;
   plane.coverage.assign(std::size_t{plane.width_px} / 8 * plane.height_px, 0xff);
   const std::size_t count = plane.fragment_count();
   plane.covered_texels.assign(count, plane.fragment_width_px * plane.fragment_height_px);
@@ -92,8 +93,6 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
                                          const FragmentStudyOptions& options, const RunContext& context) {
   const CutImage cut = cut_image(image, static_cast<std::uint32_t>(grid));
   const TexturePlane& plane = cut.fragments.planes[0];
-  if (plane.width_px >= 2 * (image.width_px + kBlock) || plane.height_px >= 2 * (image.height_px + kBlock))
-    return {};
   LadderOptions ladder_options;
   ladder_options.rungs = options.qualities;
   ladder_options.subsampling = options.subsampling;
@@ -115,6 +114,8 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   for (std::size_t q = 0; q < qualities; ++q) {
     FragmentStudyRow row{grid,
                          options.qualities[q],
+                         plane.columns,
+                         plane.rows,
                          plane.fragment_width_px,
                          plane.fragment_height_px,
                          whole[q].standard,
@@ -146,6 +147,8 @@ std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const Fragme
   });
   std::vector<FragmentStudyRow> out;
   for (std::size_t g = 0; g < options.grids.size(); ++g) {
+    const auto before = options.grids.begin() + static_cast<std::ptrdiff_t>(g);
+    if (std::find(options.grids.begin(), before, *before) != before) continue;
     const auto rows = study_grid(pixels, options.grids[g], whole, options, context);
     out.insert(out.end(), rows.begin(), rows.end());
     context.report(static_cast<double>(g + 1) / static_cast<double>(options.grids.size()));

@@ -20,15 +20,16 @@ struct FragmentStudyOptions {
 /// packages hold: abbreviated streams behind one table stream, which is counted.
 struct FragmentStudyRow {
   int grid = 0, quality = 0;
+  std::uint32_t columns = 0, rows = 0;  // at most grid: fragments without a pixel of the image do not count
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;
   std::uint64_t file_standard = 0, file_optimised = 0;                // the whole image in one file
-  std::uint64_t sum_standard = 0, sum_optimised = 0, sum_shared = 0;  // of the grid * grid fragments
+  std::uint64_t sum_standard = 0, sum_optimised = 0, sum_shared = 0;  // of the columns * rows fragments
 };
 
-/// By grid, then quality, as the options list them. Fragments have sides that are multiples of 16 and at
-/// least image side / grid, the image's edges repeated to fill them ("the entire texture is adjusted so that
-/// there is no partial fragment"); grids whose fragments of 16 px would not fit the image (twice its size and
-/// more) are left out. `pixels` have 1 or 3 channels. Throws StageError for options or pixels outside these
+/// By grid, then quality, as the options list them; a grid that is listed twice counts once. Fragments have
+/// sides that are multiples of 16 and at least image side / grid, the image's edges repeated to fill them
+/// ("the entire texture is adjusted so that there is no partial fragment"), and there are as many as the
+/// image reaches into. `pixels` have 1 or 3 channels. Throws StageError for options or pixels outside these
 /// ranges. Same result for any thread count.
 std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const FragmentStudyOptions& options,
                                               const RunContext& context);

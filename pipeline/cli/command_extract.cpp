@@ -1,8 +1,5 @@
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -28,14 +25,6 @@ std::uint32_t rung_of(const std::string& text) {
   if (text.empty() || text.size() > 3 || text.find_first_not_of("0123456789") != std::string::npos)
     throw UsageError("--rung", "", "a rung's number (texmesh dump PKG ladder lists them) or max", text);
   return static_cast<std::uint32_t>(std::stoul(text));
-}
-
-void check_output(const std::string& path) {
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  if (std::filesystem::is_directory(path))
-    throw InputError(path, "", "a file that can be written", "a folder");
-  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
-    throw InputError(path, "", "a file that can be written", std::strerror(errno));
 }
 
 ExtractRequest request_of(const ExtractArguments& a) {
@@ -105,7 +94,7 @@ void add_extract_command(CLI::App& app, int& exit_code) {
       "a file within 2 % below --bytes: the nearest possible file is written then.");
   c->callback([args, &exit_code] {
     const ExtractRequest request = request_of(*args);
-    check_output(args->output);  // not after the search
+    check_output_file(args->output);  // not after the search
     RunContext context;
     context.threads =
         args->jobs > 0 ? args->jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));

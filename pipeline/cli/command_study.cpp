@@ -72,17 +72,17 @@ Pixels read_pixels(const std::string& path) {
 std::string fragment_text(const StudiedImage& image) {
   TextTable table;
   for (const char* header :
-       {"n", "fragment px", "quality", "file std kB", "file opt kB", "sum std kB", "over std %", "sum opt kB",
-        "over opt %", "shared kB", "over std %", "over opt %"})
+       {"n", "fragments", "fragment px", "quality", "file std kB", "file opt kB", "sum std kB", "over std %",
+        "sum opt kB", "over opt %", "shared kB", "over std %", "over opt %"})
     table.column(header);
   std::size_t within = 0, large = 0, large_within = 0;
   for (const FragmentStudyRow& r : image.rows) {
-    table.row({fmt::format("{}^2", r.grid), fmt::format("{}x{}", r.fragment_width_px, r.fragment_height_px),
-               std::to_string(r.quality), kilobytes(r.file_standard), kilobytes(r.file_optimised),
-               kilobytes(r.sum_standard), more_than(r.sum_standard, r.file_standard),
-               kilobytes(r.sum_optimised), more_than(r.sum_optimised, r.file_optimised),
-               kilobytes(r.sum_shared), more_than(r.sum_shared, r.file_standard),
-               more_than(r.sum_shared, r.file_optimised)});
+    table.row({fmt::format("{}^2", r.grid), fmt::format("{}x{}", r.columns, r.rows),
+               fmt::format("{}x{}", r.fragment_width_px, r.fragment_height_px), std::to_string(r.quality),
+               kilobytes(r.file_standard), kilobytes(r.file_optimised), kilobytes(r.sum_standard),
+               more_than(r.sum_standard, r.file_standard), kilobytes(r.sum_optimised),
+               more_than(r.sum_optimised, r.file_optimised), kilobytes(r.sum_shared),
+               more_than(r.sum_shared, r.file_standard), more_than(r.sum_shared, r.file_optimised)});
     const bool good = r.sum_shared <= r.file_standard;
     const bool is_large = std::min(r.fragment_width_px, r.fragment_height_px) >= 128;
     within += good, large += is_large, large_within += good && is_large;
@@ -97,6 +97,8 @@ std::string fragment_text(const StudiedImage& image) {
 
 Json fragment_json(const FragmentStudyRow& r) {
   return {{"grid", r.grid},
+          {"columns", r.columns},
+          {"rows", r.rows},
           {"fragment_width_px", r.fragment_width_px},
           {"fragment_height_px", r.fragment_height_px},
           {"quality", r.quality},
@@ -124,7 +126,7 @@ std::string fragment_csv(const std::vector<StudiedImage>& images) {
     for (const FragmentStudyRow& r : i.rows)
       out +=
           fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_name(i.path), i.width_px, i.height_px,
-                      r.grid, r.grid * r.grid, r.fragment_width_px, r.fragment_height_px, r.quality,
+                      r.grid, r.columns * r.rows, r.fragment_width_px, r.fragment_height_px, r.quality,
                       r.file_standard, r.file_optimised, r.sum_standard, r.sum_optimised, r.sum_shared);
   return out;
 }
@@ -132,6 +134,7 @@ std::string fragment_csv(const std::vector<StudiedImage>& images) {
 void run_fragments(const FragmentArguments& args) {
   FragmentStudyOptions options{args.grids, args.qualities,
                                args.subsampling == "444" ? Subsampling::k444 : Subsampling::k420};
+  if (!args.csv.empty()) check_output_file(args.csv);  // not after the study
   std::vector<StudiedImage> studied;
   Json list = Json::array();
   for (const std::string& path : args.images) {
@@ -179,7 +182,10 @@ void add_fragments(CLI::App& study, int& exit_code) {
       "shared table\n"
       "stream, which is counted. \"over std %\" is how much more a sum takes than one such file; less is "
       "negative.\n"
-      "Fragments have sides that are multiples of 16: the image's edges are repeated to fill the last ones.\n"
+      "Fragments have sides that are multiples of 16: the image's edges are repeated to fill the last ones, "
+      "and "
+      "small\n"
+      "images are cut into fewer than n x n.\n"
       "Examples:\n"
       "  texmesh study fragments atlas.jpg\n"
       "  texmesh study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv\n"
@@ -248,14 +254,19 @@ std::vector<std::uint8_t> side_by_side(const Choices& choices) {
 std::string quality_text(const Choices& choices) {
   TextTable table;
   table.column("choice", Align::kLeft);
-  for (const char* header : {"kB", "fragments", "skipped", "lowest q", "highest q", "surface SSIM",
-                             "rendered SSIM", "rendered difference"})
+  const std::uint64_t budget = choices.size() > 1 ? choices[1].bytes : 0;  // uniform's
+  for (const char* header : {"kB", "of budget %", "fragments", "skipped", "lowest q", "highest q",
+                             "surface SSIM", "rendered SSIM", "rendered difference"})
     table.column(header);
   for (const StudiedChoice& c : choices)
     if (c.fragments > 0)
-      table.row({c.name, kilobytes(c.bytes), std::to_string(c.fragments), std::to_string(c.skipped),
-                 std::to_string(c.lowest_quality), std::to_string(c.highest_quality),
-                 fixed(c.surface_ssim, 4), fixed(c.ssim, 4), fixed(c.difference, 4)});
+      table.row(
+          {c.name, kilobytes(c.bytes),
+           fixed(100 * static_cast<double>(c.bytes) / static_cast<double>(std::max<std::uint64_t>(budget, 1)),
+                 1),
+           std::to_string(c.fragments), std::to_string(c.skipped), std::to_string(c.lowest_quality),
+           std::to_string(c.highest_quality), fixed(c.surface_ssim, 4), fixed(c.ssim, 4),
+           fixed(c.difference, 4)});
   return table.text();
 }
 
@@ -279,7 +290,8 @@ void add_quality(CLI::App& study, int& exit_code) {
   auto args = std::make_shared<QualityArguments>();
   CLI::App* c = study.add_subcommand(
       "quality",
-      "Is variable texture quality better than one for all, at equal bytes? Rendered and scored (Fig. 3.9)");
+      "Is variable texture quality better than one for all, within the same bytes? Rendered and scored (Fig. "
+      "3.9)");
   c->add_option("MODEL", args->model, "A textured model; runs the stages that are needed, through the cache")
       ->required();
   c->add_option("-o,--output", args->output,
@@ -307,7 +319,10 @@ void add_quality(CLI::App& study, int& exit_code) {
   c->add_flag("--no-cache", args->no_cache, "Compute everything, keep nothing");
   c->add_flag("--json", args->json, "One JSON object, for programs");
   c->footer(
-      "variable (3.2) and (log): quality by feature density eta, around the highest Q_i whose bytes fit.\n"
+      "variable (3.2) and (log): quality by feature density eta, around the highest Q_i whose bytes fit; "
+      "they "
+      "move by\n"
+      "whole rungs, so \"of budget %\" says what they leave of the bytes.\n"
       "rate-distortion: bytes where they save most surface-weighted (1 - SSIM); fragments may be skipped, "
       "which show the\n"
       "preview. Surface SSIM is that of the tables; rendered SSIM and difference (FLIP-like) compare S_0 "
@@ -324,6 +339,7 @@ void add_quality(CLI::App& study, int& exit_code) {
       exit_code = kExitUsage;
       return;
     }
+    if (!args->output.empty()) check_output_file(args->output);
     const Choices choices = study_model(*args);
     if (!args->output.empty()) write_output_file(args->output, side_by_side(choices));
     std::cout << (args->json ? quality_json(choices).dump() + "\n" : quality_text(choices));

@@ -33,6 +33,7 @@ TEST_F(StudyCommand, FragmentsAsTableCsvAndJson) {
   ASSERT_EQ(text.exit_code, 0) << text.errors;
   EXPECT_NE(text.output.find("160 x 96 px"), std::string::npos) << text.output;
   EXPECT_NE(text.output.find("4^2"), std::string::npos) << text.output;
+  EXPECT_NE(text.output.find("4x3"), std::string::npos) << "48 px in rows of 32 px: " << text.output;
   const CommandResult machine =
       texmesh({"study", "fragments", rgba, grey, "--grids", "1,2,4", "--qualities", "20,80", "--json"});
   ASSERT_EQ(machine.exit_code, 0) << machine.errors;
@@ -84,6 +85,18 @@ TEST_F(StudyCommand, QualityOfAModel) {
   const CommandResult again = texmesh({"study", "quality", scan, "--size", "64", "--views", "2", "--quality",
                                        "30", "--json", "--no-cache", "-j", "1"});
   EXPECT_EQ(again.output, r.output);  // the same on one thread
+}
+
+TEST_F(StudyCommand, OutputsThatCannotBeWrittenAreToldBeforeTheStudy) {
+  const std::string grey = image("grey.png", 1), scan = folder / "none.glb";
+  for (const auto& arguments :
+       {std::vector<std::string>{"study", "fragments", grey, "--csv", folder / "no/x.csv"},
+        {"study", "quality", scan, "-o", folder / "no/x.png"}}) {
+    const CommandResult result = texmesh(arguments);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_TRUE(result.output.empty()) << result.output;
+    EXPECT_NE(result.errors.find("a file that can be written"), std::string::npos) << result.errors;
+  }
 }
 
 TEST_F(StudyCommand, WhatCannotBeStudied) {

@@ -69,10 +69,28 @@ TEST(FragmentStudy, OddSizesGreyAndTinyImages) {
   options.grids = {2, 16};
   options.qualities = {60};
   const auto odd = study(picture(101, 57, 1), options);
-  ASSERT_EQ(odd.size(), 1u);  // 16 x 16 fragments of 16 px would be five times the image's height
+  ASSERT_EQ(odd.size(), 2u);
   EXPECT_EQ(odd[0].fragment_width_px, 64u);
   EXPECT_EQ(odd[0].fragment_height_px, 32u);
-  EXPECT_TRUE(study(picture(1, 1, 3), options).size() <= 2);
+  // 16 x 16 of at least 16 px do not fit: 7 x 4 do.
+  EXPECT_EQ(std::tuple(odd[1].columns, odd[1].rows), std::tuple(7u, 4u));
+  const auto tiny = study(picture(1, 1, 3), options);
+  ASSERT_EQ(tiny.size(), 2u);
+  EXPECT_EQ(tiny[1].columns * tiny[1].rows, 1u);
+}
+
+TEST(FragmentStudy, OnlyFragmentsThatHoldSomeOfTheImageCount) {
+  FragmentStudyOptions options;
+  options.grids = {64, 8, 64};
+  options.qualities = {50};
+  const auto rows = study(picture(128, 128, 3), options);
+  ASSERT_EQ(rows.size(), 2u) << "a grid that is listed twice counts once";
+  EXPECT_EQ(std::tuple(rows[0].columns, rows[0].rows), std::tuple(8u, 8u));
+  EXPECT_EQ(rows[0].sum_standard, rows[1].sum_standard);
+  EXPECT_EQ(rows[0].sum_shared, rows[1].sum_shared);
+  options.grids = {2};
+  const auto thin = study(picture(15, 700, 1), options);
+  EXPECT_EQ(std::tuple(thin[0].columns, thin[0].rows), std::tuple(1u, 2u));
 }
 
 TEST(FragmentStudy, SameRowsForAnyNumberOfThreads) {
