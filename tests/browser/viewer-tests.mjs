@@ -114,6 +114,14 @@ test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer
   check(await page.locator('#panel').isHidden(), 'the panel stays');
 }), {seconds: 90});
 
+test('viewer: a rung beyond the ladder equals its highest, and the time is said in words', () => withViewer('?pkg=packages/maps.texmesh&time=2&rung=99', async (page) => {
+  await phase(page, 'done');
+  await settled(page);
+  const rungs = await page.locator('#rung option').count() - 1;
+  check(rungs >= 3 && await page.locator('#rung').inputValue() === String(rungs - 1), `"${await page.locator('#rung').inputValue()}" of ${rungs}`);
+  check(await page.locator('#time').getAttribute('aria-valuetext') === '2.00 s', `${await page.locator('#time').getAttribute('aria-valuetext')}`);
+}));
+
 test('viewer: two fingers zoom', () => withViewer('?pkg=packages/maps.texmesh&time=2', async (page) => {
   await phase(page, 'done');
   const distance = () => page.evaluate(() => window.texmeshViewer.stage.camera.position.length());

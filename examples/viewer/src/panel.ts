@@ -117,10 +117,11 @@ export class Panel {
       return make('option', { value: String(p) }, `${image?.role ?? t.role} ${t.image}, ${size}${t.mip ? ` (1/${2 ** t.mip})` : ''}`);
     });
     this.planeSelect.replaceChildren(...names);
-    const qualities = [...(this.live.tables.find((t) => t)?.rungQuality ?? [])];
+    // Of the longest ladder: planes with fewer rungs take their highest.
+    const qualities = this.live.textures.map((t) => t.rungQuality).reduce((a, b) => (b.length > a.length ? b : a), []);
     this.rungSelect.replaceChildren(make('option', { value: '' }, 'by time and importance'),
       ...qualities.map((q, r) => make('option', { value: String(r) }, `rung ${r} · quality ${q}`)));
-    this.rungSelect.value = this.choices.rung === null ? '' : String(this.choices.rung);
+    this.rungSelect.value = this.choices.rung === null ? '' : String(Math.min(this.choices.rung, qualities.length - 1));
   }
 
   private figuresSection(): HTMLElement {
@@ -140,10 +141,11 @@ export class Panel {
     const out = make('output', { for: 'time' }, format.seconds(c.timeS));
     const nearest = kTimes.findIndex((t) => t >= c.timeS);
     const range = make('input', {
-      type: 'range', id: 'time', min: '0', max: String(kTimes.length - 1), step: '1', value: String(nearest < 0 ? kTimes.length - 1 : nearest),
+      type: 'range', id: 'time', min: '0', max: String(kTimes.length - 1), step: '1', value: String(nearest < 0 ? kTimes.length - 1 : nearest), 'aria-valuetext': format.seconds(c.timeS),
       oninput: () => {
         c.timeS = kTimes[Number(range.value)] ?? Infinity;
         out.textContent = format.seconds(c.timeS);
+        range.setAttribute('aria-valuetext', format.seconds(c.timeS));
       },
       onchange: changed,
     });

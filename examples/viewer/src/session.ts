@@ -219,7 +219,7 @@ export class Session {
       else this.solved();
       this.stage.draw();
     });
-    on('error', (e) => { if (e.fatal) this.failed(e.error); else this.problem(e.error); });
+    on('error', (e) => { if (!e.fatal) this.problem(e.error); }); // a fatal one rejects `done`
   }
 
   private decision(e: DecisionEvent, origin: number): void {
