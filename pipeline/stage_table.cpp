@@ -74,9 +74,19 @@ StageOutputs run_fragmentation(const StageInputs& in) {
                                       in.get<ScaleMap>("ssf"), in.options.fragmentation, in.context));
 }
 
+/// With --fill none the source's own texels stay, whatever they cost.
+LadderOptions ladder_options(const StageInputs& in) {
+  LadderOptions out = in.options.ladder;
+  if (in.options.fragmentation.fill == Fill::kNone) out.uncovered = Uncovered::kKept;
+  return out;
+}
+
 StageOutputs run_fill(const StageInputs& in) {
+  const LadderOptions ladder = ladder_options(in);
+  const bool encoder_knows = ladder.mode == LadderMode::kJpeg && ladder.uncovered == Uncovered::kFree;
   return plain(fill_planes(in.get<Fragments>("fragmentation"), in.get<Images>("import.images"),
-                           in.options.fragmentation.fill, in.context));
+                           in.options.fragmentation.fill, in.context,
+                           encoder_knows ? PartBlocks::kSmooth : PartBlocks::kSparse));
 }
 
 StageOutputs run_zim(const StageInputs& in) {
@@ -86,7 +96,7 @@ StageOutputs run_zim(const StageInputs& in) {
 
 StageOutputs run_ladder(const StageInputs& in) {
   const Fragments& fragments = in.get<Fragments>("fragmentation");
-  Ladder ladder = encode_ladder(fragments, in.get<Planes>("fill"), in.options.ladder, in.context);
+  Ladder ladder = encode_ladder(fragments, in.get<Planes>("fill"), ladder_options(in), in.context);
   if (in.options.ladder.lossless_top)
     add_lossless_top(fragments, in.get<Images>("import.images"), ladder, in.context);
   return with_notes(std::move(ladder));
@@ -192,7 +202,7 @@ std::vector<Stage> make_table() {
        "images, coverage -> filled texels (derived, never stored)",
        {"fragmentation", "import.images"},
        {derived("fill")},
-       {"fragmentation.fill"},
+       {"fragmentation.fill", "ladder.mode", "ladder.uncovered"},
        {"libjpeg-turbo", "libpng", "openimageio"},
        false,
        run_fill},
@@ -210,7 +220,7 @@ std::vector<Stage> make_table() {
        "fragments -> rungs of streams in the chosen codec, previews",
        {"fragmentation", "fill", "import.images"},
        {artefact<Ladder>("ladder")},
-       {"ladder"},
+       {"ladder", "fragmentation.fill"},
        {"libjpeg-turbo", "libwebp"},
        true,
        run_ladder},

@@ -227,7 +227,8 @@ class Mcu {
 };
 
 template <int C>
-void flatten_rows(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
+void flatten_rows(Pixels& pixels, const std::vector<std::uint8_t>& coverage, PartBlocks part,
+                  const RunContext& context) {
   parallel_for(context, pixels.height_px / kMcu, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       std::array<int, C> before{};
@@ -237,7 +238,7 @@ void flatten_rows(Pixels& pixels, const std::vector<std::uint8_t>& coverage, con
         const bool none = mcu.none_covered();
         if (none)
           before = mcu.flatten(flat ? &before : nullptr);
-        else if (!mcu.all_covered())
+        else if (part == PartBlocks::kSparse && !mcu.all_covered())
           mcu.extrapolate_all();
         flat = none;
       }
@@ -247,11 +248,12 @@ void flatten_rows(Pixels& pixels, const std::vector<std::uint8_t>& coverage, con
 
 }  // namespace
 
-void flatten_unseen(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
+void flatten_unseen(Pixels& pixels, const std::vector<std::uint8_t>& coverage, PartBlocks part,
+                    const RunContext& context) {
   if (pixels.channels == 1)
-    flatten_rows<1>(pixels, coverage, context);
+    flatten_rows<1>(pixels, coverage, part, context);
   else
-    flatten_rows<3>(pixels, coverage, context);
+    flatten_rows<3>(pixels, coverage, part, context);
 }
 
 }  // namespace texmesh

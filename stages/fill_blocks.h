@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/decode_image.h"
+#include "stages/fragmentation.h"
 #include "stages/run_context.h"
 
 namespace texmesh {
@@ -14,11 +14,12 @@ namespace texmesh {
 /// - without a covered texel: flat, of the smooth fill's mean, and of the block's to the left where that one
 /// is
 ///   flat and hardly differs, so that neither AC nor DC coefficients cost more than their least code;
-/// - covered in part: uncovered texels of each 8 x 8 block of luma, and of halved chroma, are chosen so that
-/// the
+/// - covered in part, when these are to be sparse: uncovered texels of each 8 x 8 block of luma, and of
+/// halved chroma, are chosen so that the
 ///   block has few DCT coefficients: alternating projections with a falling threshold (the sparse
 ///   extrapolation of Guleryuz 2006; Papoulis and Gerchberg's iteration).
 /// Double arithmetic without libm, same bytes for any thread count.
-void flatten_unseen(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context);
+void flatten_unseen(Pixels& pixels, const std::vector<std::uint8_t>& coverage, PartBlocks part,
+                    const RunContext& context);
 
 }  // namespace texmesh

@@ -18,6 +18,12 @@ struct Level {
   std::vector<std::uint8_t> data, mask;
 };
 
+/// How the texels that nobody sees are made up.
+struct FillWay {
+  Fill fill;
+  PartBlocks part;
+};
+
 struct Neighbours {
   std::uint32_t near, far;
 };
@@ -273,23 +279,23 @@ void push_pull(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const 
     PushPull<3>(pixels, coverage, context).run();
 }
 
-void flatten_where_covered(Pixels& pixels, const std::vector<std::uint8_t>& coverage,
+void flatten_where_covered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, PartBlocks part,
                            const RunContext& context) {
   check_coverage(pixels, coverage);
   if (std::ranges::any_of(coverage, [](std::uint8_t bits) { return bits != 0; }))
-    flatten_unseen(pixels, coverage, context);
+    flatten_unseen(pixels, coverage, part, context);
 }
 
 /// A full-size plane and its mips. Each size is halved before its blocks are made flat, which would show as
 /// squares in the next one.
 void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::size_t first_mip,
-                Pixels pixels, Fill fill, const RunContext& context, std::vector<Pixels>& out) {
-  if (fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
+                Pixels pixels, FillWay way, const RunContext& context, std::vector<Pixels>& out) {
+  if (way.fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
   for (std::size_t p = base, next = first_mip;; p = next++) {
     const bool more = next < planes.size() && planes[next].mip > 0 && planes[next].base == base;
     Pixels half =
         more ? halved(pixels, planes[p].width_px, planes[p].height_px, halving_of(planes[next])) : Pixels{};
-    if (fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, context);
+    if (way.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, way.part, context);
     out[p] = padded(std::move(pixels), planes[p]);
     if (!more) return;
     pixels = std::move(half);
@@ -305,7 +311,7 @@ std::vector<std::size_t> first_mips(const std::vector<TexturePlane>& planes, std
 }
 
 void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
-                     const std::vector<Image>& images, Fill fill, const RunContext& context,
+                     const std::vector<Image>& images, FillWay way, const RunContext& context,
                      std::vector<Pixels>& out) {
   const std::vector<std::size_t> mips = first_mips(planes, full);
   std::vector<std::size_t> starts;  // planes of one image stand together; each image is decoded once
@@ -324,7 +330,7 @@ void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
         const bool last = p + 1 == full || planes[p + 1].image != planes[p].image;
         Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
                                                                       : channels_of(decoded, planes[p]);
-        fill_chain(planes, p, mips[p], std::move(plane), fill, inner, out);
+        fill_chain(planes, p, mips[p], std::move(plane), way, inner, out);
       }
     }
   });
@@ -334,15 +340,15 @@ void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
 
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
   push_pull(pixels, coverage, context);
-  flatten_where_covered(pixels, coverage, context);
+  flatten_where_covered(pixels, coverage, PartBlocks::kSparse, context);
 }
 
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
-                                const RunContext& context) {
+                                const RunContext& context, PartBlocks part) {
   const std::vector<TexturePlane>& planes = fragments.planes;
   const std::size_t full = check_planes(planes, images.size());
   std::vector<Pixels> out(planes.size());
-  decode_and_fill(planes, full, images, fill, context, out);
+  decode_and_fill(planes, full, images, {fill, part}, context, out);
   return out;
 }
 

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFragmentationVersion = 4;
+inline constexpr int kFragmentationVersion = 5;
 
 enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>
@@ -119,13 +119,18 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
                             const std::vector<Image>& images, const ScaleMap& scale_map,
                             const FragmentationOptions& options, const RunContext& context);
 
+/// What blocks of 16 x 16 texels become that are covered in part: kSparse makes their uncovered texels such
+/// that any codec finds few coefficients (fill_blocks.h); kSmooth leaves the smooth fill, for an encoder that
+/// knows which texels are free, as the ladder's baseline JPEG does, and costs a sixth of the time.
+enum class PartBlocks : std::uint8_t { kSparse, kSmooth };
+
 /// The pixels of every plane: decoded, uncovered texels filled, and extended to columns x fragment_width by
 /// rows x fragment_height: edges repeated to the end of their 16 x 16 block, flat blocks beyond (never seen,
 /// nearly free). A mip is the next finer plane, filled smoothly, halved (stages/halve_pixels.h), its blocks
 /// made cheap in turn. Derived data, never stored: zim, ladder and lut share one copy. Throws InputError for
 /// an image that does not decode, StageError for planes that do not fit the images or each other.
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,
-                                const RunContext& context);
+                                const RunContext& context, PartBlocks part = PartBlocks::kSparse);
 
 /// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of
 /// the covered ones, and fill_blocks.h makes that cheap for JPEG; covered ones keep their value. Without any

@@ -248,6 +248,15 @@ void JpegCoder::use_tables(const HuffmanTables& tables) {
   }
 }
 
+std::vector<std::array<std::uint16_t, 64>> JpegCoder::quantisers() const {
+  const jpeg_compress_struct& info = state_->info;
+  std::vector<std::array<std::uint16_t, 64>> out(static_cast<std::size_t>(info.num_components));
+  for (std::size_t c = 0; c < out.size(); ++c)
+    for (std::size_t k = 0; k < kBlockCoefficients; ++k)
+      out[c][k] = info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no]->quantval[kNaturalOfZigzag[k]];
+  return out;
+}
+
 std::vector<std::vector<std::uint8_t>> JpegCoder::possible_symbols() const {
   const jpeg_compress_struct& info = state_->info;
   std::vector<std::vector<std::uint8_t>> out;

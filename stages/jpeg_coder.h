@@ -1,6 +1,7 @@
 #pragma once
 // Inside stages only: libjpeg-turbo's compressor behind an interface that neither leaks its headers nor its
 // longjmp.
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -37,6 +38,8 @@ class JpegCoder {
   /// Those in use; a new coder has the typical ones of ISO 10918-1 annex K.3, which have a code for every
   /// symbol.
   HuffmanTables tables() const;
+  /// By component, zigzag order.
+  std::vector<std::array<std::uint16_t, 64>> quantisers() const;
   /// For each of those tables, the symbols that coding any image can take: quantisers bound the coefficients,
   /// so coarse ones leave few.
   std::vector<std::vector<std::uint8_t>> possible_symbols() const;

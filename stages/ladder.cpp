@@ -62,11 +62,18 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
   }
 }
 
-PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, std::size_t fragment) {
+/// Without the coverage where uncovered texels are kept.
+PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered,
+                      std::size_t fragment) {
   const auto column = static_cast<std::uint32_t>(fragment % plane.columns);
   const auto row = static_cast<std::uint32_t>(fragment / plane.columns);
-  return {pixels.at(column * plane.fragment_width_px, row * plane.fragment_height_px),
-          std::size_t{pixels.width_px} * pixels.channels, plane.fragment_width_px, plane.fragment_height_px};
+  const std::uint32_t left = column * plane.fragment_width_px, top = row * plane.fragment_height_px;
+  CoverageWindow coverage;
+  if (uncovered == Uncovered::kFree && !plane.coverage.empty())
+    coverage = {plane.coverage.data(), (std::size_t{plane.width_px} + 7) / 8, left, top, plane.width_px,
+                plane.height_px};
+  return {pixels.at(left, top), std::size_t{pixels.width_px} * pixels.channels, plane.fragment_width_px,
+          plane.fragment_height_px, coverage};
 }
 
 /// What codes a plane, with a note where it is not what the mode asks for.
@@ -106,7 +113,8 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
 /// smaller ones show more of the plane for the same work. Whole rows, because the DC step from a row's end to
 /// the next row's begin is large: narrower windows would show it too often, and the DC tables would be made
 /// for it.
-std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels& pixels, int wanted) {
+std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered,
+                                         int wanted) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
     if (plane.covered_texels[f] > 0) covered.push_back(f);
@@ -120,8 +128,11 @@ std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels
     height += kRows;
   std::vector<PixelWindow> sample;
   for (std::size_t k = 0; k < count; ++k) {
-    PixelWindow window = window_of(plane, pixels, covered[(2 * k + 1) * covered.size() / (2 * count)]);
-    window.data += (window.height_px - height) / (2 * kRows) * kRows * window.stride_bytes;
+    PixelWindow window =
+        window_of(plane, pixels, uncovered, covered[(2 * k + 1) * covered.size() / (2 * count)]);
+    const std::uint32_t above = (window.height_px - height) / (2 * kRows) * kRows;
+    window.data += above * window.stride_bytes;
+    window.coverage.top_px += above;
     window.height_px = height;
     sample.push_back(window);
   }
@@ -286,19 +297,19 @@ class OrderedRungs {
   std::map<std::size_t, Encoded> waiting_;
 };
 
-Encoded encode_task(const TexturePlane& plane, const Pixels& pixels, std::size_t rungs,
+Encoded encode_task(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, std::size_t rungs,
                     const EncodeTask& task, FragmentEncoder& encoder) {
   Encoded out;
   out.data.resize(rungs);
   out.ends.resize(rungs);
   for (std::size_t f = task.first; f < task.last; ++f) {
-    if (plane.covered_texels[f] > 0) encoder.encode(window_of(plane, pixels, f), out.data);
+    if (plane.covered_texels[f] > 0) encoder.encode(window_of(plane, pixels, uncovered, f), out.data);
     for (std::size_t r = 0; r < rungs; ++r) out.ends[r].push_back(out.data[r].size());
   }
   return out;
 }
 
-void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels,
+void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels, Uncovered uncovered,
                    const std::vector<std::unique_ptr<TextureCodec>>& codecs, std::vector<PlaneLadder>& planes,
                    const RunContext& context) {
   const std::vector<EncodeTask> tasks = encode_tasks(fragments);
@@ -310,7 +321,8 @@ void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels
       const std::size_t t = next++;  // in order, whatever part of the range a thread was given
       const std::size_t p = tasks[t].plane;
       auto encoder = encoders.take(p);
-      rungs.add(t, encode_task(fragments.planes[p], pixels[p], planes[p].rungs.size(), tasks[t], *encoder));
+      rungs.add(t, encode_task(fragments.planes[p], pixels[p], uncovered, planes[p].rungs.size(), tasks[t],
+                               *encoder));
       encoders.give_back(p, std::move(encoder));
       context.report(0.2 + 0.8 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
     }
@@ -331,7 +343,7 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
     PlaneLadder& out = ladder.planes[p];
     out.codec = codec_of(plane, p, options.mode, ladder.notes);
     codecs[p] = make_texture_codec(out.codec, coding_of(plane, out.codec, options));
-    const auto sample = training_sample(plane, pixels[p], options.training_fragments);
+    const auto sample = training_sample(plane, pixels[p], options.uncovered, options.training_fragments);
     for (CodecRung& rung : codecs[p]->train(sample, context))
       out.rungs.push_back({rung.quality, std::move(rung.tables), {}, {0}});
     context.report(0.15 * static_cast<double>(p + 1) / static_cast<double>(planes));
@@ -343,7 +355,7 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
       encode_preview(fragments.planes[p], pixels[p], options, inner, ladder.planes[p]);
   });
   context.report(0.2);
-  encode_planes(fragments, pixels, codecs, ladder.planes, context);
+  encode_planes(fragments, pixels, options.uncovered, codecs, ladder.planes, context);
   drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
   return ladder;
 }

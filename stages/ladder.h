@@ -20,6 +20,12 @@ struct EnumNames<LadderMode> {
   static constexpr std::array<std::string_view, 3> names{"jpeg", "progressive", "webp"};
 };
 
+enum class Uncovered : std::uint8_t { kFree, kKept };
+template <>
+struct EnumNames<Uncovered> {
+  static constexpr std::array<std::string_view, 2> names{"free", "kept"};
+};
+
 struct LadderOptions {
   LadderMode mode = LadderMode::kJpeg;
   // IJG qualities, strictly rising, for colours, normals, other data, and alpha:
@@ -29,6 +35,7 @@ struct LadderOptions {
   std::vector<int> alpha_rungs{18, 30, 53, 75, 86, 93, 97};
   int progressive_quality = 92;                 // of a colour plane's whole progressive files
   Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
+  Uncovered uncovered = Uncovered::kFree;
   int training_fragments = 64;
   int preview_quality = 60;
   double hull_gain = 0.05;
@@ -45,6 +52,9 @@ struct LadderOptions {
     v("progressive_quality", s.progressive_quality, Range{10, 100},
       "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
     v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
+    v("uncovered", s.uncovered,
+      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks cheap; "
+      "kept = what the fill, or the source with --fill none, has there");
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
@@ -95,13 +105,14 @@ struct Ladder {
 };
 
 /// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
-/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart. Tables are
-/// trained on covered fragments spread over the plane and have a code for every symbol, so that no fragment
-/// needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment has tables and a
-/// preview but no data. Works on the pixels as they stand: beside the result it takes some fragments' streams
-/// per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for pixels that do not
-/// fit the planes. Same bytes for any thread count. Rungs of mips that lie off
-/// the hull are dropped (stages/rung_hull.h).
+/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
+/// with uncovered texels, when those are free, by stages/masked_jpeg.h, so that only covered texels cost
+/// bytes. Tables are trained on covered fragments spread over the plane and have a code for every symbol, so
+/// that no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment
+/// has tables and a preview but no data. Works on the pixels as they stand: beside the result it takes some
+/// fragments' streams per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for
+/// pixels that do not fit the planes. Same bytes for any thread count. Rungs of mips that lie off the hull
+/// are dropped (stages/rung_hull.h).
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context);
 

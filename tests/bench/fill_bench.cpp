@@ -74,9 +74,12 @@ struct Point {
 
 /// Per rung, over the planes: bytes of the fragments, PSNR of luma over covered texels.
 std::vector<Point> measure(const Fragments& fragments, const std::vector<std::size_t>& shown,
-                           const std::vector<Pixels>& pixels, const RunContext& context) {
+                           const std::vector<Pixels>& pixels, Uncovered uncovered,
+                           const RunContext& context) {
+  LadderOptions options;
+  options.uncovered = uncovered;
   const Predictors predictors = predict_quality(fragments, pixels, {}, context);
-  const Ladder ladder = encode_ladder(fragments, pixels, {}, context);
+  const Ladder ladder = encode_ladder(fragments, pixels, options, context);
   const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, {}, context);
   std::vector<Point> out(tables.planes[shown[0]].rung_count());
   for (std::size_t r = 0; r < out.size(); ++r) {
@@ -148,13 +151,15 @@ void print_model(const std::string& path) {
   const std::vector<Pixels> source = fill_planes(shown_only, model.images, Fill::kNone, context);
   std::vector<Pixels> nearest = source;
   for (std::size_t p = 0; p < nearest.size(); ++p) dilate(nearest[p], shown_only.planes[p]);
-  const std::vector<Pixels> ours = fill_planes(shown_only, model.images, Fill::kPushPull, context);
+  const std::vector<Pixels> ours =
+      fill_planes(shown_only, model.images, Fill::kPushPull, context, PartBlocks::kSmooth);
 
-  const std::vector<Point> reference = measure(shown_only, shown, source, context);
+  const std::vector<Point> reference = measure(shown_only, shown, source, Uncovered::kKept, context);
   std::cout << fmt::format("{:<22} {:5.1f} {:5.1f} ", model_name(path), 100 * texels / stored_texels,
                            100 * flat_share(shown_only, shown, source));
   for (const std::vector<Pixels>* pixels : {&std::as_const(nearest), &ours}) {
-    const std::vector<Point> curve = measure(shown_only, shown, *pixels, context);
+    const std::vector<Point> curve =
+        measure(shown_only, shown, *pixels, pixels == &ours ? Uncovered::kFree : Uncovered::kKept, context);
     double sum = 0;
     int count = 0;
     std::string at;
@@ -170,7 +175,7 @@ void print_model(const std::string& path) {
   }
   std::vector<Pixels> whole = ours;
   for (std::size_t p = 0; p < whole.size(); ++p) leave_whole_blocks(whole[p], shown_only.planes[p]);
-  const std::vector<Point> least = measure(shown_only, shown, whole, context);
+  const std::vector<Point> least = measure(shown_only, shown, whole, Uncovered::kKept, context);
   std::cout << fmt::format("   {:.3f} {:.3f} {:.3f}   {:.0f} kB {:.2f} dB at quality 53\n",
                            least[3].bytes / reference[3].bytes, least[5].bytes / reference[5].bytes,
                            least[7].bytes / reference[7].bytes, reference[5].bytes / 1e3, reference[5].psnr);
