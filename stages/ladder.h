@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 5;
+inline constexpr int kLadderVersion = 6;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>

@@ -13,7 +13,7 @@ namespace texmesh {
 namespace {
 
 constexpr std::size_t kFrequencies = 15;  // 0..14: sums of two of 0..7
-constexpr int kNoCode = 1 << 16;          // bits: never worth it
+constexpr int kNoCode = 1 << 28;          // bits: never
 constexpr float kLargest = 1023;          // of coefficients before they are quantised
 // Every change lowers the cost, so the search ends, after about ten passes; this bounds what rounding could
 // do.
@@ -137,7 +137,9 @@ class Look {
     // One more coefficient takes bits, but for rare codes: not worth counting.
     if (now == 0 && error <= best_.gain) return;
     if (static_cast<float>(std::abs(now + move)) * coding_.quantisers[k_] > kLargest) return;
-    const float gain = error - coding_.bit_cost * static_cast<float>(block_.more_bits(k_, now + move));
+    const int bits = block_.more_bits(k_, now + move);
+    if (bits > kNoCode / 2) return;
+    const float gain = error - coding_.bit_cost * static_cast<float>(bits);
     if (gain > best_.gain) best_ = {now + move, gain};
   }
 

@@ -65,7 +65,7 @@ Coded code(const Picture& picture, const JpegKind& kind, bool masked) {
   }
   const std::vector<std::uint8_t> head = coder.head_stream(kWidth, kHeight);
   out.pixels =
-      decode_jpeg(join_fragment(Codec::kJpeg, head, {{std::span<const std::uint8_t>(out.body)}}), 1 << 20);
+      decode_jpeg(join_fragment(Codec::kJpeg, head, std::span<const std::uint8_t>(out.body)), 1 << 20);
   return out;
 }
 
@@ -195,7 +195,7 @@ TEST(MaskedBlock, NoSingleStepMakesItBetter) {
     block.load(samples, weights);
     BlockCoefficients found = block.quantise(coding, 0);
     const double least = error_of(found, coding, samples, weights);
-    EXPECT_LT(least, error_of(quantise_whole(block_dct(samples), coding), coding, samples, weights));
+    EXPECT_LT(least, error_of({}, coding, samples, weights) / 8);
     for (std::size_t k = 0; k < 64; ++k)
       for (const int step : {-1, 1}) {
         found[k] = static_cast<std::int16_t>(found[k] + step);
