@@ -276,7 +276,7 @@ TEST(MaskedLadder, WhollyCoveredPlanesAndKeptTexelsAreCodedAsWithoutCoverage) {
     EXPECT_EQ(a.data, b.data);  // covered wholly: other tables, the same coefficients
     less += 2 * stream(free.planes[0].rungs[r], 1).size() < stream(plain.planes[0].rungs[r], 1).size();
   }
-  EXPECT_GE(less, 8u);
+  EXPECT_GE(less, 5u);  // half of the rungs
 }
 
 TEST(MaskedLadder, IsTheSameForAnyThreadCount) {
