@@ -111,7 +111,7 @@ PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, dou
   if (scale.scale == 0 || !(manifest.object_height > 0)) return {};
   const double px_per_unit = displayed_px / manifest.object_height;
   const double p95 = scale.display_px_error >= kAnyDisplayPx ? 0 : displayed_px / scale.display_px_error;
-  return {p95, scale.error_rms * px_per_unit, scale.error_max * px_per_unit};
+  return {p95, scale.error_rms * px_per_unit, std::max(p95, scale.error_max * px_per_unit)};
 }
 
 VisiblePart clip_to(const ScreenRect& object, const ScreenRect& view) {

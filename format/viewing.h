@@ -32,7 +32,9 @@ std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, S
 /// The scale of the first step that reaches this height.
 int scale_at(std::span<const ManifestStep> steps, double displayed_px);
 
-/// How far a scale's surface is from S_0's on screen, in px at most (a distance seen from the side).
+/// How far a scale's surface is from S_0's on screen, in px at most (a distance seen from the side). `max` is
+/// the largest of some thousand sampled distances, never less than p95, which comes from samples of its own.
+/// What has vanished counts with its distance to what is left.
 struct PixelError {
   double p95 = 0, rms = 0, max = 0;
 };

@@ -25,15 +25,17 @@ StageOutputs plain(T value) {
 StageOutputs run_import(const StageInputs& in) {
   ImportedModel m = in.get<Source>("source").import(in.context);
   Notes notes = std::move(m.model.notes);
-  return {
-      {object(ImportedMesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification}),
-       object(std::move(m.model.materials)), object(std::move(m.model.images))},
-      std::move(notes)};
+  return {{object(ImportedMesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification,
+                               uv_sets_of(m.model.materials)}),
+           object(std::move(m.model.materials)), object(std::move(m.model.images))},
+          std::move(notes)};
 }
 
 StageOutputs run_condition(const StageInputs& in) {
   const auto& m = in.get<ImportedMesh>("import.mesh");
-  return with_notes(condition_mesh(m.mesh, m.normals_by_specification, in.options.condition, in.context));
+  ConditionedMesh mesh = condition_mesh(m.mesh, m.normals_by_specification, in.options.condition, in.context);
+  mesh.uv_sets = m.uv_sets;
+  return with_notes(std::move(mesh));
 }
 
 StageOutputs run_skeletonization(const StageInputs& in) {
@@ -115,10 +117,11 @@ StageOutputs run_scales(const StageInputs& in) {
 }
 
 StageOutputs run_quality(const StageInputs& in) {
-  return plain(
+  MeasuredQuality measured =
       measure_quality(in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
                       in.get<Materials>("import.materials"), in.get<Fragments>("fragmentation"),
-                      in.get<Planes>("fill"), in.get<Ladder>("ladder"), in.options.quality, in.context));
+                      in.get<Planes>("fill"), in.get<Ladder>("ladder"), in.options.quality, in.context);
+  return {{object(std::move(measured.table))}, std::move(measured.notes)};
 }
 
 StageOutputs run_package(const StageInputs& in) {

@@ -11,6 +11,7 @@
 #include "format/note.h"
 #include "pipeline/options.h"
 #include "stages/run_context.h"
+#include "stages/uv_sets.h"
 
 namespace texmesh {
 
@@ -78,9 +79,10 @@ struct ImportedMesh {
   Mesh mesh;
   RangeGrid range;
   bool normals_by_specification = false;
+  std::vector<UvSets> uv_sets;  // of the materials: no other change of theirs is one of the shapes
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.mesh, s.range, s.normals_by_specification);
+    a(s.mesh, s.range, s.normals_by_specification, s.uv_sets);
   }
 };
 

@@ -27,9 +27,8 @@ std::vector<double> texture_lengths(const CollapseMesh& mesh, const Mesh& input)
     const std::size_t material = input.triangle_material[mesh.face_source(f)];
     if (material >= surface.size()) surface.resize(material + 1), texture.resize(material + 1);
     surface[material] += length(face_normal(mesh, face));
-    const Vec2d a = to_double(input.uv0[mesh.wedge_source(face.wedge[0])]);
-    texture[material] += std::fabs(cross(to_double(input.uv0[mesh.wedge_source(face.wedge[1])]) - a,
-                                         to_double(input.uv0[mesh.wedge_source(face.wedge[2])]) - a));
+    const Vec2d a = mesh.wedge_uv(face.wedge[0]);
+    texture[material] += std::fabs(cross(mesh.wedge_uv(face.wedge[1]) - a, mesh.wedge_uv(face.wedge[2]) - a));
   }
   for (std::size_t m = 0; m < surface.size(); ++m)
     scale.push_back(texture[m] > 0 ? std::sqrt(surface[m] / texture[m]) : 0);
@@ -44,9 +43,10 @@ double mean_edge(const CollapseMesh& mesh) {
   return sum / (3 * static_cast<double>(std::max<std::size_t>(mesh.faces().size(), 1)));
 }
 
-bool colours_vary(const Mesh& input) {
+template <class Same>
+bool colours_vary(const Mesh& input, Same&& same) {
   return !std::all_of(input.colours.begin(), input.colours.end(),
-                      [&](const Vec4f& c) { return c == input.colours[0]; });
+                      [&](const Vec4f& c) { return same(c, input.colours[0]); });
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ void CollapseCost::add_shape() {
 
 /// Planes that stand on open borders, on borders of materials and parts, and on seams of the texture.
 void CollapseCost::add_lines(const Mesh& input, const SimplificationOptions& options) {
-  CollapseRing ring(mesh_, input.uv0);
+  CollapseRing ring(mesh_);
   constexpr std::uint64_t kUnseen = ~std::uint64_t{0};
   struct Uses {
     std::uint64_t first = kUnseen;
@@ -107,9 +107,14 @@ void CollapseCost::add_lines(const Mesh& input, const SimplificationOptions& opt
 
 void CollapseCost::add_attributes(const Mesh& input, const SimplificationOptions& options) {
   const bool normal = options.normal_weight > 0 && !input.normals.empty();
-  const bool colour = options.colour_weight > 0 && colours_vary(input);
-  texture_channels_ = options.uv_weight > 0 && !input.uv0.empty() ? 2 : 0;
-  const std::size_t channels = texture_channels_ + (normal ? 3 : 0) + (colour ? 3 : 0);
+  const bool colour = options.colour_weight > 0;
+  colour_varies_ = colour && colours_vary(input, [](const Vec4f& a, const Vec4f& b) {
+                     return a.x == b.x && a.y == b.y && a.z == b.z;
+                   });
+  alpha_varies_ = colour && colours_vary(input, [](const Vec4f& a, const Vec4f& b) { return a.w == b.w; });
+  texture_channels_ = options.uv_weight > 0 && mesh_.has_uv() ? 2 : 0;
+  const std::size_t channels =
+      texture_channels_ + (normal ? 3 : 0) + (colour_varies_ ? 3 : 0) + (alpha_varies_ ? 1 : 0);
   attribute_quadric_ = AttributeQuadrics(channels);
   if (channels == 0) return;
   if (texture_channels_ > 0) shift_per_cost_ = 1 / options.uv_weight;
@@ -127,23 +132,25 @@ void CollapseCost::fill_attributes(const Mesh& input, const SimplificationOption
   const double texture_factor = std::sqrt(options.uv_weight);
   const double normal_length = std::sqrt(options.normal_weight) * mean_edge(mesh_);
   // Beside a texture, which has the photograph, colours are tints.
-  const double colour_length =
-      std::sqrt(options.colour_weight * (texture_channels_ > 0 ? kTint : 1)) * kColourLength;
+  const double alpha_length = std::sqrt(options.colour_weight) * kColourLength;
+  const double colour_length = alpha_length * (texture_channels_ > 0 ? std::sqrt(kTint) : 1);
   const bool normal = options.normal_weight > 0 && !input.normals.empty();
   for (std::uint32_t f = 0; f < mesh_.faces().size(); ++f)
     for (std::uint32_t w : mesh_.faces()[f].wedge) {
       double* at = attribute_.data() + w * channels;
-      const double* end = at + channels;
       const std::uint32_t source = mesh_.wedge_source(w);
       if (texture_channels_ > 0) {
         const double s = texture_factor * texture[input.triangle_material[mesh_.face_source(f)]];
-        *at++ = s * input.uv0[source].x, *at++ = s * input.uv0[source].y;
+        const Vec2d uv = mesh_.wedge_uv(w);
+        *at++ = s * uv.x, *at++ = s * uv.y;
       }
       if (normal)
         for (int k = 0; k < 3; ++k) *at++ = normal_length * input.normals[source][k];
-      if (at == end) continue;
+      if (!colour_varies_ && !alpha_varies_) continue;
       const Vec4f c = input.colours[source];
-      *at++ = colour_length * c.x, *at++ = colour_length * c.y, *at++ = colour_length * c.z;
+      if (colour_varies_)
+        *at++ = colour_length * c.x, *at++ = colour_length * c.y, *at++ = colour_length * c.z;
+      if (alpha_varies_) *at++ = alpha_length * c.w;
     }
 }
 

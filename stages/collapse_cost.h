@@ -52,11 +52,12 @@ class CollapseCost {
   }
 
   const CollapseMesh& mesh_;
-  std::vector<Quadric> quadric_;         // per point
-  std::size_t texture_channels_ = 0;     // the first of the channels
-  double shift_per_cost_ = 0;            // takes the weight of the texture out again
-  std::vector<double> attribute_;        // per wedge: its attributes as lengths
-  AttributeQuadrics attribute_quadric_;  // per wedge
+  std::vector<Quadric> quadric_;                       // per point
+  std::size_t texture_channels_ = 0;                   // the first of the channels
+  bool colour_varies_ = false, alpha_varies_ = false;  // have channels, behind those of the normals
+  double shift_per_cost_ = 0;                          // takes the weight of the texture out again
+  std::vector<double> attribute_;                      // per wedge: its attributes as lengths
+  AttributeQuadrics attribute_quadric_;                // per wedge
 };
 
 }  // namespace texmesh

@@ -23,7 +23,7 @@ CollapseEngine::CollapseEngine(const ConditionedMesh& input, const ScaleMap& sca
       mesh_(input),
       cost_(mesh_, input.mesh, options),
       components_(mesh_, input),
-      ring_(mesh_, input.mesh.uv0),
+      ring_(mesh_),
       initial_positions_(mesh_.alive_positions()),
       persistence_(mesh_.point_count(), 0),
       flags_(mesh_.point_count(), 0),
@@ -43,7 +43,7 @@ void CollapseEngine::fill_queue(const RunContext& context) {
   parallel_for(
       context, count, std::max<std::size_t>(count / threads + 1, 4096),
       [&](std::size_t begin, std::size_t end) {
-        CollapseRing ring(mesh_, ring_.uv0());
+        CollapseRing ring(mesh_);
         for (std::size_t p = begin; p < end; ++p) {
           const Choice choice = evaluate(ring, static_cast<std::uint32_t>(p));
           flags_[p] = static_cast<std::uint8_t>((choice.exact ? kExact : 0) | (choice.too_far ? kTooFar : 0));

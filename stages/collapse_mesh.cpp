@@ -25,6 +25,7 @@ CollapseMesh::CollapseMesh(const ConditionedMesh& input) {
   number_points(input, point_of_position);
   add_faces(input.mesh, point_of_position);
   number_wedges(input.mesh);
+  take_uv(input);
   build_lists();
   left_.resize(input.mesh.triangles.size());
   std::iota(left_.begin(), left_.end(), 0u);
@@ -118,6 +119,26 @@ void CollapseMesh::number_wedges(const Mesh& mesh) {
   }
 }
 
+void CollapseMesh::take_uv(const ConditionedMesh& input) {
+  const Mesh& mesh = input.mesh;
+  const std::vector<Vec2f>* sets[2] = {&mesh.uv0, &mesh.uv1};
+  if (mesh.uv0.empty() && (mesh.uv1.empty() || input.uv_sets.empty())) return;
+  const bool two = !mesh.uv0.empty() && !mesh.uv1.empty();
+  const auto both = [](const UvSets& s) { return s.both != 0; };
+  wedge_uv_.resize(wedge_count());
+  if (two && std::any_of(input.uv_sets.begin(), input.uv_sets.end(), both))
+    wedge_other_uv_.resize(wedge_count());
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    const std::size_t material = mesh.triangle_material[face_source_[f]];
+    const UvSets use = material < input.uv_sets.size() ? input.uv_sets[material] : UvSets{};
+    const std::vector<Vec2f>&guide = *sets[use.guide], &other = *sets[1 - use.guide];
+    for (std::uint32_t w : faces_[f].wedge) {
+      if (!guide.empty()) wedge_uv_[w] = guide[wedge_source_[w]];
+      if (use.both && !wedge_other_uv_.empty()) wedge_other_uv_[w] = other[wedge_source_[w]];
+    }
+  }
+}
+
 void CollapseMesh::build_lists() {
   lists_.assign(points_.size(), {});
   for (const Face& face : faces_)
@@ -141,6 +162,11 @@ std::uint32_t CollapseMesh::add_wedge(std::uint32_t wedge, std::uint32_t positio
   wedge_real_.push_back(input_wedges_ + static_cast<std::uint32_t>(new_wedges_.size() - 1));
   wedge_source_.push_back(source);
   wedge_position_.push_back(position);
+  for (std::vector<Vec2f>* uv : {&wedge_uv_, &wedge_other_uv_}) {
+    if (uv->empty()) continue;
+    const Vec2f same = (*uv)[wedge];
+    uv->push_back(same);
+  }
   return wedge_count() - 1;
 }
 

@@ -46,7 +46,14 @@ class CollapseMesh {
   bool is_multiple(std::uint32_t p) const { return member_begin_[p + 1] - member_begin_[p] > 1; }
   std::uint32_t wedge_position(std::uint32_t w) const { return wedge_position_[w]; }  // position of the input
   std::uint32_t wedge_source(std::uint32_t w) const { return wedge_source_[w]; }  // wedge with the attributes
-  std::uint32_t face_source(std::uint32_t f) const { return face_source_[f]; }    // triangle of the input
+  /// Texture coordinates that guide collapses: of the set that the wedge's material uses for its colours;
+  /// zero for all where there are none.
+  bool has_uv() const { return !wedge_uv_.empty(); }
+  Vec2d wedge_uv(std::uint32_t w) const { return to_double(wedge_uv_[w]); }
+  /// Those of the other set where the wedge's material has textures in both, otherwise zero.
+  bool has_other_uv() const { return !wedge_other_uv_.empty(); }
+  Vec2d wedge_other_uv(std::uint32_t w) const { return to_double(wedge_other_uv_[w]); }
+  std::uint32_t face_source(std::uint32_t f) const { return face_source_[f]; }  // triangle of the input
   std::uint32_t alive_faces() const { return alive_faces_; }
   std::uint32_t alive_positions() const { return alive_positions_; }
   bool is_alive(std::uint32_t p) const { return lists_[p].count != lists_[p].dead; }
@@ -106,6 +113,7 @@ class CollapseMesh {
   void number_points(const ConditionedMesh& input, std::vector<std::uint32_t>& point_of_position);
   void add_faces(const Mesh& mesh, const std::vector<std::uint32_t>& point_of_position);
   void number_wedges(const Mesh& mesh);
+  void take_uv(const ConditionedMesh& input);
   void build_lists();
   void remove_face(std::uint32_t face, std::uint32_t except_point);
   void append(std::uint32_t to);
@@ -119,6 +127,7 @@ class CollapseMesh {
   std::vector<std::uint32_t> face_source_, face_of_source_;
   std::vector<std::uint32_t> left_;  // triangles of the input that were left at the last snapshot
   std::vector<std::uint32_t> wedge_real_, wedge_position_, wedge_source_;
+  std::vector<Vec2f> wedge_uv_, wedge_other_uv_;
   std::vector<NewWedge> new_wedges_;
   std::vector<List> lists_;
   std::vector<std::uint32_t> pool_, moved_;

@@ -171,6 +171,16 @@ bool CollapseRing::keeps_positions(std::uint32_t slot) const {
   return true;
 }
 
+/// Texture triangles without area may become anything.
+template <class Uv>
+bool CollapseRing::turns_over(const Corner& c, Uv&& uv) const {
+  const CollapseMesh::Face& face = mesh_.faces()[c.face];
+  const Vec2d a = uv(face.wedge[(c.corner + 1) % 3]), b = uv(face.wedge[(c.corner + 2) % 3]);
+  const Vec2d from = uv(wedges_[c.wedge]), to = uv(target_[c.wedge]);
+  const double before = cross(a - from, b - from);
+  return before != 0 && !(before * cross(a - to, b - to) > 0);
+}
+
 bool CollapseRing::keeps_orientation(std::uint32_t slot) const {
   const Vec3d from = mesh_.point(centre_), to = mesh_.point(neighbours_[slot].point);
   for (const Corner& c : corners_) {
@@ -181,13 +191,10 @@ bool CollapseRing::keeps_orientation(std::uint32_t slot) const {
     if (dot(before, before) > 0 &&
         (along <= 0 || along * along <= kLeastNormalCosine * kLeastNormalCosine * square))
       return false;
-    if (uv0_.empty() || target_[c.wedge] == kNone) continue;
-    const CollapseMesh::Face& face = mesh_.faces()[c.face];
-    auto uv = [&](std::uint32_t wedge) { return to_double(uv0_[mesh_.wedge_source(wedge)]); };
-    const Vec2d ua = uv(face.wedge[(c.corner + 1) % 3]), ub = uv(face.wedge[(c.corner + 2) % 3]);
-    const double old_turn = cross(ua - uv(wedges_[c.wedge]), ub - uv(wedges_[c.wedge]));
-    const double new_turn = cross(ua - uv(target_[c.wedge]), ub - uv(target_[c.wedge]));
-    if (old_turn != 0 && !(old_turn * new_turn > 0)) return false;
+    if (target_[c.wedge] == kNone) continue;
+    if (mesh_.has_uv() && turns_over(c, [&](std::uint32_t w) { return mesh_.wedge_uv(w); })) return false;
+    if (mesh_.has_other_uv() && turns_over(c, [&](std::uint32_t w) { return mesh_.wedge_other_uv(w); }))
+      return false;
   }
   return true;
 }

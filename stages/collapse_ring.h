@@ -29,15 +29,12 @@ class CollapseRing {
     std::uint32_t face = 0, corner = 0, a = 0, b = 0, wedge = 0;
   };  // a, b: the face's other two points as indices into neighbours(); wedge: index into wedges()
 
-  /// `uv0`: per wedge of the input, or empty.
-  CollapseRing(const CollapseMesh& mesh, const std::vector<Vec2f>& uv0)
-      : mesh_(mesh), uv0_(uv0), mark_(mesh.point_count()) {}
+  explicit CollapseRing(const CollapseMesh& mesh) : mesh_(mesh), mark_(mesh.point_count()) {}
 
   /// Looks at point u: everything below is about it from now on, until the mesh changes.
   void gather(std::uint32_t u);
   void prefetch(std::uint32_t neighbour) const { __builtin_prefetch(&mark_[neighbour]); }
   std::uint32_t centre() const { return centre_; }
-  const std::vector<Vec2f>& uv0() const { return uv0_; }
   const std::vector<Corner>& corners() const { return corners_; }
   std::vector<Neighbour>& neighbours() { return neighbours_; }
   const std::vector<Neighbour>& neighbours() const { return neighbours_; }
@@ -60,8 +57,8 @@ class CollapseRing {
   /// The link condition on the welded surface, twins as one: no new non-manifold edge, no new hole, nothing
   /// vanishes.
   bool keeps_topology(std::uint32_t slot);
-  /// No face turns by more than about 78 degrees or loses its area, and no texture triangle turns over. For
-  /// the collapse that was mapped last.
+  /// No face turns by more than about 78 degrees or loses its area, and no texture triangle turns over, in no
+  /// set of texture coordinates that its material uses. For the collapse that was mapped last.
   bool keeps_orientation(std::uint32_t slot) const;
 
  private:
@@ -71,9 +68,10 @@ class CollapseRing {
   std::uint32_t slot_of(std::uint32_t point);
   bool positions_agree(const Neighbour& n) const;
   bool keeps_positions(std::uint32_t slot) const;
+  template <class Uv>
+  bool turns_over(const Corner& c, Uv&& uv) const;
 
   const CollapseMesh& mesh_;
-  const std::vector<Vec2f>& uv0_;
   std::uint32_t centre_ = kNone, now_ = 0, mapped_slot_ = kNone;
   bool mapped_ = false;
   std::vector<Corner> corners_;

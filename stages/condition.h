@@ -5,12 +5,13 @@
 #include "format/fields.h"
 #include "format/model.h"
 #include "stages/run_context.h"
+#include "stages/uv_sets.h"
 
 namespace texmesh {
 
 /// Raise when equal inputs may give other bytes; part of the cache key. (The same holds for every
 /// k...Version.)
-inline constexpr int kConditionVersion = 1;
+inline constexpr int kConditionVersion = 2;
 
 enum class NormalsPolicy : std::uint8_t { kAuto, kKeep, kSmooth };
 template <>
@@ -65,12 +66,13 @@ struct ConditionedMesh {
   std::uint32_t component_count = 0;
   std::vector<std::uint32_t> position_source;  // per position: index in the input mesh
   std::vector<std::uint32_t> triangle_source;  // per triangle: index in the input mesh
+  std::vector<UvSets> uv_sets;                 // per material, or empty: the first set for all; the caller's
   ConditionReport report;
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.mesh, s.twin, s.component, s.component_count, s.position_source, s.triangle_source, s.report,
-      s.notes);
+    a(s.mesh, s.twin, s.component, s.component_count, s.position_source, s.triangle_source, s.uv_sets,
+      s.report, s.notes);
   }
 };
 

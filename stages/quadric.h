@@ -40,7 +40,7 @@ struct Quadric {
 /// precision is enough: what is left in there are differences over a few edges.
 class AttributeQuadrics {
  public:
-  static constexpr std::size_t kMaxChannels = 8;
+  static constexpr std::size_t kMaxChannels = 9;  // 2 + 3 + 4
   using Step = std::array<double, kMaxChannels>;  // a change of the attributes
 
   explicit AttributeQuadrics(std::size_t channels = 0) : channels_(channels), stride_(11 + 4 * channels) {}

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "format/srgb.h"
 #include "stages/image_compare.h"
@@ -13,6 +14,9 @@ namespace texmesh {
 namespace {
 
 constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples of 16
+/// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
+/// the whole picture, one pixel wide, covers 0.5 %.
+constexpr double kLeastCovered = 0.002;
 
 struct Sphere {
   Vec3d centre;
@@ -31,6 +35,25 @@ Sphere bounding_sphere(const Mesh& mesh) {
   for (Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
   if (!(s.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
   return s;
+}
+
+/// Around the place where nearly all positions lie, whatever a few others do.
+Sphere crowd_sphere(const Mesh& mesh, const Sphere& bounds) {
+  constexpr double kCrowd = 0.98, kMargin = 1.25;
+  const std::size_t n = mesh.positions.size();
+  Sphere s;
+  std::vector<double> values(n);
+  const auto at_rank = [&](std::size_t rank) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
+    return values[rank];
+  };
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t p = 0; p < n; ++p) values[p] = mesh.positions[p][k];
+    s.centre[k] = at_rank(n / 2);
+  }
+  for (std::size_t p = 0; p < n; ++p) values[p] = length(to_double(mesh.positions[p]) - s.centre);
+  s.radius = kMargin * at_rank(static_cast<std::size_t>(kCrowd * static_cast<double>(n - 1)));
+  return s.radius > 0 && s.radius < bounds.radius ? s : bounds;
 }
 
 /// Planes that show: those that a material's base colour or emission samples.
@@ -250,7 +273,59 @@ std::vector<PictureDifference> measure_view(const std::vector<ViewScene>& scenes
   return found;
 }
 
-/// Means over all covered pixels of all views.
+/// What the views show of S_0.
+struct Coverage {
+  std::uint64_t pixels = 0;
+  LevelCount levels;
+};
+
+Coverage look_around(const ViewScene& scene, const Sphere& sphere, std::size_t planes,
+                     const QualityTable& table, const RunContext& context) {
+  const int views = static_cast<int>(table.views);
+  Coverage seen{0, LevelCount(planes)};
+  for (int v = 0; v < views; ++v) {
+    context.check_cancelled();
+    const ViewBuffer view = look_at(scene, camera_of(v, views, sphere.centre, sphere.radius), table.size_px);
+    for (std::uint8_t hits : view.hits) seen.pixels += hits > 0;
+    seen.levels.add(view);
+  }
+  return seen;
+}
+
+std::string count_outside(const Mesh& mesh, const Sphere& sphere) {
+  const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
+    return length(to_double(p) - sphere.centre) > sphere.radius;
+  });
+  return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
+}
+
+/// The sphere that the pictures frame, and what they show: the object's, unless it shows next to nothing of
+/// the object and that of the crowd more.
+Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& table, Sphere& sphere,
+               Notes& notes, const RunContext& context) {
+  const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
+  Coverage seen = look_around(scene, sphere, planes, table, context);
+  if (static_cast<double>(seen.pixels) >= kLeastCovered * all) return seen;
+  const Sphere crowd = crowd_sphere(*scene.mesh, sphere);
+  if (crowd.radius < sphere.radius) {
+    Coverage closer = look_around(scene, crowd, planes, table, context);
+    if (closer.pixels > seen.pixels) {
+      sphere = crowd;
+      add_warning(notes, "far-outliers", "",
+                  "quality was measured without the " + count_outside(*scene.mesh, crowd) +
+                      " positions that lie so far from all others that pictures of the whole object show "
+                      "next to nothing");
+      seen = std::move(closer);
+    }
+  }
+  if (seen.pixels == 0)
+    add_warning(notes, "quality-not-measured", "",
+                "no picture of " + std::to_string(table.size_px) +
+                    " px shows anything of the object; its scales count as equal");
+  return seen;
+}
+
+/// Means over all covered pixels of all views; none covered: equal.
 void fill_table(QualityTable& table, const std::vector<std::vector<PictureDifference>>& views) {
   for (std::size_t i = 0; i < views[0].size(); ++i) {
     PictureDifference sum;
@@ -259,8 +334,7 @@ void fill_table(QualityTable& table, const std::vector<std::vector<PictureDiffer
       sum.difference += view[i].difference;
       sum.pixels += view[i].pixels;
     }
-    if (sum.pixels == 0)
-      throw StageError("quality", "S_0", "pixels that show the object", "none in any view");
+    if (sum.pixels == 0) sum = {1, 0, 1};
     const auto n = static_cast<double>(sum.pixels);
     table.ssim.push_back(static_cast<float>(std::clamp(sum.ssim / n, 0.0, 1.0)));
     table.difference.push_back(static_cast<float>(std::clamp(sum.difference / n, 0.0, 1.0)));
@@ -269,13 +343,14 @@ void fill_table(QualityTable& table, const std::vector<std::vector<PictureDiffer
 
 }  // namespace
 
-QualityTable measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
-                             const std::vector<Material>& materials, const Fragments& fragments,
-                             const std::vector<Pixels>& pixels, const Ladder& ladder,
-                             const QualityOptions& options, const RunContext& context) {
-  const Sphere sphere = bounding_sphere(scales.mesh);
+MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
+                                const std::vector<Material>& materials, const Fragments& fragments,
+                                const std::vector<Pixels>& pixels, const Ladder& ladder,
+                                const QualityOptions& options, const RunContext& context) {
+  Sphere sphere = bounding_sphere(scales.mesh);
   const ShownPlanes shown = find_shown(materials, fragments);
-  QualityTable table;
+  MeasuredQuality result;
+  QualityTable& table = result.table;
   table.views = static_cast<std::uint32_t>(options.views);
   table.size_px = static_cast<std::uint32_t>(options.size_px);
   std::vector<ViewScene> scenes;
@@ -285,11 +360,9 @@ QualityTable measure_quality(const NestedScales& scales, const PerceptualValues&
     scenes.push_back(scene_of(scales, scales.scales[k], materials, shown, fragments));
   }
 
-  LevelCount levels(shown.planes.size());
-  for (int v = 0; v < options.views && !shown.planes.empty(); ++v)
-    levels.add(look_at(scenes[0], camera_of(v, options.views, sphere.centre, sphere.radius), table.size_px));
-  const Textures textures =
-      decode_textures(shown, fragments, pixels, ladder, levels.first_levels(), options.rung_samples, context);
+  const Coverage seen = frame(scenes[0], shown.planes.size(), table, sphere, result.notes, context);
+  const Textures textures = decode_textures(shown, fragments, pixels, ladder, seen.levels.first_levels(),
+                                            options.rung_samples, context);
   table.rungs = textures.quality;
 
   std::vector<std::vector<PictureDifference>> found;
@@ -299,7 +372,7 @@ QualityTable measure_quality(const NestedScales& scales, const PerceptualValues&
     found.push_back(measure_view(scenes, camera, textures, table.size_px, context));
   }
   fill_table(table, found);
-  return table;
+  return result;
 }
 
 }  // namespace texmesh

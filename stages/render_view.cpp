@@ -36,10 +36,9 @@ std::vector<std::uint32_t> rasterise(const std::vector<Projected>& points, const
     if (area == 0) continue;
     const auto [x_lo, x_hi] = std::minmax({a.x, b.x, c.x});
     const auto [y_lo, y_hi] = std::minmax({a.y, b.y, c.y});
-    // Sample (x, y) lies at x + 0.5, y + 0.5; everything is inside the picture because the camera frames the
-    // object.
-    const auto x0 = static_cast<std::uint32_t>(std::max(0.0, std::ceil(x_lo - 0.5)));
-    const auto y0 = static_cast<std::uint32_t>(std::max(0.0, std::ceil(y_lo - 0.5)));
+    // Sample (x, y) lies at x + 0.5, y + 0.5.
+    const auto x0 = static_cast<std::uint32_t>(std::clamp<double>(std::ceil(x_lo - 0.5), 0, side));
+    const auto y0 = static_cast<std::uint32_t>(std::clamp<double>(std::ceil(y_lo - 0.5), 0, side));
     for (std::uint32_t y = y0; y < side && y + 0.5 <= y_hi; ++y)
       for (std::uint32_t x = x0; x < side && x + 0.5 <= x_hi; ++x) {
         const double u = edge(b, c, x + 0.5, y + 0.5), v = edge(c, a, x + 0.5, y + 0.5),

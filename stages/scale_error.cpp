@@ -60,22 +60,28 @@ class ErrorMeter {
     std::vector<double> limit = diagonal_;  // of a component's distance: no limit where it is still there
     for (const Triangle& t : scale.triangles)
       limit[component_[mesh_.wedge_position[t[0]]]] = std::numeric_limits<double>::infinity();
-    const auto there = distances(surface_.size(), [&](std::size_t i) {
-      return std::min(coarse(surface_[i].point), limit[surface_[i].component]);
-    });
+    const auto there = distances(surface_.size(), [&](std::size_t i) { return coarse(surface_[i].point); });
     const std::vector<SurfaceSample> samples =
         sample_surface(mesh_.positions, mesh_.wedge_position, scale.triangles, kErrorSamples);
     const auto back = distances(
         samples.size(), [&](std::size_t i) { return original_(place(mesh_, scale.triangles, samples[i])); });
-    double square = 0, largest = 0;
+    double square = 0, largest = 0, deviation = 0;  // the last with the limits
     for (const auto* side : {&there, &back})
       for (double d : *side) square += d * d, largest = std::max(largest, d);
+    for (double d : back) deviation = std::max(deviation, d);
+    for (std::size_t i = 0; i < there.size(); ++i)
+      deviation = std::max(deviation, std::min(there[i], limit[surface_[i].component]));
     const auto count = static_cast<double>(std::max<std::size_t>(there.size() + back.size(), 1));
     scale.error_rms = static_cast<float>(std::sqrt(square / count));
-    const auto far = distances(vertices_.size(), [&](std::size_t i) {
-      return std::min(coarse(vertices_[i].point, largest), limit[vertices_[i].component]);
-    });
-    scale.error_max = static_cast<float>(std::max(largest, *std::max_element(far.begin(), far.end())));
+    // What is within the deviation so far changes neither number: some bound is enough of it.
+    const auto far =
+        distances(vertices_.size(), [&](std::size_t i) { return coarse(vertices_[i].point, deviation); });
+    for (std::size_t i = 0; i < far.size(); ++i) {
+      largest = std::max(largest, far[i]);
+      deviation = std::max(deviation, std::min(far[i], limit[vertices_[i].component]));
+    }
+    scale.error_max = static_cast<float>(largest);
+    scale.deviation = static_cast<float>(deviation);
   }
 
  private:

@@ -263,6 +263,31 @@ double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
   return largest;
 }
 
+void note_parts(const Mesh& mesh, Notes& notes) {
+  if (!parts_merged(mesh)) return;
+  add_info(notes, "parts-merged", "",
+           std::to_string(mesh.part_names.size()) + " parts became one node, because more than " +
+               std::to_string(kMostNodes) +
+               " would cost more bytes than the mesh; feature ids of the vertices count their names, which "
+               "its mesh lists in extras.partNames");
+}
+
+void note_grid(const ScaleCoding& coding, std::size_t triangles, std::size_t written, Notes& notes) {
+  const int bits = coding.position.bits, asked = coding.options.position_bits;
+  if (bits > 0 && bits < asked)
+    add_info(notes, "fewer-bits", "",
+             "position_bits is " + std::to_string(asked) + ", of which mesh_codec " +
+                 std::string(enum_name(coding.options.mesh_codec)) + " holds " + std::to_string(bits));
+  if (written >= triangles) return;
+  constexpr std::size_t kManyPart = 100;  // more than a hundredth of all: that may show
+  const Severity severity =
+      (triangles - written) * kManyPart > triangles ? Severity::kWarning : Severity::kInfo;
+  notes.push_back({severity, "flattened-triangles", "scale 0",
+                   std::to_string(triangles - written) + " of " + std::to_string(triangles) +
+                       " triangles have two corners in one place of the grid of " + std::to_string(bits) +
+                       " bits per coordinate, show nothing and were left out"});
+}
+
 }  // namespace
 
 bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
@@ -281,13 +306,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   for (std::size_t k = 0; k < scales.scales.size(); ++k)
     if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
   ScaleFiles result;
-  if (parts_merged(scales.mesh))
-    add_info(
-        result.notes, "parts-merged", "",
-        std::to_string(scales.mesh.part_names.size()) + " parts became one node, because more than " +
-            std::to_string(kMostNodes) +
-            " would cost more bytes than the mesh; feature ids of the vertices count their names, which its "
-            "mesh lists in extras.partNames");
+  note_parts(scales.mesh, result.notes);
   result.position_bits = coding.position.bits;
   result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
   result.position_error = largest_rounding(scales.mesh, coding.position);
@@ -298,6 +317,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
       context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
     }
   });
+  note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
   write_stream(coding, scales, kept, materials, images, context, result);
   return result;
 }

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 3;
+inline constexpr int kScalesVersion = 4;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -38,15 +38,19 @@ struct ScalesOptions {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
     v("position_bits", s.position_bits, Range{0, 24},
-      "bits per position coordinate; 0 = from the edge lengths");
+      "bits per position coordinate; 0 = from the edge lengths; quantized and meshopt: at most 16");
     v("uv_bits", s.uv_bits, Range{0, 24},
-      "bits per texture coordinate; 0 = so that the error is under 1/8 texel");
+      "bits per texture coordinate; 0 = so that the error is under 1/8 texel; quantized and meshopt: 16 "
+      "where "
+      "that is so fine, or floats");
     v("least_position_bits", s.least_position_bits, Range{1, 24},
       "fewest bits per position coordinate where they follow from the edge lengths");
     v("least_uv_bits", s.least_uv_bits, Range{1, 24},
       "fewest bits per texture coordinate where they follow from the textures");
-    v("normal_bits", s.normal_bits, Range{4, 16}, "bits per normal component");
-    v("tangent_bits", s.tangent_bits, Range{4, 16}, "bits per tangent component");
+    v("normal_bits", s.normal_bits, Range{4, 16},
+      "bits per normal component; quantized and meshopt: 8 or 16");
+    v("tangent_bits", s.tangent_bits, Range{4, 16},
+      "bits per tangent component; quantized and meshopt: 8 or 16");
     v("stream", s.stream, "also write all scales as one stream of vertex splits");
   }
 };
@@ -77,14 +81,14 @@ struct ScaleFiles {
 /// have feature ids), the source's materials with the previews of the planes as images (RGBA PNG where a
 /// material needs alpha). GLB image k is named "texture/<k>" for source image k. Positions are quantised on
 /// one grid for all scales, so shared vertices are bit-equal between scales; triangles with two corners in
-/// one place of the grid are left out. Texture coordinates of unused sets are left out, and textures whose
-/// coordinates the mesh does not have. Tangents of the source are kept where a normal map needs them; none
-/// are made, since glTF says how a viewer makes them (MikkTSpace). Positions stay in the local frame
-/// (Mesh::origin is the manifest's). draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization;
-/// meshopt = the same under EXT_meshopt_compression; none = plain floats. The stream (format/split_stream.h)
-/// holds the same scales on the same grid, or on one of 24 bits where the files have floats; there is none,
-/// and a note says so, when only one scale is kept or it would break the format's bounds. Throws StageError
-/// when nothing is left on the grid. Same bytes for any thread count.
+/// one place of the grid are left out, and a note says how many of S_0's. Texture coordinates of unused sets
+/// are left out, and textures whose coordinates the mesh does not have. Tangents of the source are kept where
+/// a normal map needs them; none are made, since glTF says how a viewer makes them (MikkTSpace). Positions
+/// stay in the local frame (Mesh::origin is the manifest's). draco = KHR_draco_mesh_compression; quantized =
+/// KHR_mesh_quantization; meshopt = the same under EXT_meshopt_compression; none = plain floats. The stream
+/// (format/split_stream.h) holds the same scales on the same grid, or on one of 24 bits where the files have
+/// floats; there is none, and a note says so, when only one scale is kept or it would break the format's
+/// bounds. Throws StageError when nothing is left on the grid. Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
                         const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,

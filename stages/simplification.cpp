@@ -17,8 +17,27 @@ constexpr double kRepeatedShare = 0.97;
 
 constexpr double kCoarsestShare = 0.05;  // of the vertices: coarsest_vertices asks for no more
 
+// Where a scale has less than this share of the next finer one's vertices, the map falls too fast: packages
+// have steps of about 2x in triangles between their scales, and there would be none to choose from.
+constexpr double kLeastShare = 0.25, kGentleShare = 0.5;
+
+/// Where next to nothing persists (many small components, dust) the map asks for the last scale's vertices at
+/// once: from there on each scale halves them until the map is met, or takes larger steps where too few
+/// scales are left to meet the last target.
+void soften_falls(std::vector<std::uint32_t>& target) {
+  for (std::size_t i = 1; i < target.size(); ++i) {
+    if (target[i] >= kLeastShare * target[i - 1]) continue;
+    const double steps = static_cast<double>(target.size() - i);
+    const double share =
+        portable::pow(std::max(target.back(), 1u) / static_cast<double>(target[i - 1]), 1 / steps);
+    target[i] =
+        std::max(target[i],
+                 static_cast<std::uint32_t>(std::floor(std::min(share, kGentleShare) * target[i - 1] + 0.5)));
+  }
+}
+
 /// #{p >= i} for i = 0..scales, scaled down so that the last is at most the share that the options ask for,
-/// but not below coarsest_vertices.
+/// but not below coarsest_vertices, and without falls that leave nothing between two scales.
 std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const SimplificationOptions& options) {
   std::vector<std::uint32_t> target(static_cast<std::size_t>(scale_map.scales) + 1, 0);
   for (std::uint8_t p : scale_map.persistence)
@@ -32,6 +51,7 @@ std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const Simpl
     t = static_cast<std::uint32_t>(std::floor(std::max(t * scale, least) + 0.5));
     scale *= factor;
   }
+  soften_falls(target);
   return target;
 }
 
@@ -97,7 +117,7 @@ void note_floor(NestedScales& result, const std::vector<std::uint32_t>& target, 
 /// Leaves out trailing scales that deviate by more than max_error, and what only they use.
 void drop_far_scales(NestedScales& result, double limit) {
   std::vector<NestedScale>& scales = result.scales;
-  while (scales.size() > 1 && scales.back().error_max > limit) scales.pop_back();
+  while (scales.size() > 1 && scales.back().deviation > limit) scales.pop_back();
   result.collapses.resize(scales.back().collapse_count);
   std::uint32_t last = 0;
   for (const NestedScale& scale : scales)

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 4;
+inline constexpr int kSimplificationVersion = 5;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kQem, kThesis };
 template <>
@@ -30,7 +30,8 @@ struct SimplificationOptions {
   double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
   double boundary_weight = 3;  // of the border quadrics
   double seam_weight = 1;      // of the same at seams of the texture
-  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more. At half of it
+  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more
+  // (NestedScale::deviation). At half of it
   // scans cut into scraps keep no scale but S_0.
   double max_error = 0.05;
   double max_shift = 0.05;  // of the diagonal: no collapse that shifts the texture by more
@@ -55,7 +56,8 @@ struct SimplificationOptions {
     v("seam_weight", s.seam_weight, Range{0, 1000}, "weight of seams of the texture");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
-      "no scale deviates more than this fraction of the diagonal");
+      "no scale deviates more than this fraction of the diagonal; of what vanishes as a whole the size "
+      "counts");
     v("max_shift", s.max_shift, Range{0.0001, 1},
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
@@ -86,15 +88,16 @@ struct NestedScale {
   std::vector<std::uint32_t>
       triangle_source;               // per triangle: index of the S_0 triangle it comes from (material, part)
   std::uint32_t position_count = 0;  // positions in use
-  // Distance between S_0 and S_i, sampled both ways, object units. What has vanished with its whole component
-  // counts as no farther from S_i than the component's diagonal.
-  float error_max = 0, error_rms = 0;
+  float error_max = 0, error_rms = 0;  // distance between S_0 and S_i, sampled both ways, object units
+  // What max_error bounds: as error_max, but what has vanished with its whole component counts as no farther
+  // from S_i than the component's diagonal: a pebble that is too small to be seen may be far from all others.
+  float deviation = 0;
   std::string floor_reason;  // why the scale has more vertices than asked for, or is the coarsest although
                              // more were asked for; "" when neither
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,
-      s.floor_reason);
+      s.deviation, s.floor_reason);
   }
 };
 
@@ -116,7 +119,8 @@ struct NestedScales {
 /// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}, see
 /// SimplificationOptions::coarsest), seam- and
 /// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV
-/// triangle; border vertices move along the border only, seams along the seam, twins together.
+/// triangle (in every set of texture coordinates that its material uses; the set of the base colour has the
+/// quadric and max_shift); border vertices move along the border only, seams along the seam, twins together.
 /// Deterministic: ties by place along a space-filling curve. About 5 us per
 /// removed vertex on one core. Throws StageError when the scale map is of another mesh.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,

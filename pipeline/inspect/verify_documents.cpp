@@ -28,12 +28,8 @@ std::string text_of(const EntryRef& e) {
 
 void check_scales(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.scales.size(); ++k) {
+    // No rule about triangles: on a coarse grid a scale may show more of them than the next finer one.
     const ManifestScale& s = m.scales[k];
-    if (k > 0)
-      findings.require(s.triangles <= m.scales[k - 1].triangles, "scale", kManifestPath,
-                       at("scales/triangles", k),
-                       "at most " + std::to_string(m.scales[k - 1].triangles) + ", as the finer scale",
-                       std::to_string(s.triangles));
     findings.require(s.error_rms <= s.error_max, "scale", kManifestPath, at("scales/errorRms", k),
                      "at most errorMax, " + number(s.error_max), number(s.error_rms));
   }

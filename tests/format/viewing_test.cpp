@@ -90,6 +90,9 @@ TEST(Viewing, PixelErrorGrowsWithTheDisplayedHeight) {
   EXPECT_NEAR(at400.max, 2, 1e-12);
   EXPECT_NEAR(pixel_error(m, m.scales[2], 800).p95, 2, 1e-12);
   EXPECT_EQ(pixel_error(m, m.scales[0], 800).max, 0);
+  Manifest other = m;  // both are sampled, each for itself
+  other.scales[2].error_max = 0.1 * other.scales[2].error_rms;
+  EXPECT_EQ(pixel_error(other, other.scales[2], 400).max, pixel_error(other, other.scales[2], 400).p95);
 }
 
 TEST(Viewing, ClipsToTheViewAndToTheFovea) {

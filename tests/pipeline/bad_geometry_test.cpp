@@ -55,6 +55,7 @@ class BadGeometry : public ::testing::Test {
       request.output = folder_ / "m.texmesh";
       CompileOptions& o = request.options;
       o.scales.mesh_codec = codec;
+      o.scales.position_bits = position_bits_;
       o.skeletonization.alpha_divisor = 10, o.skeletonization.max_wrap_faces = 500;
       o.quality.views = 1, o.quality.size_px = 32, o.quality.rung_samples = 1;
       NullStore store;
@@ -80,6 +81,7 @@ class BadGeometry : public ::testing::Test {
   bool warned(const std::string& code) const {
     return std::any_of(notes_.begin(), notes_.end(), [&](const Note& n) { return n.code == code; });
   }
+  int position_bits_ = 0;
   std::size_t scales_ = 0;  // of the last package
   Notes notes_;
 
@@ -111,6 +113,32 @@ TEST_F(BadGeometry, SliversOfNextToNoArea) {
   const std::vector<Mesh> finest = compile(m);
   EXPECT_EQ(finest[0].triangles.size(), m.triangles.size());
   EXPECT_GT(scales_, 1u);
+}
+
+/// On a coarse grid most faces of the stream show nothing, and the files have none of them.
+TEST_F(BadGeometry, GridsOfFewBits) {
+  Mesh m = sheet(48, 0.1f);
+  for (Vec3f& p : m.positions)
+    if (p.y < 0.45f) p.y *= 1e-12f, p.z = 0;
+  for (position_bits_ = 1; position_bits_ <= 6; ++position_bits_) {
+    SCOPED_TRACE(position_bits_);
+    compile(m);
+    EXPECT_TRUE(warned("flattened-triangles"));
+  }
+}
+
+TEST_F(BadGeometry, AStrayTriangleFarFromTheScan) {
+  for (float away : {1e3f, 1e5f}) {
+    SCOPED_TRACE(away);
+    Mesh stray = bare({{0, 0, 0}, {0.1f, 0, 0}, {0, 0.1f, 0}}, {{0, 1, 2}});
+    Mesh scan = bumpy_sphere(24, 36);
+    stray.normals.assign(3, {0, 0, 1});
+    compile(side_by_side({scan, stray}, away));
+    EXPECT_TRUE(warned("far-outliers"));
+  }
+  compile(bare({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1e5f, 0, 0}, {1e5f + 1, 0, 0}, {1e5f, 1, 0}},
+               {{0, 1, 2}, {3, 4, 5}}));
+  EXPECT_TRUE(warned("quality-not-measured"));
 }
 
 TEST_F(BadGeometry, FacesTwiceOver) {

@@ -247,8 +247,6 @@ TEST(Verify, References) {
 TEST(Verify, ScalesAndSteps) {
   EXPECT_TRUE(
       catches_only(sealed_with([](Manifest& m) { m.scales[1].error_rms = 0.5; }), "scale", kManifestPath));
-  EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.scales[1].triangles = m.scales[0].triangles + 1; }),
-                      "scale", kManifestPath));
   EXPECT_TRUE(
       catches_only(sealed_with([](Manifest& m) { m.steps[0].up_to_px = 201; }), "step", kManifestPath));
   EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_jnd = 150; }), "step",

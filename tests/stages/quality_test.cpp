@@ -70,7 +70,12 @@ QualityTable measure(const Sample& s, const QualityOptions& options = {}, int th
   RunContext context;
   context.threads = threads;
   return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, options,
-                         context);
+                         context)
+      .table;
+}
+
+Notes notes_of(const Sample& s) {
+  return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, {}, {}).notes;
 }
 
 TEST(Quality, TableHasKeptScalesAndSpreadRungs) {
@@ -154,6 +159,67 @@ TEST(Quality, OptionsAreTaken) {
   EXPECT_EQ(t.size_px, 64u);
   options.rung_samples = 16;
   EXPECT_EQ(measure(sample_sheet(true), options).rungs, LadderOptions{}.rungs);
+}
+
+/// Adds a triangle of that side, so far away, to all scales.
+void add_stray(Sample& s, float away, float side) {
+  Mesh& m = s.scales.mesh;
+  const auto p = static_cast<std::uint32_t>(m.positions.size()),
+             w = static_cast<std::uint32_t>(m.wedge_count());
+  for (Vec3f corner : {Vec3f{0, 0, 0}, Vec3f{side, 0, 0}, Vec3f{0, side, side}}) {
+    m.wedge_position.push_back(static_cast<std::uint32_t>(m.positions.size()));
+    m.positions.push_back(Vec3f{away, away, 0} + corner);
+    if (!m.uv0.empty()) m.uv0.push_back({0.5f, 0.5f});
+    if (!m.normals.empty()) m.normals.push_back({0, 0, 1});
+  }
+  EXPECT_EQ(m.positions.size(), p + 3);
+  for (NestedScale& scale : s.scales.scales) {
+    scale.triangles.push_back({w, w + 1, w + 2});
+    scale.triangle_source.push_back(0);
+  }
+}
+
+TEST(Quality, AStrayTriangleFarAwayChangesLittle) {
+  for (bool textured : {false, true}) {
+    const Sample alone = sample_sheet(textured);
+    EXPECT_TRUE(notes_of(alone).empty());
+    const QualityTable want = measure(alone);
+    for (float away : {300.f, 1e5f}) {
+      SCOPED_TRACE(away);
+      if (textured && away < 1e5f) continue;  // dear
+      Sample s = alone;
+      add_stray(s, away, 0.02f);
+      const QualityTable t = measure(s);
+      ASSERT_EQ(t.ssim.size(), want.ssim.size());
+      EXPECT_LT(t.ssim.back(), t.ssim[t.rungs.size() - 1]) << "the coarsest differs from S_0";
+      for (std::size_t i = 0; i < t.ssim.size(); ++i) EXPECT_NEAR(t.ssim[i], want.ssim[i], 0.1) << i;
+      const Notes notes = notes_of(s);
+      ASSERT_EQ(notes.size(), 1u);
+      EXPECT_EQ(notes[0].code, "far-outliers");
+      EXPECT_NE(notes[0].text.find("the 3 of "), std::string::npos) << notes[0].text;
+    }
+  }
+}
+
+TEST(Quality, WhatNoPictureShowsCountsAsEqual) {
+  Sample thread = sample_sheet(false);
+  for (Vec3f& p : thread.scales.mesh.positions) p = {1e-7f * p.x, p.y, 1e-7f * p.z};
+  Sample specks = sample_sheet(false);
+  specks.scales.scales.resize(2);
+  specks.perceptual.kept.resize(2);
+  for (NestedScale& scale : specks.scales.scales) scale.triangles.clear(), scale.triangle_source.clear();
+  specks.scales.mesh = Mesh{};
+  specks.scales.mesh.triangle_material = {0};
+  add_stray(specks, 1000, 0.01f);
+  add_stray(specks, -1000, 0.01f);
+  for (const Sample* s : {&thread, &specks}) {
+    const QualityTable t = measure(*s);
+    for (float x : t.ssim) EXPECT_EQ(x, 1.f);
+    for (float x : t.difference) EXPECT_EQ(x, 0.f);
+    const Notes notes = notes_of(*s);
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_EQ(notes[0].code, "quality-not-measured");
+  }
 }
 
 TEST(Quality, NothingToLookAtIsAnError) {

@@ -56,11 +56,28 @@ TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   EXPECT_EQ(asked.position_bits, 18);
   EXPECT_EQ(asked.uv_bits, 15);
   EXPECT_LT(asked.position_error, automatic.position_error / 4);
-  EXPECT_EQ(c.write(MeshCodec::kQuantized, options).position_bits, 16);
+  EXPECT_TRUE(asked.notes.empty());
+  const ScaleFiles shorts = c.write(MeshCodec::kQuantized, options);
+  EXPECT_EQ(shorts.position_bits, 16);
+  ASSERT_EQ(shorts.notes.size(), 1u);
+  EXPECT_EQ(shorts.notes[0].code, "fewer-bits");
   options.position_bits = 24, options.uv_bits = 24;
   expect_round_trip(c, MeshCodec::kDraco, options);
   EXPECT_EQ(c.write(MeshCodec::kNone).position_error, 0);
   EXPECT_EQ(c.write(MeshCodec::kNone).position_bits, 0);
+}
+
+TEST(Scales, SaysHowManyTrianglesTheGridFlattens) {
+  const Case c(testing::bumpy_sphere(30, 44));
+  const ScaleFiles fine = c.write(MeshCodec::kDraco, {.position_bits = 16});
+  EXPECT_TRUE(fine.notes.empty());
+  const ScaleFiles coarse = c.write(MeshCodec::kDraco, {.position_bits = 4});
+  ASSERT_LT(coarse.files[0].triangles, fine.files[0].triangles);
+  ASSERT_EQ(coarse.notes.size(), 1u);
+  EXPECT_EQ(coarse.notes[0].code, "flattened-triangles");
+  EXPECT_EQ(coarse.notes[0].severity, Severity::kWarning);
+  const std::string count = std::to_string(fine.files[0].triangles - coarse.files[0].triangles);
+  EXPECT_EQ(coarse.notes[0].text.find(count + " of "), 0u) << coarse.notes[0].text;
 }
 
 TEST(Scales, ASmallPartBesideALargeOneKeepsItsShape) {

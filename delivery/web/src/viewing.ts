@@ -69,7 +69,10 @@ export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): nu
   return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
 }
 
-/** How far a scale's surface is from S_0's on screen, px at most. */
+/**
+ * How far a scale's surface is from S_0's on screen, px at most; `max` is the largest of some thousand sampled
+ * distances, never less than `p95`, which comes from samples of its own.
+ */
 export function pixelError(
   manifest: Manifest,
   scale: ManifestScale,
@@ -78,7 +81,7 @@ export function pixelError(
   if (scale.scale === 0 || !(manifest.objectHeight > 0)) return { p95: 0, rms: 0, max: 0 };
   const pxPerUnit = displayedPx / manifest.objectHeight;
   const p95 = scale.displayPxError >= anyDisplayPx ? 0 : displayedPx / scale.displayPxError;
-  return { p95, rms: scale.errorRms * pxPerUnit, max: scale.errorMax * pxPerUnit };
+  return { p95, rms: scale.errorRms * pxPerUnit, max: Math.max(p95, scale.errorMax * pxPerUnit) };
 }
 
 /** In px, y downwards. */
