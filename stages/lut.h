@@ -35,7 +35,8 @@ struct LutOptions {
     v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
     v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
     v("log_width", s.log_width, Range{0, 4},
-      "dg: how far feature density moves the logarithm of the quantiser");
+      "dg: how far feature density moves the logarithm of the quantiser; below 0.6 by at most one of the "
+      "default rungs");
     v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
     v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
   }
