@@ -15,10 +15,15 @@ namespace {
 constexpr std::size_t kFrequencies = 15;  // 0..14: sums of two of 0..7
 constexpr int kNoCode = 1 << 28;          // bits: never
 constexpr float kLargest = 1023;          // of coefficients before they are quantised
-// Every change lowers the cost, so the search ends, after about ten passes; this bounds what rounding could
-// do.
-constexpr int kMostPasses = 100;
-constexpr float kLeastGain = 1e-3f;
+// Every change lowers the cost, so the search ends, after about six passes; this bounds what rounding could
+// do. The last ones look at the used coefficients, too.
+constexpr int kMostPasses = 100, kMostTrims = 3;
+// Changes that gain less, in bits, are not looked for; all of them together are 0.4 % of a rung and a third
+// of the time.
+constexpr float kWorthBits = 0.5f;
+// Changes are taken in a pass that gain at least this part of the best. A half: 0.3 % fewer bytes, half as
+// much time again.
+constexpr float kPassPart = 0.125f;
 
 /// [frequency * 8 + sample]: cos((2 n + 1) k pi / 16).
 const std::array<float, kFrequencies * 8>& cosines() {
@@ -223,14 +228,25 @@ BlockCoefficients MaskedBlock::quantise(const BlockCoding& coding, int dc_before
     rest[k] = correlation_[k] * q;
     energy[k] = diagonal_[k] * q * q;
   }
+  const float worth = kWorthBits * coding.bit_cost;
   float least = std::numeric_limits<float>::max();
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  // Most looks at a used coefficient find nothing: they are left for the end.
+  for (int pass = 0, trims = 0; pass < kMostPasses && trims < kMostTrims;) {
+    const bool trim = least == worth;
     float refused = 0;
     bool changed = false;
     for (std::size_t k = 0; k < 64; ++k) {
-      if ((std::fabs(rest[k]) * 2 < energy[k] && block.value(k) == 0) || energy[k] <= 0) continue;
+      if (energy[k] <= 0) continue;
+      if (!(trim && block.value(k) != 0)) {
+        if (std::fabs(rest[k]) * 2 < energy[k]) continue;
+        // No change of the coefficient takes more error away, whatever bits it costs.
+        if (const float most = rest[k] * rest[k]; most < least * energy[k]) {
+          refused = std::max(refused, most / energy[k]);
+          continue;
+        }
+      }
       const Change change = Look(coding, block, k, rest[k], energy[k]).best();
-      if (change.gain < least) {
+      if (change.gain < least || change.gain <= 0) {
         refused = std::max(refused, change.gain);
         continue;
       }
@@ -240,8 +256,10 @@ BlockCoefficients MaskedBlock::quantise(const BlockCoding& coding, int dc_before
       block.set(k, change.value);
       changed = true;
     }
-    if (!changed && refused < kLeastGain) break;
-    least = std::max(refused / 2, kLeastGain);
+    ++pass;
+    trims += trim;
+    if (trim && !changed) break;
+    least = std::max(std::min(refused, least) * kPassPart, worth);
   }
   return block.values();
 }

@@ -36,8 +36,8 @@ class MaskedBlock {
   /// Samples (level shift taken off), and weights 0..1 of their squared errors, not all 0.
   void load(const BlockValues& samples, const BlockValues& weights);
   /// Coefficients of small weighted squared error + bit_cost x coded bits: from all zero on, changes of
-  /// one coefficient that gain at least half of what the best one does, until none gains (matching pursuit by
-  /// rate and distortion).
+  /// one coefficient that gain at least an eighth of what the best one could, until none is worth half a bit
+  /// (matching pursuit by rate and distortion).
   /// Bits are those of the Huffman codes, with runs and with the step from the DC before; a symbol without a
   /// code is never chosen.
   BlockCoefficients quantise(const BlockCoding& coding, int dc_before);

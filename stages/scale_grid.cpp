@@ -6,6 +6,9 @@
 namespace texmesh {
 namespace {
 
+// With fewer a surface is off its own bounds by more than readers may take for damage.
+constexpr int kLeastAskedBits = 6;
+
 /// Least bits whose step is at most `step`.
 int bits_for(double range, double step) {
   int bits = 1;
@@ -94,7 +97,7 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   grid.range = std::max({size.x, size.y, size.z});
   if (!(grid.range > 0)) grid.range = 1;
   if (options.position_bits > 0) {
-    grid.bits = std::min(options.position_bits, max_bits);
+    grid.bits = std::clamp(options.position_bits, kLeastAskedBits, max_bits);
     return grid;
   }
   std::vector<float> edges = edge_lengths(mesh);

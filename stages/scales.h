@@ -38,7 +38,8 @@ struct ScalesOptions {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
     v("position_bits", s.position_bits, Range{0, 24},
-      "bits per position coordinate; 0 = from the edge lengths; quantized and meshopt: at most 16");
+      "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at most "
+      "16");
     v("uv_bits", s.uv_bits, Range{0, 24},
       "bits per texture coordinate; 0 = so that the error is under 1/8 texel; quantized and meshopt: 16 "
       "where "

@@ -120,7 +120,8 @@ TEST_F(BadGeometry, GridsOfFewBits) {
   Mesh m = sheet(48, 0.1f);
   for (Vec3f& p : m.positions)
     if (p.y < 0.45f) p.y *= 1e-12f, p.z = 0;
-  for (position_bits_ = 1; position_bits_ <= 6; ++position_bits_) {
+  for (const int bits : {1, 6, 7}) {
+    position_bits_ = bits;
     SCOPED_TRACE(position_bits_);
     compile(m);
     EXPECT_TRUE(warned("flattened-triangles"));
