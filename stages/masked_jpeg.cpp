@@ -16,9 +16,9 @@ namespace {
 constexpr float kLumaBitCost = 0.09f, kOtherBitCost = 0.05f;
 // Of an uncovered sample, so that it does not run away; .001 to .01 make 0.1 % of the bytes.
 constexpr float kUncoveredWeight = 0.003f;
-// An uncovered block takes the DC before it when its own level is no further off. It only shows in mips that
-// a client makes by itself, of 1/16 and less.
-constexpr float kSameLevel = 64;
+// An uncovered block takes the DC before it when its own level is no further off. It shows in mips that a
+// client makes by itself: of 1/4 where a chart ends at a block's border, else of 1/16. 64 saves 0.5 % more.
+constexpr float kSameLevel = 24;
 
 SymbolCodes codes_of(const HuffmanTable& table) {
   SymbolCodes out;
