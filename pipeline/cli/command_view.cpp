@@ -26,7 +26,8 @@ std::string url_host(const std::string& host) {
 
 void announce(const Arguments& args, const Site& site, const std::string& base) {
   const std::vector<std::string> packages = site.packages();
-  const std::string page = packages.size() == 1 ? base + "?pkg=" + packages[0] : base;
+  // Once more: a query is decoded before what it holds is taken for a URL.
+  const std::string page = packages.size() == 1 ? base + "?pkg=" + percent_encoded(packages[0]) : base;
   if (args.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const std::string& p : packages) list.push_back(base + p);

@@ -106,6 +106,15 @@ class CliView : public ::testing::Test {
   int port_ = 0;
 };
 
+TEST_F(CliView, NamesWithMarksStandInTheQueryAsAUrlDoes) {
+  fs::copy_file(kGolden, folder_ / "a b#?.texmesh");
+  const Json said = start(folder_ / "a b#?.texmesh");
+  EXPECT_NE(said["url"].get<std::string>().find("/?pkg=packages/a%2520b%2523%253F.texmesh"),
+            std::string::npos)
+      << said["url"];
+  EXPECT_EQ(client().Get("/packages/a%20b%23%3F.texmesh")->status, 200);
+}
+
 TEST_F(CliView, ServesThePageThePackageAndItsRanges) {
   const Json said = start(kGolden);
   EXPECT_NE(said["url"].get<std::string>().find("/?pkg=packages/v1.1-scan.texmesh"), std::string::npos);
