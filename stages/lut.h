@@ -22,7 +22,7 @@ struct LutOptions {
   Allocation allocate = Allocation::kLog;
   double quality_fine = 80, quality_coarse = 40;  // Q_i falls linearly from S_0 to S_max
   double quality_width = 60;                      // dQ of (3.2)
-  double log_width = 0.45;                        // dg of the log-quantiser form
+  double log_width = 0.42;                        // dg of the log-quantiser form
   double quality_min = 5, quality_max = 97;       // clip
   template <class S, class V>
   static void fields(S& s, V&& v) {
