@@ -235,11 +235,6 @@ Pixels decode_for(const Image& image, const TexturePlane& plane) {
   return out;
 }
 
-Halving halving_of(const TexturePlane& plane) {
-  if (is_colour(plane.role)) return Halving::kLight;
-  return plane.role == TextureRole::kNormal && plane.channels == 3 ? Halving::kNormals : Halving::kNumbers;
-}
-
 /// The number of full-size planes; they stand first, and every mip follows its next finer plane's size.
 std::size_t check_planes(const std::vector<TexturePlane>& planes, std::size_t images) {
   const auto fail = [](std::size_t p, const char* expected, std::uint64_t found) {
@@ -293,8 +288,9 @@ void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::
   if (way.fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
   for (std::size_t p = base, next = first_mip;; p = next++) {
     const bool more = next < planes.size() && planes[next].mip > 0 && planes[next].base == base;
-    Pixels half =
-        more ? halved(pixels, planes[p].width_px, planes[p].height_px, halving_of(planes[next])) : Pixels{};
+    Pixels half = more ? halved(pixels, planes[p].width_px, planes[p].height_px,
+                                halving_of(planes[next].role, planes[next].channels))
+                       : Pixels{};
     if (way.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, way.part, context);
     out[p] = padded(std::move(pixels), planes[p]);
     if (!more) return;

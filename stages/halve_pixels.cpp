@@ -9,6 +9,7 @@
 
 #include "format/errors.h"
 #include "format/srgb.h"
+#include "stages/parallel.h"
 
 namespace texmesh {
 namespace {
@@ -39,23 +40,29 @@ const LightTables& light_tables() {
 
 /// What an output texel takes along one axis: `count` texels from `first` on.
 struct Taps {
+  static constexpr std::uint32_t kMost = 9;  // an eighth of 8 k + 1 texels takes parts of nine
   std::uint32_t first = 0, count = 0;
-  std::array<std::uint64_t, 3> weight{};
+  std::array<std::uint64_t, kMost> weight{};
 };
 
-/// Weights of one axis; each output's sum to `whole`.
-std::vector<Taps> taps_of(std::uint32_t size, std::uint64_t& whole) {
-  const std::uint32_t half = (size + 1) / 2, common = std::gcd(size, half);
-  const std::uint64_t w = size / common, o = half / common;
-  whole = w;
-  std::vector<Taps> out(half);
-  for (std::uint32_t i = 0; i < half; ++i) {
+/// One axis of a reduction to 1 / divisor, rounded up.
+struct Axis {
+  std::vector<Taps> taps;
+  std::uint64_t whole = 0;  // sum of the weights of each output
+};
+
+Axis axis_of(std::uint32_t size, std::uint32_t divisor) {
+  const std::uint32_t less = (size + divisor - 1) / divisor, common = std::gcd(size, less);
+  const std::uint64_t w = size / common, o = less / common;
+  Axis axis{std::vector<Taps>(less), w};
+  for (std::uint32_t i = 0; i < less; ++i) {
     const std::uint64_t lo = i * w, hi = (i + std::uint64_t{1}) * w;  // in units of 1 / o texels
-    out[i].first = static_cast<std::uint32_t>(lo / o);
+    Taps& taps = axis.taps[i];
+    taps.first = static_cast<std::uint32_t>(lo / o);
     for (std::uint64_t j = lo / o; j * o < hi; ++j)
-      out[i].weight[out[i].count++] = std::min(hi, (j + 1) * o) - std::max(lo, j * o);
+      taps.weight[taps.count++] = std::min(hi, (j + 1) * o) - std::max(lo, j * o);
   }
-  return out;
+  return axis;
 }
 
 void put_normal(const std::array<std::uint64_t, 3>& sum, std::uint64_t whole, std::uint8_t* to) {
@@ -69,13 +76,16 @@ void put_normal(const std::array<std::uint64_t, 3>& sum, std::uint64_t whole, st
     to[c] = static_cast<std::uint8_t>(std::clamp(std::floor((n[c] / length + 1) * 127.5 + 0.5), 0.0, 255.0));
 }
 
+/// Rows first .. last - 1 of the output.
 template <Halving kKind, std::uint32_t C>
-void reduce(const Pixels& from, const std::vector<Taps>& columns, const std::vector<Taps>& rows,
-            std::uint64_t whole, Pixels& to) {
+void reduce(const Pixels& from, const Axis& columns, const Axis& rows, std::size_t first, std::size_t last,
+            Pixels& to) {
   const LightTables& light = light_tables();
-  std::uint8_t* out = to.data.data();
-  for (const Taps& row : rows)
-    for (const Taps& column : columns) {
+  const std::uint64_t whole = columns.whole * rows.whole;
+  std::uint8_t* out = to.data.data() + first * to.width_px * C;
+  for (std::size_t y = first; y < last; ++y)
+    for (const Taps& column : columns.taps) {
+      const Taps& row = rows.taps[y];
       std::array<std::uint64_t, 3> sum{};
       for (std::uint32_t v = 0; v < row.count; ++v) {
         const std::uint8_t* p = from.at(column.first, row.first + v);
@@ -97,9 +107,7 @@ void reduce(const Pixels& from, const std::vector<Taps>& columns, const std::vec
     }
 }
 
-}  // namespace
-
-Pixels halved(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind) {
+void check(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind) {
   const bool grey = from.channels == 1;
   if (width_px == 0 || height_px == 0 || width_px > from.width_px || height_px > from.height_px ||
       from.data.size() != std::size_t{from.width_px} * from.height_px * from.channels ||
@@ -107,21 +115,46 @@ Pixels halved(const Pixels& from, std::uint32_t width_px, std::uint32_t height_p
     throw StageError("fragmentation", "pixels to halve", "1 or 3 channels of the size that is asked for",
                      std::to_string(from.width_px) + " x " + std::to_string(from.height_px) + " x " +
                          std::to_string(from.channels));
-  std::uint64_t across = 0, down = 0;
-  const std::vector<Taps> columns = taps_of(width_px, across), rows = taps_of(height_px, down);
-  Pixels to{
-      static_cast<std::uint32_t>(columns.size()), static_cast<std::uint32_t>(rows.size()), from.channels, {}};
+}
+
+Pixels reduced(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, std::uint32_t divisor,
+               Halving kind, const RunContext& context) {
+  check(from, width_px, height_px, kind);
+  const Axis columns = axis_of(width_px, divisor), rows = axis_of(height_px, divisor);
+  Pixels to{static_cast<std::uint32_t>(columns.taps.size()),
+            static_cast<std::uint32_t>(rows.taps.size()),
+            from.channels,
+            {}};
   to.data.resize(std::size_t{to.width_px} * to.height_px * to.channels);
-  const std::uint64_t whole = across * down;
-  if (kind == Halving::kNormals)
-    reduce<Halving::kNormals, 3>(from, columns, rows, whole, to);
-  else if (kind == Halving::kLight)
-    grey ? reduce<Halving::kLight, 1>(from, columns, rows, whole, to)
-         : reduce<Halving::kLight, 3>(from, columns, rows, whole, to);
-  else
-    grey ? reduce<Halving::kNumbers, 1>(from, columns, rows, whole, to)
-         : reduce<Halving::kNumbers, 3>(from, columns, rows, whole, to);
+  const bool grey = from.channels == 1;
+  constexpr std::size_t kRowsPerTask = 8;
+  parallel_for(context, to.height_px, kRowsPerTask, [&](std::size_t first, std::size_t last) {
+    if (kind == Halving::kNormals)
+      reduce<Halving::kNormals, 3>(from, columns, rows, first, last, to);
+    else if (kind == Halving::kLight)
+      grey ? reduce<Halving::kLight, 1>(from, columns, rows, first, last, to)
+           : reduce<Halving::kLight, 3>(from, columns, rows, first, last, to);
+    else
+      grey ? reduce<Halving::kNumbers, 1>(from, columns, rows, first, last, to)
+           : reduce<Halving::kNumbers, 3>(from, columns, rows, first, last, to);
+  });
   return to;
+}
+
+}  // namespace
+
+Halving halving_of(TextureRole role, std::uint32_t channels) {
+  if (is_colour(role)) return Halving::kLight;
+  return role == TextureRole::kNormal && channels == 3 ? Halving::kNormals : Halving::kNumbers;
+}
+
+Pixels halved(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind) {
+  return reduced(from, width_px, height_px, 2, kind, {});
+}
+
+Pixels eighth_of(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind,
+                 const RunContext& context) {
+  return reduced(from, width_px, height_px, 8, kind, context);
 }
 
 }  // namespace texmesh

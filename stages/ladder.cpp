@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "stages/halve_pixels.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
 #include "stages/rung_hull.h"
@@ -139,87 +140,20 @@ std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels
   return sample;
 }
 
-/// Sums over boxes of a plane proper (not its padding); boxes at the right and bottom may be partial.
-struct BoxSums {
-  std::uint32_t width = 0, height = 0, channels = 0;
-  std::vector<std::uint16_t> sum, count;  // [box * channels + channel], [box]; 256 texels of 255 fit
-};
-
-/// The rows of boxes first .. last - 1.
-void add_rows_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height, std::size_t first,
-                       std::size_t last, BoxSums& out) {
-  const auto end = static_cast<std::uint32_t>(std::min<std::size_t>(8 * last, height));
-  for (auto y = static_cast<std::uint32_t>(8 * first); y < end; ++y) {
-    const std::uint8_t* p = from.at(0, y);
-    std::uint16_t* sum = out.sum.data() + std::size_t{y / 8} * out.width * out.channels;
-    std::uint16_t* count = out.count.data() + std::size_t{y / 8} * out.width;
-    for (std::uint32_t x = 0; x < width; x += 8, sum += out.channels) {
-      const std::uint32_t n = std::min(8u, width - x);
-      *count++ += static_cast<std::uint16_t>(n);
-      if (out.channels == 3) {
-        unsigned a = sum[0], b = sum[1], c = sum[2];
-        for (std::uint32_t k = 0; k < n; ++k, p += 3) a += p[0], b += p[1], c += p[2];
-        sum[0] = static_cast<std::uint16_t>(a);
-        sum[1] = static_cast<std::uint16_t>(b);
-        sum[2] = static_cast<std::uint16_t>(c);
-      } else {
-        unsigned a = sum[0];
-        for (std::uint32_t k = 0; k < n; ++k) a += *p++;
-        sum[0] = static_cast<std::uint16_t>(a);
-      }
-    }
-  }
-}
-
-BoxSums sums_of_eight(const Pixels& from, std::uint32_t width, std::uint32_t height,
-                      const RunContext& context) {
-  BoxSums out{(width + 7) / 8, (height + 7) / 8, from.channels, {}, {}};
-  out.count.resize(std::size_t{out.width} * out.height);
-  out.sum.resize(out.count.size() * out.channels);
-  parallel_for(context, out.height, 8, [&](std::size_t begin, std::size_t end) {
-    add_rows_of_eight(from, width, height, begin, end, out);
-  });
-  return out;
-}
-
-BoxSums sums_of_twice(const BoxSums& from) {
-  BoxSums out{(from.width + 1) / 2, (from.height + 1) / 2, from.channels, {}, {}};
-  out.count.resize(std::size_t{out.width} * out.height);
-  out.sum.resize(out.count.size() * out.channels);
-  for (std::uint32_t y = 0; y < from.height; ++y)
-    for (std::uint32_t x = 0; x < from.width; ++x) {
-      const std::size_t a = std::size_t{y} * from.width + x, b = std::size_t{y / 2} * out.width + x / 2;
-      out.count[b] = static_cast<std::uint16_t>(out.count[b] + from.count[a]);
-      for (std::uint32_t c = 0; c < out.channels; ++c) {
-        std::uint16_t& sum = out.sum[b * out.channels + c];
-        sum = static_cast<std::uint16_t>(sum + from.sum[a * out.channels + c]);
-      }
-    }
-  return out;
-}
-
-Pixels means_of(const BoxSums& boxes) {
-  Pixels out{boxes.width, boxes.height, boxes.channels, {}};
-  out.data.resize(boxes.sum.size());
-  for (std::size_t k = 0; k < out.data.size(); ++k) {
-    const unsigned count = boxes.count[k / boxes.channels];
-    out.data[k] = static_cast<std::uint8_t>((boxes.sum[k] + count / 2) / count);
-  }
-  return out;
-}
-
 void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
                     const RunContext& context, PlaneLadder& out) {
   if (plane.mip > 0) return;  // its full-size plane's preview serves
   const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
-  const auto encode = [&](const BoxSums& boxes) {
-    out.preview = encode_jpeg(means_of(boxes), options.preview_quality, subsampling);
-    out.preview_width_px = boxes.width;
-    out.preview_height_px = boxes.height;
+  const Halving kind = halving_of(plane.role, plane.channels);
+  const auto encode = [&](const Pixels& small) {
+    out.preview = encode_jpeg(small, options.preview_quality, subsampling);
+    out.preview_width_px = small.width_px;
+    out.preview_height_px = small.height_px;
   };
-  const BoxSums eighth = sums_of_eight(pixels, plane.width_px, plane.height_px, context);
+  const Pixels eighth = eighth_of(pixels, plane.width_px, plane.height_px, kind, context);
   encode(eighth);
-  if (out.preview.size() >= kPreviewLimitBytes) encode(sums_of_twice(eighth));
+  if (out.preview.size() >= kPreviewLimitBytes)
+    encode(halved(eighth, eighth.width_px, eighth.height_px, kind));
 }
 
 /// A few neighbouring fragments at every rung: what one thread encodes at a time.

@@ -12,7 +12,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 6;
+inline constexpr int kLadderVersion = 7;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>
@@ -88,7 +88,8 @@ struct PlaneLadder {
   SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
   std::vector<std::uint8_t>
-      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB; mips have none
+      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
+                // mips are means of (stages/halve_pixels.h); mips have none
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {

@@ -2,23 +2,18 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <string>
 
-#include "format/portable_math.h"
 #include "format/sha256.h"
 #include "stages/fragment_meter.h"
 #include "stages/jpeg.h"
 #include "stages/parallel.h"
+#include "stages/size_model.h"
 
 namespace texmesh {
 namespace {
 
 constexpr int kGammas = 21;  // 0, 0.05 .. 1
-// What is the same in every stream: SOI and EOI.
-constexpr double kHeaderBytes = 2 + 2;
-// (8.8) divides by log(100 p): singular at 0.01, negative below.
-constexpr double kLeastPredictor = 0.02;
 
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
            const Ladder& ladder, const LutOptions& options) {
@@ -217,53 +212,6 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
   return out;
 }
 
-/// The rungs that the size model is fitted on. Not those whose quantisers stand at an end of their range:
-/// steps of 255 below quality 10 and of 1 above 95 do not follow the exponential, and with them the
-/// correlation of a scan's texture fell to 0.90. Nor one without loss, whose bytes are not a quality's.
-std::vector<std::size_t> modelled_rungs(const PlaneLadder& ladder) {
-  constexpr int kLeast = 10, kMost = 95;
-  std::vector<std::size_t> all, within;
-  for (std::size_t r = 0; r + (ladder.lossless ? 1 : 0) < ladder.rungs.size(); ++r) {
-    all.push_back(r);
-    if (ladder.rungs[r].quality >= kLeast && ladder.rungs[r].quality <= kMost) within.push_back(r);
-  }
-  return within.size() > 2 ? within : all;
-}
-
-/// S = A R^Q + c by least squares on log (S - c) (8.7), B from (8.8) with the plane's mean VQP.
-void fit_size_model(const PlaneLadder& ladder, PlaneTables& t) {
-  const std::vector<std::size_t> modelled = modelled_rungs(ladder);
-  const std::size_t rungs = modelled.size();
-  if (t.order.empty() || rungs < 2) return;
-  const double header = kHeaderBytes * static_cast<double>(t.order.size());
-  std::vector<double> size(rungs), q(rungs), s(rungs);
-  double mean_q = 0, mean_s = 0, predictor = 0;
-  for (std::size_t r = 0; r < rungs; ++r) {
-    for (std::uint16_t f : t.order) size[r] += static_cast<double>(bytes_to_show(t, modelled[r], f));
-    q[r] = t.rung_quality[modelled[r]];
-    s[r] = portable::log(std::max(size[r] - header, 1.0));
-    mean_q += q[r] / static_cast<double>(rungs);
-    mean_s += s[r] / static_cast<double>(rungs);
-  }
-  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
-  double qq = 0, qs = 0, ss = 0;
-  for (std::size_t r = 0; r < rungs; ++r) {
-    qq += (q[r] - mean_q) * (q[r] - mean_q);
-    qs += (q[r] - mean_q) * (s[r] - mean_s);
-    ss += (s[r] - mean_s) * (s[r] - mean_s);
-  }
-  const double log_r = qs / qq, log_a = mean_s - log_r * mean_q;
-  double error = 0;
-  for (std::size_t r = 0; r < rungs; ++r)
-    error += std::fabs(portable::exp(log_a + log_r * q[r]) + header - size[r]) / size[r] /
-             static_cast<double>(rungs);
-  t.model_a = static_cast<float>(portable::exp(log_a));
-  t.model_r = static_cast<float>(portable::exp(log_r));
-  t.model_b = static_cast<float>(log_r / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
-  t.model_correlation = ss > 0 ? static_cast<float>(qs / std::sqrt(qq * ss)) : 0.0f;
-  t.model_error = static_cast<float>(error);
-}
-
 }  // namespace
 
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
@@ -294,7 +242,8 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   parallel_for(context, out.planes.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       out.planes[p].total_bytes = total_bytes(out.planes[p]);
-      fit_size_model(ladder.planes[p], out.planes[p]);
+      const TexturePlane& plane = fragments.planes[p];
+      fit_size_model(ladder.planes[p], plane.fragment_width_px, plane.fragment_height_px, out.planes[p]);
     }
   });
   return out;

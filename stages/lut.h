@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 4;
+inline constexpr int kLutVersion = 5;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>
@@ -46,11 +46,9 @@ struct LutOptions {
 /// exact bytes, the digest, MSE and 1 - SSIM of luma, for data of every channel, over covered texels, and 1 -
 /// SSIM of the preview, scaled up bilinearly, where no rung is shown; Q_i, D_i over 21 values of Gamma (bytes
 /// of the fragments' streams, tables not counted; with `allocate = rd` the bytes of log, which rungs_of()
-/// spends); the order of falling importance: eta of scale 0, then surface, then index; and the size model S =
-/// A R^Q + c over the plane's rungs, c = the stored fragments' constant headers, B from (8.8) with the
-/// plane's mean VQP, not below 0.02. The model is 0 where there are fewer than two rungs or nothing is
-/// stored. `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each other, FormatError
-/// for a stream that does not decode. Same result for any thread count.
+/// spends); the order of falling importance: eta of scale 0, then surface, then index; and the size model
+/// (stages/size_model.h). `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each
+/// other, FormatError for a stream that does not decode. Same result for any thread count.
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
                            const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
                            const RunContext& context);

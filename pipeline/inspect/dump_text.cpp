@@ -291,11 +291,14 @@ std::string tables_text(PackageReader& p) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
     s += plane_title(p.textures()[k], k);
-    s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
-                     shortest(static_cast<double>(t.model_a)), shortest(static_cast<double>(t.model_b)),
-                     shortest(static_cast<double>(t.model_r), 6),
-                     fixed(static_cast<double>(t.model_correlation), 4),
-                     percent(static_cast<double>(t.model_error)));
+    if (t.model_r > 0)
+      s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
+                       shortest(static_cast<double>(t.model_a)), shortest(static_cast<double>(t.model_b)),
+                       shortest(static_cast<double>(t.model_r), 6),
+                       fixed(static_cast<double>(t.model_correlation), 4),
+                       percent(static_cast<double>(t.model_error)));
+    else
+      s += "  no size model: it needs two rungs\n";
     s += fmt::format(
         "  allocation {}, width {}, q within {} .. {}; D_i at the default Gamma, then by Gamma\n",
         allocation_name(t), shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),

@@ -25,10 +25,10 @@ double linear(int v) {
 }
 double encoded(double y) { return 255 * (y <= 0.0031308 ? 12.92 * y : 1.055 * std::pow(y, 1 / 2.4) - 0.055); }
 
-/// The mean over the rectangle of output texel (i, j), by areas.
-double mean_over(const Pixels& p, std::uint32_t w, std::uint32_t h, std::uint32_t i, std::uint32_t j,
-                 std::uint32_t c, bool light) {
-  const double ow = (w + 1) / 2, oh = (h + 1) / 2;
+/// The mean over the rectangle of output texel (i, j) of `to`, by areas.
+double mean_over(const Pixels& p, std::uint32_t w, std::uint32_t h, std::array<std::uint32_t, 2> to,
+                 std::uint32_t i, std::uint32_t j, std::uint32_t c, bool light) {
+  const double ow = to[0], oh = to[1];
   const double x0 = i * w / ow, x1 = (i + 1) * w / ow, y0 = j * h / oh, y1 = (j + 1) * h / oh;
   double sum = 0, area = 0;
   for (std::uint32_t y = 0; y < h; ++y)
@@ -53,11 +53,35 @@ TEST(HalvePixels, IsTheMeanOverEveryTexelsAreaAtAnySize) {
       for (std::uint32_t y = 0; y < numbers.height_px; ++y)
         for (std::uint32_t x = 0; x < numbers.width_px; ++x)
           for (std::uint32_t c = 0; c < channels; ++c) {
-            EXPECT_NEAR(numbers.at(x, y)[c], mean_over(padded, w, h, x, y, c, false), 0.5001);
+            EXPECT_NEAR(numbers.at(x, y)[c],
+                        mean_over(padded, w, h, {(w + 1) / 2, (h + 1) / 2}, x, y, c, false), 0.5001);
             // The 16-bit table is coarser than a code only below 5 (slope 12.92).
-            EXPECT_NEAR(light.at(x, y)[c], encoded(mean_over(padded, w, h, x, y, c, true)), 0.53);
+            EXPECT_NEAR(light.at(x, y)[c],
+                        encoded(mean_over(padded, w, h, {(w + 1) / 2, (h + 1) / 2}, x, y, c, true)), 0.53);
           }
     }
+}
+
+TEST(HalvePixels, AnEighthIsTheMeanOverEveryTexelsAreaAtAnySize) {
+  for (const auto& [w, h] : {std::array{16u, 24u}, {17u, 1u}, {1u, 9u}, {15u, 65u}, {25u, 31u}, {7u, 8u}}) {
+    const Pixels padded = noise(w + 5, h + 3, 3);
+    RunContext eight;
+    eight.threads = 8;
+    for (const Halving kind : {Halving::kNumbers, Halving::kLight}) {
+      const Pixels small = eighth_of(padded, w, h, kind, {});
+      EXPECT_EQ(small.data, eighth_of(padded, w, h, kind, eight).data);
+      ASSERT_EQ(small.width_px, (w + 7) / 8);
+      ASSERT_EQ(small.height_px, (h + 7) / 8);
+      for (std::uint32_t y = 0; y < small.height_px; ++y)
+        for (std::uint32_t x = 0; x < small.width_px; ++x)
+          for (std::uint32_t c = 0; c < 3; ++c) {
+            const bool light = kind == Halving::kLight;
+            const double mean = mean_over(padded, w, h, {small.width_px, small.height_px}, x, y, c, light);
+            EXPECT_NEAR(small.at(x, y)[c], light ? encoded(mean) : mean, 0.53);
+          }
+    }
+  }
+  EXPECT_EQ(eighth_of(noise(64, 64, 3), 64, 64, Halving::kNormals, {}).data.size(), 8u * 8u * 3u);
 }
 
 TEST(HalvePixels, ConstantsStayAndLightIsBrighterThanNumbers) {

@@ -275,6 +275,26 @@ TEST(Ladder, PreviewIsOneEighthWhereSmallAndOneSixteenthElsewhere) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(dot.data[c], tiny.pixels[0].data[c], 12);
 }
 
+TEST(Ladder, PreviewsAreMeansOfWhatMipsAreMeansOf) {
+  Plane p = make_plane(2, 2, 64, 3);
+  const auto fill = [&](auto value) {
+    for (std::uint32_t y = 0; y < 128; ++y)
+      for (std::uint32_t x = 0; x < 128; ++x)
+        for (std::uint32_t c = 0; c < 3; ++c)
+          p.pixels[0].data[(std::size_t{y} * 128 + x) * 3 + c] = static_cast<std::uint8_t>(value(x + y, c));
+  };
+  fill([](std::uint32_t k, std::uint32_t) { return k % 2 * 255; });
+  const auto preview = [&] { return decode_jpeg(encode(p).planes[0].preview, 1 << 20); };
+  for (const std::uint8_t v : preview().data) EXPECT_NEAR(v, 188, 2) << "half the light, not half the code";
+  p.fragments.planes[0].role = TextureRole::kOcclusionRoughnessMetallic;
+  for (const std::uint8_t v : preview().data) EXPECT_NEAR(v, 128, 2);
+
+  p.fragments.planes[0].role = TextureRole::kNormal;  // ridges: their mean is (0, 0, 1)
+  fill([](std::uint32_t k, std::uint32_t c) { return c == 1 ? 128 : c == 2 ? 204 : k % 2 ? 230 : 25; });
+  const Pixels normals = preview();
+  for (std::size_t k = 0; k < normals.data.size(); k += 3) EXPECT_NEAR(normals.data[k + 2], 255, 3);
+}
+
 TEST(Ladder, RefusesRungsThatDoNotRiseAndPixelsThatDoNotFit) {
   Plane p = make_plane(1, 1, 16, 3);
   LadderOptions options;
