@@ -311,7 +311,7 @@ void add_fetch_command(CLI::App& app, int& exit_code) {
               "All fragments of a texture at once, as for servers without ranges");
   c->add_option("-o,--output", args->output,
                 "Folder for the scale's GLB and the fragments as complete image files");
-  c->add_flag("--json", args->json, "One JSON object, for programs");
+  c->add_flag("--json", args->json, "One JSON object (schemas/fetch.v1.schema.json)");
   c->footer(
       "Every fragment is checked against its digest; what a server fails to deliver is asked of another "
       "one.\n"

@@ -151,7 +151,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   add_delivery_options(*c, *args, true);
   c->add_option("--budget", args->budget,
                 "Bytes instead of time: the mesh and the textures that look best together in 500kB");
-  c->add_flag("--json", args->json, "One JSON object, for programs");
+  c->add_flag("--json", args->json, "One JSON object (schemas/plan.v1.schema.json)");
   c->footer(
       "Plays the transfer over a model of the network; the package alone decides. The predicted SSIM comes "
       "from what\n"
@@ -193,7 +193,7 @@ void add_check_command(CLI::App& app, int& exit_code) {
   c->add_option("--max-first-picture", args->max_first_picture,
                 "Latest time of the first picture: 1s, 800ms");
   c->add_option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB");
-  c->add_flag("--json", args->json, "One JSON object, for programs");
+  c->add_flag("--json", args->json, "One JSON object (schemas/plan.v1.schema.json)");
   c->footer(
       "Example:\n"
       "  texmesh check bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --min-ssim 0.95 "

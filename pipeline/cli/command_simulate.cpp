@@ -45,7 +45,7 @@ void print_table_4_2(const SimulateArguments& a) {
                       {"trace_deviation_percent", r.trace_deviation_percent},
                       {"trace_worst_percent", r.trace_worst_percent},
                       {"static_percent", r.static_percent}});
-    std::cout << Json{{"rows", list}}.dump() << '\n';
+    std::cout << Json{{"version", 1}, {"table", "4.2"}, {"rows", list}}.dump() << '\n';
     return;
   }
   if (a.csv) {
@@ -115,7 +115,8 @@ Json theorem_json(const std::vector<HtcTheorem>& runs, const TheoremSummary& sum
                     {"last_residual_s", t.last_residual_s},
                     {"corrected_bound_s", t.corrected_bound_s},
                     {"published_bound_s", t.published_bound_s}});
-  return {{"runs", runs.size()},
+  return {{"version", 1},
+          {"runs", runs.size()},
           {"identity_error", sum.identity_error},
           {"largest_surplus_s", sum.largest_surplus_s},
           {"corrected_bound_broken", sum.corrected_broken},
@@ -274,7 +275,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   c->add_option("--plot", args->plot, "SVG file: quality and time by fragment, throughput, credit");
-  auto* json = c->add_flag("--json", args->json, "One JSON object, for programs");
+  auto* json = c->add_flag("--json", args->json, "One JSON object (schemas/simulate.v1.schema.json)");
   c->add_flag("--csv", args->csv, "Every decision, run or row as a line")->excludes(json);
   c->footer(
       "Deviation is of the time limit: positive when the transfer ended early. --table and --theorem play "

@@ -10,25 +10,13 @@
 #include <set>
 #include <sstream>
 #include <thread>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validator.hpp>
 
 #include "pipeline/batch/progress.h"
+#include "tests/support/schema.h"
 
 namespace texmesh {
 namespace {
 using Json = nlohmann::json;
-
-bool follows(const std::string& schema_name, const Json& document) {
-  std::ifstream in(std::string(TEXMESH_SOURCE_DIR) + "/schemas/" + schema_name + ".schema.json");
-  const Json schema_json = Json::parse(in);
-  valijson::Schema schema;
-  valijson::SchemaParser().populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_json), schema);
-  valijson::Validator validator;
-  return validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), nullptr);
-}
 
 /// Reads XML as strictly as the reports need it: balanced elements, quoted attributes, no bare & or <.
 /// Returns how often each element occurs; "not well-formed" is among them when it is not.
@@ -106,7 +94,7 @@ FakeRun ugly_run() {
 TEST(Summary, FollowsItsSchemaWhateverTheNames) {
   const FakeRun run = ugly_run();
   const Json summary = Json::parse(write_summary(run.models, run.reports, 2.5));
-  EXPECT_TRUE(follows("summary.v1", summary)) << summary.dump(1);
+  EXPECT_TRUE(testing::follows_schema(summary, "summary.v1"));
   EXPECT_EQ(summary["models"].size(), 5u);
   EXPECT_EQ(summary["compiled"], 1);
   EXPECT_EQ(summary["unchanged"], 1);
@@ -115,7 +103,7 @@ TEST(Summary, FollowsItsSchemaWhateverTheNames) {
   EXPECT_EQ(summary["models"][0]["bytes"], 1234);
   EXPECT_EQ(summary["models"][2]["error"]["kind"], "input");
   EXPECT_FALSE(summary["models"][0].contains("error"));
-  EXPECT_TRUE(follows("summary.v1", Json::parse(write_summary({}, {}, 0))));
+  EXPECT_TRUE(testing::follows_schema(Json::parse(write_summary({}, {}, 0)), "summary.v1"));
 }
 
 TEST(Junit, IsWellFormedAndCountsAsTheSummaryDoes) {
@@ -265,7 +253,7 @@ TEST(Progress, EventsFollowTheirSchema) {
   std::multiset<std::string> kinds;
   for (std::string line; std::getline(in, line);) {
     const Json e = Json::parse(line);
-    EXPECT_TRUE(follows("event.v1", e)) << line;
+    EXPECT_TRUE(testing::follows_schema(e, "event.v1")) << line;
     kinds.insert(e["event"]);
   }
   EXPECT_EQ(kinds.count("model-started"), 2u);
@@ -274,7 +262,7 @@ TEST(Progress, EventsFollowTheirSchema) {
   EXPECT_EQ(kinds.count("summary"), 1u);
   std::ostringstream out;
   Progress(out, OutputMode::kJson, false, false).cache_event("cache-not-written", "the disk is full");
-  EXPECT_TRUE(follows("event.v1", Json::parse(out.str()))) << out.str();
+  EXPECT_TRUE(testing::follows_schema(Json::parse(out.str()), "event.v1")) << out.str();
 }
 
 }  // namespace

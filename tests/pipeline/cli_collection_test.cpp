@@ -7,11 +7,8 @@
 #include <fstream>
 #include <set>
 #include <thread>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validator.hpp>
 
+#include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
 
 namespace texmesh::testing {
@@ -258,25 +255,15 @@ TEST_F(Collection, AFileChangedWithItsTimePutBackIsSeen) {
   EXPECT_EQ(results_in(events())["a.obj"], "ok");
 }
 
-void expect_schema(const std::string& schema_name, const Json& document) {
-  const Json schema_json =
-      Json::parse(read_text(std::string(TEXMESH_SOURCE_DIR) + "/schemas/" + schema_name + ".schema.json"));
-  valijson::Schema schema;
-  valijson::SchemaParser().populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_json), schema);
-  valijson::Validator validator;
-  EXPECT_TRUE(validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), nullptr))
-      << document.dump();
-}
-
 TEST_F(Collection, ReportsAndEventsOfARealRunFollowTheirSchemas) {
   ASSERT_NO_FATAL_FAILURE(add_three());
   write_text(model("bad.obj"), "f 1 2 3\n");
   const CommandResult r = compile({"--json", "--explain", "--jobs", "2", "--summary", folder_ / "s.json",
                                    "--junit", folder_ / "j.xml", "--trace", folder_ / "t.json"});
   EXPECT_EQ(r.exit_code, 1);
-  for (const Json& e : events_of(r.output)) expect_schema("event.v1", e);
+  for (const Json& e : events_of(r.output)) EXPECT_TRUE(testing::follows_schema(e, "event.v1"));
   const Json summary = Json::parse(read_text(folder_ / "s.json"));
-  expect_schema("summary.v1", summary);
+  EXPECT_TRUE(testing::follows_schema(summary, "summary.v1"));
   EXPECT_EQ(summary["compiled"], 3);
   EXPECT_EQ(summary["failed"], 1);
   for (const Json& m : summary["models"])

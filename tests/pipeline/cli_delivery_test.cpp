@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tests/support/command.h"
+#include "tests/support/schema.h"
 
 namespace texmesh::testing {
 namespace {
@@ -20,11 +21,15 @@ CommandResult texmesh(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
   return run_command(arguments);
 }
-Json json_of(std::vector<std::string> arguments) {
+/// What a command prints, which follows the schema that its help names.
+Json json_of(std::vector<std::string> arguments, int exit_code = 0) {
   arguments.push_back("--json");
   const CommandResult r = texmesh(arguments);
-  EXPECT_EQ(r.exit_code, 0) << r.errors;
-  return Json::parse(r.output);
+  EXPECT_EQ(r.exit_code, exit_code) << r.errors;
+  const Json document = Json::parse(r.output);
+  const std::string name = arguments[0] == "check" ? "plan" : arguments[0];
+  EXPECT_TRUE(follows_schema(document, name + ".v1")) << r.output;
+  return document;
 }
 
 TEST(CliSimulate, Table42HasTwelveRowsOfTheSetUp) {
@@ -171,11 +176,10 @@ TEST(CliPlan, ABudgetIsKeptAndMoreBytesLookBetter) {
   const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
   double before = 0;
   for (const int kb : {30, 50, 60, 100, 200}) {
-    const CommandResult r =
-        texmesh({"plan", golden, "--display", "800", "--budget", std::to_string(kb) + "kB", "--json"});
-    ASSERT_EQ(r.exit_code, kb == 30 ? 4 : 0) << r.errors;  // the least there is takes 39 kB
-    const Json p = Json::parse(r.output);
-    EXPECT_EQ(r.exit_code == 0, p["bytes"]["all"].get<int>() <= 1000 * kb);
+    const bool fits = kb > 30;  // the least there is takes 39 kB
+    const Json p =
+        json_of({"plan", golden, "--display", "800", "--budget", std::to_string(kb) + "kB"}, fits ? 0 : 4);
+    EXPECT_EQ(fits, p["bytes"]["all"].get<int>() <= 1000 * kb);
     EXPECT_GE(p["ssim"].get<double>(), before) << kb;
     before = p["ssim"];
     EXPECT_FALSE(p.contains("complete_s"));
@@ -200,6 +204,7 @@ TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
   thread.join();
   ASSERT_EQ(r.exit_code, 0) << r.errors;
   const Json got = Json::parse(r.output);
+  EXPECT_TRUE(follows_schema(got, "fetch.v1")) << r.output;
   EXPECT_EQ(got["given_up"], 0);
   EXPECT_GT(got["texture_ssim"].get<double>(), 0.9);
   std::size_t meshes = 0, fragments = 0;
@@ -227,6 +232,12 @@ TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
   EXPECT_EQ(with({"--mirror", "1MB/s,dead=0s", "--mirror", "1MB/s"}).exit_code, 0);
   for (const char* nan : {"--min-ssim", "--min-texture-ssim"}) EXPECT_EQ(with({nan, "nan"}).exit_code, 2);
   EXPECT_EQ(with({"--max-bytes", "much"}).exit_code, 2);
+  std::vector<std::string> dead = base;
+  dead.insert(dead.end(), {"--mirror", "1MB/s,dead=0s"});
+  const Json never = json_of(dead, 4);
+  EXPECT_TRUE(never["complete_s"].is_null());
+  EXPECT_EQ(never["good"], false);
+  EXPECT_EQ(json_of(base)["good"], true);
   for (const char* reason : {"predicted SSIM", "first picture at", "expected at most 1 000"})
     EXPECT_NE(r.output.find(reason), std::string::npos) << r.output;
 }

@@ -5,12 +5,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validator.hpp>
 
 #include "tests/support/command.h"
+#include "tests/support/schema.h"
 
 namespace texmesh {
 namespace {
@@ -18,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::CommandResult;
+using testing::follows_schema;
 using testing::read_text;
 using testing::write_text;
 
@@ -26,14 +24,6 @@ const std::string kSource = TEXMESH_SOURCE_DIR, kGolden = kSource + "/tests/gold
 CommandResult texmesh(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
   return testing::run_command(arguments);
-}
-
-bool follows_schema(const json& document, const std::string& name) {
-  const json text = json::parse(read_text(kSource + "/schemas/" + name + ".schema.json"));
-  valijson::Schema schema;
-  valijson::SchemaParser(valijson::SchemaParser::kDraft7)
-      .populateSchema(valijson::adapters::NlohmannJsonAdapter(text), schema);
-  return valijson::Validator().validate(schema, valijson::adapters::NlohmannJsonAdapter(document), nullptr);
 }
 
 struct CliInspect : ::testing::Test {
