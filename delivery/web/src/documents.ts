@@ -1,6 +1,103 @@
-// What is parsed after the manifest; loaded when it is first needed.
+import { codecTraits } from './codec';
+import { FormatError } from './errors';
+import { IndexHead, parseIndexPage, readIndexHead } from './index_table';
+import * as layout from './layout';
+import { EntryRef, Manifest, PagedRef, mostManifestPreviews } from './manifest';
+import { parseTablesSection, readTablesHead } from './read_tables';
+import { missingFeature, readTextures } from './read_textures';
+import { PlaneTables, TablesHead, fragmentCount, rungCount } from './tables';
+import { TextureInfo, fullSizePlanes } from './textures';
 
-export { readIndex, readIndexHead, readIndexPage } from './index_table';
+// What is decoded after the manifest, and checked against it and against each other: in workers, or here where there are none. Digests
+// have been checked before.
+
+export { readIndex } from './index_table';
 export { readQuality } from './quality_table';
-export { readTablesHead, readTablesSection } from './tables';
-export { fullSizePlanes, missingFeature, readTextures } from './textures';
+
+const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
+
+function require(good: boolean, file: string, place: string, expected: string, found: unknown): asserts good {
+  if (!good) throw new FormatError(file, place, expected, String(found));
+}
+
+/** The head, or more, of index.bin. */
+export function indexHead(bytes: Uint8Array, { headBytes }: PagedRef): IndexHead {
+  const head = readIndexHead(bytes);
+  require(head.bytes === headBytes, layout.indexPath, 'head', `${headBytes} bytes`, head.bytes);
+  return head;
+}
+
+/** The entries of a page of index.bin by their paths; those of the page without a plane are what the manifest says of them. */
+export function indexPage(bytes: Uint8Array, plane: number, count: number, minor: number, m: Manifest): Map<string, EntryRef> {
+  const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
+  if (plane >= 0) return entries;
+  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+    const e = entries.get(ref.path);
+    const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
+    require(!!same, layout.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+  }
+  return entries;
+}
+
+/** textures.json. */
+export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
+  const planes = readTextures(bytes);
+  require(planes.length === planeCount, layout.texturesPath, '', `${planeCount} planes`, planes.length);
+  const feature = missingFeature(planes, requiredFeatures);
+  require(feature === '', layout.manifestPath, '/requiredFeatures', feature, 'a codec without it');
+  const full = fullSizePlanes(planes);
+  const mips = requiredFeatures.includes('mips');
+  const mipCount = planes.length - full;
+  require(mips === mipCount > 0, layout.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
+  const said = previews.length === Math.min(full, mostManifestPreviews);
+  require(said, layout.manifestPath, '', 'previews of the full-size planes', previews.length);
+  return planes;
+}
+
+/** The head, or more, of tables.bin. */
+export function tablesHead(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): TablesHead {
+  const head = readTablesHead(bytes);
+  require(head.bytes === ref.headBytes, layout.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
+  require(head.planes.length === planeCount, layout.tablesPath, '', `${planeCount} planes`, head.planes.length);
+  const last = head.planes[planeCount - 1];
+  const end = last ? last.offset + last.bytes : head.bytes;
+  require(end === ref.bytes, layout.tablesPath, '', `${end} bytes`, ref.bytes);
+  return head;
+}
+
+/** Tables of one plane, and where each fragment's stream stands within its rung's entry: [rung * F + fragment]. */
+export interface PlaneDocument {
+  tables: PlaneTables;
+  offsets: Float64Array;
+}
+
+/** A section of tables.bin; textures.json and the index speak of the same fragments and bytes. */
+export function planeTables(
+  bytes: Uint8Array,
+  plane: number,
+  minor: number,
+  info: TextureInfo,
+  entries: Map<string, EntryRef>,
+): PlaneDocument {
+  const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
+  const requireHere = (good: boolean, expected: string, found: unknown): void =>
+    require(good, layout.tablesPath, `texture plane ${plane}`, expected, found);
+  const { columns, rows, rungQuality, order, sizeBytes } = tables;
+  const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
+  requireHere(columns === info.columns && rows === info.rows && sameRungs, 'the grid and rungs of textures.json', 'others');
+  requireHere(tables.incremental === codecTraits(info.codec).incremental, 'tables of the codec in textures.json', 'others');
+  const requireSum = (path: string, total: number): void =>
+    requireHere(entries.get(path)?.bytes === total, `${path} of ${total} bytes in the index`, entries.get(path)?.bytes ?? 'none');
+  requireSum(layout.tableStreamsPath(plane), sum(tables.tableBytes));
+  const n = fragmentCount(tables);
+  const offsets = new Float64Array(n * rungCount(tables));
+  for (let r = 0; r < rungCount(tables); ++r) {
+    requireSum(layout.rungPath(plane, r), sum(sizeBytes.subarray(r * n, (r + 1) * n)));
+    let at = 0;
+    for (const f of order) {
+      offsets[r * n + f] = at;
+      at += sizeBytes[r * n + f];
+    }
+  }
+  return { tables, offsets };
+}

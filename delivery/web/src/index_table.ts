@@ -1,4 +1,5 @@
-import { BytesIn, toHex } from './bytes';
+import { toHex } from './bytes';
+import { BytesIn } from './bytes_in';
 import { FormatError } from './errors';
 import * as layout from './layout';
 import { EntryRef, formatMajor, formatMinor } from './manifest';
@@ -80,6 +81,16 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   return { path, offset, bytes, sha256: digest };
 }
 
+/** The entries of a page of some plane, in container order; whoever has the bytes has checked their digest. */
+export function parseIndexPage(bytes: Uint8Array, plane: number, count: number, minor: number): EntryRef[] {
+  const input = new BytesIn(bytes, `${file}: ${plane < 0 ? 'page 0' : `page of plane ${plane}`}`);
+  const entries: EntryRef[] = [];
+  for (let i = 0; i < count; ++i) entries.push(readRecord(input, plane));
+  if (minor <= formatMinor) input.finish();
+  checkOrder(entries);
+  return entries;
+}
+
 /** One page's entries, in container order; its digest is checked. */
 export async function readIndexPage(head: IndexHead, page: number, bytes: Uint8Array): Promise<EntryRef[]> {
   const p = head.pages[page];
@@ -87,12 +98,7 @@ export async function readIndexPage(head: IndexHead, page: number, bytes: Uint8A
   if (bytes.length !== p.bytes) throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`);
   const digest = toHex(await sha256(bytes));
   if (digest !== toHex(p.sha256)) throw new FormatError(file, place, `SHA-256 ${toHex(p.sha256)}`, digest);
-  const input = new BytesIn(bytes, `${file}: ${place}`);
-  const entries: EntryRef[] = [];
-  for (let i = 0; i < p.entries; ++i) entries.push(readRecord(input, p.plane));
-  if (head.minor <= formatMinor) input.finish();
-  checkOrder(entries);
-  return entries;
+  return parseIndexPage(bytes, p.plane, p.entries, head.minor);
 }
 
 /** All pages, merged into container order. */

@@ -1,25 +1,21 @@
-import { samePrefix, toHex } from './bytes';
-import { CodecId, codecTraits, joinFragment } from './codec';
+import { requireDigest } from './digests';
 import { FormatError, InputError } from './errors';
 import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
-import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS, sleepS } from './http';
+import { toHex } from './bytes';
+import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS } from './http';
 import type { IndexHead } from './index_table';
 import * as layout from './layout';
-import {
-  ByteRange, EntryRef, Manifest, PagedRef, mostManifestPreviews, readManifest,
-} from './manifest';
+import { ByteRange, EntryRef, Manifest, PagedRef, readManifest } from './manifest';
 import type { QualityTable } from './quality_table';
 import { sha256 } from './sha256';
 import { PackageForm, PackageStore, ReadOptions, StoreMode, openStore } from './store';
 import type { PlaneTables, TablesHead } from './tables';
 import type { TextureInfo } from './textures';
+import type { DocumentDecoder, Documents } from './worker_protocol';
 
-const documents = () => import('./documents');
-
-const fragmentFilesPath = 'fragments.json';
-const fragmentCount = (t: PlaneTables): number => t.columns * t.rows;
-const rungCount = (t: PlaneTables): number => t.rungQuality.length;
+const here = () => import('./documents');
+const more = () => import('./package_more');
 
 /** Of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {
@@ -49,11 +45,7 @@ const wholeDocumentBytes = 192 << 10;
 /** Sections of tables closer together than this are read by one request. */
 const gapBytes = 4096;
 
-const sum = (values: ArrayLike<number>, from = 0, to = values.length): number => {
-  let total = 0;
-  for (let i = from; i < to; ++i) total += values[i];
-  return total;
-};
+const decodeHere = (async (name, ...args: unknown[]) => ((await here())[name] as (...of: unknown[]) => unknown)(...args)) as DocumentDecoder;
 
 /**
  * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they are first
@@ -70,9 +62,9 @@ export class PackageReader {
   readonly bytesByKind: Partial<Record<RequestKind, number>> = {};
   private readonly listeners_ = new Set<(record: RequestRecord) => void>();
   private readonly once_ = new Map<string, Promise<unknown>>();
-  private wholeTables_?: Promise<Uint8Array>;
-  private readonly tables_ = new Map<number, PlaneTables>();
-  private readonly offsets_ = new Map<number, Float64Array>(); // by plane: [rung * F + fragment]
+  private readonly planes_ = new Map<number, PlaneFiles>();
+  /** Who decodes documents, when it is not this thread: loads say it, which have workers. Where that fails, this thread does. */
+  decodeDocument = decodeHere;
 
   constructor(
     readonly store: PackageStore,
@@ -142,9 +134,8 @@ export class PackageReader {
   dispose(): void {
     this.store.dispose();
     this.once_.clear();
-    this.tables_.clear();
-    this.offsets_.clear();
-    this.wholeTables_ = undefined;
+    this.planes_.clear();
+    this.decodeDocument = decodeHere;
   }
 
   /** Read once for all who ask; again after a failure, or where it was another asker who cancelled. */
@@ -162,75 +153,61 @@ export class PackageReader {
       throw error;
     }
   }
-  private fail_(place: string, expected: string, found: string): never {
-    throw new FormatError(this.store.name, place, expected, found);
-  }
   private digestCheck_(place: string, digest: Uint8Array): (bytes: Uint8Array) => Promise<void> {
-    return async (bytes) => {
-      const found = await sha256(bytes);
-      if (!samePrefix(found, digest)) this.fail_(place, `SHA-256 ${toHex(digest)}`, toHex(found.subarray(0, digest.length)));
-    };
+    return (bytes) => requireDigest(bytes, digest, this.store.name, place);
   }
   private readAll_(ref: EntryRef, how: ReadOptions): Promise<Uint8Array> {
     return this.store.read(ref, 0, ref.bytes, { ...how, verify: this.digestCheck_(`entry ${ref.path}`, ref.sha256) });
   }
-  private async readPaged_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
-    const bytes = await this.readAll_(ref, how);
-    await this.digestCheck_(`head of ${ref.path}`, ref.headSha256)(bytes.subarray(0, ref.headBytes));
-    return bytes;
+  /** A document, or only its head where it is long and that can be had. */
+  private readPaged_(ref: PagedRef, kind: RequestKind, signal?: AbortSignal, all = false): Promise<Uint8Array> {
+    const whole = all || ref.bytes <= wholeDocumentBytes || this.form !== 'range';
+    const verify = async (bytes: Uint8Array): Promise<void> => {
+      await this.digestCheck_(`head of ${ref.path}`, ref.headSha256)(bytes.subarray(0, ref.headBytes));
+      if (whole) await this.digestCheck_(`entry ${ref.path}`, ref.sha256)(bytes);
+    };
+    return this.store.read(ref, 0, whole ? ref.bytes : ref.headBytes, { kind, signal, verify });
   }
-  private readHead_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
-    const verify = this.digestCheck_(`head of ${ref.path}`, ref.headSha256);
-    return this.store.read(ref, 0, ref.headBytes, { ...how, verify });
-  }
-  private requireHead_(ref: PagedRef, headBytes: number): void {
-    if (ref.headBytes !== headBytes) this.fail_(`head of ${ref.path}`, `${ref.headBytes} bytes`, `${headBytes}`);
+  private async decoded_<K extends keyof Documents>(
+    signal: AbortSignal | undefined,
+    name: K,
+    ...args: Parameters<Documents[K]>
+  ): Promise<Awaited<ReturnType<Documents[K]>>> {
+    try {
+      return await this.decodeDocument(name, ...args);
+    } catch (error) {
+      if (error instanceof FormatError || signal?.aborted) throw error;
+      return decodeHere(name, ...args); // no workers, or those of a load that has ended
+    }
   }
 
   // ---- index
 
   /** Every entry but manifest.json and index.bin, in container order. */
   async index(): Promise<EntryRef[]> {
-    const bytes = await this.readPaged_(this.manifest.index, { kind: 'index' });
-    return (await documents()).readIndex(bytes);
+    return decodeHere('readIndex', await this.readPaged_(this.manifest.index, 'index', undefined, true));
   }
 
-  private async loadIndexHead_(signal?: AbortSignal): Promise<IndexHead> {
+  private indexHead_(signal?: AbortSignal): Promise<IndexHead> {
     const ref = this.manifest.index;
-    const small = ref.bytes <= wholeDocumentBytes || this.form !== 'range';
-    const bytes = await (small ? this.readPaged_(ref, { kind: 'index', signal }) : this.readHead_(ref, { kind: 'index', signal }));
-    const head = (await documents()).readIndexHead(bytes);
-    this.requireHead_(ref, head.bytes);
-    return head;
+    return this.shared_('index', async () => this.decoded_(signal, 'indexHead', await this.readPaged_(ref, 'index', signal), ref), signal);
   }
   private async loadIndexPage_(plane: number, signal?: AbortSignal): Promise<Map<string, EntryRef>> {
-    const head = await this.shared_('index', () => this.loadIndexHead_(signal), signal);
-    const page = head.pages.findIndex((p) => p.plane === plane);
-    const entries = new Map<string, EntryRef>();
-    if (page < 0) return entries;
-    const { offset, bytes } = head.pages[page];
-    const { readIndexPage } = await documents();
-    let read: EntryRef[] = [];
-    const verify = async (got: Uint8Array): Promise<void> => void (read = await readIndexPage(head, page, got));
-    await this.store.read(this.manifest.index, offset, bytes, { kind: 'index', signal, verify });
-    for (const e of read) entries.set(e.path, e);
-    if (plane < 0) this.checkManifestRefs_(entries);
-    return entries;
+    const { manifest } = this;
+    const { pages, minor } = await this.indexHead_(signal);
+    const page = pages.find((p) => p.plane === plane);
+    if (!page) return new Map();
+    const verify = this.digestCheck_(`index of plane ${plane}`, page.sha256);
+    const bytes = await this.store.read(manifest.index, page.offset, page.bytes, { kind: 'index', signal, verify });
+    return this.decoded_(signal, 'indexPage', bytes, plane, page.entries, minor, manifest);
   }
-  private checkManifestRefs_(entries: Map<string, EntryRef>): void {
-    const m = this.manifest;
-    for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
-      const e = entries.get(ref.path);
-      if (!e || e.offset !== ref.offset || e.bytes !== ref.bytes || !samePrefix(e.sha256, ref.sha256))
-        this.fail_(`index entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
-    }
+  private indexPage_(plane: number, signal?: AbortSignal): Promise<Map<string, EntryRef>> {
+    return this.shared_(`index/${plane}`, () => this.loadIndexPage_(plane, signal), signal);
   }
   /** An entry of the index, of which only the page that has it is read. */
   async find(path: string, signal?: AbortSignal): Promise<EntryRef> {
-    const plane = layout.planeOfPath(path);
-    const page = await this.shared_(`index/${plane}`, () => this.loadIndexPage_(plane, signal), signal);
-    const entry = page.get(path);
-    if (!entry) return this.fail_(`entry ${path}`, 'an entry of the index', 'none');
+    const entry = (await this.indexPage_(layout.planeOfPath(path), signal)).get(path);
+    if (!entry) throw new FormatError(this.store.name, `entry ${path}`, 'an entry of the index', 'none');
     return entry;
   }
   /** The bytes of an entry. */
@@ -242,31 +219,14 @@ export class PackageReader {
 
   /** The texture planes: full-size ones first, then mips. */
   textures(signal?: AbortSignal): Promise<TextureInfo[]> {
-    return this.shared_('textures', () => this.loadTextures_(signal), signal);
-  }
-  private async loadTextures_(signal?: AbortSignal): Promise<TextureInfo[]> {
-    const m = this.manifest;
-    const { fullSizePlanes, missingFeature, readTextures } = await documents();
-    const textures = readTextures(await this.readAll_(m.textures, { kind: 'textures', signal }));
-    if (textures.length !== m.planeCount) this.fail_(layout.texturesPath, `${m.planeCount} planes`, `${textures.length}`);
-    const feature = missingFeature(textures, m.requiredFeatures);
-    if (feature !== '') this.fail_('/requiredFeatures', feature, 'a codec without it');
-    const full = fullSizePlanes(textures);
-    const mips = m.requiredFeatures.includes('mips');
-    if (mips !== full < textures.length)
-      this.fail_(layout.texturesPath, mips ? 'mips, as the manifest requires' : 'no mips', `${textures.length - full}`);
-    if (m.previews.length !== Math.min(full, mostManifestPreviews))
-      this.fail_(layout.manifestPath, 'previews of the full-size planes', `${m.previews.length}`);
-    return textures;
+    const read = (): Promise<Uint8Array> => this.readAll_(this.manifest.textures, { kind: 'textures', signal });
+    return this.shared_('textures', async () => this.decoded_(signal, 'textures', await read(), this.manifest), signal);
   }
 
   /** Measured quality of scales and rungs. */
   quality(signal?: AbortSignal): Promise<QualityTable> {
-    const read = async (): Promise<QualityTable> => {
-      const bytes = await this.readAll_(this.manifest.quality, { kind: 'quality', signal });
-      return (await documents()).readQuality(bytes);
-    };
-    return this.shared_('quality', read, signal);
+    const read = (): Promise<Uint8Array> => this.readAll_(this.manifest.quality, { kind: 'quality', signal });
+    return this.shared_('quality', async () => this.decoded_(signal, 'readQuality', await read()), signal);
   }
 
   /** What the package was made from and with, as JSON. */
@@ -275,19 +235,9 @@ export class PackageReader {
     return JSON.parse(new TextDecoder().decode(bytes));
   }
 
-  private async loadTablesHead_(signal?: AbortSignal): Promise<TablesHead> {
-    const ref = this.manifest.tables;
-    if (ref.bytes <= wholeDocumentBytes || this.form !== 'range')
-      this.wholeTables_ = this.readPaged_(ref, { kind: 'tables', signal });
-    const { readTablesHead } = await documents();
-    const head = readTablesHead(await (this.wholeTables_ ?? this.readHead_(ref, { kind: 'tables', signal })));
-    this.requireHead_(ref, head.bytes);
-    if (head.planes.length !== this.manifest.planeCount)
-      this.fail_(layout.tablesPath, `${this.manifest.planeCount} planes`, `${head.planes.length}`);
-    const last = head.planes[head.planes.length - 1];
-    const end = last ? last.offset + last.bytes : head.bytes;
-    if (end !== ref.bytes) this.fail_(layout.tablesPath, `${end} bytes`, `${ref.bytes}`);
-    return head;
+  private tablesHead_(signal?: AbortSignal): Promise<TablesHead> {
+    const read = (): Promise<Uint8Array> => this.readPaged_(this.manifest.tables, 'tables', signal);
+    return this.shared_('tables', async () => this.decoded_(signal, 'tablesHead', await read(), this.manifest), signal);
   }
 
   /** Tables of one plane. */
@@ -300,12 +250,11 @@ export class PackageReader {
    * read by one request.
    */
   async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
-    const head = await this.shared_('tables', () => this.loadTablesHead_(signal), signal);
+    const head = await this.tablesHead_(signal);
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
-      if (!(p >= 0 && p < head.planes.length))
-        throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
-    const read = (p: number, run: readonly number[], bytes?: Promise<Uint8Array>): Promise<PlaneTables> =>
+      if (!head.planes[p]) throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
+    const read = (p: number, run: readonly number[], bytes?: Promise<Uint8Array>): Promise<PlaneFiles> =>
       this.shared_(`tables/${p}`, () => this.readSection_(head, p, run[0], bytes ?? this.readRun_(head, run, signal), signal), signal);
     const missing = wanted.filter((p) => !this.once_.has(`tables/${p}`));
     for (const run of this.runsOf_(head, missing)) {
@@ -314,73 +263,45 @@ export class PackageReader {
     }
     // Where another asker has cancelled, each plane by a request of its own.
     await Promise.all(wanted.map((p) => read(p, [p])));
-    return head.planes.map((_, p) => this.tables_.get(p));
+    return head.planes.map((_, p) => this.planes_.get(p)?.tables);
   }
   /** From the first byte of the run's first plane on. */
-  private async readRun_(head: TablesHead, run: readonly number[], signal?: AbortSignal): Promise<Uint8Array> {
-    const begin = head.planes[run[0]].offset;
-    if (this.wholeTables_) return (await this.wholeTables_).subarray(begin);
-    const last = head.planes[run[run.length - 1]];
+  private readRun_({ planes }: TablesHead, run: readonly number[], signal?: AbortSignal): Promise<Uint8Array> {
+    const begin = planes[run[0]].offset;
+    const last = planes[run[run.length - 1]];
     const verify = async (got: Uint8Array): Promise<void> => {
       for (const p of run) {
-        const { offset, bytes, sha256: digest } = head.planes[p];
+        const { offset, bytes, sha256: digest } = planes[p];
         await this.digestCheck_(`texture plane ${p}`, digest)(got.subarray(offset - begin, offset - begin + bytes));
       }
     };
     return this.store.read(this.manifest.tables, begin, last.offset + last.bytes - begin, { kind: 'tables', once: true, signal, verify });
   }
   private async readSection_(
-    head: TablesHead,
+    { planes, minor }: TablesHead,
     p: number,
     first: number,
     run: Promise<Uint8Array>,
     signal?: AbortSignal,
-  ): Promise<PlaneTables> {
-    const [{ readTablesSection }, got] = await Promise.all([documents(), run]);
-    await sleepS(0); // a turn of the page for each
-    const { offset, bytes } = head.planes[p];
-    const begin = offset - head.planes[first].offset;
-    const table = await readTablesSection(head, p, got.subarray(begin, begin + bytes));
-    await this.checkPlane_(p, table, signal);
-    this.tables_.set(p, table);
-    return table;
+  ): Promise<PlaneFiles> {
+    const begin = planes[p].offset - planes[first].offset;
+    const [got, textures, entries] = await Promise.all([run, this.textures(signal), this.indexPage_(p, signal)]);
+    const { tables, offsets } = await this.decoded_(signal, 'planeTables', got.subarray(begin, begin + planes[p].bytes), p, minor, textures[p], entries);
+    const packs = Array.from(tables.rungQuality, (_, r) => entries.get(layout.rungPath(p, r))!);
+    const files = { tables, packs, offsets };
+    this.planes_.set(p, files);
+    return files;
   }
-  private runsOf_(head: TablesHead, planes: readonly number[]): number[][] {
+  private runsOf_({ planes }: TablesHead, wanted: readonly number[]): number[][] {
     const runs: number[][] = [];
-    for (const p of planes) {
-      const last = runs[runs.length - 1];
-      const before = last && head.planes[last[last.length - 1]];
-      if (before && head.planes[p].offset - before.offset - before.bytes <= gapBytes) last.push(p);
+    let end = -Infinity;
+    for (const p of wanted) {
+      const { offset, bytes } = planes[p];
+      if (offset - end <= gapBytes) runs[runs.length - 1].push(p);
       else runs.push([p]);
+      end = offset + bytes;
     }
     return runs;
-  }
-  /** Tables, textures.json and index speak of the same fragments and bytes. */
-  private async checkPlane_(plane: number, t: PlaneTables, signal?: AbortSignal): Promise<void> {
-    const info = (await this.textures(signal))[plane];
-    const place = `texture plane ${plane}`;
-    const sameRungs =
-      t.rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === t.rungQuality[r]);
-    if (t.columns !== info.columns || t.rows !== info.rows || !sameRungs)
-      this.fail_(place, 'the grid and rungs of textures.json in tables.bin', 'others');
-    if (t.incremental !== codecTraits(info.codec).incremental)
-      this.fail_(place, 'tables of the codec in textures.json', 'others');
-    const requireSum = async (path: string, bytes: number): Promise<void> => {
-      const entry = await this.find(path, signal);
-      if (entry.bytes !== bytes) this.fail_(`entry ${path}`, `${bytes} bytes, as tables.bin adds up`, `${entry.bytes}`);
-    };
-    await requireSum(layout.tableStreamsPath(plane), sum(t.tableBytes));
-    const n = fragmentCount(t);
-    const offsets = new Float64Array(n * rungCount(t));
-    for (let r = 0; r < rungCount(t); ++r) {
-      await requireSum(layout.rungPath(plane, r), sum(t.sizeBytes, r * n, (r + 1) * n));
-      let at = 0;
-      for (const f of t.order) {
-        offsets[r * n + f] = at;
-        at += t.sizeBytes[r * n + f];
-      }
-    }
-    this.offsets_.set(plane, offsets);
   }
 
   /** What decisions about textures are made from, with the tables of these planes. */
@@ -393,13 +314,7 @@ export class PackageReader {
 
   /** Reads the range of the first picture, so that what it holds needs no further request. */
   firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
-    return this.shared_('picture', () => this.loadFirstPicture_(how), how.signal);
-  }
-  private async loadFirstPicture_(how: Partial<ReadOptions>): Promise<void> {
-    if (this.form !== 'range') return;
-    const { offset, bytes, sha256: digest } = this.manifest.firstPicture;
-    const verify = this.digestCheck_('first picture', digest);
-    await this.store.read({ path: 'first picture', offset, bytes }, 0, bytes, { kind: 'first-picture', ...how, verify });
+    return this.shared_('picture', async () => (await more()).readFirstPicture(this, how), how.signal);
   }
   /** The GLB of a scale; needs no index. */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
@@ -421,59 +336,36 @@ export class PackageReader {
   }
   /** What the fragments of a rung have in common. */
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const t = await this.planeTables(plane, signal);
-    if (!(rung >= 0 && rung < rungCount(t)))
-      throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${rungCount(t)}`, `${rung}`);
+    const { tableBytes } = await this.planeTables(plane, signal);
+    if (!(rung in tableBytes))
+      throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${tableBytes.length}`, `${rung}`);
     const read = (): Promise<Uint8Array> => this.entry(layout.tableStreamsPath(plane), 'texture', signal);
     const streams = await this.shared_(`streams/${plane}`, read, signal);
-    const begin = sum(t.tableBytes, 0, rung);
-    return streams.subarray(begin, begin + t.tableBytes[rung]);
+    const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
+    return streams.subarray(begin, begin + tableBytes[rung]);
   }
 
   /** Where a fragment's stream stands within its rung's entry; bytes 0 = not stored. */
   async fragmentRange(plane: number, rung: number, fragment: number): Promise<ByteRange> {
-    const t = await this.planeTables(plane);
-    if (!(rung >= 0 && rung < rungCount(t) && fragment >= 0 && fragment < fragmentCount(t)))
-      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it', `${rung}, ${fragment}`);
-    const at = rung * fragmentCount(t) + fragment;
-    return { offset: this.offsets_.get(plane)![at], bytes: t.sizeBytes[at] };
+    return (await more()).fragmentRange(this, plane, rung, fragment);
   }
   /** The first 8 bytes of the SHA-256 of a fragment's stream. */
   async fragmentDigest(plane: number, rung: number, fragment: number): Promise<Uint8Array> {
-    const t = await this.planeTables(plane);
-    const at = 8 * (rung * fragmentCount(t) + fragment);
-    return t.digest.subarray(at, at + 8);
+    return (await more()).fragmentDigest(this, plane, rung, fragment);
   }
   /** Tables, packs and offsets of a plane. */
   async planeFiles(plane: number, signal?: AbortSignal): Promise<PlaneFiles> {
-    const tables = await this.planeTables(plane, signal);
-    const paths = Array.from({ length: rungCount(tables) }, (_, r) => layout.rungPath(plane, r));
-    const packs = await Promise.all(paths.map((path) => this.find(path, signal)));
-    const complete = (await this.fragmentFiles(signal))?.[plane];
-    return { tables, packs, offsets: this.offsets_.get(plane)!, complete };
+    await this.tables([plane], signal);
+    return { ...this.planes_.get(plane)!, complete: (await this.fragmentFiles(signal))?.[plane] };
   }
   /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
-  fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
-    return this.shared_('files', () => this.loadFragmentFiles_(signal), signal);
-  }
-  private async loadFragmentFiles_(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
-    const { store } = this;
-    if (!store.extraFile) return undefined;
-    // Packs do, too.
-    const bytes = await store.extraFile(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
-      if (!(error instanceof InputError)) throw error;
-      return undefined;
-    });
-    return bytes && (await import('./store_files')).readFragmentFiles(bytes);
+  async fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
+    if (this.form !== 'files') return undefined;
+    return this.shared_('files', async () => (await import('./store_files')).fragmentFiles(this.store, signal), signal);
   }
   /** A fragment's complete file of such a tree, digest checked. */
   async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const { extension } = codecTraits((await this.textures(signal))[plane].codec);
-    const path = layout.fragmentFilePath(plane, rung, fragment, extension);
-    const file = (await this.planeFiles(plane, signal)).complete?.[rung]?.get(fragment);
-    const verify = file && this.digestCheck_(path, file.sha256);
-    const got = file && (await this.store.extraFile?.(path, file.bytes, { kind: 'texture', signal, once: true, verify }));
-    return got ?? this.fail_(path, 'a file', 'none');
+    return (await import('./store_files')).fragmentFile(this, plane, rung, fragment, signal);
   }
 
   /** Reads index, tables, textures.json and quality.json by one request, where they are small; false where not. */
@@ -492,20 +384,11 @@ export class PackageReader {
 
   /** A fragment's stream at a rung, digest checked. */
   async fragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const range = await this.fragmentRange(plane, rung, fragment);
-    const pack = await this.find(layout.rungPath(plane, rung), signal);
-    const place = `fragment ${fragment} of ${pack.path}`;
-    if (range.bytes === 0) this.fail_(place, 'a stored fragment', 'none');
-    const verify = this.digestCheck_(place, await this.fragmentDigest(plane, rung, fragment));
-    return this.store.read(pack, range.offset, range.bytes, { kind: 'texture', once: this.form !== 'files', signal, verify });
+    return (await more()).fragment(this, plane, rung, fragment, signal);
   }
   /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
   async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const codec: CodecId = (await this.textures(signal))[plane].codec;
-    const first = codecTraits(codec).incremental ? 0 : rung;
-    const streams: Uint8Array[] = [];
-    for (let r = first; r <= rung; ++r) streams.push(await this.fragment(plane, r, fragment, signal));
-    return joinFragment(codec, await this.tableStream(plane, first, signal), streams);
+    return (await more()).completeFragment(this, plane, rung, fragment, signal);
   }
 
   /** Head of the vertex-split stream; undefined when the package has none. */
@@ -518,14 +401,12 @@ export class PackageReader {
     if (!ref) return undefined;
     const check = this.digestCheck_(`head of ${layout.splitStreamPath}`, ref.headSha256);
     const verify = (got: Uint8Array): Promise<void> => check(got.subarray(0, ref.headBytes));
-    const bytes = Math.min(ref.bytes, ref.headBytes + more);
-    return this.store.read({ path: layout.splitStreamPath, ...ref }, 0, bytes, { kind: 'stream', signal, verify });
+    return this.splitStream(0, Math.min(ref.bytes, ref.headBytes + more), { once: false, signal, verify });
   }
   /** Bytes of the vertex-split stream; whoever takes blocks of it checks them by its head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const ref = this.manifest.stream;
-    if (!ref) return this.fail_(layout.splitStreamPath, 'a stream of vertex splits', 'none');
+    if (!ref) throw new FormatError(this.store.name, layout.splitStreamPath, 'a stream of vertex splits', 'none');
     return this.store.read({ path: layout.splitStreamPath, ...ref }, offset, bytes, { kind: 'stream', once: true, ...how });
   }
 }
-

@@ -1,4 +1,5 @@
-import { BytesIn, samePrefix } from './bytes';
+import { samePrefix } from './bytes';
+import { BytesIn } from './bytes_in';
 import { FormatError } from './errors';
 import { splitStreamPath as file } from './layout';
 import { formatMajor } from './manifest';

@@ -1,12 +1,44 @@
+import { codecTraits } from './codec';
+import { requireDigest } from './digests';
 import { FormatError, InputError } from './errors';
+import { FragmentFiles, readFragmentFiles } from './fragment_files';
 import { HttpClient, getWhole, isAbort, shownUrl } from './http';
-import { isValidEntryPath, manifestPath } from './layout';
+import { fragmentFilePath, isValidEntryPath, manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
+import type { PackageReader } from './package_reader';
 import { Mirror, Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
 
 // For servers that know no ranges; loaded when one is met.
 
-export { readFragmentFiles } from './fragment_files';
+const fragmentFilesPath = 'fragments.json';
+
+/** See PackageReader.fragmentFiles. */
+export async function fragmentFiles(store: PackageStore, signal?: AbortSignal): Promise<FragmentFiles | undefined> {
+  // Packs do, too.
+  const bytes = await store.extraFile?.(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
+    if (!(error instanceof InputError)) throw error;
+    return undefined;
+  });
+  return bytes && readFragmentFiles(bytes);
+}
+/** See PackageReader.fragmentFile. */
+export async function fragmentFile(
+  reader: PackageReader,
+  plane: number,
+  rung: number,
+  fragment: number,
+  signal?: AbortSignal,
+): Promise<Uint8Array> {
+  const { store } = reader;
+  const { extension } = codecTraits((await reader.textures(signal))[plane].codec);
+  const path = fragmentFilePath(plane, rung, fragment, extension);
+  const file = (await reader.planeFiles(plane, signal)).complete?.[rung]?.get(fragment);
+  if (!file || !store.extraFile) throw new FormatError(store.name, path, 'a file', 'none');
+  const verify = (bytes: Uint8Array): Promise<void> => requireDigest(bytes, file.sha256, store.name, path);
+  const got = await store.extraFile(path, file.bytes, { kind: 'texture', signal, once: true, verify });
+  if (!got) throw new FormatError(store.name, path, 'a file', 'none');
+  return got;
+}
 
 /** Whole files of a tree, beside the container or by itself: for servers without ranges. */
 export class TreeStore implements PackageStore {

@@ -1,6 +1,6 @@
 import type { Mesh } from 'three';
 import type { ComposedPlane } from './api';
-import { fullSizePlanes } from './documents';
+import { fullSizePlanes } from './textures';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { GroupedList, groupBytes, groupedList, throughputOf } from './groups';
 import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
@@ -87,6 +87,7 @@ export class TextureLoad {
   /** Reads what decisions are made from. */
   async documents(): Promise<PackageData> {
     this.load_.pool.start();
+    this.load_.reader.decodeDocument = this.load_.pool.decodeDocument;
     const [whole] = await Promise.all([
       this.load_.reader.prefetchDocuments(this.load_.signal),
       this.load_.scales.openStream(this.load_.signal),

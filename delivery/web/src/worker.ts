@@ -1,13 +1,15 @@
 import { samePrefix } from './bytes';
-import { codecTraits, joinFragment } from './codec';
+import { codecTraits } from './codec';
+import * as documents from './documents';
 import { FormatError, TexmeshError } from './errors';
 import { imageSize } from './image_size';
+import { joinFragment } from './join_fragment';
 import { sha256 } from './sha256';
 import { SplitStreamReader } from './split_stream';
 import { splitInfo, splitUpdate } from './split_update';
 import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest } from './worker_protocol';
 
-// What happens off the main thread: digests, images, vertex splits. `handle` works on the main thread, too, where no
+// What happens off the main thread: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no
 // worker can be had.
 
 const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
@@ -51,11 +53,23 @@ function enlarge({ picture, width, height, x0, x1, y0, y1, levels }: EnlargeRequ
   return out;
 }
 
+/** Those of all typed arrays in a value; several may share one. */
+function buffersOf(value: unknown, found = new Set<ArrayBuffer>()): ArrayBuffer[] {
+  if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
+  else if (value instanceof Map) for (const v of value.values()) buffersOf(v, found);
+  else if (typeof value === 'object' && value) for (const v of Object.values(value)) buffersOf(v, found);
+  return [...found];
+}
+
 const streams = new Map<number, { reader: SplitStreamReader; wedges: number }>();
 
 /** Answers a request; the second value lists what may be handed over instead of copied. */
 export async function handle(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   switch (request.op) {
+    case 'document': {
+      const decoded = await (documents[request.name] as (...args: unknown[]) => unknown)(...request.args);
+      return [decoded, buffersOf(decoded)];
+    }
     case 'decode': {
       const levels = await decode(request);
       return [levels, levels];

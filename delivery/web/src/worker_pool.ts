@@ -1,12 +1,13 @@
 import { FormatError } from './errors';
-import type { DecodeRequest, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest } from './worker_protocol';
+import type {
+  DecodeRequest, DocumentDecoder, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
+} from './worker_protocol';
 
 /** Images decoded at once, over all workers. */
 const mostAtOnce = 8;
 
 interface Job {
   request: WorkerRequest;
-  transfer: Transferable[];
   /** Only this worker may take it: splits are decoded where their stream was opened. */
   worker?: number;
   done: (result: unknown) => void;
@@ -22,7 +23,7 @@ function closeBitmaps(result: unknown): void {
 
 /** Answers requests; a Worker, or the main thread where there is none. */
 interface Helper {
-  post(id: number, request: WorkerRequest, transfer: Transferable[]): void;
+  post(id: number, request: WorkerRequest): void;
   end(): void;
 }
 type OnAnswer = (answer: WorkerAnswer) => void;
@@ -40,7 +41,7 @@ function startWorker(url: string | URL | undefined, onAnswer: OnAnswer, onBroken
     onBroken();
   };
   return {
-    post: (id, request, transfer) => worker.postMessage({ ...request, id }, transfer),
+    post: (id, request) => worker.postMessage({ ...request, id }),
     end: () => worker.terminate(),
   };
 }
@@ -67,7 +68,7 @@ export interface PoolOptions {
   decode?: DecodeHere;
 }
 
-/** Workers that decode images and vertex splits. */
+/** Workers that decode documents, images and vertex splits. */
 export class WorkerPool {
   private readonly helpers_: Helper[] = [];
   private readonly queue_: Job[] = [];
@@ -121,7 +122,7 @@ export class WorkerPool {
     for (const [id, r] of this.running_) {
       if (r.worker !== index) continue;
       if (again && this.works_) this.answered_({ id, failed: new Error('a worker broke') });
-      else this.helpers_[index].post(id, r.job.request, []);
+      else this.helpers_[index].post(id, r.job.request);
     }
   }
 
@@ -140,25 +141,32 @@ export class WorkerPool {
   }
 
   private pump_(): void {
-    while (this.queue_.length > 0 && this.running_.size < mostAtOnce) {
-      const job = this.queue_.shift()!;
-      let worker = job.worker ?? 0;
-      if (job.worker === undefined) this.load_.forEach((n, i) => (worker = n < this.load_[worker] ? i : worker));
-      ++this.load_[worker];
-      this.running_.set(this.nextId_, { job, worker });
-      // Copied, not handed over: a worker that breaks gives its requests back.
-      this.helpers_[worker].post(this.nextId_++, job.request, job.transfer);
-    }
+    while (this.queue_.length > 0 && this.running_.size < mostAtOnce) this.post_(this.queue_.shift()!);
+  }
+  private post_(job: Job): void {
+    let worker = job.worker ?? 0;
+    if (job.worker === undefined) this.load_.forEach((n, i) => (worker = n < this.load_[worker] ? i : worker));
+    ++this.load_[worker];
+    this.running_.set(this.nextId_, { job, worker });
+    // Copied, not handed over: a worker that breaks gives its requests back.
+    this.helpers_[worker].post(this.nextId_++, job.request);
   }
 
   private ask_(request: WorkerRequest, worker?: number): Promise<unknown> {
     return new Promise((done, failed) => {
       if (this.ended_) return failed(new DOMException('The load was cancelled', 'AbortError'));
-      this.queue_.push({ request, transfer: [], worker, done, failed });
+      const job = { request, worker, done, failed };
+      if (request.op === 'document') return this.post_(job); // everything waits for it
+      this.queue_.push(job);
       this.pump_();
     });
   }
 
+  /** See PackageReader.decodeDocument. */
+  readonly decodeDocument: DocumentDecoder = (name, ...args) => {
+    const own = (args as unknown[]).map((a) => (a instanceof Uint8Array ? alone(a) : a));
+    return this.ask_({ op: 'document', name, args: own }) as ReturnType<typeof this.decodeDocument<typeof name>>;
+  };
   decode({ streams, tables, ...request }: Omit<DecodeRequest, 'op'>): Promise<Levels> {
     return this.ask_({ op: 'decode', ...request, tables: alone(tables), streams: streams.map(alone) }) as Promise<Levels>;
   }

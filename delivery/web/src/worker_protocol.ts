@@ -47,8 +47,21 @@ export interface SplitCloseRequest {
   op: 'split-close';
   key: number;
 }
+/** What documents.ts decodes. */
+export type Documents = typeof import('./documents');
+/** Decodes a document by the name of a function there. */
+export type DocumentDecoder = <K extends keyof Documents>(
+  name: K,
+  ...args: Parameters<Documents[K]>
+) => Promise<Awaited<ReturnType<Documents[K]>>>;
+/** Decode a document by a function of documents.ts. Gives what that gives. */
+export interface DocumentRequest {
+  op: 'document';
+  name: keyof Documents;
+  args: unknown[];
+}
 /** Anything that a worker is asked. */
-export type WorkerRequest = DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
 
 /** What the head of a stream says of it. */
 export interface SplitInfo {
@@ -82,7 +95,7 @@ export interface SplitUpdate {
 /** What a worker answers. */
 export interface WorkerAnswer {
   id: number;
-  /** Levels of decode and enlarge, SplitUpdate of split-add. */
+  /** Levels of decode and enlarge, SplitUpdate of split-add, what a document says. */
   result?: unknown;
   /** The error itself, where no thread lies between. */
   failed?: unknown;

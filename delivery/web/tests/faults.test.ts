@@ -393,3 +393,66 @@ it('a worker that breaks is replaced once, then there are none', async () => {
     else Reflect.deleteProperty(globalThis, 'Worker');
   }
 });
+
+describe('documents', () => {
+  /** As a worker would: what is asked and answered is copied. */
+  const elsewhere = (heard: WorkerRequest['op'][]): WorkerPool =>
+    new WorkerPool({
+      decode: async (request) => {
+        heard.push(request.op);
+        const [result, transfer] = await handle(structuredClone(request));
+        return [structuredClone(result, { transfer }), []];
+      },
+    });
+  it('say the same when workers decode them', async () => {
+    const heard: WorkerRequest['op'][] = [];
+    const [here, there] = [await openAt(range()), await openAt(range())];
+    there.decodeDocument = elsewhere(heard).decodeDocument;
+    expect(await there.data()).toEqual(await here.data());
+    expect(await there.quality()).toEqual(await here.quality());
+    expect(await there.planeFiles(1)).toEqual(await here.planeFiles(1));
+    expect(heard.length).toBeGreaterThan(4);
+    expect(new Set(heard)).toEqual(new Set(['document']));
+  });
+  it('are decoded here where workers cannot, or have ended', async () => {
+    const pools = [new WorkerPool({ decode: () => Promise.reject(new Error('broken')) }), new WorkerPool({ decode: handle }), new WorkerPool()];
+    pools[1].dispose();
+    for (const pool of pools) {
+      const reader = await openAt(range());
+      reader.decodeDocument = pool.decodeDocument;
+      expect((await reader.data()).tables.length).toBe(reader.manifest.planeCount);
+    }
+  });
+  it('that are damaged are told, and not decoded twice', async () => {
+    const heard: WorkerRequest['op'][] = [];
+    const { decodeDocument } = elsewhere(heard);
+    const { manifest } = await PackageReader.openBytes(container, 'golden');
+    const bytes = container.slice(manifest.textures.offset, manifest.textures.offset + manifest.textures.bytes);
+    expect((await decodeDocument('textures', bytes, manifest)).length).toBe(manifest.planeCount);
+    expect(await rejection(decodeDocument('textures', bytes, { ...manifest, planeCount: 99 }))).toBeInstanceOf(FormatError);
+    const damaged = bytes.slice();
+    damaged[0] ^= 1;
+    const forged = await openAt(range());
+    forged.decodeDocument = (name, ...args) => decodeDocument(name, ...(args.map((a) => (a instanceof Uint8Array ? damaged : a)) as typeof args));
+    heard.length = 0;
+    expect(await rejection(forged.textures())).toBeInstanceOf(FormatError);
+    expect(heard).toEqual(['document']);
+  });
+  it('do not wait behind pictures', async () => {
+    const posted: WorkerRequest['op'][] = [];
+    const pool = new WorkerPool({
+      decode: (request) => {
+        posted.push(request.op);
+        return new Promise(() => undefined);
+      },
+    });
+    const none = new Uint8Array(0);
+    for (let i = 0; i < 30; ++i)
+      void pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).catch(() => undefined);
+    void pool.decodeDocument('readQuality', none).catch(() => undefined);
+    await new Promise((go) => setTimeout(go, 5));
+    expect(posted.length).toBeLessThan(30);
+    expect(posted).toContain('document');
+    pool.dispose();
+  });
+});

@@ -1,0 +1,45 @@
+import { CodecId, codecTraits } from './codec';
+import { FormatError } from './errors';
+
+const beginsAndEnds = (b: Uint8Array): boolean =>
+  b.length >= 4 && b[0] === 0xff && b[1] === 0xd8 && b[b.length - 2] === 0xff && b[b.length - 1] === 0xd9;
+
+function withoutEnd(tables: Uint8Array): Uint8Array {
+  if (!beginsAndEnds(tables))
+    throw new FormatError('JPEG', 'table stream', 'SOI ... EOI', `${tables.length} other bytes`);
+  return tables.subarray(0, tables.length - 2);
+}
+
+function joined(parts: Uint8Array[]): Uint8Array {
+  const out = new Uint8Array(parts.reduce((sum, p) => sum + p.length, 0));
+  let at = 0;
+  for (const p of parts) {
+    out.set(p, at);
+    at += p.length;
+  }
+  return out;
+}
+
+/**
+ * The complete image file of one fragment. `tables` is the table stream of the rung, or of the lowest rung for an
+ * incremental codec; `streams` is the rung's one stream, or those of the lowest rung up to it. Nothing is decoded.
+ */
+export function joinFragment(codec: CodecId, tables: Uint8Array, streams: readonly Uint8Array[]): Uint8Array {
+  const fail = (expected: string): never => {
+    throw new FormatError(codec, 'fragment', expected, `${streams[0]?.length ?? 0} other bytes`);
+  };
+  if (streams.length === 0 || (streams.length > 1 && !codecTraits(codec).incremental)) fail('one stream');
+  const first = streams[0];
+  if (codec === 'jpeg') {
+    if (!beginsAndEnds(first)) fail('SOI ... EOI');
+    return joined([withoutEnd(tables), first.subarray(2)]);
+  }
+  if (codec === 'jpeg-progressive') {
+    const last = streams[streams.length - 1];
+    if (first.length === 0 || last[last.length - 1] === 0xff) fail('scans');
+    return joined([withoutEnd(tables), ...streams, new Uint8Array([0xff, 0xd9])]);
+  }
+  const text = (at: number): string => String.fromCharCode(...first.subarray(at, at + 4));
+  if (first.length <= 12 || text(0) !== 'RIFF' || text(8) !== 'WEBP') fail('RIFF ... WEBP');
+  return first;
+}
