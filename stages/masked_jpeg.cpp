@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "stages/jpeg_stream.h"
+
 namespace texmesh {
 namespace {
 
@@ -88,24 +90,23 @@ class CountSink {
 
 /// The symbols of a block, ISO 10918-1 F.1.2.
 template <class Sink>
-void emit(const BlockCoefficients& block, int dc_before, std::size_t component, Sink& sink) {
+void emit(const CodedBlock& block, int dc_before, std::size_t component, Sink& sink) {
   const auto size = [](int v) {
     return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(v))));
   };
   const auto bits = [](int v) { return static_cast<unsigned>(v < 0 ? v - 1 : v); };
-  const int step = block[0] - dc_before;
+  const int step = block.values[0] - dc_before;
   sink.dc(component, size(step), bits(step));
-  unsigned zeros = 0;
-  for (std::size_t k = 1; k < block.size(); ++k) {
-    if (block[k] == 0) {
-      ++zeros;
-      continue;
-    }
+  unsigned before = 0;
+  for (std::uint64_t left = block.used & ~std::uint64_t{1}; left != 0; left &= left - 1) {
+    const auto k = static_cast<unsigned>(std::countr_zero(left));
+    const int value = block.values[k];
+    unsigned zeros = k - before - 1;
     for (; zeros > 15; zeros -= 16) sink.ac(component, 0xf0, 0);
-    sink.ac(component, zeros << 4 | size(block[k]), bits(block[k]));
-    zeros = 0;
+    sink.ac(component, zeros << 4 | size(value), bits(value));
+    before = k;
   }
-  if (zeros > 0) sink.ac(component, 0, 0);
+  if (before < 63) sink.ac(component, 0, 0);
 }
 
 /// A component's samples as JPEG has them before chroma is halved, less 128. In libjpeg's integers.
@@ -137,12 +138,12 @@ Seen seen(const BlockValues& weights) {
 }
 
 /// A block that nobody sees.
-BlockCoefficients flat_block(float level, const BlockCoding& coding, int dc_before) {
-  BlockCoefficients out{};
+CodedBlock flat_block(float level, const BlockCoding& coding, int dc_before) {
+  CodedBlock out;
   const float own = 8 * level / coding.quantisers[0];
   const int nearest = static_cast<int>(own < 0 ? own - 0.5f : own + 0.5f);
   const float off = static_cast<float>(nearest - dc_before) * coding.quantisers[0] / 8;
-  out[0] = static_cast<std::int16_t>(std::fabs(off) <= kSameLevel ? dc_before : nearest);
+  out.values[0] = static_cast<std::int16_t>(std::fabs(off) <= kSameLevel ? dc_before : nearest);
   return out;
 }
 
@@ -155,8 +156,8 @@ MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::u
     BlockCoding& coding = out[c];
     float square = 0;
     for (std::size_t k = 0; k < 64; ++k) {
-      coding.quantisers[k] = quantisers[c][k];
-      if (k > 0 && k < 10) square += coding.quantisers[k] * coding.quantisers[k] / 9;
+      const float q = coding.quantisers[kNaturalOfZigzag[k]] = quantisers[c][k];
+      if (k > 0 && k < 10) square += q * q / 9;
     }
     coding.bit_cost = (c == 0 && !kind.rgb ? kLumaBitCost : kOtherBitCost) * square;
     coding.dc = codes_of(tables[2 * table_pair(kind, c)]);
@@ -244,11 +245,11 @@ void MaskedJpeg::code_block(std::size_t component, std::uint32_t left, std::uint
   for (std::size_t r = 0; r < rungs.size(); ++r) {
     const BlockCoding& coding = rungs[r][component];
     int& dc = dc_before_[r][component];
-    const BlockCoefficients block = what == Seen::kAll    ? quantise_whole(coefficients, coding)
-                                    : what == Seen::kPart ? block_.quantise(coding, dc)
-                                                          : flat_block(level, coding, dc);
+    const CodedBlock block = what == Seen::kAll    ? quantise_whole(coefficients, coding)
+                             : what == Seen::kPart ? block_.quantise(coding, dc)
+                                                   : flat_block(level, coding, dc);
     emit(block, dc, component, sinks[r]);
-    dc = block[0];
+    dc = block.values[0];
   }
 }
 

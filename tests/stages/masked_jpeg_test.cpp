@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "stages/jpeg_stream.h"
@@ -155,18 +156,20 @@ TEST(MaskedBlock, WithoutAMaskAndARateItIsPlainQuantisation) {
     const BlockCoding coding = coding_without_rate(9);
     MaskedBlock block;
     block.load(samples, weights);
-    const BlockCoefficients ours = block.quantise(coding, 0),
-                            plain = quantise_whole(block_dct(samples), coding);
+    const CodedBlock ours = block.quantise(coding, 0), plain = quantise_whole(block_dct(samples), coding);
     for (std::size_t k = 0; k < 64; ++k) {
-      const float exact = block_dct(samples)[k] / 9;
-      EXPECT_LE(std::fabs(static_cast<float>(plain[k]) - exact), 0.501f);
-      if (std::fabs(exact - std::floor(exact) - 0.5f) > 1e-2f) EXPECT_EQ(ours[k], plain[k]) << k;
+      const float exact = block_dct(samples)[kNaturalOfZigzag[k]] / 9;
+      EXPECT_LE(std::fabs(static_cast<float>(plain.values[k]) - exact), 0.501f);
+      EXPECT_EQ(plain.used >> k & 1, plain.values[k] != 0);
+      EXPECT_EQ(ours.used >> k & 1, ours.values[k] != 0);
+      if (std::fabs(exact - std::floor(exact) - 0.5f) > 1e-2f)
+        EXPECT_EQ(ours.values[k], plain.values[k]) << k;
     }
   }
 }
 
 /// Weighted squared error of what the coefficients decode to, by the definition of the DCT.
-double error_of(const BlockCoefficients& block, const BlockCoding& coding, const BlockValues& samples,
+double error_of(const CodedBlock& block, const BlockCoding& coding, const BlockValues& samples,
                 const BlockValues& weights) {
   double sum = 0;
   for (std::size_t y = 0; y < 8; ++y)
@@ -174,9 +177,9 @@ double error_of(const BlockCoefficients& block, const BlockCoding& coding, const
       double value = 0;
       for (std::size_t k = 0; k < 64; ++k) {
         const std::size_t u = kNaturalOfZigzag[k] % 8, v = kNaturalOfZigzag[k] / 8;
-        value += block[k] * static_cast<double>(coding.quantisers[k]) * (u ? 0.5 : std::sqrt(0.125)) *
-                 (v ? 0.5 : std::sqrt(0.125)) * std::cos((2.0 * x + 1) * u * M_PI / 16) *
-                 std::cos((2.0 * y + 1) * v * M_PI / 16);
+        value += block.values[k] * static_cast<double>(coding.quantisers[kNaturalOfZigzag[k]]) *
+                 (u ? 0.5 : std::sqrt(0.125)) * (v ? 0.5 : std::sqrt(0.125)) *
+                 std::cos((2.0 * x + 1) * u * M_PI / 16) * std::cos((2.0 * y + 1) * v * M_PI / 16);
       }
       const double d = value - samples[y * 8 + x];
       sum += weights[y * 8 + x] * d * d;
@@ -193,14 +196,14 @@ TEST(MaskedBlock, NoSingleStepMakesItBetter) {
     const BlockCoding coding = coding_without_rate(12);
     MaskedBlock block;
     block.load(samples, weights);
-    BlockCoefficients found = block.quantise(coding, 0);
+    CodedBlock found = block.quantise(coding, 0);
     const double least = error_of(found, coding, samples, weights);
     EXPECT_LT(least, error_of({}, coding, samples, weights) / 8);
     for (std::size_t k = 0; k < 64; ++k)
       for (const int step : {-1, 1}) {
-        found[k] = static_cast<std::int16_t>(found[k] + step);
+        found.values[k] = static_cast<std::int16_t>(found.values[k] + step);
         EXPECT_GT(error_of(found, coding, samples, weights), least - 0.05) << k;
-        found[k] = static_cast<std::int16_t>(found[k] - step);
+        found.values[k] = static_cast<std::int16_t>(found.values[k] - step);
       }
   }
 }
@@ -216,9 +219,69 @@ TEST(MaskedBlock, NeverTakesASymbolWithoutACode) {
     if ((s & 15u) > 5) coding.ac.bits[s] = 0;  // no coefficient above 31
   MaskedBlock block;
   block.load(samples, weights);
-  const BlockCoefficients found = block.quantise(coding, 0);
-  EXPECT_GT(std::ranges::count_if(found, [](int v) { return v != 0; }), 3);
-  for (std::size_t k = 1; k < 64; ++k) EXPECT_LE(std::abs(found[k]), 31);
+  // The second time starts at the first one's values; then from ones that have no code.
+  for (const float finer : {1.0f, 1.0f, 0.25f}) {
+    for (float& q : coding.quantisers) q *= finer;
+    const CodedBlock found = block.quantise(coding, 0);
+    EXPECT_GT(std::ranges::count_if(found.values, [](int v) { return v != 0; }), 3);
+    for (std::size_t k = 1; k < 64; ++k) EXPECT_LE(std::abs(found.values[k]), 31);
+  }
+}
+
+/// Bits of the AC coefficients with coding_without_rate().
+int ac_bits(const CodedBlock& block) {
+  int bits = 0, zeros = 0;
+  for (std::size_t k = 1; k < 64; ++k) {
+    if (block.values[k] == 0) {
+      ++zeros;
+      continue;
+    }
+    for (; zeros > 15; zeros -= 16) bits += 4;
+    bits += 4 + static_cast<int>(std::bit_width(static_cast<unsigned>(std::abs(block.values[k]))));
+    zeros = 0;
+  }
+  return bits + (zeros > 0 ? 4 : 0);
+}
+
+TEST(MaskedBlock, RungsThatStartAtTheOneBeforeCostNoMoreThanOnesThatStartAtNothing) {
+  Random random{29};
+  double next_cost = 0, fresh_cost = 0;
+  for (int n = 0; n < 40; ++n) {
+    const BlockValues samples = random_values(random, 90);
+    BlockValues weights{};
+    for (float& w : weights) w = random.next() % 2 == 0 ? 1.0f : 0.003f;
+    MaskedBlock ladder;
+    ladder.load(samples, weights);
+    for (const float quantiser : {80.0f, 40.0f, 20.0f, 10.0f, 5.0f}) {
+      BlockCoding coding = coding_without_rate(quantiser);
+      coding.bit_cost = 0.09f * quantiser * quantiser;
+      MaskedBlock alone;
+      alone.load(samples, weights);
+      const auto cost = [&](const CodedBlock& block) {
+        return error_of(block, coding, samples, weights) / coding.bit_cost + ac_bits(block);
+      };
+      next_cost += cost(ladder.quantise(coding, 0));
+      fresh_cost += cost(alone.quantise(coding, 0));
+    }
+  }
+  EXPECT_LT(next_cost, 1.03 * fresh_cost);
+}
+
+TEST(BlockGram, HoldsTheWeightedProductsOfTheBasis) {
+  Random random{31};
+  BlockValues weights;
+  for (float& w : weights) w = static_cast<float>(random.next() % 1000) / 1000;
+  BlockGram gram;
+  gram.set_weights(weights);
+  for (std::size_t k = 0; k < 64; k += 5) {
+    BlockValues unit{};
+    unit[k] = 1;
+    BlockValues shown = block_inverse_dct(unit);
+    for (std::size_t n = 0; n < 64; ++n) shown[n] *= weights[n];
+    const BlockValues wanted = block_dct(shown);
+    EXPECT_NEAR(gram.diagonal()[k], wanted[k], 1e-5);
+    for (std::size_t n = 0; n < 64; ++n) EXPECT_NEAR(gram.column(k)[n], wanted[n], 1e-5) << k << " " << n;
+  }
 }
 
 /// Two fragments, of which the first is covered wholly.

@@ -1,0 +1,43 @@
+#pragma once
+// Inside stages only: JPEG's transform of 8 x 8 blocks, and what a mask makes of it. Plain single precision
+// in a fixed order: same bits everywhere.
+#include <array>
+#include <cstdint>
+
+namespace texmesh {
+
+/// Samples, or coefficients by frequency: [8 * down + across].
+using BlockValues = std::array<float, 64>;
+
+/// Orthonormal DCT, which is JPEG's.
+BlockValues block_dct(const BlockValues& samples);
+BlockValues block_inverse_dct(const BlockValues& coefficients);
+
+/// Products of the transform's basis functions with each other, summed over samples by weight.
+class BlockGram {
+ public:
+  /// Weights 0..1, not all 0. Costs little when they are the last ones.
+  void set_weights(const BlockValues& weights);
+  const BlockValues& weights() const { return weights_; }
+  /// Of every basis function with itself.
+  const BlockValues& diagonal() const { return diagonal_; }
+  /// Of basis function k with all of them.
+  const BlockValues& column(std::size_t k) {
+    if (!(has_column_ >> k & 1)) make_column(k);
+    return columns_[k];
+  }
+
+ private:
+  static constexpr std::size_t kFrequencies = 15;  // 0..14: sums of two of 0..7
+  static constexpr std::size_t kStride = 24;       // frequencies -7..14 across, and two more
+
+  void make_column(std::size_t k);
+
+  BlockValues weights_{};
+  std::array<float, kFrequencies * kStride> spectrum_{};  // of the weights: sums of w cos() cos()
+  BlockValues diagonal_{};
+  std::array<BlockValues, 64> columns_;
+  std::uint64_t has_column_ = 0;
+};
+
+}  // namespace texmesh
