@@ -136,7 +136,7 @@ test('viewer: two fingers zoom', () => withViewer('?pkg=packages/maps.texmesh&ti
 }, {viewport: kPhone, touch: true}));
 
 test('viewer: a slow link shows progress, then the picture', () => withViewer('?pkg=packages/large.texmesh&time=4', async (page) => {
-  await page.waitForFunction(() => window.texmeshViewer?.session.live.scale !== null, null, {timeout: 60000});
+  await page.waitForFunction(() => Number.isFinite(window.texmeshViewer?.session.live.scale), null, {timeout: 60000});
   check(await page.locator('#progress').isVisible(), 'no progress bar');
   await shot(page, 'viewer-loading');
   await phase(page, 'done');

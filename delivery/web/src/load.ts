@@ -3,7 +3,7 @@ import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedMode
 import { displayOf } from './camera';
 import { InputError } from './errors';
 import { Emitter } from './events';
-import { gpuIdle } from './gpu';
+import { gpuIdle, programsReady } from './gpu';
 import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { PackageReader } from './package_reader';
@@ -195,6 +195,7 @@ export class ModelLoad implements LoadedModel {
     throwIfAborted(this.context_.signal);
     renderer.compile?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
     await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
+    await programsReady(renderer, mostCompileS, () => throwIfAborted(this.context_.signal));
     for (const material of this.materialSet_.all)
       for (const [, texture] of texturesOf(material)) {
         await sleepS(0);

@@ -30,6 +30,7 @@ export class FragmentMap {
   private plane = 0;
   private live: Live | null = null;
   private asked = false;
+  private said = '';
 
   constructor() {
     this.box.append(this.canvas, this.legend, this.hint);
@@ -74,7 +75,7 @@ export class FragmentMap {
       this.canvas.width = Math.round(width * dense);
       this.canvas.height = Math.round(height * dense);
     }
-    const c = this.canvas.getContext('2d');
+    const c = this.canvas.getContext('2d', { willReadFrequently: true }); // a few hundred rectangles: not worth the GPU's time
     if (!c) return;
     c.clearRect(0, 0, this.canvas.width, this.canvas.height);
     const fill = this.colours(tables);
@@ -102,7 +103,7 @@ export class FragmentMap {
     const skippedSet = this.live?.skipped.get(this.plane);
     const stored = new Uint8Array(fragments);
     for (const f of t.order) stored[f] = 1;
-    const skipped = colour('skipped');
+    const [skipped, here, left] = [colour('skipped'), colour('k1'), colour('warm')];
     const top = t.rungQuality.length - 1;
     const bytesOf = (f: number): number => this.bytesOf(t, f);
     switch (this.by) {
@@ -122,7 +123,7 @@ export class FragmentMap {
       }
       case 'skipped':
         this.words([['k1', 'here'], ['warm', 'skipped by the plan'], ['skipped', 'not yet']]);
-        return (f) => (!stored[f] ? null : (rungs?.[f] ?? -1) >= 0 ? colour('k1') : skippedSet?.has(f) ? colour('warm') : skipped);
+        return (f) => (!stored[f] ? null : (rungs?.[f] ?? -1) >= 0 ? here : skippedSet?.has(f) ? left : skipped);
     }
   }
 
@@ -135,14 +136,23 @@ export class FragmentMap {
   }
 
   private ramp(low: string, high: string, skip: boolean): void {
+    if (this.legendIsOf(`ramp ${low} ${high} ${skip}`)) return;
     const stops = [0, 0.25, 0.5, 0.75, 1].map(rampColour).join(', ');
     const bar = make('span', { class: 'ramp', style: `background: linear-gradient(to right, ${stops})` });
     this.legend.replaceChildren(low, bar, high, ...(skip ? [make('span', { class: 'skip' }), 'preview'] : []));
   }
 
   private words(names: [string, string][]): void {
+    if (this.legendIsOf(`words ${names}`)) return;
     this.legend.replaceChildren(
       ...names.flatMap(([c, text]) => [make('span', { class: 'skip', style: `background: var(--${c})` }), text]));
+  }
+
+  /** Whether the legend says this already; else it will. */
+  private legendIsOf(what: string): boolean {
+    const is = this.said === what;
+    this.said = what;
+    return is;
   }
 
   private point(e: PointerEvent): void {

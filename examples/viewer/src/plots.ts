@@ -28,6 +28,7 @@ export interface PlotOptions {
 export class Plot {
   private plot: uPlot | null = null;
   private data: uPlot.AlignedData = [[]];
+  private mark: { x: number; label: string } | null | undefined;
   private width = 0;
 
   constructor(
@@ -39,15 +40,19 @@ export class Plot {
     onTheme(() => this.rebuild());
   }
 
+  /** What is drawn already is not drawn again. */
   set(data: (number | null)[][]): void {
+    const mark = this.options.mark?.();
+    const moved = mark?.x !== this.mark?.x || mark?.label !== this.mark?.label;
+    const same = equal(data, this.data as (number | null)[][]);
+    this.mark = mark;
+    if (same && this.plot) {
+      if (moved) this.plot.redraw(false, false);
+      return;
+    }
     this.data = data as uPlot.AlignedData;
     if (this.plot) this.plot.setData(this.data);
     else this.rebuild();
-  }
-
-  /** Draws again when only the mark has moved. */
-  touch(): void {
-    this.plot?.redraw(false, false);
   }
 
   private fit(): void {
@@ -65,6 +70,10 @@ export class Plot {
     if (this.width <= 0 || (this.data[0] as unknown[]).length === 0) return;
     this.plot = new uPlot(uplotOptions(this.options, this.width), this.data, this.box);
   }
+}
+
+function equal(a: readonly (readonly (number | null)[])[], b: readonly (readonly (number | null)[])[]): boolean {
+  return a.length === b.length && a.every((row, i) => row.length === b[i]?.length && row.every((v, k) => v === b[i]?.[k]));
 }
 
 function uplotOptions(o: PlotOptions, width: number): uPlot.Options {

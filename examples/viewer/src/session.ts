@@ -40,7 +40,9 @@ export class Session {
     this.changed('opening');
     try {
       const cap = Number.isFinite(choices.capBytesPerSecond) ? choices.capBytesPerSecond : 0;
-      const pkg = await open(this.url, { signal: this.abort.signal, capBytesS: cap });
+      const opening = open(this.url, { signal: this.abort.signal, capBytesS: cap });
+      await Promise.all([opening, this.stage.begin()]); // the package's head comes meanwhile
+      const pkg = await opening;
       if (turn !== this.turn) return pkg.dispose();
       this.pkg = pkg;
       this.opened(pkg, first);
@@ -87,6 +89,7 @@ export class Session {
     } finally {
       if (this.openingOriginal === turn) this.openingOriginal = -1;
     }
+    await this.stage.begin();
     if (turn !== this.turn) return pkg.dispose();
     const model = pkg.load(this.stage.original, {
       ...this.common(), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,

@@ -1,8 +1,9 @@
 import {
   Box3, DirectionalLight, HemisphereLight, MathUtils, NeutralToneMapping, PerspectiveCamera, Scene, Spherical, SRGBColorSpace,
-  Vector3, WebGLRenderer,
+  Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { graphics, idle, pixelRatio, turn } from './gpu';
 
 const kFieldOfViewDegrees = 32;
 const kTurnDegrees = 6; // per press of an arrow key
@@ -10,10 +11,9 @@ const kMargin = 0.95; // of the sphere round the box, which hardly any object fi
 
 /**
  * The picture: a camera that goes round the object by mouse, touch and keyboard, and two scenes of which the left one is shown
- * left of a movable border. Draws only when something has changed.
+ * left of a movable border. Draws only when something has changed, and once `begin` has made a renderer.
  */
 export class Stage {
-  readonly renderer: WebGLRenderer;
   readonly camera = new PerspectiveCamera(kFieldOfViewDegrees, 1, 0.01, 100);
   readonly current = new Scene();
   readonly original = new Scene();
@@ -22,6 +22,10 @@ export class Stage {
   /** Called when the camera, or the size of the picture, has changed. */
   onView: () => void = () => {};
 
+  private made: WebGLRenderer | null = null;
+  private becoming: Promise<void> | null = null;
+  private widthPx = 1;
+  private heightPx = 1;
   private readonly controls: OrbitControls;
   private readonly lamps: DirectionalLight[];
   private readonly bounds = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
@@ -29,11 +33,6 @@ export class Stage {
   private asked = false;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.outputColorSpace = SRGBColorSpace;
-    this.renderer.toneMapping = NeutralToneMapping;
-    this.renderer.setClearAlpha(0);
     this.lamps = [this.current, this.original].map(light);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
@@ -45,6 +44,31 @@ export class Stage {
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement ?? canvas);
     canvas.addEventListener('keydown', (e) => this.key(e));
     canvas.addEventListener('webglcontextrestored', () => this.draw());
+    this.resize();
+  }
+
+  /** Makes the renderer, once, in turns of the page. Rejects where there is no WebGL. */
+  begin(): Promise<void> {
+    return (this.becoming ??= this.makeRenderer());
+  }
+
+  /** Throws before `begin` has resolved. */
+  get renderer(): WebGLRenderer {
+    if (!this.made) throw new Error('The stage is not ready');
+    return this.made;
+  }
+
+  private async makeRenderer(): Promise<void> {
+    const context = graphics(this.canvas);
+    await idle(context);
+    const renderer = new WebGLRenderer({ canvas: this.canvas, context });
+    renderer.outputColorSpace = SRGBColorSpace;
+    renderer.toneMapping = NeutralToneMapping;
+    renderer.setClearAlpha(0);
+    // Reading what the compiler has to say of three.js's own shaders would hold the page up.
+    renderer.debug.checkShaderErrors = import.meta.env.DEV;
+    await turn();
+    this.made = renderer;
     this.resize();
   }
 
@@ -78,7 +102,7 @@ export class Stage {
   displayedHeightPx(objectHeight: number): number {
     const centre = this.bounds.getCenter(new Vector3());
     const distance = Math.max(this.camera.position.distanceTo(centre), this.camera.near);
-    const scale = this.renderer.domElement.height / (2 * Math.tan(MathUtils.degToRad(kFieldOfViewDegrees) / 2));
+    const scale = (this.heightPx * pixelRatio()) / (2 * Math.tan(MathUtils.degToRad(kFieldOfViewDegrees) / 2));
     return (objectHeight / distance) * scale;
   }
 
@@ -103,8 +127,8 @@ export class Stage {
     this.controls.update(); // while it is gliding, this asks for the next frame
     this.onFrame();
     this.carryLamps();
-    const r = this.renderer;
-    const { width, height } = this.canvas.getBoundingClientRect();
+    const [r, width, height] = [this.made, this.widthPx, this.heightPx];
+    if (!r) return;
     if (this.split > 0) {
       const border = Math.round(width * this.split);
       r.setScissorTest(true);
@@ -171,13 +195,21 @@ export class Stage {
   private resize(): void {
     const box = this.canvas.parentElement?.getBoundingClientRect();
     if (!box || box.width < 1 || box.height < 1) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(box.width, box.height, false);
+    [this.widthPx, this.heightPx] = [box.width, box.height];
+    this.fit();
     this.camera.aspect = box.width / box.height;
     this.camera.updateProjectionMatrix();
     // A canvas that was resized is empty until the next frame: draw at once, or it flickers.
     this.render();
     this.onView();
+  }
+
+  /** The renderer's buffer as large as the picture; made anew only when it has another size. */
+  private fit(): void {
+    const r = this.made;
+    const ratio = pixelRatio();
+    if (!r || (r.getPixelRatio() === ratio && r.getSize(new Vector2()).equals({ x: this.widthPx, y: this.heightPx }))) return;
+    r.setDrawingBufferSize(this.widthPx, this.heightPx, ratio); // setPixelRatio and setSize would make two
   }
 }
 

@@ -12,13 +12,17 @@ function stored(): string | null {
   }
 }
 
-function apply(): void {
-  document.documentElement.dataset['theme'] = stored() ?? (system.matches ? 'dark' : 'light');
+/** Colours that were asked for: asking makes the page work out its styles. */
+const known = new Map<string, string>();
+
+function apply(theme = stored() ?? (system.matches ? 'dark' : 'light')): void {
+  document.documentElement.dataset['theme'] = theme;
+  known.clear();
   for (const f of listeners) f();
 }
 
 export function startTheme(): void {
-  system.addEventListener('change', apply);
+  system.addEventListener('change', () => apply());
   apply();
 }
 
@@ -27,11 +31,9 @@ export function toggleTheme(): void {
   try {
     localStorage.setItem(kKey, next);
   } catch {
-    document.documentElement.dataset['theme'] = next;
-    for (const f of listeners) f();
-    return;
+    // for this page alone, then
   }
-  apply();
+  apply(next);
 }
 
 /** Calls `f` after every change of the theme. */
@@ -41,5 +43,7 @@ export function onTheme(f: () => void): void {
 
 /** A colour of style.css, by the name of its variable. */
 export function colour(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  let value = known.get(name);
+  if (value === undefined) known.set(name, (value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()));
+  return value;
 }
