@@ -138,8 +138,8 @@ export function throwIfAborted(signal?: AbortSignal): void {
   if (signal?.aborted) throw abortError();
 }
 
-function contentRange(text: string | null): Answer['range'] {
-  const m = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text ?? '');
+function contentRange(text: string): Answer['range'] {
+  const m = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text);
   if (!m) return undefined;
   const [first, last, total] = m.slice(1).map(Number);
   return first <= last && last < total ? { first, last, total } : undefined;
@@ -182,97 +182,82 @@ export class HttpClient {
 
   /** One GET; network problems come back in the answer, only cancelling throws. */
   async get(url: string, get: GetOptions): Promise<Answer> {
-    throwIfAborted(get.signal);
+    const { signal, range, kind, stallTimeoutS = this.options.stallTimeoutS } = get;
+    throwIfAborted(signal);
     await this.enter_();
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    get.signal?.addEventListener('abort', cancel);
+    signal?.addEventListener('abort', cancel);
     const record: RequestRecord = {
-      url, offset: get.range?.offset ?? 0, bytes: get.range?.bytes ?? -1, received: 0, kind: get.kind,
+      url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
     };
-    const answer: Answer = {
-      url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false,
-    };
-    const stall = new StallTimer(get.stallTimeoutS ?? this.options.stallTimeoutS, () => abort.abort());
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false };
+    const stall = stallTimer(stallTimeoutS, cancel);
     try {
-      throwIfAborted(get.signal);
-      await this.transfer_(url, get, abort.signal, answer, record, stall);
+      throwIfAborted(signal);
+      await this.transfer_(get, abort.signal, answer, record, stall);
     } catch (error) {
-      if (get.signal?.aborted) throw abortError();
-      answer.problem = stall.fired ? `no byte for ${stall.seconds.toFixed(1)} s` : String((error as Error).message);
+      if (signal?.aborted) throw abortError();
+      answer.problem = stall.fired ? `no byte for ${stallTimeoutS.toFixed(1)} s` : String((error as Error).message);
     } finally {
       stall.stop();
-      get.signal?.removeEventListener('abort', cancel);
-      if (!answer.complete) abort.abort();
+      signal?.removeEventListener('abort', cancel);
+      if (!answer.complete) cancel();
       this.leave_();
       record.ended = nowS();
       record.status = answer.status;
-      record.ok = answer.complete && (answer.status === 206 || (answer.status === 200 && !get.range));
+      record.ok = answer.complete && answer.status === (range ? 206 : 200);
       this.note_(url, record);
     }
     return answer;
   }
 
-  private async transfer_(
-    url: string,
-    get: GetOptions,
-    signal: AbortSignal,
-    answer: Answer,
-    record: RequestRecord,
-    stall: StallTimer,
-  ): Promise<void> {
+  private async transfer_(get: GetOptions, signal: AbortSignal, answer: Answer, record: RequestRecord, stall: StallTimer): Promise<void> {
+    const { range, ifRange } = get;
     const headers: Record<string, string> = {};
-    if (get.range) headers.Range = `bytes=${get.range.offset}-${get.range.offset + get.range.bytes - 1}`;
-    if (get.ifRange) headers['If-Range'] = get.ifRange;
-    const doFetch = this.options.fetch ?? globalThis.fetch;
-    const cache = get.reload ? 'reload' : get.range ? this.options.rangeCache : 'default';
-    const response = await doFetch(url, { headers, signal, cache });
+    if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
+    if (ifRange) headers['If-Range'] = ifRange;
+    const cache = get.reload ? 'reload' : range ? this.options.rangeCache : 'default';
+    const response = await (this.options.fetch ?? globalThis.fetch)(answer.url, { headers, signal, cache });
     stall.restart();
     record.firstByte = nowS();
-    answer.status = response.status;
-    if (response.url) answer.url = response.url;
-    const etag = response.headers.get('etag') ?? '';
-    answer.etag = etag.startsWith('"') ? etag : '';
-    answer.range = contentRange(response.headers.get('content-range'));
-    const wanted = response.status === 206 ? !!get.range : response.status === 200 && !get.range;
-    if (!wanted) {
-      void response.body?.cancel().catch(() => undefined);
-      answer.complete = response.status !== 206;
+    const { status, body } = response;
+    const header = (name: string): string => response.headers.get(name) ?? '';
+    answer.status = status;
+    answer.url = response.url || answer.url;
+    if (header('etag').startsWith('"')) answer.etag = header('etag');
+    answer.range = contentRange(header('content-range'));
+    if (status !== (range ? 206 : 200)) {
+      void body?.cancel().catch(() => undefined);
+      answer.complete = status !== 206;
       return;
     }
-    await this.readBody_(response, get, answer, record, stall);
-    const said = answer.range && response.status === 206 ? answer.range.last - answer.range.first + 1 : -1;
-    const length = said >= 0 ? said : plainLength(response);
-    answer.complete = !answer.tooLong && (length < 0 || length === answer.body.length);
+    await this.readBody_(body, get, answer, record, stall);
+    // Content-Length, where nothing was decoded on the way.
+    const said = header('content-encoding') ? '' : header('content-length');
+    const length = answer.range && range ? answer.range.last - answer.range.first + 1 : /^\d+$/.test(said) ? +said : answer.body.length;
+    answer.complete = !answer.tooLong && length === answer.body.length;
   }
 
-  private async readBody_(
-    response: Response,
-    get: GetOptions,
-    answer: Answer,
-    record: RequestRecord,
-    stall: StallTimer,
-  ): Promise<void> {
+  private async readBody_(body: Response['body'], get: GetOptions, answer: Answer, record: RequestRecord, stall: StallTimer): Promise<void> {
     const chunks: Uint8Array[] = [];
-    let total = 0;
-    const reader = response.body?.getReader();
+    const reader = body?.getReader();
     try {
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();
         stall.restart();
         if (done) break;
         chunks.push(value);
-        total += value.length;
-        record.received = total;
+        record.received += value.length;
         this.received += value.length;
-        if (total > get.maxBytes) answer.tooLong = true;
-        else get.onBytes?.(total);
+        if (record.received > get.maxBytes) answer.tooLong = true;
+        else get.onBytes?.(record.received);
         await this.holdBack_(value.length, stall, get.signal);
       }
     } finally {
       // What came before a cut is worth keeping.
-      answer.body = chunks.length === 1 ? chunks[0] : concat(chunks, total);
+      answer.body = chunks.length === 1 ? chunks[0] : concat(chunks, record.received);
     }
   }
 
@@ -302,13 +287,6 @@ export class HttpClient {
   }
 }
 
-/** Content-Length, where nothing was decoded on the way; -1 when nobody says. */
-function plainLength(response: Response): number {
-  if (response.headers.get('content-encoding')) return -1;
-  const length = response.headers.get('content-length');
-  return length !== null && /^\d+$/.test(length) ? Number(length) : -1;
-}
-
 /** Pieces of `total` bytes as one. */
 export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array {
   const out = new Uint8Array(total);
@@ -320,34 +298,26 @@ export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array
   return out;
 }
 
-class StallTimer {
-  fired = false;
-  private timer_?: ReturnType<typeof setTimeout>;
-  constructor(
-    readonly seconds: number,
-    private readonly onStall_: () => void,
-  ) {
-    this.restart();
-  }
-  restart(): void {
-    this.stop();
-    if (this.fired) return;
-    this.timer_ = setTimeout(() => {
-      this.fired = true;
-      this.onStall_();
-    }, this.seconds * 1000);
-  }
-  stop(): void {
-    if (this.timer_ !== undefined) clearTimeout(this.timer_);
-    this.timer_ = undefined;
-  }
+/** Aborts after so many seconds without a restart. */
+interface StallTimer {
+  fired: boolean;
+  restart(): void;
+  stop(): void;
 }
-
-/** Whether asking again may help. */
-export function mayRetry(a: Answer): boolean {
-  const { status } = a;
-  if (status === 0 || status === 408 || status === 429 || status >= 500) return true;
-  return (status === 200 || status === 206) && !a.complete && !a.tooLong;
+function stallTimer(seconds: number, onStall: () => void): StallTimer {
+  let timer: ReturnType<typeof setTimeout>;
+  const stop = (): void => clearTimeout(timer);
+  const fire = (): void => {
+    stall.fired = true;
+    onStall();
+  };
+  const restart = (): void => {
+    stop();
+    timer = setTimeout(fire, seconds * 1000);
+  };
+  const stall: StallTimer = { fired: false, restart, stop };
+  restart();
+  return stall;
 }
 
 /** Whether what could not be had will not be there later on, either. */
@@ -358,39 +328,4 @@ export function isForGood(error: unknown): boolean {
 /** For messages. */
 export function whatCame(a: Answer): string {
   return a.problem !== '' ? a.problem : a.status === 0 ? 'no answer' : `status ${a.status}`;
-}
-
-/** Waits longer from try to try; false when there have been enough. */
-export class Retries {
-  private left_: number;
-  private delayS_: number;
-  constructor(options: HttpOptions) {
-    this.left_ = options.retries;
-    this.delayS_ = options.retryDelayS;
-  }
-  async wait(signal?: AbortSignal): Promise<boolean> {
-    if (this.left_-- <= 0) return false;
-    await sleepS(this.delayS_, signal);
-    throwIfAborted(signal);
-    this.delayS_ *= 2;
-    return true;
-  }
-}
-
-/** A whole file; with retries, unless somebody else has it. */
-export async function getWhole(
-  client: HttpClient,
-  url: string,
-  maxBytes: number,
-  how: Pick<GetOptions, 'kind' | 'signal' | 'onBytes' | 'reload' | 'stallTimeoutS'>,
-  elsewhere = false,
-): Promise<Uint8Array> {
-  const retries = new Retries(client.options);
-  for (;;) {
-    const a = await client.get(url, { maxBytes, ...how });
-    if (a.status === 200 && a.complete) return a.body;
-    if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${maxBytes} bytes`, 'more');
-    if (!mayRetry(a) || elsewhere || !(await retries.wait(how.signal)))
-      throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
-  }
 }

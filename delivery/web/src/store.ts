@@ -1,9 +1,6 @@
-import { FormatError, InputError, TexmeshError } from './errors';
-import {
-  Answer, GetOptions, HttpClient, RequestKind, Retries, concat, getWhole, isAbort, mayRetry, nowS, shownUrl, whatCame,
-} from './http';
+import { FormatError, InputError } from './errors';
+import { Answer, GetOptions, HttpClient, RequestKind, concat, isAbort, shownUrl, sleepS, whatCame } from './http';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
-import { Throughput, defaultThroughput } from './throughput';
 
 /** How a package's bytes are read: ranges of a container, files of a tree, or one whole container. */
 export type PackageForm = 'range' | 'files' | 'whole';
@@ -39,292 +36,147 @@ export interface PackageStore {
   dispose(): void;
 }
 
-/** The server answers whole files only. */
-class NoRanges extends InputError {}
-
-const silenceFactor = 4;
-const leastPatienceRtts = 8;
-const leastPatienceS = 0.5;
-
-/** A URL that a package can be had from, and what it has shown so far. */
-export class Mirror {
-  alive = true;
-  etag = '';
-  total = -1;
+/** What a server has shown of a container so far. */
+export interface Source {
   /** Where its answers come from. */
   at: string;
-  readonly throughput = new Throughput({ ...defaultThroughput });
-  owedBytes = 0;
-  lastS = 0;
-  constructor(readonly url: string) {
-    this.at = url;
-  }
+  etag: string;
+  /** Bytes of the container; -1 = not known. */
+  total: number;
+}
+/** Who reads ranges once something has failed: PatientRanges. */
+export interface RangeReader {
+  /** What a server said that knows no ranges. */
+  noRanges?: InputError;
+  /** `first` is an answer of the first URL that is not what was asked for. */
+  fetch(offset: number, bytes: number, how: ReadOptions, first?: Answer): Promise<Uint8Array>;
 }
 
-/** Which mirror delivers first, by what each has delivered so far and has to deliver yet. */
-export class Mirrors {
-  readonly all: Mirror[];
-  constructor(urls: readonly string[]) {
-    this.all = urls.map((url) => new Mirror(url));
-  }
-  get alive(): number {
-    return this.all.filter((m) => m.alive).length;
-  }
-  choose(bytes: number): Mirror {
-    let best: Mirror | undefined;
-    let bestS = 0;
-    for (const m of this.all) {
-      if (!m.alive) continue;
-      const s = (m.owedBytes + bytes) / m.throughput.bytesS();
-      if (!best || s < bestS) {
-        best = m;
-        bestS = s;
-      }
-    }
-    return best ?? this.all[0];
-  }
-  asked(m: Mirror, bytes: number): number {
-    m.owedBytes += bytes;
-    return m.owedBytes / m.throughput.bytesS();
-  }
-  delivered(m: Mirror, bytes: number, fromS: number, atS: number): void {
-    m.throughput.add(bytes, atS - Math.max(m.lastS, fromS));
-    m.lastS = atS;
-    m.owedBytes -= bytes;
-  }
-  /** A mirror that fails is not asked again, as long as there are others. Says whether there are. */
-  failed(m: Mirror, bytes: number): boolean {
-    m.owedBytes -= bytes;
-    if (m.alive && this.alive > 1) m.alive = false;
-    return !m.alive;
-  }
+/** Whether an answer from there is read without asking the server first (CORS). */
+export function sameOrigin(url: string): boolean {
+  const here = globalThis.location;
+  return !here || new URL(url, here.href).origin === here.origin;
 }
 
-/** Tries mirror after mirror; a failure of the last one is everybody's. */
-export async function fromMirrors<T>(
-  mirrors: Mirrors,
-  client: HttpClient,
-  bytes: number,
-  ask: (m: Mirror, patienceS: number) => Promise<T>,
-): Promise<T> {
-  for (;;) {
-    const m = mirrors.choose(bytes);
-    const expectedS = mirrors.asked(m, bytes);
-    const patient = Math.max(leastPatienceS, leastPatienceRtts * client.rttS, silenceFactor * expectedS);
-    const patience = mirrors.alive > 1 ? Math.min(patient, client.options.stallTimeoutS) : client.options.stallTimeoutS;
-    const started = nowS();
-    try {
-      const result = await ask(m, patience);
-      mirrors.delivered(m, bytes, started + client.rttS, nowS());
-      return result;
-    } catch (error) {
-      const cancelled = !(error instanceof TexmeshError); // which says nothing of the mirror
-      if (cancelled) m.owedBytes -= bytes;
-      if (cancelled || !mirrors.failed(m, bytes)) throw error;
-    }
-  }
+/** Asks for a range of the container that reading began with. */
+export function rangeRequest({ at, etag }: Source, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): GetOptions {
+  // If-Range from another origin would cost a preflight request.
+  return { range: { offset, bytes }, ifRange: sameOrigin(at) ? etag : '', maxBytes: bytes, kind, signal, onBytes };
 }
+
+/** Whether an answer is what rangeRequest asked for; then what it says of the container is kept. */
+function isAsAsked(source: Source, a: Answer, offset: number, bytes: number): boolean {
+  const { range, etag } = a;
+  const total = range ? range.total : source.total;
+  const wanted = offset > 0 || total < 0 ? bytes : Math.min(bytes, total);
+  const good =
+    a.status === 206 && a.complete && (!source.etag || !etag || etag === source.etag) && (source.total < 0 || total === source.total) &&
+    // Another origin may keep the header to itself; then only the length tells.
+    (range ? range.first === offset : !sameOrigin(a.url)) && (a.body.length === wanted || (offset === 0 && total < 0));
+  if (good) Object.assign(source, { at: a.url, etag: source.etag || etag, total });
+  return good;
+}
+
+const troubles = () => import('./store_troubles');
+/** Without a byte from the first of several mirrors, before anything is known of them. */
+const firstPatienceS = 0.7;
 
 /** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
 class RangeStore implements PackageStore {
   readonly form = 'range';
-  private readonly parts_: { begin: number; bytes: Uint8Array }[] = []; // by begin, not overlapping
-  private readonly mirrors_: Mirrors;
-  /** What a server said that knows no ranges. */
-  noRanges?: NoRanges;
+  private parts_: { begin: number; bytes: Uint8Array }[] = [];
+  private readonly source_: Source;
+  private patient_?: RangeReader;
 
   constructor(
-    urls: readonly string[],
+    private readonly urls_: readonly string[],
     private readonly client_: HttpClient,
   ) {
-    this.mirrors_ = new Mirrors(urls);
+    this.source_ = { at: urls_[0], etag: '', total: -1 };
+    if (urls_.length > 1) this.becomePatient_().catch(() => undefined);
+  }
+  get noRanges(): InputError | undefined {
+    return this.patient_?.noRanges;
   }
   get name(): string {
-    return shownUrl(this.mirrors_.all[0].url);
+    return shownUrl(this.urls_[0]);
   }
 
   async manifest(signal?: AbortSignal): Promise<Uint8Array> {
-    const bytes = await this.fetchRange_(0, bootstrapBytes, { kind: 'manifest', signal });
-    this.keep_(0, bytes);
+    const bytes = await this.fetch_(0, bootstrapBytes, { kind: 'manifest', signal });
+    this.parts_.push({ begin: 0, bytes });
     return manifestOfContainer(bytes, this.name);
   }
 
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     const begin = place.offset + offset;
-    if (bytes === 0) return new Uint8Array(0);
-    const missing = this.missing_(begin, begin + bytes);
-    if (!missing || missing.end - missing.begin < bytes) {
-      const got = missing ? await this.fetchRange_(missing.begin, missing.end - missing.begin, how) : new Uint8Array(0);
-      const whole = this.assemble_(begin, bytes, missing?.begin ?? 0, got);
-      try {
-        await how.verify?.(whole);
-        if (missing && !how.once) this.keep_(missing.begin, got);
-        return whole;
-      } catch (error) {
-        if (!(error instanceof FormatError)) throw error;
-        this.drop_(begin, begin + bytes); // what was known may be what is bad
-      }
+    const end = begin + bytes;
+    const chunks = this.known_(begin, end);
+    const from = chunks.reduce((at, c) => at + c.length, begin);
+    if (from < end) chunks.push(await this.fetch_(from, end - from, how));
+    let got = chunks.length === 1 ? chunks[0] : concat(chunks, bytes);
+    let isNew = from < end;
+    try {
+      await how.verify?.(got);
+    } catch (error) {
+      if (!(error instanceof FormatError)) throw error;
+      this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
+      got = await this.fetch_(begin, bytes, how, error);
+      isNew = true;
     }
-    const got = await this.fetchRange_(begin, bytes, how, how.verify);
-    if (!how.once) this.keep_(begin, got);
+    if (isNew && !how.once) {
+      this.parts_ = this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end);
+      this.parts_.push({ begin, bytes: got });
+    }
     return got;
   }
-  private drop_(begin: number, end: number, within = false): void {
-    for (let i = this.parts_.length - 1; i >= 0; --i) {
-      const p = this.parts_[i];
-      const [first, last] = [p.begin, p.begin + p.bytes.length];
-      if (within ? first >= begin && last <= end : first < end && last > begin) this.parts_.splice(i, 1);
+  /** What is known from a place on. */
+  private known_(begin: number, end: number): Uint8Array[] {
+    const chunks: Uint8Array[] = [];
+    for (let at = begin; at < end; at += chunks[chunks.length - 1].length) {
+      const part = this.parts_.find((p) => p.begin <= at && p.begin + p.bytes.length > at);
+      if (!part) break;
+      chunks.push(part.bytes.subarray(at - part.begin, end - part.begin));
     }
+    return chunks;
   }
 
-  /** The range from the first to the last byte that is not known; known gaps inside are asked for again. */
-  private missing_(begin: number, end: number): { begin: number; end: number } | undefined {
-    let from = begin;
-    let to = end;
-    for (const p of this.parts_) if (p.begin <= from && p.begin + p.bytes.length > from) from = p.begin + p.bytes.length;
-    for (let i = this.parts_.length - 1; i >= 0; --i) {
-      const p = this.parts_[i];
-      if (p.begin < to && p.begin + p.bytes.length >= to) to = Math.max(from, p.begin);
+  private async fetch_(offset: number, bytes: number, how: ReadOptions, damaged?: Error): Promise<Uint8Array> {
+    const { urls_: urls, client_: client, source_: source } = this;
+    const { stallTimeoutS: most } = client.options;
+    let first: Answer | undefined;
+    const beyond = offset > 0 && source.total >= 0 && offset + bytes > source.total; // told below
+    if (!this.patient_ && !damaged && !beyond) {
+      const stallTimeoutS = urls.length > 1 ? Math.min(firstPatienceS, most) : most;
+      first = await client.get(urls[0], { ...rangeRequest(source, offset, bytes, how), stallTimeoutS });
+      if (isAsAsked(source, first, offset, bytes)) return first.body;
     }
-    return from < to ? { begin: from, end: to } : undefined;
-  }
-  private assemble_(begin: number, bytes: number, gotAt: number, got: Uint8Array): Uint8Array {
-    if (gotAt === begin && got.length === bytes) return got;
-    const out = new Uint8Array(bytes);
-    for (const p of [...this.parts_, { begin: gotAt, bytes: got }]) {
-      const from = Math.max(begin, p.begin);
-      const to = Math.min(begin + bytes, p.begin + p.bytes.length);
-      if (from < to) out.set(p.bytes.subarray(from - p.begin, to - p.begin), from - begin);
-    }
-    return out;
-  }
-  private keep_(begin: number, bytes: Uint8Array): void {
-    this.drop_(begin, begin + bytes.length, true);
-    this.parts_.push({ begin, bytes });
-    this.parts_.sort((a, b) => a.begin - b.begin);
-  }
-
-  private fetchRange_(
-    offset: number,
-    bytes: number,
-    how: ReadOptions,
-    verify?: (got: Uint8Array) => Promise<void>,
-  ): Promise<Uint8Array> {
-    return fromMirrors(this.mirrors_, this.client_, bytes, async (m, patience) => {
-      const got = await this.fetchFrom_(m, offset, bytes, how, patience, false);
-      try {
-        await verify?.(got);
-        return got;
-      } catch (error) {
-        if (this.mirrors_.alive > 1) throw error;
-        // A cache on the way may hold something bad; the server itself is asked once.
-        const fresh = await this.fetchFrom_(m, offset, bytes, how, patience, true);
-        await verify?.(fresh);
-        return fresh;
-      }
+    const patient = await this.becomePatient_().catch(() => {
+      throw damaged ?? new InputError(this.name, `byte ${offset}`, 'an answer with status 206', first ? whatCame(first) : 'another');
     });
+    return patient.fetch(offset, bytes, { ...how, verify: damaged && how.verify }, first);
   }
-
-  private async fetchFrom_(
-    m: Mirror,
-    offset: number,
-    bytes: number,
-    how: ReadOptions,
-    patience: number,
-    reload: boolean,
-  ): Promise<Uint8Array> {
-    let got: Uint8Array[] = [];
-    let have = 0;
-    const retries = new Retries(this.client_.options);
-    // Nothing is made room for that cannot come.
-    if (offset > 0 && m.total >= 0 && offset + bytes > m.total)
-      throw new FormatError(this.name, `byte ${offset}`, `a file of ${offset + bytes} bytes`, `${m.total}`);
-    for (;;) {
-      const before = have;
-      const a = await this.client_.get(m.url, {
-        range: { offset: offset + have, bytes: bytes - have },
-        ifRange: sameOrigin(m.at) ? m.etag : '',
-        maxBytes: bytes - have,
-        kind: how.kind,
-        signal: how.signal,
-        stallTimeoutS: patience,
-        onBytes: how.onBytes && ((n) => how.onBytes!(before + n)),
-        reload,
-      } satisfies GetOptions);
-      m.at = a.url;
-      if (a.status === 206) this.checkRange_(m, a, offset + have, bytes - have);
-      if (a.status === 206) {
-        got.push(a.body);
-        have += a.body.length;
-      }
-      const wanted = m.total >= 0 ? Math.min(bytes, m.total - offset) : bytes;
-      if (a.status === 206 && a.complete) {
-        if (have === wanted || (m.total < 0 && offset === 0)) return got.length === 1 ? got[0] : concat(got, have);
-        throw new FormatError(this.name, `byte ${offset}`, `${wanted} bytes`, `${have}`);
-      }
-      this.refuse_(m, a, offset, bytes);
-      if (!mayRetry(a) || (this.mirrors_.alive > 1 && have === before) || !(await retries.wait(how.signal)))
-        throw new InputError(shownUrl(m.url), `byte ${offset + have}`, 'an answer with status 206', whatCame(a));
-      if (have === 0) got = [];
-    }
-  }
-
-  /** Answers after which there is no use in trying again. */
-  private refuse_(m: Mirror, a: Answer, offset: number, bytes: number): void {
-    const file = shownUrl(m.url);
-    if (a.status === 200) {
-      if (m.total < 0) throw (this.noRanges = new NoRanges(file, '', 'a server that answers ranges', 'status 200'));
-      throw new FormatError(
-        file, '', 'the file that reading began with',
-        'status 200: it was replaced, or the server no longer answers ranges',
-      );
-    }
-    if (a.status === 416) throw new FormatError(file, `byte ${offset}`, 'a longer file', 'status 416');
-    if (a.tooLong) throw new FormatError(file, `byte ${offset}`, `${bytes} bytes`, 'more');
-  }
-
-  private checkRange_(m: Mirror, a: Answer, offset: number, bytes: number): void {
-    const fail = (expected: string, found: string): never => {
-      throw new FormatError(shownUrl(m.url), `byte ${offset}`, expected, found);
-    };
-    if (m.etag !== '' && a.etag !== '' && a.etag !== m.etag)
-      fail('the file that reading began with', 'another one (ETag)');
-    if (m.etag === '') m.etag = a.etag;
-    const { range } = a;
-    if (!range) {
-      // Another origin may keep the header to itself; then only the length tells.
-      if (sameOrigin(a.url)) fail('a Content-Range', 'none that can be read');
-      return;
-    }
-    if (m.total >= 0 && range.total !== m.total) fail(`a file of ${m.total} bytes`, `${range.total}`);
-    if (range.first !== offset || range.last !== Math.min(offset + bytes, range.total) - 1)
-      fail('the range that was asked for', `${range.first}-${range.last}`);
-    m.total = range.total;
+  private async becomePatient_(): Promise<RangeReader> {
+    const { PatientRanges } = await troubles().catch(() => sleepS(this.client_.options.retryDelayS).then(troubles));
+    return (this.patient_ ??= new PatientRanges(this.urls_, this.client_, this.source_));
   }
 
   dispose(): void {
-    this.parts_.length = 0;
+    this.parts_ = [];
   }
-}
-
-/** If-Range from another origin would cost a preflight request. */
-function sameOrigin(url: string): boolean {
-  const here = globalThis.location;
-  return !here || new URL(url, here.href).origin === here.origin;
-}
-
-/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
-export function treeUrl(url: string): string {
-  const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
-  return m ? `${m[1]}/${m[2] ?? ''}` : '';
 }
 
 /** See OpenOptions.mode. */
 export type StoreMode = 'auto' | 'range' | 'files';
+/** A store, and the manifest's bytes. */
+export interface OpenedStore {
+  store: PackageStore;
+  manifest: Uint8Array;
+}
 
 /**
  * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside it where it
- * answers 200 to a range; the whole container where there is no tree. Gives the store and the manifest's bytes.
+ * answers 200 to a range; the whole container where there is no tree.
  */
 export async function openStore(
   url: string,
@@ -332,39 +184,21 @@ export async function openStore(
   mode: StoreMode,
   client: HttpClient,
   signal?: AbortSignal,
-): Promise<{ store: PackageStore; manifest: Uint8Array }> {
+): Promise<OpenedStore> {
   const urls = [url, ...mirrors.filter((m) => m !== url)];
-  const use = async (store: PackageStore): Promise<{ store: PackageStore; manifest: Uint8Array }> => ({
-    store,
-    manifest: await store.manifest(signal),
-  });
-  const path = url.replace(/[?#].*$/, '');
   const files = () => import('./store_files');
-  if (path.endsWith('/')) return use(new (await files()).TreeStore(urls, client));
-  const roots = urls.map(treeUrl).filter((root) => root !== '');
-  if (mode === 'files' && roots.length === 0)
-    throw new InputError(shownUrl(url), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
-  if (mode === 'files') return use(new (await files()).TreeStore(roots, client));
-  const ranges = new RangeStore(urls, client);
+  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
+  const store = new RangeStore(urls, client);
   try {
-    return await use(ranges);
+    return { store, manifest: await store.manifest(signal) };
   } catch (error) {
+    const { noRanges } = store;
     // Whole files are better than nothing, whatever the other mirrors said.
-    if (!ranges.noRanges || isAbort(error)) throw error;
-    if (mode === 'range') throw ranges.noRanges;
+    if (!noRanges || isAbort(error)) throw error;
+    if (mode === 'range') throw noRanges;
+    const { openWithoutRanges } = await files().catch(() => {
+      throw noRanges;
+    });
+    return openWithoutRanges(urls, client, signal);
   }
-  const { TreeStore, openBytes } = await files();
-  if (roots.length > 0) {
-    try {
-      const found = await use(new TreeStore(roots, client));
-      if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
-    } catch (error) {
-      if (!(error instanceof InputError)) throw error;
-    }
-  }
-  const whole = new Mirrors(urls);
-  return fromMirrors(whole, client, bootstrapBytes, async (m, stallTimeoutS) => {
-    const how = { kind: 'other', signal, stallTimeoutS } as const;
-    return use(openBytes(await getWhole(client, m.url, client.options.maxWholeBytes, how, whole.alive > 1), shownUrl(m.url)));
-  });
 }

@@ -2,11 +2,12 @@ import { codecTraits } from './codec';
 import { requireDigest } from './digests';
 import { FormatError, InputError } from './errors';
 import { FragmentFiles, readFragmentFiles } from './fragment_files';
-import { HttpClient, getWhole, isAbort, shownUrl } from './http';
+import { HttpClient, isAbort, shownUrl } from './http';
 import { fragmentFilePath, isValidEntryPath, manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
 import type { PackageReader } from './package_reader';
-import { Mirror, Mirrors, PackageStore, Place, ReadOptions, fromMirrors } from './store';
+import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';
+import { Mirror, Mirrors, fromMirrors, getWhole } from './store_troubles';
 
 // For servers that know no ranges; loaded when one is met.
 
@@ -158,4 +159,43 @@ class WholeStore implements PackageStore {
 /** A container that is in memory already. */
 export function openBytes(bytes: Uint8Array, name: string): PackageStore {
   return new WholeStore(bytes, name);
+}
+
+/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+export function treeUrl(url: string): string {
+  const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
+  return m ? `${m[1]}/${m[2] ?? ''}` : '';
+}
+
+async function opened(store: PackageStore, signal?: AbortSignal): Promise<OpenedStore> {
+  return { store, manifest: await store.manifest(signal) };
+}
+const treesOf = (urls: readonly string[]): string[] => urls.map(treeUrl).filter((root) => root !== '');
+
+/** A tree, by its own URL or that of the container beside it. */
+export function openTree(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+  const isTree = urls[0].replace(/[?#].*$/, '').endsWith('/');
+  const roots = isTree ? urls : treesOf(urls);
+  if (roots.length === 0)
+    throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
+  return opened(new TreeStore(roots, client), signal);
+}
+
+/** The tree beside a container, or the whole container. */
+export async function openWithoutRanges(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+  const roots = treesOf(urls);
+  if (roots.length > 0) {
+    try {
+      const found = await opened(new TreeStore(roots, client), signal);
+      if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+    }
+  }
+  const whole = new Mirrors(urls);
+  return fromMirrors(whole, client, bootstrapBytes, async (m, stallTimeoutS) => {
+    const how = { kind: 'other', signal, stallTimeoutS } as const;
+    const bytes = await getWhole(client, m.url, client.options.maxWholeBytes, how, whole.alive > 1);
+    return opened(openBytes(bytes, shownUrl(m.url)), signal);
+  });
 }

@@ -3,7 +3,7 @@ import { toHex } from '../src/bytes';
 import { fragmentFilePath } from '../src/layout';
 import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
 import { sha256 } from '../src/sha256';
-import { treeUrl } from '../src/store';
+import { treeUrl } from '../src/store_files';
 import { Fault, FakeServer, FaultKind, bytesAskedTwice, fakeServer, treeFiles } from './fake_server';
 import { golden } from './support';
 
