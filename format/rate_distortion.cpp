@@ -54,6 +54,9 @@ std::vector<std::uint32_t> spend_bytes(const std::vector<RdCurve>& curves, std::
   std::uint64_t left = budget_bytes;
   for (const Step& step : steps) {
     if (ended[step.curve]) continue;
+    // Rejected: smaller steps of ended curves with what is left, and the best quality for all where that
+    // loses less. Neither changed a third decimal of the bytes at equal loss on eight scans: rd is at most
+    // 0.5 % above what parts of steps would give, the price of whole fragments (64 of them).
     if (step.bytes > left) {
       ended[step.curve] = true;
       continue;

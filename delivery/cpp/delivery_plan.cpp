@@ -50,7 +50,8 @@ void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPla
     plan.worst_quality = std::min(plan.worst_quality, quality);
   }
   plan.mean_quality = list.offers.empty() ? 100 : weight > 0 ? mean / weight : 0;
-  plan.texture_dssim = list.total_weight > 0 ? plan.textures.loss / list.total_weight : 0;
+  plan.texture_dssim =
+      list.total_weight > 0 ? (plan.textures.loss + list.preview_loss) / list.total_weight : 0;
 }
 
 /// Bytes of a range that the first request has not brought yet.

@@ -55,20 +55,27 @@ void add_plane(PackageReader& package, std::uint32_t plane, const ListOptions& o
   for (const std::uint16_t f : t.order) {
     FragmentOffer o;
     const double weight = role * weights[f];
-    o.loss.push_back(weight * (t.skip_dssim.empty() ? 1.0 : t.skip_dssim[f]));
-    bool stored = true;
+    const double skipped = t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[f]);
+    o.loss.push_back(weight * skipped);
+    bool stored = true, shows_more = false;
     for (std::size_t r = 0; r < t.rung_count(); ++r) {
       const std::uint64_t bytes = bytes_to_show(t, r, f);
       stored = stored && bytes > 0 && bytes <= 0xffffffffu;
       o.bytes.push_back(static_cast<std::uint32_t>(bytes));
-      o.loss.push_back(weight * t.dssim[r * t.fragment_count() + f]);
+      const double dssim = static_cast<double>(t.dssim[r * t.fragment_count() + f]);
+      o.loss.push_back(weight * dssim);
+      shows_more = shows_more || dssim < skipped;
     }
     if (!stored) continue;
+    list.total_weight += weight;
+    if (!shows_more) {
+      list.preview_loss += o.loss[0];
+      continue;
+    }
     o.eta = eta[f] * weight;
     o.planned_bytes = std::max(1.0, interpolated_bytes(t, f, quality[f]));
     o.low_rung = std::min(low, high);
     o.high_rung = high;
-    list.total_weight += weight;
     list.fragments.push_back({plane, f});
     list.offers.push_back(std::move(o));
   }
@@ -168,7 +175,7 @@ TextureBudget spend_on(PackageReader& package, std::vector<PlaneChoice> planes, 
       curve.loss.push_back(static_cast<std::uint64_t>(loss / total * kLossUnit));
     curves.push_back(std::move(curve));
   }
-  double loss = 0;
+  double loss = out.list.preview_loss;
   const std::vector<std::uint32_t> ways = spend_bytes(curves, bytes);
   for (std::size_t i = 0; i < ways.size(); ++i) {
     out.rungs.push_back(static_cast<std::int32_t>(ways[i]) - 1);

@@ -20,11 +20,13 @@ struct ListedFragment {
 };
 
 /// The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4),
-/// ordered by eta x weight of the role x share of the surface.
+/// ordered by eta x weight of the role x share of the surface. Fragments of which no rung shows more than the
+/// preview does (1 - SSIM of the tables) are left to it.
 struct FragmentList {
   std::vector<FragmentOffer> offers;
   std::vector<ListedFragment> fragments;  // by offer
   double total_weight = 0;                // of the losses: a loss of this is 1 - SSIM = 1 everywhere
+  double preview_loss = 0;  // of fragments not in the list: no rung shows more of them than the preview
 };
 
 /// What a role counts for in the list and in losses: 1 for base colour, less for what changes the picture

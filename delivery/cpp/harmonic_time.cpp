@@ -58,10 +58,16 @@ std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers) {
   return best;
 }
 
-std::size_t lowest(const FragmentOffer& f, bool hard) {
-  return hard ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
-}
 std::size_t highest(const FragmentOffer& f) { return std::min<std::size_t>(f.high_rung, f.bytes.size() - 1); }
+
+/// The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does.
+std::size_t lowest(const FragmentOffer& f, bool limits, bool hard) {
+  const std::size_t low = limits ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
+  if (hard) return low;
+  for (std::size_t r = low; r <= highest(f); ++r)
+    if (f.loss[r + 1] < f.loss[0]) return r;
+  return low;
+}
 
 }  // namespace
 
@@ -84,8 +90,8 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
   for (const FragmentOffer& f : offers_) {
     planned_.push_back(f.planned_bytes);
     planned_total_ += f.planned_bytes;
-    smallest_left_ += f.bytes[lowest(f, options_.hard_limits)];
-    low_left_ += f.bytes[lowest(f, true)];
+    smallest_left_ += f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)];
+    low_left_ += f.bytes[lowest(f, true, options_.hard_limits)];
   }
   planned_left_ = planned_total_;
   // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
@@ -124,7 +130,8 @@ void HarmonicTimePlan::plan_for_least_loss() {
   planned_total_ = 0;
   for (std::size_t i = 0; i < offers_.size(); ++i) {
     const FragmentOffer& f = offers_[i];
-    planned_[i] = std::max<double>(price_bytes_[i], f.bytes[lowest(f, options_.hard_limits)]);
+    planned_[i] =
+        std::max<double>(price_bytes_[i], f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)]);
     planned_total_ += planned_[i];
   }
   planned_left_ = planned_total_;
@@ -206,8 +213,8 @@ void HarmonicTimePlan::take(std::uint32_t offer) {
   while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
   while (left_ < right_ && taken_[sorted_[right_ - 1]]) --right_;
   planned_left_ -= planned_[offer];
-  smallest_left_ -= f.bytes[lowest(f, options_.hard_limits)];
-  low_left_ -= f.bytes[lowest(f, true)];
+  smallest_left_ -= f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)];
+  low_left_ -= f.bytes[lowest(f, true, options_.hard_limits)];
   if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
 }
 
@@ -301,9 +308,9 @@ std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, doubl
 
 std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool limits,
                                                bool may_skip) const {
-  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, limits));
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, limits, options_.hard_limits));
   double distance = std::abs(target - (best < 0 ? 0.0 : f.bytes[static_cast<std::size_t>(best)]));
-  for (std::size_t r = lowest(f, limits); r <= highest(f); ++r)
+  for (std::size_t r = lowest(f, limits, options_.hard_limits); r <= highest(f); ++r)
     if (const double d = std::abs(target - f.bytes[r]); d < distance) {
       distance = d;
       best = static_cast<std::int32_t>(r);
@@ -313,7 +320,7 @@ std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double ta
 
 std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double price, bool may_skip,
                                                 double most_bytes) const {
-  const std::size_t low = lowest(f, options_.hard_limits);
+  const std::size_t low = lowest(f, options_.hard_limits, options_.hard_limits);
   std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
   double cost = may_skip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
   for (std::size_t r = low; r <= highest(f); ++r) {

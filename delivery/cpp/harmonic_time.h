@@ -44,7 +44,7 @@ struct HtcOptions {
   int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2
   int max_in_flight = 64;
   // true: never below low_rung, nothing skipped, as in the thesis. false: so while the time is enough for it,
-  // then the bottom of the ladder, then skipping.
+  // then the bottom of the ladder, then skipping; and never a rung that loses no less than skipping does.
   bool hard_limits = false;
   double guard = 1.5;       // factor of kGuard, > 1
   double price_kappa = 10;  // how fast kPrice's price rises with delay

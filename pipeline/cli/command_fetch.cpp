@@ -174,7 +174,7 @@ std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const Htt
 void predict(PackageReader& package, const DeliveryRequest& request, const TextureLoader& loader,
              const std::vector<PlaneChoice>& planes, const ListOptions& options, Fetched& f) {
   const FragmentList list = fragment_list(package, planes, options);
-  double loss = 0;
+  double loss = list.preview_loss;
   for (std::size_t i = 0; i < list.offers.size(); ++i)
     loss += list.offers[i].loss[static_cast<std::size_t>(
         loader.held(list.fragments[i].plane, list.fragments[i].fragment) + 1)];

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -128,6 +129,24 @@ TEST(HarmonicTime, ATenfoldDropIsMetByTheBottomOfTheLadderAndSkips) {
   EXPECT_EQ(r.skipped, 0u);
   for (const std::int32_t rung : r.rungs) EXPECT_GE(rung, 2);
   EXPECT_GT(r.late_s, 0.5 * limit);  // what limits cost that are none
+}
+
+TEST(HarmonicTime, RungsThatShowLessThanThePreviewAreNotAskedFor) {
+  std::vector<FragmentOffer> offers = some_offers(128);
+  for (FragmentOffer& f : offers) f.loss[0] = 0.2;  // rungs 0 and 1 lose 0.5 and 0.25
+  const double limit = planned(offers) / 1e4;
+  for (const Policy policy : {Policy::kHtc, Policy::kGuard, Policy::kPrice}) {
+    HtcOptions o = serial(limit, 2e3);
+    o.policy = policy;
+    const SimulationResult r = simulate_samples(offers, o, [](std::size_t, double) { return 2e3; });
+    for (const std::int32_t rung : r.rungs) EXPECT_TRUE(rung < 0 || rung >= 2) << rung;
+    EXPECT_LE(r.late_s, 0.02 * limit);
+    EXPECT_LT(r.loss, 0.2 * 128) << "more is shown than the previews do";
+  }
+  HtcOptions hard = serial(limit, 2e3);
+  hard.hard_limits = true;  // the thesis knows no previews
+  const SimulationResult r = simulate_samples(offers, hard, [](std::size_t, double) { return 2e3; });
+  EXPECT_EQ(*std::min_element(r.rungs.begin(), r.rungs.end()), 0);
 }
 
 TEST(HarmonicTime, TheStaticPolicyAdaptsToNothing) {

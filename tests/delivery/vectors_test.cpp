@@ -201,6 +201,12 @@ Json harmonic_time() {
   const auto offers = some_offers(18, 6, 41);
   cases.push_back(play("every fifth transfer is given up", offers, limit(offers, 2e4, Policy::kGuard, 3),
                        link(bursty, 0.02), 5));
+  for (const Policy policy : {Policy::kHtc, Policy::kGuard, Policy::kPrice}) {
+    auto worse = some_offers(24, 6, 43);
+    for (std::size_t i = 0; i < worse.size(); ++i) worse[i].loss[0] = 0.9 * worse[i].loss[1 + i % 4];
+    cases.push_back(play(std::string("the lowest rungs show less than the preview, ") + kPolicies.at(policy),
+                         worse, limit(worse, 1.2e4, policy, 0), link(bursty, 0.02)));
+  }
   const auto one = some_offers(1, 3, 42);
   cases.push_back(play("one fragment", one, limit(one, 2e4, Policy::kHtc, 0), link(bursty, 0.02)));
   return cases;
@@ -393,6 +399,7 @@ Json lists(PackageReader& package) {
                    {"fragments", fragments},
                    {"offers", offers_json(list.offers)},
                    {"total_weight", list.total_weight},
+                   {"preview_loss", list.preview_loss},
                    {"dssim_quality_ssim", qualities},
                    {"budgets", budgets(package, px, o)}});
   }

@@ -49,6 +49,7 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
     PlaneTables t = make_tables(2, 1, 2, 1);
     t.order = {1, 0};
     t.covered_texels = {100, 200};
+    t.skip_dssim = {1.5f, 1.5f};  // every rung shows more
     std::vector<std::uint8_t> streams;
     for (std::uint32_t r = 0; r < 2; ++r) {
       t.table_bytes[r] = 20 + r;

@@ -29,6 +29,8 @@ export interface FragmentList {
   fragments: ListedFragment[];
   /** Of the losses: a loss of this is 1 - SSIM = 1 everywhere. */
   totalWeight: number;
+  /** Of fragments that are not in the list because no rung shows more of them than the preview. */
+  previewLoss: number;
 }
 /** Of fragmentList. */
 export interface ListOptions {
@@ -83,13 +85,21 @@ function addPlane(data: PackageData, plane: number, options: ListOptions, list: 
   for (const f of t.order) {
     const weight = role * weights[f];
     const bytes: number[] = [];
-    const loss = [weight * (t.skipDssim.length === 0 ? 1 : t.skipDssim[f])];
+    const skipped = t.skipDssim.length === 0 ? 1 : t.skipDssim[f];
+    const loss = [weight * skipped];
+    let showsMore = false;
     for (let r = 0; r < rungCount(t); ++r) {
+      const dssim = t.dssim[r * fragments + f];
       bytes.push(bytesToShow(t, r, f));
-      loss.push(weight * t.dssim[r * fragments + f]);
+      loss.push(weight * dssim);
+      showsMore ||= dssim < skipped;
     }
     if (!bytes.every((b) => b > 0 && b <= 0xffffffff)) continue;
     list.totalWeight += weight;
+    if (!showsMore) {
+      list.previewLoss += loss[0];
+      continue;
+    }
     list.fragments.push({ plane, fragment: f });
     list.offers.push({
       bytes,
@@ -110,7 +120,7 @@ export function fragmentList(
   planes: readonly PlaneChoice[],
   options: Partial<ListOptions> = {},
 ): FragmentList {
-  const list: FragmentList = { offers: [], fragments: [], totalWeight: 0 };
+  const list: FragmentList = { offers: [], fragments: [], totalWeight: 0, previewLoss: 0 };
   for (const p of planes) addPlane(data, p.plane, { ...defaultListOptions, ...options }, list);
   return list;
 }
@@ -240,7 +250,7 @@ function spendOn(
     loss: f.loss.map((l) => Math.floor((l / total) * lossUnit)),
   }));
   const ways = spendBytes(curves, budget);
-  let loss = 0;
+  let loss = list.previewLoss;
   let bytes = 0;
   ways.forEach((way, i) => {
     bytes += curves[i].bytes[way];

@@ -139,8 +139,15 @@ function meanFragment(offers: readonly FragmentOffer[]): number {
   return best;
 }
 
-const lowest = (f: FragmentOffer, hard: boolean): number => (hard ? Math.min(f.lowRung, f.bytes.length - 1) : 0);
 const highest = (f: FragmentOffer): number => Math.min(f.highRung ?? anyRung, f.bytes.length - 1);
+
+/** The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does. */
+function lowest(f: FragmentOffer, limits: boolean, hard: boolean): number {
+  const low = limits ? Math.min(f.lowRung, f.bytes.length - 1) : 0;
+  if (hard) return low;
+  for (let r = low; r <= highest(f); ++r) if (f.loss[r + 1] < f.loss[0]) return r;
+  return low;
+}
 
 /**
  * Decides fragment by fragment what to ask for: call next() until it gives nothing, and completed() or failed() for every request.
@@ -190,10 +197,11 @@ export class HarmonicTimePlan {
     this.right_ = n;
     this.mean_ = meanFragment(offers);
     this.planned_ = offers.map((f) => f.plannedBytes);
+    const hard = options_.hardLimits;
     for (const f of offers) {
       this.plannedTotal_ += f.plannedBytes;
-      this.smallestLeft_ += f.bytes[lowest(f, options_.hardLimits)];
-      this.lowLeft_ += f.bytes[lowest(f, true)];
+      this.smallestLeft_ += f.bytes[lowest(f, hard, hard)];
+      this.lowLeft_ += f.bytes[lowest(f, true, hard)];
     }
     this.plannedLeft_ = this.plannedTotal_;
     // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come next; with
@@ -255,7 +263,7 @@ export class HarmonicTimePlan {
 
   private planForLeastLoss_(): void {
     const hard = this.options_.hardLimits;
-    this.planned_ = this.offers.map((f, i) => Math.max(this.priceBytes_[i], f.bytes[lowest(f, hard)]));
+    this.planned_ = this.offers.map((f, i) => Math.max(this.priceBytes_[i], f.bytes[lowest(f, hard, hard)]));
     this.plannedTotal_ = 0;
     for (const b of this.planned_) this.plannedTotal_ += b;
     this.plannedLeft_ = this.plannedTotal_;
@@ -339,8 +347,9 @@ export class HarmonicTimePlan {
     while (this.left_ < this.right_ && this.taken_[this.sorted_[this.left_]]) ++this.left_;
     while (this.left_ < this.right_ && this.taken_[this.sorted_[this.right_ - 1]]) --this.right_;
     this.plannedLeft_ -= this.planned_[offer];
-    this.smallestLeft_ -= f.bytes[lowest(f, this.options_.hardLimits)];
-    this.lowLeft_ -= f.bytes[lowest(f, true)];
+    const hard = this.options_.hardLimits;
+    this.smallestLeft_ -= f.bytes[lowest(f, hard, hard)];
+    this.lowLeft_ -= f.bytes[lowest(f, true, hard)];
     if (this.priceBytes_.length > 0) this.priceDone_ += this.priceBytes_[offer];
   }
 
@@ -431,7 +440,7 @@ export class HarmonicTimePlan {
   }
 
   private nearestRungOf_(f: FragmentOffer, target: number, limits: boolean, maySkip: boolean): number {
-    const low = lowest(f, limits);
+    const low = lowest(f, limits, this.options_.hardLimits);
     let best = maySkip ? -1 : low;
     let distance = Math.abs(target - (best < 0 ? 0 : f.bytes[best]));
     for (let r = low; r <= highest(f); ++r) {
@@ -445,7 +454,8 @@ export class HarmonicTimePlan {
   }
 
   private cheapestRungOf_(f: FragmentOffer, price: number, maySkip: boolean, mostBytes: number): number {
-    const low = lowest(f, this.options_.hardLimits);
+    const hard = this.options_.hardLimits;
+    const low = lowest(f, hard, hard);
     let best = maySkip ? -1 : low;
     let cost = maySkip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
     for (let r = low; r <= highest(f); ++r) {

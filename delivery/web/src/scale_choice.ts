@@ -70,7 +70,7 @@ function* texturesInTime(data: PackageData, quality: QualityTable, request: InTi
       ? simulate(list.offers, htc, link)
       : { rungs: list.offers.map(() => -1), bytes: 0, endS: 0, loss: list.offers.reduce((sum, o) => sum + o.loss[0], 0) };
   yield;
-  const shown = list.totalWeight > 0 ? played.loss / list.totalWeight : 0;
+  const shown = list.totalWeight > 0 ? (played.loss + list.previewLoss) / list.totalWeight : 0;
   const textureDssim = 1 - (1 - shown) * (1 - mipLoss(data, planes, displayedPx));
   const ssim = predictedSsim(quality, scale, equivalentQuality(data, planesForDisplay(data, displayedPx), textureDssim));
   return { scale, planes, list, textureDssim, ssim, rungs: played.rungs, bytes: played.bytes, endS: played.endS, late: htc.timeLimitS <= 0 };

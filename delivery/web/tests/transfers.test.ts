@@ -47,6 +47,17 @@ async function setUp(fault?: Fault) {
 const wishesOf = (list: FragmentList, rung: number): Wish[] =>
   list.fragments.map((f, offer) => ({ ...f, rung: Math.min(rung, list.offers[offer].bytes.length - 1), offer }));
 
+describe('fragment list', () => {
+  it('leaves to the preview what no rung shows better', async () => {
+    const { data, list } = await setUp();
+    const tables = data.tables.map((t, p) => (t && p === 0 ? { ...t, skipDssim: t.skipDssim.map(() => 0) } : t));
+    const shorter = fragmentList({ ...data, tables }, fullSize(data.textures), { scale: 0 });
+    expect(shorter.fragments).toEqual(list.fragments.filter((f) => f.plane !== 0));
+    expect(shorter.fragments.length).toBeLessThan(list.fragments.length);
+    expect([shorter.totalWeight, shorter.previewLoss]).toEqual([list.totalWeight, 0]);
+  });
+});
+
 describe('transfers', () => {
   it('neighbours of a rung share a request, nothing comes twice', async () => {
     const s = await setUp();

@@ -137,7 +137,7 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
     for (const name of Object.keys(o))
       expectBits([(list.offers[i] as Json)[name]].flat(), [o[name]].flat(), `offer ${i}: ${name}`);
   });
-  expectBits([list.totalWeight], [v.total_weight], 'weight');
+  expectBits([list.totalWeight, list.previewLoss], [v.total_weight, v.preview_loss], 'weight');
   for (const b of v.budgets) {
     const budget = t.textureForBudget(data, v.displayed_px, { scale: v.scale }, b.budget_bytes);
     expect(budget.planes.map((p) => [p.base, p.plane])).toEqual(b.planes);
