@@ -1,7 +1,7 @@
 // Baseline JPEG: every rung has Huffman tables trained on a sample of the plane, and everything that
 // fragments have in common stands in the rung's table stream. Fragments with uncovered texels are coded by
 // MaskedJpeg, all others by libjpeg.
-#include <algorithm>
+#include <functional>
 
 #include "stages/jpeg_coder.h"
 #include "stages/masked_jpeg.h"
@@ -39,15 +39,17 @@ class JpegCodec : public TextureCodec {
   std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
     std::vector<CodecRung> rungs(plane_.qualities.size());
     tables_.resize(rungs.size());
-    parallel_for(context, rungs.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        const JpegKind kind = kind_of(plane_, plane_.qualities[r]);
-        JpegCoder coder(kind);
-        tables_[r] = train_rung(kind, coder, sample);
-        coder.use_tables(tables_[r]);
-        rungs[r] = {plane_.qualities[r],
-                    coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px)};
-      }
+    std::vector<PixelWindow> whole, part;
+    for (const PixelWindow& window : sample) (wholly_covered(window) ? whole : part).push_back(window);
+    std::vector<Training> training(rungs.size());
+    for_each(context, rungs.size(), [&](std::size_t r) { training[r] = train_plainly(r, sample, whole); });
+    if (!part.empty()) count_masked(part, context, training);
+    for_each(context, rungs.size(), [&](std::size_t r) {
+      JpegCoder coder(kind_of(plane_, plane_.qualities[r]));
+      tables_[r] = sample.empty() ? coder.tables() : tables_for(coder, training[r].counts);
+      coder.use_tables(tables_[r]);
+      rungs[r] = {plane_.qualities[r],
+                  coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px)};
     });
     return rungs;
   }
@@ -55,26 +57,56 @@ class JpegCodec : public TextureCodec {
   std::unique_ptr<FragmentEncoder> encoder() const override { return std::make_unique<Encoder>(*this); }
 
  private:
-  static HuffmanTables train_rung(const JpegKind& kind, JpegCoder& coder,
-                                  std::span<const PixelWindow> sample) {
-    HuffmanTables tables = coder.tables();
-    SymbolCounts counts(tables.size());
-    for (const PixelWindow& window : sample) coder.count_symbols(window, counts);
+  /// Of one rung: what masked blocks are to be chosen by, and symbols.
+  struct Training {
+    MaskedRung masked;
+    SymbolCounts counts;
+  };
+
+  static void for_each(const RunContext& context, std::size_t count,
+                       const std::function<void(std::size_t)>& body) {
+    parallel_for(context, count, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) body(k);
+    });
+  }
+
+  static HuffmanTables tables_for(const JpegCoder& coder, const SymbolCounts& counts) {
     const auto possible = coder.possible_symbols();
-    for (std::size_t k = 0; k < tables.size() && !sample.empty(); ++k)
-      tables[k] = table_for(counts[k], possible[k]);
-    if (std::all_of(sample.begin(), sample.end(), wholly_covered)) return tables;
-    // Which symbols masked blocks take depends on their bits: once more, with those of the plain blocks.
-    const MaskedRung rung = masked_rung(kind, coder.quantisers(), tables);
-    MaskedJpeg masked(kind);
-    counts.assign(tables.size(), {});
-    for (const PixelWindow& window : sample)
-      if (wholly_covered(window))
-        coder.count_symbols(window, counts);
-      else
-        masked.count_symbols(window, rung, counts);
-    for (std::size_t k = 0; k < tables.size(); ++k) tables[k] = table_for(counts[k], possible[k]);
+    HuffmanTables tables;
+    for (std::size_t k = 0; k < counts.size(); ++k) tables.push_back(table_for(counts[k], possible[k]));
     return tables;
+  }
+
+  /// Counts the symbols of wholly covered windows. Which symbols masked blocks take depends on the bits of
+  /// symbols: those of plain blocks for a start.
+  Training train_plainly(std::size_t r, std::span<const PixelWindow> sample,
+                         std::span<const PixelWindow> whole) const {
+    const JpegKind kind = kind_of(plane_, plane_.qualities[r]);
+    JpegCoder coder(kind);
+    Training out;
+    out.counts.resize(coder.tables().size());
+    for (const PixelWindow& window : whole) coder.count_symbols(window, out.counts);
+    if (whole.size() == sample.size()) return out;
+    SymbolCounts all(out.counts.size());
+    for (const PixelWindow& window : sample) coder.count_symbols(window, all);
+    out.masked = masked_rung(kind, coder.quantisers(), tables_for(coder, all));
+    return out;
+  }
+
+  /// Adds those of windows covered in part.
+  void count_masked(std::span<const PixelWindow> part, const RunContext& context,
+                    std::vector<Training>& training) const {
+    std::vector<MaskedRung> rungs;
+    for (const Training& t : training) rungs.push_back(t.masked);
+    std::vector<std::vector<SymbolCounts>> counts(part.size());
+    for_each(context, part.size(), [&](std::size_t w) {
+      counts[w].assign(rungs.size(), SymbolCounts(training[0].counts.size()));
+      MaskedJpeg(kind_of(plane_, plane_.qualities[0])).count_symbols(part[w], rungs, counts[w]);
+    });
+    for (const auto& window : counts)
+      for (std::size_t r = 0; r < window.size(); ++r)
+        for (std::size_t k = 0; k < window[r].size(); ++k)
+          for (std::size_t s = 0; s < window[r][k].size(); ++s) training[r].counts[k][s] += window[r][k][s];
   }
 
   class Encoder : public FragmentEncoder {

@@ -31,6 +31,8 @@ constexpr float kNewBits = 5;
 constexpr float kRounding = 0.35f, kRoundingBelowOne = 0.25f;
 // Then the best changes are taken to gain no more bits than this.
 constexpr float kMostBits = 8;
+// What making a value smaller saves at most, in bits, but for rare codes: that of 1, and others.
+constexpr float kVanishingBits = 10, kSmallerBits = 3;
 // So many coefficients are taken out of the rest one by one; more go together, by transforms.
 constexpr int kFewMoves = 6;
 
@@ -219,15 +221,19 @@ CodedBlock coded_block(const BlockValues& steps) {
   return out;
 }
 
-/// Bit n: the coefficient of frequency n may take fewer bits when it is made smaller.
-std::uint64_t trims_of(const CodedBlock& block) {
-  std::uint64_t out = 0;
-  for (std::uint64_t used = block.used; used != 0; used &= used - 1) {
-    const auto k = static_cast<std::size_t>(std::countr_zero(used));
-    const int size = std::abs(block.values[k]);
-    if (k == 0 || (size & (size - 1)) == 0) out |= std::uint64_t{1} << kNaturalOfZigzag[k];
-  }
-  return out;
+/// Bit k: coefficient k, made smaller by one quantiser, may save more bits than it costs error: one that
+/// vanishes at most kVanishingBits, others kSmallerBits.
+std::uint64_t worth_a_trim(const BlockValues& rest, const BlockValues& energy, const BlockCoding& coding,
+                           const BlockValues& coded) {
+  const Quad vanishing = Quad{} + kVanishingBits * coding.bit_cost,
+             smaller = Quad{} + kSmallerBits * coding.bit_cost;
+  return mask_where([&](std::size_t k) {
+    const Quad c = load_quad(coded, k), q = load_quad(coding.quantisers, k);
+    const Quad toward_zero =
+        (Quad)((Bits)load_quad(rest, k) ^ ((Bits)c & std::numeric_limits<std::int32_t>::min()));
+    const Quad cost = q * (toward_zero + toward_zero + q * load_quad(energy, k));
+    return (c != 0) & (cost < (magnitude(c) < 1.5f * q ? vanishing : smaller));
+  });
 }
 
 void subtract(BlockValues& from, float times, const BlockValues& column) {
@@ -327,7 +333,7 @@ CodedBlock MaskedBlock::quantise(const BlockCoding& coding, int dc_before) {
     least = std::max(std::min(promise.peak, least) * kPassPart, worth);
     const bool trim = least == worth;
     std::uint64_t left = promise.at_least(std::max(least, 1e-30f));
-    if (trim) left |= trims_of(block);
+    if (trim) left |= worth_a_trim(rest_, energy, coding, coded_);
     bool changed = false;
     for (; left != 0; left &= left - 1) {
       const auto n = static_cast<std::size_t>(std::countr_zero(left));

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <utility>
 
 #include "stages/jpeg_stream.h"
@@ -38,37 +39,51 @@ std::size_t table_pair(const JpegKind& kind, std::size_t component) {
   return component > (kind.rgb ? 1u : 0u) ? 1 : 0;  // as JpegCoder
 }
 
+// What a block takes at most: 64 symbols of 16 + 11 bits, each byte perhaps with a zero behind it.
+constexpr std::size_t kMostBlockBytes = 512;
+
 /// Writes entropy-coded bits, with a zero behind every 0xFF.
 class BitSink {
  public:
-  BitSink(std::vector<std::uint8_t>& out, const MaskedRung& rung) : out_(&out), rung_(&rung) {}
-  void dc(std::size_t component, unsigned symbol, unsigned value) {
-    put((*rung_)[component].dc, symbol, value, symbol);
+  BitSink(std::vector<std::uint8_t>& out, const MaskedRung& rung)
+      : out_(&out), rung_(&rung), used_(out.size()) {}
+  void begin_block(std::size_t component) {
+    coding_ = &(*rung_)[component];
+    if (out_->size() - used_ < kMostBlockBytes) out_->resize(2 * out_->size() + kMostBlockBytes);
   }
-  void ac(std::size_t component, unsigned symbol, unsigned value) {
-    put((*rung_)[component].ac, symbol, value, symbol & 15u);
-  }
+  void dc(unsigned symbol, unsigned value) { put(coding_->dc, symbol, value, symbol); }
+  void ac(unsigned symbol, unsigned value) { put(coding_->ac, symbol, value, symbol & 15u); }
   /// The last byte is filled with ones.
   void finish() {
-    if (count_ > 0) add((1u << (8 - count_)) - 1, 8 - count_);
+    if (count_ > 0) {
+      const unsigned fill = (8 - count_ % 8) % 8;
+      add((1u << fill) - 1, fill);
+    }
+    while (count_ > 0) write(static_cast<std::uint8_t>(held_ >> (count_ -= 8)));
+    out_->resize(used_);
   }
 
  private:
   void put(const SymbolCodes& codes, unsigned symbol, unsigned value, unsigned size) {
-    add(codes.code[symbol], codes.bits[symbol]);
-    if (size > 0) add(value & ((1u << size) - 1), size);
+    add(unsigned{codes.code[symbol]} << size | (value & ((1u << size) - 1)), codes.bits[symbol] + size);
   }
   void add(unsigned value, unsigned count) {
     held_ = held_ << count | value;
-    for (count_ += count; count_ >= 8;) {
-      count_ -= 8;
-      const auto byte = static_cast<std::uint8_t>(held_ >> count_);
-      out_->push_back(byte);
-      if (byte == 0xff) out_->push_back(0);
+    count_ += count;
+    while (count_ >= 32) {
+      count_ -= 32;
+      const auto word = static_cast<std::uint32_t>(held_ >> count_);
+      for (unsigned shift = 32; shift > 0;) write(static_cast<std::uint8_t>(word >> (shift -= 8)));
     }
+  }
+  void write(std::uint8_t byte) {
+    (*out_)[used_++] = byte;
+    if (byte == 0xff) (*out_)[used_++] = 0;
   }
   std::vector<std::uint8_t>* out_;
   const MaskedRung* rung_;
+  const BlockCoding* coding_ = nullptr;
+  std::size_t used_;
   std::uint64_t held_ = 0;
   unsigned count_ = 0;
 };
@@ -76,16 +91,14 @@ class BitSink {
 class CountSink {
  public:
   CountSink(const JpegKind& kind, SymbolCounts& counts) : kind_(&kind), counts_(&counts) {}
-  void dc(std::size_t component, unsigned symbol, unsigned) {
-    ++(*counts_)[2 * table_pair(*kind_, component)][symbol];
-  }
-  void ac(std::size_t component, unsigned symbol, unsigned) {
-    ++(*counts_)[2 * table_pair(*kind_, component) + 1][symbol];
-  }
+  void begin_block(std::size_t component) { dc_ = counts_->data() + 2 * table_pair(*kind_, component); }
+  void dc(unsigned symbol, unsigned) { ++(*dc_)[symbol]; }
+  void ac(unsigned symbol, unsigned) { ++dc_[1][symbol]; }
 
  private:
   const JpegKind* kind_;
   SymbolCounts* counts_;
+  SymbolCounts::value_type* dc_ = nullptr;  // and AC behind it
 };
 
 /// The symbols of a block, ISO 10918-1 F.1.2.
@@ -95,18 +108,19 @@ void emit(const CodedBlock& block, int dc_before, std::size_t component, Sink& s
     return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(v))));
   };
   const auto bits = [](int v) { return static_cast<unsigned>(v < 0 ? v - 1 : v); };
+  sink.begin_block(component);
   const int step = block.values[0] - dc_before;
-  sink.dc(component, size(step), bits(step));
+  sink.dc(size(step), bits(step));
   unsigned before = 0;
   for (std::uint64_t left = block.used & ~std::uint64_t{1}; left != 0; left &= left - 1) {
     const auto k = static_cast<unsigned>(std::countr_zero(left));
     const int value = block.values[k];
     unsigned zeros = k - before - 1;
-    for (; zeros > 15; zeros -= 16) sink.ac(component, 0xf0, 0);
-    sink.ac(component, zeros << 4 | size(value), bits(value));
+    for (; zeros > 15; zeros -= 16) sink.ac(0xf0, 0);
+    sink.ac(zeros << 4 | size(value), bits(value));
     before = k;
   }
-  if (before < 63) sink.ac(component, 0, 0);
+  if (before < 63) sink.ac(0, 0);
 }
 
 /// A component's samples as JPEG has them before chroma is halved, less 128. In libjpeg's integers.
@@ -132,9 +146,17 @@ void component_values(const PixelWindow& image, const JpegKind& kind, std::size_
 enum class Seen : std::uint8_t { kNothing, kPart, kAll };
 
 Seen seen(const BlockValues& weights) {
-  float sum = 0, least = 1;
-  for (const float w : weights) sum += w, least = std::min(least, w);
-  return least >= 1 ? Seen::kAll : sum > 0 ? Seen::kPart : Seen::kNothing;
+  bool all = true, any = false;
+  for (const float w : weights) all &= w >= 1, any |= w > 0;
+  return all ? Seen::kAll : any ? Seen::kPart : Seen::kNothing;
+}
+
+float mean_of(const BlockValues& samples) {
+  std::array<float, 8> sums{};
+  for (std::size_t k = 0; k < 64; ++k) sums[k % 8] += samples[k];
+  float sum = 0;
+  for (const float s : sums) sum += s;
+  return sum / 64;
 }
 
 /// A block that nobody sees.
@@ -179,48 +201,56 @@ MaskedJpeg::MaskedJpeg(const JpegKind& kind)
       halved_(kind.channels == 3 && !kind.rgb && kind.subsampling == Subsampling::k420),
       components_(kind.channels) {}
 
-/// A sample of halved chroma is the mean of its covered texels. Its weight: what bilinear interpolation (9,
-/// 3, 3 and 1 sixteenths, edges repeated) of covered texels takes from it, 1 when all of them are covered.
-void MaskedJpeg::halve(const std::vector<float>& mask, Component& chroma, std::vector<float>& weights) const {
-  const std::uint32_t w = chroma.width, h = chroma.height;
+/// A sample of halved chroma is the mean of its covered texels.
+void MaskedJpeg::halve(Component& chroma) const {
+  const std::uint32_t w = chroma.width;
   chroma.width /= 2, chroma.height /= 2;
   std::vector<float> values(std::size_t{chroma.width} * chroma.height);
-  const bool weigh = weights.empty();
-  if (weigh) weights.resize(values.size());
-  for (std::uint32_t y = 0; y < chroma.height; ++y)
+  for (std::uint32_t y = 0; y < chroma.height; ++y) {
+    const std::size_t row = std::size_t{2 * y} * w;
     for (std::uint32_t x = 0; x < chroma.width; ++x) {
-      const std::size_t to = std::size_t{y} * chroma.width + x;
       float covered = 0, all = 0, count = 0;
-      for (std::uint32_t t = 0; t < 4; ++t) {
-        const std::size_t at = std::size_t{2 * y + t / 2} * w + 2 * x + t % 2;
-        covered += mask[at] * chroma.values[at], count += mask[at], all += chroma.values[at];
-      }
-      values[to] = count > 0 ? covered / count : all / 4;
-      if (!weigh) continue;
-      float taken = 0;
-      for (std::uint32_t v = 0; v < 4; ++v)
-        for (std::uint32_t u = 0; u < 4; ++u) {
-          const std::uint32_t row = std::clamp(2 * y + v, 1u, h) - 1,
-                              column = std::clamp(2 * x + u, 1u, w) - 1;
-          taken += mask[std::size_t{row} * w + column] * (v % 3 ? 3.0f : 1.0f) * (u % 3 ? 3.0f : 1.0f);
-        }
-      weights[to] = taken / 64;
+      for (const std::size_t at : {row + 2 * x, row + 2 * x + 1, row + w + 2 * x, row + w + 2 * x + 1})
+        covered += weights_[at] * chroma.values[at], count += weights_[at], all += chroma.values[at];
+      values[std::size_t{y} * chroma.width + x] = count > 0 ? covered / count : all / 4;
     }
+  }
   chroma.values = std::move(values);
+}
+
+/// What bilinear interpolation (9, 3, 3 and 1 sixteenths, edges repeated) of covered texels takes from a
+/// sample of halved chroma, 1 when all of them are covered.
+void MaskedJpeg::weigh_halved(std::uint32_t width, std::uint32_t height) {
+  halved_weights_.resize(weights_.size() / 4);
+  std::vector<float> across(std::size_t{width / 2} * height);
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; x += 2) {
+      const float* row = weights_.data() + std::size_t{y} * width;
+      across[std::size_t{y} * (width / 2) + x / 2] =
+          row[x > 0 ? x - 1 : 0] + 3 * (row[x] + row[x + 1]) + row[std::min(x + 2, width - 1)];
+    }
+  const std::uint32_t half = width / 2;
+  for (std::uint32_t y = 0; y < height; y += 2)
+    for (std::uint32_t x = 0; x < half; ++x) {
+      const auto at = [&](std::uint32_t row) { return across[std::size_t{row} * half + x]; };
+      halved_weights_[std::size_t{y / 2} * half + x] =
+          (at(y > 0 ? y - 1 : 0) + 3 * (at(y) + at(y + 1)) + at(std::min(y + 2, height - 1))) / 64;
+    }
 }
 
 void MaskedJpeg::load(const PixelWindow& image) {
   const std::uint32_t w = image.width_px, h = image.height_px;
-  std::vector<float> mask(std::size_t{w} * h), half;
+  weights_.resize(std::size_t{w} * h);
   for (std::uint32_t y = 0; y < h; ++y)
     for (std::uint32_t x = 0; x < w; ++x)
-      mask[std::size_t{y} * w + x] = image.coverage.bits == nullptr || image.coverage.covered(x, y) ? 1 : 0;
+      weights_[std::size_t{y} * w + x] =
+          image.coverage.bits == nullptr || image.coverage.covered(x, y) ? 1.0f : 0.0f;
+  if (halved_) weigh_halved(w, h);
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& component = components_[c];
     component.width = w, component.height = h;
     component_values(image, kind_, c, component.values);
-    if (halved_ && c > 0) halve(mask, component, half);
-    component.weights = halved_ && c > 0 ? half : mask;
+    if (halved_ && c > 0) halve(component);
   }
 }
 
@@ -228,14 +258,15 @@ template <class Sink>
 void MaskedJpeg::code_block(std::size_t component, std::uint32_t left, std::uint32_t top,
                             std::span<const MaskedRung> rungs, std::span<Sink> sinks) {
   const Component& from = components_[component];
+  const std::vector<float>& from_weights = halved_ && component > 0 ? halved_weights_ : weights_;
   BlockValues samples, weights;
-  float level = 0;
-  for (std::uint32_t k = 0; k < 64; ++k) {
-    const std::size_t at = std::size_t{top + k / 8} * from.width + left + k % 8;
-    samples[k] = from.values[at], weights[k] = from.weights[at];
-    level += samples[k] / 64;
+  for (std::uint32_t y = 0; y < 8; ++y) {
+    const std::size_t at = std::size_t{top + y} * from.width + left;
+    std::memcpy(samples.data() + 8 * y, from.values.data() + at, 8 * sizeof(float));
+    std::memcpy(weights.data() + 8 * y, from_weights.data() + at, 8 * sizeof(float));
   }
   const Seen what = seen(weights);
+  const float level = what == Seen::kNothing ? mean_of(samples) : 0;
   BlockValues coefficients{};
   if (what == Seen::kAll) coefficients = block_dct(samples);
   if (what == Seen::kPart) {
@@ -281,9 +312,11 @@ void MaskedJpeg::append_bodies(const PixelWindow& image, std::span<const MaskedR
   }
 }
 
-void MaskedJpeg::count_symbols(const PixelWindow& image, const MaskedRung& rung, SymbolCounts& counts) {
-  CountSink sink(kind_, counts);
-  code(image, std::span(&rung, 1), std::span(&sink, 1));
+void MaskedJpeg::count_symbols(const PixelWindow& image, std::span<const MaskedRung> rungs,
+                               std::span<SymbolCounts> counts) {
+  std::vector<CountSink> sinks;
+  for (SymbolCounts& c : counts) sinks.emplace_back(kind_, c);
+  code(image, rungs, std::span(sinks));
 }
 
 }  // namespace texmesh

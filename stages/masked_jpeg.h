@@ -36,17 +36,19 @@ class MaskedJpeg {
   /// Appends SOI data EOI of rung r to streams[r], as JpegCoder::append_body() does.
   void append_bodies(const PixelWindow& image, std::span<const MaskedRung> rungs,
                      std::span<std::vector<std::uint8_t>> streams);
-  /// Adds the symbols that coding the image takes at one rung.
-  void count_symbols(const PixelWindow& image, const MaskedRung& rung, SymbolCounts& counts);
+  /// Adds the symbols that coding the image at rung r takes to counts[r].
+  void count_symbols(const PixelWindow& image, std::span<const MaskedRung> rungs,
+                     std::span<SymbolCounts> counts);
 
  private:
-  /// Samples of a component, level shift taken off, and their weights.
+  /// Samples of a component, level shift taken off.
   struct Component {
     std::uint32_t width = 0, height = 0;
-    std::vector<float> values, weights;
+    std::vector<float> values;
   };
   void load(const PixelWindow& image);
-  void halve(const std::vector<float>& mask, Component& chroma, std::vector<float>& weights) const;
+  void weigh_halved(std::uint32_t width, std::uint32_t height);
+  void halve(Component& chroma) const;
   template <class Sink>
   void code(const PixelWindow& image, std::span<const MaskedRung> rungs, std::span<Sink> sinks);
   template <class Sink>
@@ -56,7 +58,8 @@ class MaskedJpeg {
   JpegKind kind_;
   bool halved_;  // chroma
   std::vector<Component> components_;
-  std::vector<std::array<int, 3>> dc_before_;  // [rung][component]
+  std::vector<float> weights_, halved_weights_;  // of samples; of those of halved chroma
+  std::vector<std::array<int, 3>> dc_before_;    // [rung][component]
   MaskedBlock block_;
 };
 

@@ -119,7 +119,7 @@ TEST(MaskedJpeg, CountsTheSymbolsThatItWrites) {
     const MaskedRung rung = masked_rung(kind, coder.quantisers(), coder.tables());
     MaskedJpeg jpeg(kind);
     SymbolCounts ours(coder.tables().size()), theirs(coder.tables().size());
-    jpeg.count_symbols(picture.window(true), rung, ours);
+    jpeg.count_symbols(picture.window(true), std::span(&rung, 1), std::span(&ours, 1));
     std::vector<std::vector<std::uint8_t>> streams(1);
     jpeg.append_bodies(picture.window(true), std::span(&rung, 1), streams);
     std::vector<std::uint8_t> mcu{0};
