@@ -141,6 +141,38 @@ Rungs uniform_rungs(const std::vector<const PlaneTables*>& tables, int quality) 
   return out;
 }
 
+/// What whole rungs leave of the budget: fragment after fragment by falling eta of scale 0 (ties: plane,
+/// index) goes up by a rung where that fits, again and again until none does.
+void spend_rest(const std::vector<const PlaneTables*>& tables, std::uint64_t budget, Rungs& rungs) {
+  struct Place {
+    float eta;
+    std::size_t plane, fragment;
+  };
+  std::vector<Place> places;
+  for (std::size_t p = 0; p < tables.size(); ++p) {
+    const std::vector<float> eta = eta_of(*tables[p], 0);
+    for (std::size_t f = 0; f < eta.size(); ++f)
+      if (rungs[p][f] != kSkipped) places.push_back({eta[f], p, f});
+  }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Place& a, const Place& b) { return a.eta > b.eta; });
+  std::uint64_t spent = bytes_of(tables, rungs);
+  for (bool more = spent < budget; more;) {
+    more = false;
+    for (const Place& at : places) {
+      const PlaneTables& t = *tables[at.plane];
+      std::int16_t& rung = rungs[at.plane][at.fragment];
+      const auto next = static_cast<std::size_t>(rung) + 1;
+      if (next >= t.rung_count()) continue;
+      const std::uint64_t others = spent - bytes_to_show(t, next - 1, at.fragment);
+      if (others + bytes_to_show(t, next, at.fragment) > budget) continue;
+      spent = others + bytes_to_show(t, next, at.fragment);
+      ++rung;
+      more = true;
+    }
+  }
+}
+
 /// (3.2) or its log form with the highest Q_i that fits.
 Rungs variable_rungs(const std::vector<const PlaneTables*>& tables, std::uint8_t allocation, double width,
                      std::uint64_t budget) {
@@ -156,6 +188,7 @@ Rungs variable_rungs(const std::vector<const PlaneTables*>& tables, std::uint8_t
     }
     if (bytes_of(tables, rungs) <= budget) best = std::move(rungs);
   }
+  spend_rest(tables, budget, best);
   return best;
 }
 

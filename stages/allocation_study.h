@@ -29,7 +29,8 @@ struct StudiedChoice {
 };
 
 /// Renders S_0 with each choice's textures. `tables`, `ladder` and `pixels` are those of `fragments`.
-/// Variable choices take the highest Q_i whose bytes fit the budget, Gamma = mean eta of scale 0;
+/// Variable choices take the highest Q_i whose bytes fit the budget, Gamma = mean eta of scale 0, and spend
+/// what is left on one rung more of the fragments with the highest eta, until nothing fits;
 /// rate-distortion spends the budget over all base-colour planes at once and may skip fragments, which then
 /// show the preview. Throws StageError when no base colour has a texture. Same result for any thread count.
 std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,

@@ -45,7 +45,9 @@ FragmentList fragment_list(PackageReader& package, const std::vector<PlaneChoice
 std::vector<PlaneChoice> full_size(PackageReader& package);
 /// The smallest mips that still have a texel for every pixel where the object is displayed `displayed_px`
 /// high (device pixels): by the texels and the share of the surface of each texture, and the surface that the
-/// object shows at most.
+/// object shows at most. Never a finer one, however many bytes are left: reduced to the display, the next
+/// finer size of scans at the bytes of this one's best rung is within 0.004 of its SSIM (0.974 to 0.990, 40
+/// to 48 dB); 0.01 more takes 2 to 3.5 times the bytes, and nobody sees it. Who comes closer gets that size.
 std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px);
 
 /// What the picture loses, as 1 - SSIM over the surface, because mips stand for textures that have more

@@ -320,9 +320,9 @@ void add_quality(CLI::App& study, int& exit_code) {
   c->add_flag("--json", args->json, "One JSON object, for programs");
   c->footer(
       "variable (3.2) and (log): quality by feature density eta, around the highest Q_i whose bytes fit; "
-      "they "
-      "move by\n"
-      "whole rungs, so \"of budget %\" says what they leave of the bytes.\n"
+      "the "
+      "rest goes\n"
+      "to one rung more where eta is highest. \"of budget %\" is what whole rungs come to.\n"
       "rate-distortion: bytes where they save most surface-weighted (1 - SSIM); fragments may be skipped, "
       "which show the\n"
       "preview. Surface SSIM is that of the tables; rendered SSIM and difference (FLIP-like) compare S_0 "

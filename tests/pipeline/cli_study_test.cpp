@@ -72,6 +72,7 @@ TEST_F(StudyCommand, QualityOfAModel) {
   EXPECT_EQ(uniform["highest_quality"], 30);
   for (const Json& c : choices) {
     EXPECT_LE(c["bytes"], uniform["bytes"]);
+    EXPECT_GE(c["bytes"].get<double>(), 0.97 * uniform["bytes"].get<double>()) << c["choice"];
     EXPECT_GT(c["rendered_ssim"], 0.3);
     EXPECT_LE(c["rendered_ssim"], 1);
     EXPECT_GE(c["rendered_difference"], 0);
