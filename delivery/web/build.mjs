@@ -76,7 +76,7 @@ async function bundled(entry) {
     format: 'es', sourcemap: true, dir: dist, plugins: [minified(entry === 'open' ? internal : ['_'])], bundle,
     inlineDynamicImports: entry === 'worker', // which may be served from anywhere
     // A few lines that several parts share are no file of their own.
-    ...(entry === 'open' && { manualChunks: (id) => (/\/(open|codec|tables|textures|throughput)\.ts$/.test(id) ? entry : null) }),
+    ...(entry === 'open' && { manualChunks: (id) => (/\/(open|tables|textures|throughput)\.ts$/.test(id) ? entry : null) }),
     entryFileNames: '[name].js', chunkFileNames: `${entry}-[name].js`,
   };
 }
@@ -88,7 +88,7 @@ async function sizesOf(entry) {
   await bundle.close();
   const sizes = { first: 0, later: 0, fallback: 0 };
   for (const c of chunks.filter((chunk) => chunk.type === 'chunk')) {
-    const kind = c.isEntry ? 'first' : /store_files|store_troubles|sha256_js|enlarge|documents|package_more/.test(c.name) ? 'fallback' : 'later';
+    const kind = c.isEntry ? 'first' : /store_files|store_troubles|sha256_js|enlarge|documents|package_more|entry_paths|codec/.test(c.name) ? 'fallback' : 'later';
     sizes[kind] += gzipSync(c.code.replace(/\n\/\/# sourceMapping.*\n?$/, ''), { level: 9 }).length;
   }
   return sizes;

@@ -1,5 +1,6 @@
 import { toHex } from './bytes';
 import { BytesIn } from './bytes_in';
+import { isValidEntryPath } from './entry_paths';
 import { FormatError } from './errors';
 import * as layout from './layout';
 import { EntryRef, formatMajor, formatMinor } from './manifest';
@@ -74,7 +75,7 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   const bytes = input.u64();
   const digest = input.raw(32);
   const path = input.text(input.u8());
-  if (!layout.isValidEntryPath(path) || path === layout.manifestPath || path === layout.indexPath)
+  if (!isValidEntryPath(path) || path === layout.manifestPath || path === layout.indexPath)
     input.fail('a valid path of an entry', path);
   if (offset % 64 !== 0 || offset === 0) input.fail('an offset that is a multiple of 64', `${offset}`);
   if (layout.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);

@@ -15,20 +15,23 @@ export class JsonAt {
     return this.value_ === undefined ? 'nothing' : String(JSON.stringify(this.value_)).slice(0, 40);
   }
   has(name: string): boolean {
-    return typeof this.value_ === 'object' && this.value_ !== null && Object.hasOwn(this.value_, name);
+    return this.at(name).value_ !== undefined;
   }
   at(name: string | number): JsonAt {
-    const ok = typeof name === 'number' ? Array.isArray(this.value_) : !Array.isArray(this.value_);
-    if (!ok || typeof this.value_ !== 'object' || this.value_ === null)
-      this.fail(typeof name === 'number' ? 'an array' : 'an object', this.shown_());
-    const child = Object.hasOwn(this.value_, name) ? (this.value_ as Record<string | number, unknown>)[name] : undefined;
-    return new JsonAt(child, this.file_, `${this.path_}/${name}`);
+    const v = this.value_ as Record<string | number, unknown>;
+    const ofArray = typeof name === 'number';
+    if (typeof v !== 'object' || !v || Array.isArray(v) !== ofArray) this.fail(ofArray ? 'an array' : 'an object', this.shown_());
+    return new JsonAt(Object.hasOwn(v, name) ? v[name] : undefined, this.file_, `${this.path_}/${name}`);
   }
   array(least: number, most: number): number {
     if (!Array.isArray(this.value_)) this.fail('an array', this.shown_());
     const n = this.value_.length;
     if (n < least || n > most) this.fail(least === most ? `${least} elements` : `${least} to ${most} elements`, `${n}`);
     return n;
+  }
+  /** What is read of each element of an array. */
+  each<T>(least: number, most: number, read: (at: JsonAt, i: number) => T): T[] {
+    return Array.from({ length: this.array(least, most) }, (_, i) => read(this.at(i), i));
   }
   number(least: number, most: number): number {
     const v = this.value_;

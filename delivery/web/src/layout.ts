@@ -19,20 +19,8 @@ export const previewPath = (plane: number): string => `preview/${digits(plane, 3
 export const tableStreamsPath = (plane: number): string => `texture/${plane}/tables.pack`;
 /** texture/3/r07.pack */
 export const rungPath = (plane: number, rung: number): string => `texture/${plane}/r${digits(rung, 2)}.pack`;
-/** texture/3/r07/0123.jpg, in trees made with `unpack --fragments files` only. */
-export const fragmentFilePath = (plane: number, rung: number, fragment: number, extension: string): string =>
-  `texture/${plane}/r${digits(rung, 2)}/${digits(fragment, 4)}.${extension}`;
-
 /** The plane that an entry's page in the index belongs to; -1 = none. */
 export function planeOfPath(path: string): number {
   const match = /^texture\/(0|[1-9]\d*)\/(tables\.pack|r\d\d+(\.pack|\/\d{4,}\.(jpg|webp)))$/.exec(path);
   return match ? Number(match[1]) : -1;
-}
-
-/** A relative path of a-z 0-9 . _ - and /, without empty parts, "." and "..". */
-export function isValidEntryPath(path: string): boolean {
-  return (
-    path.length <= 200 &&
-    path.split('/').every((part) => /^[a-z0-9._-]+$/.test(part) && part !== '.' && part !== '..')
-  );
 }

@@ -96,10 +96,8 @@ export interface Manifest {
 }
 
 const largest = 1e300;
-const columns = [
-  'triangles', 'vertices', 'offset', 'bytes', 'sha256', 'major', 'errorMax', 'errorRms', 'p95', 'p99', 'displayPxJnd',
-  'displayPxError', 'displayPxEdge',
-];
+const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
+const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge'] as const;
 
 function readOffset(at: JsonAt): number {
   const offset = at.integer(64);
@@ -107,13 +105,12 @@ function readOffset(at: JsonAt): number {
   return offset;
 }
 
-function readRef(at: JsonAt, path: string): EntryRef {
-  return {
-    path,
-    offset: readOffset(at.at('offset')),
-    bytes: at.at('bytes').integer(1),
-    sha256: at.at('sha256').digest(),
-  };
+function readRange(at: Pick<JsonAt, 'at'>): ByteRange {
+  return { offset: readOffset(at.at('offset')), bytes: at.at('bytes').integer(1) };
+}
+
+function readRef(at: Pick<JsonAt, 'at'>, path: string): EntryRef {
+  return { path, ...readRange(at), sha256: at.at('sha256').digest() };
 }
 
 function readHead(at: JsonAt, bytes: number): { headBytes: number; headSha256: Uint8Array } {
@@ -126,82 +123,68 @@ function readPagedRef(at: JsonAt, path: string): PagedRef {
 }
 
 function readStream(at: JsonAt): StreamRef {
-  const bytes = at.at('bytes').integer(1);
-  return { offset: readOffset(at.at('offset')), bytes, ...readHead(at, bytes) };
+  const range = readRange(at);
+  return { ...range, ...readHead(at, range.bytes) };
 }
 
 function readVector(at: JsonAt): Vector3 {
-  at.array(3, 3);
-  return [0, 1, 2].map((i) => at.at(i).number(-largest, largest)) as Vector3;
+  return at.each(3, 3, (c) => c.number(-largest, largest)) as Vector3;
 }
 
 function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'> {
   const format = at.at('format').text(100);
   if (format !== 'texmesh') at.at('format').fail('texmesh', format);
-  const major = at.at('version').at('major').integer(0, 1e6);
-  const minor = at.at('version').at('minor').integer(0, 1e6);
-  if (major !== formatMajor)
-    at.at('version').at('major').fail(`${formatMajor}`, `${major}, which another reader is for`);
-  const features = at.at('requiredFeatures');
-  const requiredFeatures: string[] = [];
-  for (let i = 0, n = features.array(0, 100); i < n; ++i) {
-    const name = features.at(i).text(100);
-    if (!knownFeatures.includes(name)) features.at(i).fail('a feature that this reader knows', name);
-    requiredFeatures.push(name);
-  }
+  const version = at.at('version');
+  const [major, minor] = ['major', 'minor'].map((name) => version.at(name).integer(0, 1e6));
+  if (major !== formatMajor) version.at('major').fail(`${formatMajor}`, `${major}, which another reader is for`);
+  const requiredFeatures = at.at('requiredFeatures').each(0, 100, (feature) => {
+    const name = feature.text(100);
+    if (!knownFeatures.includes(name)) feature.fail('a feature that this reader knows', name);
+    return name;
+  });
   return { version: { major, minor }, requiredFeatures };
 }
 
+/** An array for each field, all of one length. */
 function readScales(at: JsonAt): ManifestScale[] {
   const n = at.at('scale').array(1, 100);
-  for (const column of columns) at.at(column).array(n, n);
   const floors = at.has('floor');
-  if (floors) at.at('floor').array(n, n);
-  const scales: ManifestScale[] = [];
-  for (let i = 0; i < n; ++i) {
-    const integer = (name: string, least: number, most?: number): number => at.at(name).at(i).integer(least, most);
-    const number = (name: string, most: number): number => at.at(name).at(i).number(0, most);
-    const scale = integer('scale', 0, 99);
-    if (i === 0 ? scale !== 0 : scale <= scales[i - 1].scale)
-      at.at('scale').at(i).fail(i === 0 ? '0' : 'a rising number', `${scale}`);
-    scales.push({
+  let before = -1;
+  return at.at('scale').each(n, n, (scaleAt, i) => {
+    const field = (name: string): JsonAt => {
+      const column = at.at(name);
+      column.array(n, n);
+      return column.at(i);
+    };
+    const numbers = <K extends string>(names: readonly K[], most: number): Record<K, number> =>
+      Object.fromEntries(names.map((name) => [name, field(name).number(0, most)])) as Record<K, number>;
+    const scale = scaleAt.integer(0, 99);
+    if (i === 0 ? scale !== 0 : scale <= before) scaleAt.fail(i === 0 ? '0' : 'a rising number', `${scale}`);
+    before = scale;
+    return {
       scale,
-      triangles: integer('triangles', 1, 0xffffffff),
-      vertices: integer('vertices', 1, 0xffffffff),
-      glb: {
-        path: layout.meshPath(scale),
-        offset: readOffset(at.at('offset').at(i)),
-        bytes: integer('bytes', 1),
-        sha256: at.at('sha256').at(i).digest(),
-      },
-      major: at.at('major').at(i).boolean(),
-      errorMax: number('errorMax', largest),
-      errorRms: number('errorRms', largest),
-      p95: number('p95', largest),
-      p99: number('p99', largest),
-      displayPxJnd: number('displayPxJnd', anyDisplayPx),
-      displayPxError: number('displayPxError', anyDisplayPx),
-      displayPxEdge: number('displayPxEdge', anyDisplayPx),
-      floor: floors ? at.at('floor').at(i).text(100) : '',
-    });
-  }
-  return scales;
+      triangles: field('triangles').integer(1, 0xffffffff),
+      vertices: field('vertices').integer(1, 0xffffffff),
+      glb: readRef({ at: field as JsonAt['at'] }, layout.meshPath(scale)),
+      major: field('major').boolean(),
+      ...numbers(lengths, largest),
+      ...numbers(heights, anyDisplayPx),
+      floor: floors ? field('floor').text(100) : '',
+    };
+  });
 }
 
 function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
-  const n = at.array(1, 100);
-  const steps: ManifestStep[] = [];
-  for (let i = 0; i < n; ++i) {
-    const pair = at.at(i);
+  let before: ManifestStep = { upToPx: -1, scale: Infinity };
+  const steps = at.each(1, 100, (pair) => {
     pair.array(2, 2);
     const step = { upToPx: pair.at(0).number(0, anyDisplayPx), scale: pair.at(1).integer(0, 100) };
     if (!scales.some((s) => s.scale === step.scale)) pair.at(1).fail('a scale of the package', `${step.scale}`);
-    if (i > 0 && step.upToPx <= steps[i - 1].upToPx) pair.at(0).fail('a rising number', 'another');
-    if (i > 0 && step.scale >= steps[i - 1].scale) pair.at(1).fail('a finer scale', `${step.scale}`);
-    steps.push(step);
-  }
-  if (steps[n - 1].upToPx !== anyDisplayPx) at.at(n - 1).at(0).fail('1e9', 'less');
-  if (steps[n - 1].scale !== 0) at.at(n - 1).at(1).fail('0', `${steps[n - 1].scale}`);
+    if (step.upToPx <= before.upToPx) pair.at(0).fail('a rising number', 'another');
+    if (step.scale >= before.scale) pair.at(1).fail('a finer scale', `${step.scale}`);
+    return (before = step);
+  });
+  if (before.upToPx !== anyDisplayPx || before.scale !== 0) at.at(steps.length - 1).fail('1e9 and scale 0', 'another step');
   return steps;
 }
 
@@ -212,25 +195,18 @@ function readFirstPicture(
 ): Pick<Manifest, 'planeCount' | 'firstPicture' | 'previews'> {
   const planeCount = at.at('planeCount').integer(0, 10000);
   const first = at.at('firstPicture');
-  const offset = readOffset(first.at('offset'));
-  if (offset !== coarsest.offset)
-    first.at('offset').fail(`the offset of the coarsest mesh, ${coarsest.offset}`, `${offset}`);
-  const firstPicture = {
-    offset,
-    bytes: first.at('bytes').integer(coarsest.bytes),
-    sha256: first.at('sha256').digest(),
-  };
+  const { path: _, ...firstPicture } = readRef(first, '');
+  const { offset, bytes } = firstPicture;
+  if (offset !== coarsest.offset) first.at('offset').fail(`the offset of the coarsest mesh, ${coarsest.offset}`, `${offset}`);
+  if (bytes < coarsest.bytes) first.at('bytes').fail(`a number from ${coarsest.bytes}`, `${bytes}`);
   const most = Math.min(planeCount, mostManifestPreviews);
-  const n = at.at('previews').array(features.includes('mips') ? Math.min(most, 1) : most, most);
-  const previews: ByteRange[] = [];
-  for (let i = 0; i < n; ++i) {
-    const pair = at.at('previews').at(i);
+  const previews = at.at('previews').each(features.includes('mips') ? Math.min(most, 1) : most, most, (pair) => {
     pair.array(2, 2);
     const range = { offset: readOffset(pair.at(0)), bytes: pair.at(1).integer(1) };
-    if (range.offset < offset + coarsest.bytes || range.offset + range.bytes > offset + firstPicture.bytes)
+    if (range.offset < offset + coarsest.bytes || range.offset + range.bytes > offset + bytes)
       pair.fail('a range within the first picture, after the mesh', `${range.offset}`);
-    previews.push(range);
-  }
+    return range;
+  });
   return { planeCount, firstPicture, previews };
 }
 
@@ -241,10 +217,11 @@ function readFirstPicture(
 export function readManifest(json: Uint8Array): Manifest {
   const at = parseJson(json, layout.manifestPath, bootstrapBytes);
   const version = readVersion(at);
-  const boundsMin = readVector(at.at('bounds').at('min'));
-  const boundsMax = readVector(at.at('bounds').at('max'));
-  for (let i = 0; i < 3; ++i)
-    if (boundsMin[i] > boundsMax[i]) at.at('bounds').at('max').at(i).fail('at least the minimum', 'less');
+  const bounds = at.at('bounds');
+  const [boundsMin, boundsMax] = ['min', 'max'].map((name) => readVector(bounds.at(name)));
+  boundsMax.forEach((most, i) => {
+    if (boundsMin[i] > most) bounds.at('max').at(i).fail('at least the minimum', 'less');
+  });
   const scales = readScales(at.at('scales'));
   return {
     ...version,
@@ -269,12 +246,9 @@ export function readManifest(json: Uint8Array): Manifest {
 
 /** The bytes of manifest.json from the first bytes of a container (section 2). */
 export function manifestOfContainer(head: Uint8Array, file: string): Uint8Array {
-  const start = [0x50, 0x4b, 3, 4, 10, 0, 0, 0, 0, 0];
-  const isPackage =
-    head.length >= 64 &&
-    start.every((byte, i) => head[i] === byte) &&
-    String.fromCharCode(...head.subarray(30, 43)) === layout.manifestPath;
-  if (!isPackage) throw new FormatError(file, 'byte 0', 'a texmesh package', 'something else');
+  const text = (begin: number, end: number): string => String.fromCharCode(...head.subarray(begin, end));
+  if (text(0, 10) !== 'PK\x03\x04\n\0\0\0\0\0' || text(30, 43) !== layout.manifestPath || head.length < 64)
+    throw new FormatError(file, 'byte 0', 'a texmesh package', 'something else');
   const bytes = new DataView(head.buffer, head.byteOffset).getUint32(22, true);
   const room = Math.min(head.length, bootstrapBytes) - 64;
   if (bytes > room) throw new FormatError(file, 'entry manifest.json', `at most ${room} bytes`, `${bytes}`);

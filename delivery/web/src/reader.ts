@@ -3,6 +3,7 @@
 export * from './errors';
 export * from './manifest';
 export * from './layout';
+export * from './entry_paths';
 export * from './index_table';
 export * from './textures';
 export * from './read_textures';

@@ -1,10 +1,8 @@
 import { BufferAttribute, BufferGeometry, Material, Mesh } from 'three';
-import { samePrefix } from './bytes';
 import { FormatError, InputError } from './errors';
 import { concat } from './http';
 import type { PackageReader } from './package_reader';
 import { MaterialSet, ParsedGltf, Slot, materialFor } from './scale_parts';
-import { sha256 } from './sha256';
 import type { WorkerPool } from './worker_pool';
 import type { SplitInfo, SplitUpdate } from './worker_protocol';
 
@@ -111,7 +109,7 @@ export class SplitShapes {
     });
   }
   private async bytes_(from: number, to: number, signal: AbortSignal): Promise<Uint8Array> {
-    const verify = (got: Uint8Array): Promise<void> => this.verify_(from, got);
+    const verify = (got: Uint8Array): Promise<void> => this.pool_.checkSplits(this.key_, from, got);
     const known = this.known_.subarray(from, to);
     if (known.length > 0)
       try {
@@ -125,17 +123,6 @@ export class SplitShapes {
       }
     return this.reader_.splitStream(from, to - from, { signal, verify });
   }
-  /** Whole blocks from a place on have the digests that the head says. */
-  private async verify_(from: number, bytes: Uint8Array): Promise<void> {
-    const { headBytes, blockBytes, digests } = this.info_!;
-    for (let b = 0, at = headBytes; b < blockBytes.length; at += blockBytes[b++]) {
-      if (at < from || at + blockBytes[b] > from + bytes.length) continue;
-      const digest = await sha256(bytes.subarray(at - from, at - from + blockBytes[b]));
-      if (!samePrefix(digest, digests.subarray(8 * b, 8 * b + 8)))
-        throw new FormatError('mesh/stream.bin', `block ${b}`, 'bytes of the digest in the head', 'others');
-    }
-  }
-
   private async add_(scale: number, update: SplitUpdate, gltf: ParsedGltf): Promise<Mesh> {
     this.append_('position', 3, update.positions, update);
     this.info_!.attributes.forEach((a, k) => this.append_(attributeNames[a.kind], a.components, update.attributes[k], update));

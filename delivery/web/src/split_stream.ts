@@ -200,6 +200,12 @@ export class SplitStreamReader {
     return this.block_;
   }
 
+  /** FormatError where whole blocks from a place of the stream on are not those of the head. */
+  async check(from: number, bytes: Uint8Array): Promise<void> {
+    for (const [i, { offset, bytes: size, digest }] of this.head.blocks.entries())
+      if (offset >= from && offset + size <= from + bytes.length && !samePrefix(await sha256(bytes.subarray(offset - from, offset - from + size)), digest))
+        throw new FormatError(file, `block ${i}`, 'bytes of the digest in the head', 'others');
+  }
   /** Decodes whole blocks that stand one after the other, digests checked. */
   async addBlocks(bytes: Uint8Array): Promise<void> {
     for (let at = 0; at < bytes.length; ) {

@@ -15,9 +15,7 @@ export function splitInfo(head: SplitStreamHead): SplitInfo {
     kind,
     components: kind === 'normal' ? 3 : components,
   }));
-  const digests = new Uint8Array(8 * head.blocks.length);
-  head.blocks.forEach((b, i) => digests.set(b.digest, 8 * i));
-  return { headBytes: head.bytes, scales, attributes, groups: head.groups, blockBytes: head.blocks.map((b) => b.bytes), digests };
+  return { headBytes: head.bytes, scales, attributes, groups: head.groups };
 }
 
 function gridValues(

@@ -1,9 +1,10 @@
 import { codecTraits } from './codec';
 import { requireDigest } from './digests';
+import { fragmentFilePath, isValidEntryPath } from './entry_paths';
 import { FormatError, InputError } from './errors';
 import { FragmentFiles, readFragmentFiles } from './fragment_files';
 import { HttpClient, isAbort, shownUrl } from './http';
-import { fragmentFilePath, isValidEntryPath, manifestPath } from './layout';
+import { manifestPath } from './layout';
 import { bootstrapBytes, manifestOfContainer } from './manifest';
 import type { PackageReader } from './package_reader';
 import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';

@@ -1,4 +1,3 @@
-import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { PackageReader, PlaneFiles } from './package_reader';
 import { bytesToShow } from './allocation';
@@ -89,7 +88,8 @@ export class Transfers {
     return this.planes_.get(plane)!;
   }
   private incremental_(plane: number): boolean {
-    return codecTraits(this.textures_[plane].codec).incremental && !this.filesOf(plane).complete;
+    const { tables, complete } = this.filesOf(plane);
+    return tables.incremental && !complete;
   }
   /** Bytes of a fragment at a rung: of what has to be fetched at most. */
   bytesOf(plane: number, rung: number, fragment: number): number {

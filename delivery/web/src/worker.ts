@@ -63,6 +63,12 @@ function buffersOf(value: unknown, found = new Set<ArrayBuffer>()): ArrayBuffer[
 
 const streams = new Map<number, { reader: SplitStreamReader; wedges: number }>();
 
+function streamOf(key: number): { reader: SplitStreamReader; wedges: number } {
+  const stream = streams.get(key);
+  if (!stream) throw new FormatError('mesh/stream.bin', '', 'a stream that was opened', 'none');
+  return stream;
+}
+
 /** Answers a request; the second value lists what may be handed over instead of copied. */
 export async function handle(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   switch (request.op) {
@@ -83,9 +89,11 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
       streams.set(request.key, { reader, wedges: 0 });
       return [splitInfo(reader.head), []];
     }
+    case 'split-check':
+      await streamOf(request.key).reader.check(request.from, request.blocks);
+      return [undefined, []];
     case 'split-add': {
-      const stream = streams.get(request.key);
-      if (!stream) throw new FormatError('mesh/stream.bin', '', 'a stream that was opened', 'none');
+      const stream = streamOf(request.key);
       await stream.reader.addBlocks(request.blocks);
       const update = splitUpdate(stream.reader, stream.wedges);
       stream.wedges = update.to;

@@ -176,6 +176,10 @@ export class WorkerPool {
   openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
     return this.ask_({ op: 'split-open', key, head: alone(head) }, 0) as Promise<SplitInfo>;
   }
+  /** FormatError where whole blocks from a place of the stream on are not those of its head. */
+  checkSplits(key: number, from: number, blocks: Uint8Array): Promise<void> {
+    return this.ask_({ op: 'split-check', key, from, blocks: alone(blocks) }, 0) as Promise<void>;
+  }
   addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
     return this.ask_({ op: 'split-add', key, blocks: alone(blocks) }, 0) as Promise<SplitUpdate>;
   }

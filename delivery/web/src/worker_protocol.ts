@@ -42,6 +42,14 @@ export interface SplitAddRequest {
   key: number;
   blocks: Uint8Array;
 }
+/** Check the digests of the whole blocks among bytes of a stream. */
+export interface SplitCheckRequest {
+  op: 'split-check';
+  key: number;
+  /** Where the bytes stand in the stream. */
+  from: number;
+  blocks: Uint8Array;
+}
 /** Forget a stream. */
 export interface SplitCloseRequest {
   op: 'split-close';
@@ -61,7 +69,7 @@ export interface DocumentRequest {
   args: unknown[];
 }
 /** Anything that a worker is asked. */
-export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
 
 /** What the head of a stream says of it. */
 export interface SplitInfo {
@@ -71,9 +79,6 @@ export interface SplitInfo {
   scales: { scale: number; blocks: number; wedges: number; end: number }[];
   attributes: { kind: SplitKind; components: number }[];
   groups: { material: number; part: number }[];
-  /** Of each block, which stand one after the other behind the head; 8 bytes of SHA-256 each. */
-  blockBytes: number[];
-  digests: Uint8Array;
 }
 
 /** What has been added to a split mesh, and its triangles now. */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { toHex } from '../src/bytes';
-import { fragmentFilePath } from '../src/layout';
+import { fragmentFilePath } from '../src/entry_paths';
 import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
 import { sha256 } from '../src/sha256';
 import { treeUrl } from '../src/store_files';
