@@ -2,7 +2,7 @@ import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { IndexHead, parseIndexPage, readIndexHead } from './index_table';
 import * as layout from './layout';
-import { EntryRef, Manifest, PagedRef, mostManifestPreviews } from './manifest';
+import { EntryRef, Manifest, mostManifestPreviews } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { missingFeature, readTextures } from './read_textures';
 import { PlaneTables, TablesHead, fragmentCount, rungCount } from './tables';
@@ -12,7 +12,7 @@ import { TextureInfo, fullSizePlanes } from './textures';
 // have been checked before.
 
 export { readIndex } from './index_table';
-export { readQuality } from './quality_table';
+export { readQuality as quality } from './quality_table';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 
@@ -21,7 +21,7 @@ function require(good: boolean, file: string, place: string, expected: string, f
 }
 
 /** The head, or more, of index.bin. */
-export function indexHead(bytes: Uint8Array, { headBytes }: PagedRef): IndexHead {
+export function indexHead(bytes: Uint8Array, { index: { headBytes } }: Manifest): IndexHead {
   const head = readIndexHead(bytes);
   require(head.bytes === headBytes, layout.indexPath, 'head', `${headBytes} bytes`, head.bytes);
   return head;

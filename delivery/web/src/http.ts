@@ -130,7 +130,8 @@ export function absolute(url: string): string {
   return here && URL.canParse(url, here) ? new URL(url, here).href : url;
 }
 
-function abortError(): Error {
+/** What cancelled calls throw. */
+export function abortError(): Error {
   return new DOMException('The load was cancelled', 'AbortError');
 }
 /** Throws an AbortError where a signal says so. */

@@ -4,7 +4,6 @@ import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
 import { toHex } from './bytes';
 import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS } from './http';
-import type { IndexHead } from './index_table';
 import * as layout from './layout';
 import { ByteRange, EntryRef, Manifest, PagedRef, readManifest } from './manifest';
 import type { QualityTable } from './quality_table';
@@ -86,18 +85,13 @@ export class PackageReader {
   ): Promise<T> {
     const client = new HttpClient(options);
     const openedS = nowS();
-    const bytes: Partial<Record<RequestKind, number>> = {};
     const early: RequestRecord[] = [];
-    client.onRequest = (record) => {
-      bytes[record.kind] = (bytes[record.kind] ?? 0) + record.received;
-      early.push(record);
-    };
+    client.onRequest = (record) => early.push(record);
     const { store, manifest } = await openStore(url, options.mirrors ?? [], options.mode ?? 'auto', client, options.signal);
     const id = toHex(await sha256(manifest));
     const reader = new this(store, client, url, { parsed: readManifest(manifest), id }, openedS);
-    Object.assign(reader.bytesByKind, bytes);
-    reader.requests = early;
     client.onRequest = (record) => reader.noteRequest_(record);
+    early.forEach(client.onRequest);
     return reader;
   }
 
@@ -188,13 +182,19 @@ export class PackageReader {
     return decodeHere('readIndex', await this.readPaged_(this.manifest.index, 'index', undefined, true));
   }
 
-  private indexHead_(signal?: AbortSignal): Promise<IndexHead> {
-    const ref = this.manifest.index;
-    return this.shared_('index', async () => this.decoded_(signal, 'indexHead', await this.readPaged_(ref, 'index', signal), ref), signal);
+  /** Read and decoded once for all who ask. */
+  private document_<K extends 'indexHead' | 'tablesHead' | 'textures' | 'quality'>(
+    name: K,
+    read: () => Promise<Uint8Array>,
+    signal?: AbortSignal,
+  ): Promise<Awaited<ReturnType<Documents[K]>>> {
+    const decoded = async (): Promise<Awaited<ReturnType<Documents[K]>>> =>
+      this.decoded_(signal, name, ...([await read(), this.manifest] as Parameters<Documents[K]>));
+    return this.shared_(name, decoded, signal);
   }
   private async loadIndexPage_(plane: number, signal?: AbortSignal): Promise<Map<string, EntryRef>> {
     const { manifest } = this;
-    const { pages, minor } = await this.indexHead_(signal);
+    const { pages, minor } = await this.document_('indexHead', () => this.readPaged_(manifest.index, 'index', signal), signal);
     const page = pages.find((p) => p.plane === plane);
     if (!page) return new Map();
     const verify = this.digestCheck_(`index of plane ${plane}`, page.sha256);
@@ -219,25 +219,18 @@ export class PackageReader {
 
   /** The texture planes: full-size ones first, then mips. */
   textures(signal?: AbortSignal): Promise<TextureInfo[]> {
-    const read = (): Promise<Uint8Array> => this.readAll_(this.manifest.textures, { kind: 'textures', signal });
-    return this.shared_('textures', async () => this.decoded_(signal, 'textures', await read(), this.manifest), signal);
+    return this.document_('textures', () => this.readAll_(this.manifest.textures, { kind: 'textures', signal }), signal);
   }
 
   /** Measured quality of scales and rungs. */
   quality(signal?: AbortSignal): Promise<QualityTable> {
-    const read = (): Promise<Uint8Array> => this.readAll_(this.manifest.quality, { kind: 'quality', signal });
-    return this.shared_('quality', async () => this.decoded_(signal, 'readQuality', await read()), signal);
+    return this.document_('quality', () => this.readAll_(this.manifest.quality, { kind: 'quality', signal }), signal);
   }
 
   /** What the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
     const bytes = await this.readAll_(this.manifest.provenance, { kind: 'other' });
     return JSON.parse(new TextDecoder().decode(bytes));
-  }
-
-  private tablesHead_(signal?: AbortSignal): Promise<TablesHead> {
-    const read = (): Promise<Uint8Array> => this.readPaged_(this.manifest.tables, 'tables', signal);
-    return this.shared_('tables', async () => this.decoded_(signal, 'tablesHead', await read(), this.manifest), signal);
   }
 
   /** Tables of one plane. */
@@ -250,7 +243,7 @@ export class PackageReader {
    * read by one request.
    */
   async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
-    const head = await this.tablesHead_(signal);
+    const head = await this.document_('tablesHead', () => this.readPaged_(this.manifest.tables, 'tables', signal), signal);
     const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
     for (const p of wanted)
       if (!head.planes[p]) throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');

@@ -1,4 +1,5 @@
 import { FormatError } from './errors';
+import { abortError } from './http';
 import type {
   DecodeRequest, DocumentDecoder, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './worker_protocol';
@@ -73,7 +74,6 @@ export class WorkerPool {
   private readonly helpers_: Helper[] = [];
   private readonly queue_: Job[] = [];
   private readonly running_ = new Map<number, { job: Job; worker: number }>();
-  private readonly load_: number[] = [];
   private readonly broken_ = new Set<number>(); // whose workers broke once
   private works_ = false; // a worker has answered
   private nextId_ = 1;
@@ -86,10 +86,7 @@ export class WorkerPool {
     const cores = globalThis.navigator?.hardwareConcurrency ?? 2;
     const count = Math.max(1, options_.workers ?? Math.min(4, Math.max(2, cores - 1)));
     const here = options_.decode !== undefined || typeof Worker === 'undefined';
-    for (let i = 0; i < (here ? 1 : count); ++i) {
-      this.helpers_.push(here ? this.startMain_() : this.start_(i));
-      this.load_.push(0);
-    }
+    for (let i = 0; i < (here ? 1 : count); ++i) this.helpers_.push(here ? this.startMain_() : this.start_(i));
   }
 
   private start_(index: number): Helper {
@@ -131,7 +128,6 @@ export class WorkerPool {
     if (!entry) return closeBitmaps(answer.result); // nobody waits for it any more
     this.works_ ||= !answer.failed;
     this.running_.delete(answer.id);
-    --this.load_[entry.worker];
     const { error } = answer;
     if (answer.failed !== undefined) entry.job.failed(answer.failed);
     else if (!error) entry.job.done(answer.result);
@@ -144,9 +140,9 @@ export class WorkerPool {
     while (this.queue_.length > 0 && this.running_.size < mostAtOnce) this.post_(this.queue_.shift()!);
   }
   private post_(job: Job): void {
-    let worker = job.worker ?? 0;
-    if (job.worker === undefined) this.load_.forEach((n, i) => (worker = n < this.load_[worker] ? i : worker));
-    ++this.load_[worker];
+    const busy = this.helpers_.map(() => 0);
+    for (const r of this.running_.values()) ++busy[r.worker];
+    const worker = job.worker ?? busy.indexOf(Math.min(...busy));
     this.running_.set(this.nextId_, { job, worker });
     // Copied, not handed over: a worker that breaks gives its requests back.
     this.helpers_[worker].post(this.nextId_++, job.request);
@@ -154,7 +150,7 @@ export class WorkerPool {
 
   private ask_(request: WorkerRequest, worker?: number): Promise<unknown> {
     return new Promise((done, failed) => {
-      if (this.ended_) return failed(new DOMException('The load was cancelled', 'AbortError'));
+      if (this.ended_) return failed(abortError());
       const job = { request, worker, done, failed };
       if (request.op === 'document') return this.post_(job); // everything waits for it
       this.queue_.push(job);
@@ -193,7 +189,7 @@ export class WorkerPool {
   dispose(): void {
     this.ended_ = true;
     for (const h of this.helpers_) h.end();
-    const error = new DOMException('The load was cancelled', 'AbortError');
+    const error = abortError();
     for (const { job } of this.running_.values()) job.failed(error);
     for (const job of this.queue_) job.failed(error);
     this.running_.clear();

@@ -449,7 +449,7 @@ describe('documents', () => {
     const none = new Uint8Array(0);
     for (let i = 0; i < 30; ++i)
       void pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).catch(() => undefined);
-    void pool.decodeDocument('readQuality', none).catch(() => undefined);
+    void pool.decodeDocument('quality', none).catch(() => undefined);
     await new Promise((go) => setTimeout(go, 5));
     expect(posted.length).toBeLessThan(30);
     expect(posted).toContain('document');
