@@ -15,11 +15,13 @@ namespace {
 constexpr int kNoCode = 1 << 28;  // bits: never
 constexpr float kLargest = 1023;  // of coefficients before they are quantised
 // Every change lowers the cost, so the search ends, after two or three passes; this bounds what rounding
-// could do. The last ones look at the used coefficients, too.
+// could do. The last ones look at the used coefficients, too. With at most 2 of those, and kMostBits = 4, a
+// tenth of the time is saved and 0.5 % more bytes are taken at equal error, 2 % at qualities 75 and up.
 constexpr int kMostPasses = 100, kMostTrims = 3;
 // Changes that gain less, in bits, are not looked for; all of them together are 0.4 % of a rung and a third
 // of the time.
 constexpr float kWorthBits = 0.5f;
+constexpr float kLeastGain = 1e-30f;  // where bits cost nothing
 // Changes are taken in a pass that gain at least this part of the best. A half: 0.3 % fewer bytes, half as
 // much time again.
 constexpr float kPassPart = 0.125f;
@@ -332,8 +334,9 @@ CodedBlock MaskedBlock::quantise(const BlockCoding& coding, int dc_before) {
     const Promise promise(rest_, energy, per_energy_, coding.quantisers, coded_, kNewBits * coding.bit_cost);
     least = std::max(std::min(promise.peak, least) * kPassPart, worth);
     const bool trim = least == worth;
-    std::uint64_t left = promise.at_least(std::max(least, 1e-30f));
-    if (trim) left |= worth_a_trim(rest_, energy, coding, coded_);
+    std::uint64_t left = promise.peak >= least ? promise.at_least(std::max(least, kLeastGain)) : 0;
+    if (trim && block.used != 0) left |= worth_a_trim(rest_, energy, coding, coded_);
+    if (left == 0 && trim) break;
     bool changed = false;
     for (; left != 0; left &= left - 1) {
       const auto n = static_cast<std::size_t>(std::countr_zero(left));
