@@ -357,23 +357,67 @@ TEST(DecodeImage, PngGreyWithAlphaOfSixteenBits) {
   EXPECT_EQ(decode_float(image).data, (std::vector<float>{0x8080, 0xffff, 0x7f, 0x1234}));
 }
 
-/// An 8-bit grey 8 x 8 picture in the seven passes of Adam7.
-Bytes interlaced_rows(const Bytes& samples) {
+/// Whole pixels of `size` bytes, row by row, in the seven passes of Adam7; a pass without a pixel has no
+/// rows.
+Bytes interlaced_rows(const Bytes& pixels, int width, int height, int size) {
   constexpr int kX0[] = {0, 4, 0, 2, 0, 1, 0}, kY0[] = {0, 0, 4, 0, 2, 0, 1};
   constexpr int kDx[] = {8, 8, 4, 4, 2, 2, 1}, kDy[] = {8, 8, 8, 4, 4, 2, 2};
   Bytes rows;
   for (int pass = 0; pass < 7; ++pass)
-    for (int y = kY0[pass]; y < 8; y += kDy[pass]) {
+    for (int y = kY0[pass]; y < height && kX0[pass] < width; y += kDy[pass]) {
       rows.push_back(0);
-      for (int x = kX0[pass]; x < 8; x += kDx[pass])
-        rows.push_back(samples[static_cast<std::size_t>(y * 8 + x)]);
+      for (int x = kX0[pass]; x < width; x += kDx[pass]) {
+        const auto at = pixels.begin() + std::ptrdiff_t{y * width + x} * size;
+        rows.insert(rows.end(), at, at + size);
+      }
     }
   return rows;
 }
 
+Bytes plain_rows(const Bytes& pixels, int width, int height, int size) {
+  Bytes rows;
+  for (int y = 0; y < height; ++y) {
+    const auto at = pixels.begin() + std::ptrdiff_t{y * width} * size;
+    rows.push_back(0);
+    rows.insert(rows.end(), at, at + std::ptrdiff_t{width} * size);
+  }
+  return rows;
+}
+
+TEST(DecodeImage, InterlacedPngOfEveryKindIsThePlainOne) {
+  struct Kind {
+    std::uint8_t colour_type;
+    int channels;
+  };
+  for (const auto& [w, h] : {std::pair{13, 9}, {8, 8}, {3, 1}, {1, 5}})
+    for (const Kind kind : {Kind{0, 1}, {2, 3}, {4, 2}, {6, 4}})
+      for (const std::uint8_t bits : {std::uint8_t{8}, std::uint8_t{16}}) {
+        const int size = kind.channels * bits / 8;
+        Bytes pixels;  // of 16 bits both halves count
+        for (int k = 0; k < w * h * size; ++k) pixels.push_back(static_cast<std::uint8_t>(k * 37 + k / 7));
+        const auto file = [&](bool interlaced) {
+          return make_png(static_cast<std::uint32_t>(w), static_cast<std::uint32_t>(h), bits,
+                          kind.colour_type, interlaced,
+                          interlaced ? interlaced_rows(pixels, w, h, size) : plain_rows(pixels, w, h, size));
+        };
+        const Image plain = probe(file(false)), passes = probe(file(true));
+        EXPECT_EQ(passes.channels, kind.channels);
+        EXPECT_EQ(passes.bits_per_channel, bits);
+        EXPECT_EQ(decode_image(passes).data, decode_image(plain).data) << w << " x " << h;
+        if (bits == 8) {
+          EXPECT_EQ(decode_image(passes).data, pixels);
+          continue;
+        }
+        std::vector<float> values;
+        for (std::size_t k = 0; k < pixels.size(); k += 2)
+          values.push_back(static_cast<float>(pixels[k] * 256 + pixels[k + 1]));
+        EXPECT_EQ(decode_float(passes).data, values) << w << " x " << h;
+      }
+}
+
 TEST(DecodeImage, InterlacedPngIsThePlainOne) {
   const Bytes samples = test_picture(8, 8, 1);
-  const Bytes file = make_png(8, 8, 8, 0, 1, interlaced_rows(samples));
+  const Bytes file = make_png(8, 8, 8, 0, 1, interlaced_rows(samples, 8, 8, 1));
   EXPECT_EQ(decode_image(probe(file)).data, samples);
   for (std::size_t n = 0; n + 16 < file.size(); ++n)
     EXPECT_THROW(decode_image(probe({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(n)})),

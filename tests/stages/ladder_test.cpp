@@ -238,6 +238,45 @@ TEST(Ladder, UncoveredFragmentsAreNotStored) {
   EXPECT_FALSE(none.planes[0].preview.empty());
 }
 
+TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
+  Plane p = make_plane(4, 2, 32, 3);
+  p.fragments.planes[0].covered_texels = {1024, 1024, 0, 0, 1024, 1024, 0, 0};
+  const auto tables = [&] {
+    std::vector<std::vector<std::uint8_t>> out;
+    const Ladder ladder = encode(p);
+    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.tables);
+    return out;
+  };
+  const auto before = tables();
+  Random random{5};
+  for (std::uint32_t y = 0; y < 64; ++y)
+    for (std::uint32_t x = 64 * 3; x < 128 * 3; ++x)
+      p.pixels[0].data[y * 128 * 3 + x] = static_cast<std::uint8_t>(random.next());
+  EXPECT_EQ(tables(), before);
+  p.fragments.planes[0].covered_texels[2] = 1024;
+  EXPECT_NE(tables(), before) << "the noise would show";
+}
+
+/// Luma's sampling factors in the frame header of a baseline JPEG: 0x22 halves the chroma.
+int luma_sampling(const std::vector<std::uint8_t>& jpeg) {
+  for (std::size_t at = 2; at + 11 < jpeg.size() && jpeg[at] == 0xff;) {
+    if (jpeg[at + 1] == 0xc0) return jpeg[at + 11];
+    at += 2 + (std::size_t{jpeg[at + 2]} << 8 | jpeg[at + 3]);
+  }
+  return -1;
+}
+
+TEST(Ladder, PreviewsOfDataAreNotSubsampled) {
+  const auto sampling = [](TextureRole role) {
+    return luma_sampling(encode(make_plane(2, 2, 64, 3, Content::kPhoto, role)).planes[0].preview);
+  };
+  for (const TextureRole role : {TextureRole::kBaseColour, TextureRole::kEmissive, TextureRole::kColour})
+    EXPECT_EQ(sampling(role), 0x22);
+  for (const TextureRole role :
+       {TextureRole::kNormal, TextureRole::kOcclusionRoughnessMetallic, TextureRole::kData})
+    EXPECT_EQ(sampling(role), 0x11);
+}
+
 TEST(Ladder, SameBytesForAnyNumberOfThreads) {
   const Plane p = make_plane(5, 4, 48, 3);
   const Ladder one = encode(p, {}, 1), eight = encode(p, {}, 8);

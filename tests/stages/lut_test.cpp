@@ -9,6 +9,7 @@
 #include "format/archive.h"
 #include "format/sha256.h"
 #include "stages/distortion.h"
+#include "stages/fragment_meter.h"
 #include "stages/size_model.h"
 #include "tests/support/meshes.h"
 
@@ -191,6 +192,60 @@ TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
   for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
 }
 
+/// The texel between the four nearest centres of a picture that covers the same rectangle.
+double bilinear(const Pixels& picture, std::uint32_t x, std::uint32_t y, std::uint32_t width,
+                std::uint32_t height) {
+  const auto at = [](std::uint32_t k, std::uint32_t size, std::uint32_t coarse) {
+    return std::clamp((k + 0.5) * coarse / size - 0.5, 0.0, coarse - 1.0);
+  };
+  const double u = at(x, width, picture.width_px), v = at(y, height, picture.height_px);
+  double sum = 0;
+  for (std::uint32_t t = 0; t < picture.height_px; ++t)
+    for (std::uint32_t s = 0; s < picture.width_px; ++s)
+      sum += std::max(0.0, 1 - std::fabs(s - u)) * std::max(0.0, 1 - std::fabs(t - v)) * picture.at(s, t)[0];
+  return sum;
+}
+
+TEST(Lut, SkippedFragmentsShowThePreviewOfTheirOwnImageBilinearly) {
+  Scene s = make_scene();
+  s.fragments.planes.push_back(plane_of(1, 1, 1));  // a mip of the second image, which has no preview
+  s.fragments.planes[2].mip = 1;
+  s.fragments.planes[2].base = 1;
+  s.pixels.push_back({32, 48, 1, std::vector<std::uint8_t>(32 * 48)});
+  for (std::size_t p = 0; p < 3; ++p)  // waves that an eighth still shows, of other lengths in each image
+    for (std::size_t k = 0; k < s.pixels[p].data.size(); ++k) {
+      const std::size_t texel = k / s.pixels[p].channels, x = texel % s.pixels[p].width_px,
+                        y = texel / s.pixels[p].width_px;
+      const double length = p == 0 ? 37 : p == 1 ? 29 : 14.5;
+      s.pixels[p].data[k] = static_cast<std::uint8_t>(128 + 60 * std::sin((x + 2.0) / length * 6.28) +
+                                                      50 * std::cos(y / length * 6.28));
+    }
+  LadderOptions ladder;
+  ladder.preview_quality = 95;
+  ladder.hull_gain = -1;
+  s.ladder = encode_ladder(s.fragments, s.pixels, ladder, {});
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  const PackageTables tables = build(s);
+  for (std::size_t p = 0; p < 3; ++p) {
+    const TexturePlane& plane = s.fragments.planes[p];
+    const Pixels preview = decode_jpeg_luma(s.ladder.planes[p == 2 ? 1 : p].preview, 1 << 20);
+    for (const std::uint16_t f : tables.planes[p].order) {
+      std::vector<std::uint8_t> source, shown, mask;
+      for (std::uint32_t y = f / plane.columns * 48; y < (f / plane.columns + 1) * 48; ++y)
+        for (std::uint32_t x = f % plane.columns * 32; x < (f % plane.columns + 1) * 32; ++x) {
+          const bool covered = x < plane.width_px && y < plane.height_px &&
+                               plane.coverage[(plane.width_px + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
+          mask.push_back(covered ? 255 : 0);
+          source.push_back(measured_value(s.pixels[p].at(x, y), plane.channels, 1, 0));
+          shown.push_back(
+              static_cast<std::uint8_t>(bilinear(preview, x, y, plane.width_px, plane.height_px) + 0.5));
+        }
+      const double want = DistortionMeter(source, mask, 32, 48).against(shown).dssim;
+      EXPECT_NEAR(tables.planes[p].skip_dssim[f], want, 1e-3) << p << ' ' << f;
+    }
+  }
+}
+
 TEST(Lut, RateDistortionSpendsNoMoreAndLosesLess) {
   const Scene s = make_scene();
   LutOptions options;
@@ -234,6 +289,17 @@ TEST(Lut, SizeModelFitsAndIsAbsentForOneRung) {
   const PlaneTables single = build(make_scene(one)).planes[0];
   EXPECT_EQ(single.model_a, 0);
   EXPECT_EQ(single.model_error, 0);
+}
+
+TEST(Lut, SizeModelIsNotFittedOnARungWithoutLoss) {
+  LadderOptions options;
+  options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
+  Scene s = make_scene(options);
+  EXPECT_GT(build(s).planes[0].model_error, 0.01f);
+  s.ladder.planes[0].lossless = true;
+  const PlaneTables t = build(s).planes[0];
+  EXPECT_NEAR(t.model_error, 0, 1e-5) << "two points have a curve through both";
+  EXPECT_NEAR(t.model_correlation, 1, 1e-6);
 }
 
 TEST(Lut, ConstantBytesAreTheCodecs) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "stages/halve_pixels.h"
@@ -131,6 +132,7 @@ Ladder encode(const Chain& chain, double gain, int threads = 1, LadderMode mode 
   LadderOptions options;
   options.mode = mode;
   options.hull_gain = gain;
+  options.normal_rungs = options.rungs;  // as low as those of colours
   RunContext context;
   context.threads = threads;
   return encode_ladder(chain.fragments, chain.pixels, options, context);
@@ -187,6 +189,46 @@ TEST(RungHull, AMipHasARungThatShowsItWellAndNoneWorseThanThePreview) {
   ASSERT_EQ(own.size(), ladder.planes[1].rungs.size() + 1);
   EXPECT_LE(own.back().loss, 0.02);
   for (std::size_t k = 1; k < own.size(); ++k) EXPECT_LT(own[k].loss, own[0].loss);
+}
+
+TEST(RungHull, ColoursAndDataHaveTheirOwnLimitOfWhatShowsAMipWell) {
+  for (const auto& [role, limit] :
+       {std::pair{TextureRole::kBaseColour, 0.02}, {TextureRole::kNormal, 0.03}}) {
+    Chain chain = make_chain(false);
+    for (TexturePlane& plane : chain.fragments.planes) plane.role = role;
+    const Ladder all = encode(chain, kKeepAll), some = encode(chain, 1e9);
+    const auto own = measure_own(chain.fragments.planes[1], chain.pixels[1], all.planes[1],
+                                 all.planes[0].preview, RunContext{});
+    std::size_t first = 1;
+    while (first + 1 < own.size() && own[first].loss > limit) ++first;
+    ASSERT_GT(first, 1u);
+    EXPECT_EQ(some.planes[1].rungs.back().quality, all.planes[1].rungs[first - 1].quality);
+  }
+}
+
+TEST(RungHull, WindowsWeighAsTheSurfaceOfTheirFragments) {
+  // Of 48 fragments every eighth from the fifth on has a window. Noise in one of them, which is all of the
+  // surface or none of it.
+  Chain chain = make_chain(false, false);
+  TexturePlane& plane = chain.fragments.planes[0];
+  constexpr std::size_t kNoisy = 20, kOther = 44;
+  testing::Random random{3};
+  std::fill(chain.pixels[0].data.begin(), chain.pixels[0].data.end(), std::uint8_t{100});
+  for (std::uint32_t y = 0; y < 64; ++y)
+    for (std::uint32_t x = 0; x < 64 * 3; ++x)
+      chain.pixels[0].data[((kNoisy / 8 * 64 + y) * 512 + kNoisy % 8 * 64) * 3 + x] =
+          static_cast<std::uint8_t>(random.next());
+  const Ladder ladder = encode(chain, kKeepAll);
+  const auto losses = [&](std::size_t seen) {
+    std::fill(plane.surface_fraction.begin(), plane.surface_fraction.end(), 0.0f);
+    plane.surface_fraction[seen] = 1;
+    return std::array{
+        measure_pairs(chain.fragments, chain.pixels, ladder, 0, RunContext{})[0].loss,
+        measure_own(plane, chain.pixels[0], ladder.planes[0], ladder.planes[0].preview, RunContext{})[0]
+            .loss};
+  };
+  for (const double loss : losses(kNoisy)) EXPECT_GT(loss, 0.3);
+  for (const double loss : losses(kOther)) EXPECT_LT(loss, 0.01);
 }
 
 TEST(RungHull, WithoutMipsNothingIsDropped) {

@@ -123,6 +123,24 @@ TEST(Zim, OnlyCoveredTexelsCount) {
   EXPECT_EQ(none.vqp, (std::vector<float>{0, 0}));
 }
 
+TEST(Zim, TheSpreadIsThatOfCoveredFragments) {
+  Plane p = make_plane(1, [](auto x, auto y, auto) { return x < 16 ? 250 : y < 8 ? 225 : 200; });
+  TexturePlane& plane = p.fragments.planes[0];
+  plane.fragment_height_px = 8;
+  plane.rows = 2;
+  plane.covered_texels = {128, 128, 0, 128};  // bright, but for the one that is not there
+  plane.eta = {0, 0, 0, 0};
+  for (std::size_t k = 8 * 4; k < 16 * 4; ++k)
+    if (k % 4 < 2) plane.coverage[k] = 0;
+  ZimOptions options;
+  options.weights = "i=1";
+  const std::vector<float> vqp = predict(p, options).vqp;
+  EXPECT_FLOAT_EQ(vqp[0], 1);
+  EXPECT_NEAR(vqp[1], 0.5f, 1e-6);
+  EXPECT_FLOAT_EQ(vqp[2], 0);
+  EXPECT_FLOAT_EQ(vqp[3], 0);
+}
+
 TEST(Zim, ThresholdAndWeights) {
   const Plane p = make_plane(3, [](auto x, auto, auto c) { return c == 1 ? x % 2 * 24 : 100; });
   ZimOptions options;
