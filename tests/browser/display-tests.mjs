@@ -68,6 +68,37 @@ test('fragments are refined where the camera looks', async () => {
   check(both < 0.7 * Math.min(front.length, back.length), `${both} of ${front.length} and ${back.length} are the same`);
 });
 
+test('the camera turns during the timed part: what is refined then is what it looks at by then', async () => {
+  const refined = {};
+  for (const turned of [false, true])
+    await throttled({}, async (page, link, url) => {
+      await lab(page, () => window.lab.start({size: 900, zoom: 3, azimuth: 30}));
+      const id = await lab(page, (u) => window.lab.load(u, {load: {time: 1.5, refineTo: 0}}), url);
+      await until(page, (i) => window.lab.report(i).events.some((e) => e.name === 'first-picture'), id);
+      check(!(await lab(page, (i) => window.lab.report(i), id)).events.some((e) => e.name === 'deadline'), 'the timed part is over already');
+      if (turned) {
+        await lab(page, () => {
+          const {camera, centre} = window.lab.stage();
+          const away = camera.position.clone().sub(centre);
+          camera.position.set(centre.x - away.x, centre.y + away.y, centre.z - away.z);
+          camera.lookAt(centre);
+          camera.updateMatrixWorld();
+        });
+      }
+      const timed = await lab(page, (i) => window.lab.finished(i), id);
+      check(!timed.error, JSON.stringify(timed.error));
+      const {at, actual} = timed.events.find((e) => e.name === 'deadline');
+      check(actual <= 1.5 * 1.1, `${actual} s of 1.5`);
+      await link.set({bytesPerSecond: 1e12, rttMs: 0});
+      await phaseIs(page, id);
+      const {events} = await lab(page, (i) => window.lab.report(i), id);
+      refined[turned] = new Set(events.filter((e) => e.name === 'fragment' && e.at > at).map((e) => `${e.plane}/${e.fragment}`));
+    });
+  const [stayed, other] = [refined.false, refined.true];
+  const both = [...other].filter((f) => stayed.has(f)).length;
+  check(stayed.size > 4 && other.size > 4 && both < 0.7 * Math.min(stayed.size, other.size), `${both} of ${stayed.size} and ${other.size} fragments are the same`);
+}, {seconds: 120});
+
 test('coming nearer during a load: it ends in time, with what the new view asks for', () => throttled({}, async (page, link, url) => {
   await lab(page, () => window.lab.start({size: 900, zoom: 0.2}));
   const id = await lab(page, (u) => window.lab.load(u, {load: {time: 3}}), url);
