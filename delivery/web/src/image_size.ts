@@ -2,7 +2,7 @@
 export const mostPreviewPx = 4096;
 
 /**
- * Width and height that a JPEG or WebP file says it has, before anybody makes room for them; 0, 0 where it is neither, or
+ * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for them; 0, 0 where it is none, or
  * decoders may find another frame than the first one here: behind markers that have no length.
  */
 export function imageSize(b: Uint8Array): [number, number] {
@@ -18,6 +18,7 @@ export function imageSize(b: Uint8Array): [number, number] {
       else if (marker <= 0xcf && marker !== 0xc4 && marker !== 0xc8 && marker !== 0xcc) return [be(i + 7), be(i + 5)];
       else i += 2 + length;
     }
+  if (be(0) === 0x8950 && be(12) === 0x4948) return [be(16) * 65536 + be(18), be(20) * 65536 + be(22)];
   if (be(0) !== 0x5249) return [0, 0];
   const kind = String.fromCharCode(...b.subarray(8, 16));
   if (kind === 'WEBPVP8 ') return [le(26) & 0x3fff, le(28) & 0x3fff];

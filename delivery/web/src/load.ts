@@ -316,7 +316,7 @@ export class ModelLoad implements LoadedModel {
     try {
       if (!this.resting_) await this.done;
       await this.restoring_;
-      await this.refineRounds_();
+      if (!this.abort_.signal.aborted) await this.refineRounds_();
     } finally {
       this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own
     }

@@ -223,6 +223,17 @@ describe('hostile answers', () => {
       return out;
     };
     requireOwnBytes(withPicture(4096));
+    // Previews with coverage are PNG.
+    const withPng = (width: number, height: number): Uint8Array => {
+      const bufferViews = [{ buffer: 0, byteLength: 24 }];
+      const out = glb(JSON.stringify({ buffers: [{ byteLength: 24 }], bufferViews, images: [{ bufferView: 0, mimeType: 'image/png' }] }), [binChunk, ' '.repeat(24)]);
+      out.set([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10, 0, 0, 0, 13, 0x49, 0x48, 0x44, 0x52], out.length - 24);
+      new DataView(out.buffer).setUint32(out.length - 8, width);
+      new DataView(out.buffer).setUint32(out.length - 4, height);
+      return out;
+    };
+    requireOwnBytes(withPng(4096, 1));
+    for (const [w, h] of [[4097, 1], [1, 4097], [0, 8], [8, 0], [0x80000001, 8], [65536 * 4, 8]]) expect(() => requireOwnBytes(withPng(w, h))).toThrow(FormatError);
     for (const bad of [
       withPicture(4097), withPicture(0), withPicture(65535), withPicture(64, { byteLength: 6 }), withPicture(64, { byteOffset: 1 }), withPicture(64, { buffer: 1 }),
       withPicture(64, { byteOffset: -12 }), withPicture(64, { extensions: {} }), withPicture(64, {}, { bufferView: 1 }), withPicture(64, {}, { bufferView: undefined }),
@@ -338,6 +349,10 @@ describe('pictures', () => {
     expect(imageSize(riff('VP8 ', 26, [0x80, 0, 0x40, 1]))).toEqual([128, 320]);
     expect(imageSize(riff('VP8L', 20, [0x2f, 0x7f, 0xc0, 0x4f, 0]))).toEqual([128, 320]);
     expect(imageSize(riff('VP8X', 24, [0x7f, 0, 0, 0x3f, 1, 0]))).toEqual([128, 320]);
+    const png = (name: string): Uint8Array => Uint8Array.from([0x89, ...new TextEncoder().encode(`PNG\r\n\x1a\n\0\0\0\r${name}`), 0, 0, 1, 64, 0, 1, 0, 2, 8, 6]);
+    expect(imageSize(png('IHDR'))).toEqual([320, 65538]);
+    expect(imageSize(png('tEXt'))).toEqual([0, 0]); // no decoder takes what does not begin with it
+    for (let n = 0; n < 20; ++n) expect(Math.min(...imageSize(png('IHDR').subarray(0, n)))).toBe(0);
     // Markers that have no length, behind which decoders find another frame than readers who think that they have one.
     const frame = [0xff, 0xc0, 0, 17, 8, 0, 16, 0, 16, 3];
     expect(imageSize(Uint8Array.from([0xff, 0xd8, ...frame]))).toEqual([16, 16]);

@@ -28,6 +28,18 @@ describe('a load', () => {
     expect(l.model.state.scale).toBe(0);
     l.dispose();
   });
+  it('that is cancelled stays so, whoever asks for more', async () => {
+    const server = fakeServer(files);
+    const l = await loading(url, server);
+    await l.model.done;
+    await l.model.refine();
+    expect(l.model.state.phase).toBe('done');
+    l.model.cancel();
+    const asked = server.log.length;
+    await l.model.refine();
+    expect([l.model.state.phase, server.log.length]).toEqual(['cancelled', asked]);
+    l.dispose();
+  });
   it('does not ask again and again for what cannot be had', async () => {
     const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
     const l = await loading(url, server, { time: 1 });

@@ -1,5 +1,5 @@
 import {
-  BoxGeometry, BufferGeometry, Group, Material, Mesh, MeshStandardMaterial, OrthographicCamera, PerspectiveCamera, SphereGeometry,
+  BackSide, BoxGeometry, BufferGeometry, DoubleSide, FrontSide, Group, Material, Mesh, MeshStandardMaterial, OrthographicCamera, PerspectiveCamera, SphereGeometry,
   Vector2, WebGLRenderer,
 } from 'three';
 import { describe, expect, it } from 'vitest';
@@ -76,6 +76,27 @@ describe('the visible surface', () => {
     expect(seen[0]).toBeGreaterThan(0.2);
     expect(seen[1]).toBeGreaterThan(0.2);
     expect(seen[0] + seen[1]).toBeGreaterThan(2.5 * (seen[2] + seen[3]));
+  });
+  it('is also what is turned away, where the material has two sides; and only that, where it has the back alone', () => {
+    const { material } = sphere;
+    const front = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    material.side = DoubleSide; // applications may change it at any time
+    expect(Math.min(...surface.ofImage(7, 4, 1, camera, root, [0.25, 1]))).toBeGreaterThan(0.9);
+    material.side = BackSide;
+    const back = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    back.forEach((share, f) => expect(share + front[f]).toBeCloseTo(1, 2));
+    material.side = FrontSide;
+  });
+  it('is the same of a mirrored mesh, in a mirrored object, too: three.js turns both', () => {
+    for (const mirrored of [sphere, root]) {
+      mirrored.scale.z = -1;
+      mirrored.updateMatrixWorld(true);
+      root.updateMatrixWorld(true);
+      const seen = new VisibleSurface(root, [sphere], () => new Set([7])).ofImage(7, 4, 1, camera, root, [0.25, 1]);
+      expect(seen[2] + seen[3]).toBeGreaterThan(2.5 * (seen[0] + seen[1])); // what was behind is in front
+      mirrored.scale.z = 1;
+      root.updateMatrixWorld(true);
+    }
   });
   it('ends at the border of the view', () => {
     const away = camera.clone();
