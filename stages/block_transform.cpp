@@ -72,9 +72,10 @@ BlockValues block_inverse_dct(const BlockValues& coefficients) {
   return out;
 }
 
-void BlockGram::set_weights(const BlockValues& weights) {
-  if (weights == weights_) return;
+void BlockGram::set_weights(const BlockValues& weights, float mean_weight) {
+  if (weights == weights_ && mean_weight == mean_weight_) return;
   weights_ = weights;
+  mean_weight_ = mean_weight;
   has_column_ = 0;
   for (std::size_t t = 0; t < kFrequencies; ++t) {
     Quad down[2]{}, sum[kStride / 4]{};
@@ -92,6 +93,7 @@ void BlockGram::set_weights(const BlockValues& weights) {
     const float *twice = none + 2 * v * kStride, a = kCosines.scales[k];
     diagonal_[k] = a * a * (none[0] + none[2 * u] + twice[0] + twice[2 * u]);  // cos^2 x = (1 + cos 2 x) / 2
   }
+  diagonal_[0] += mean_weight;
 }
 
 /// cos a cos b = (cos(a - b) + cos(a + b)) / 2, along both axes.
@@ -107,6 +109,7 @@ void BlockGram::make_column(std::size_t k) {
             kCosines.scales[k] * load(kCosines.scales.data() + t * 8 + s) * sum);
     }
   }
+  if (k == 0) columns_[0][0] += mean_weight_;
 }
 
 }  // namespace texmesh

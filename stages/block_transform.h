@@ -16,8 +16,9 @@ BlockValues block_inverse_dct(const BlockValues& coefficients);
 /// Products of the transform's basis functions with each other, summed over samples by weight.
 class BlockGram {
  public:
-  /// Weights 0..1, not all 0. Costs little when they are the last ones.
-  void set_weights(const BlockValues& weights);
+  /// Weights 0..1, not all 0; `mean_weight` is added to the product of basis function 0 with itself. Costs
+  /// little when they are the last ones.
+  void set_weights(const BlockValues& weights, float mean_weight);
   const BlockValues& weights() const { return weights_; }
   /// Of every basis function with itself.
   const BlockValues& diagonal() const { return diagonal_; }
@@ -34,6 +35,7 @@ class BlockGram {
   void make_column(std::size_t k);
 
   BlockValues weights_{};
+  float mean_weight_ = 0;
   std::array<float, kFrequencies * kStride> spectrum_{};  // of the weights: sums of w cos() cos()
   BlockValues diagonal_{};
   std::array<BlockValues, 64> columns_;

@@ -35,6 +35,10 @@ constexpr float kRounding = 0.35f, kRoundingBelowOne = 0.25f;
 constexpr float kMostBits = 8;
 // What making a value smaller saves at most, in bits, but for rare codes: that of 1, and others.
 constexpr float kVanishingBits = 10, kSmallerBits = 3;
+// Of the squared error of a block's mean, beside that of covered samples: mips that a client makes by itself
+// show uncovered texels, too. On a photogrammetry site texels of 1/8 that are covered in part are 4.4 off at
+// quality 97 without it, .8 with it and .5 with 1; its bytes grow by 1 % and 3 %.
+constexpr float kMeanWeight = 0.15f;
 // So many coefficients are taken out of the rest one by one; more go together, by transforms.
 constexpr int kFewMoves = 6;
 
@@ -270,11 +274,14 @@ CodedBlock quantise_whole(const BlockValues& coefficients, const BlockCoding& co
 }
 
 void MaskedBlock::load(const BlockValues& samples, const BlockValues& weights) {
-  gram_.set_weights(weights);
+  gram_.set_weights(weights, kMeanWeight);
   samples_ = samples;
+  mean_ = 0;
+  for (const float v : samples) mean_ += v / 8;
   BlockValues weighted;
   for (std::size_t k = 0; k < 64; ++k) weighted[k] = weights[k] * samples[k];
   rest_ = block_dct(weighted);
+  rest_[0] += kMeanWeight * mean_;
   for (std::size_t k = 0; k < 64; ++k) per_energy_[k] = gram_.diagonal()[k] > 0 ? 1 / gram_.diagonal()[k] : 0;
   coded_.fill(0);
   begun_ = false;
@@ -314,6 +321,7 @@ void MaskedBlock::recode(const BlockValues& next) {
     for (std::size_t k = 0; k < 64; k += 4)
       store_quad(left, k, load_quad(gram_.weights(), k) * (load_quad(samples_, k) - load_quad(shown, k)));
     rest_ = block_dct(left);
+    rest_[0] += kMeanWeight * (mean_ - next[0]);
   }
   coded_ = next;
 }

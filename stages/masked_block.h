@@ -49,6 +49,7 @@ class MaskedBlock {
 
   BlockGram gram_;
   BlockValues samples_{};
+  float mean_ = 0;            // of the samples, as the coefficient of frequency 0
   BlockValues per_energy_{};  // 1 / Gram diagonal, 0 where that is nothing
   BlockValues rest_{};        // correlation of basis functions with what is left of the samples, weighted
   BlockValues coded_{};       // coefficients that rest_ goes with

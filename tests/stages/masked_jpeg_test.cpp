@@ -112,6 +112,40 @@ TEST(MaskedJpeg, BlocksThatNobodySeesAreFlatAndTakeTwoCodes) {
   EXPECT_LT(coded.body.size(), 47 * 6 / 8 + 20u);
 }
 
+/// Mean of a block of 8 x 8; how many of its texels are covered.
+double block_mean(const Pixels& pixels, std::uint32_t left, std::uint32_t top) {
+  double sum = 0;
+  for (std::uint32_t k = 0; k < 64; ++k) sum += pixels.at(left + k % 8, top + k / 8)[0];
+  return sum / 64;
+}
+int covered_in_block(const Picture& picture, std::uint32_t left, std::uint32_t top) {
+  int count = 0;
+  for (std::uint32_t k = 0; k < 64; ++k) count += picture.covered(left + k % 8, top + k / 8);
+  return count;
+}
+
+// Mips that a client makes of decoded fragments show uncovered texels, too.
+TEST(MaskedJpeg, BlocksCoveredInPartKeepTheirMean) {
+  for (const int quality : {53, 97}) {
+    Picture picture = disc(1);
+    for (std::uint32_t y = 0; y < kHeight; ++y)
+      for (std::uint32_t x = 0; x < kWidth; ++x)
+        if (!picture.covered(x, y))
+          picture.pixels.data[y * kWidth + x] = static_cast<std::uint8_t>(60 + 2 * x + y);
+    const Coded coded = code(picture, {1, quality, Subsampling::k420}, true);
+    double squares = 0, blocks = 0;
+    for (std::uint32_t y = 0; y < kHeight; y += 8)
+      for (std::uint32_t x = 0; x < kWidth; x += 8)
+        if (const int covered = covered_in_block(picture, x, y); covered > 0 && covered < 64) {
+          const double off = block_mean(coded.pixels, x, y) - block_mean(picture.pixels, x, y);
+          squares += off * off;
+          ++blocks;
+        }
+    ASSERT_GT(blocks, 10);
+    EXPECT_LT(std::sqrt(squares / blocks), quality == 53 ? 4 : 2.5) << quality;  // 9.2 and 7.3 without
+  }
+}
+
 TEST(MaskedJpeg, CountsTheSymbolsThatItWrites) {
   for (const JpegKind& kind : kinds(60)) {
     const Picture picture = disc(kind.channels);
@@ -223,7 +257,7 @@ TEST(MaskedBlock, NeverTakesASymbolWithoutACode) {
   for (const float finer : {1.0f, 1.0f, 0.25f}) {
     for (float& q : coding.quantisers) q *= finer;
     const CodedBlock found = block.quantise(coding, 0);
-    EXPECT_GT(std::ranges::count_if(found.values, [](int v) { return v != 0; }), 3);
+    EXPECT_GE(std::ranges::count_if(found.values, [](int v) { return v != 0; }), 2);
     for (std::size_t k = 1; k < 64; ++k) EXPECT_LE(std::abs(found.values[k]), 31);
   }
 }
@@ -272,7 +306,7 @@ TEST(BlockGram, HoldsTheWeightedProductsOfTheBasis) {
   BlockValues weights;
   for (float& w : weights) w = static_cast<float>(random.next() % 1000) / 1000;
   BlockGram gram;
-  gram.set_weights(weights);
+  gram.set_weights(weights, 0);
   for (std::size_t k = 0; k < 64; k += 5) {
     BlockValues unit{};
     unit[k] = 1;
