@@ -9,6 +9,8 @@ export interface Choices {
   rung: number | null;
 }
 
+/** Longer limits are none. */
+const mostTimeS = 3600;
 export const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
 const kCaps: [string, number][] = [
   ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
@@ -39,7 +41,7 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
   const mbit = number('mbit');
   const named = query.get('policy') === 'htca' ? 'htc' : query.get('policy');
   return {
-    timeS: query.get('time') === 'none' ? Infinity : time !== null && time > 0 ? time : 4,
+    timeS: query.get('time') === 'none' || (time ?? 0) > mostTimeS ? Infinity : time !== null && time > 0 ? time : 4,
     capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
     policy: kPolicies.find(([p]) => p === named)?.[0] ?? 'guard',
     scale: whole('scale'),
