@@ -1,5 +1,6 @@
 // Small packages for the tests, made by make_scan and texmesh; kept while both programs are older than they are.
 import {env, fs, packages, path, run} from './browser.mjs';
+import {sheetGlb} from './sheet.mjs';
 
 const kQuick = ['--no-cache', '--quiet', '--quality.views', '1', '--quality.size_px', '32'];
 
@@ -15,6 +16,9 @@ const kPackages = {
   webp: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'webp', '--rungs', '20,60']},
   // Meshes that three.js decodes without a worker.
   meshopt: {scan: ['--triangles', '3000', '--texture', '512', '--charts', '8'], options: ['--rungs', '20,60,85', '--mesh-codec', 'meshopt']},
+  // Coverage, two sides, a texture of a material extension; the source stays beside them.
+  blend: {sheet: {alphaMode: 'BLEND'}, options: ['--rungs', '20,60,90']},
+  mask: {sheet: {alphaMode: 'MASK'}, options: ['--rungs', '20,60,90']},
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
@@ -26,9 +30,10 @@ export function makePackages() {
     const file = path.join(packages, `${name}.texmesh`);
     if (fs.existsSync(file) && fs.statSync(file).mtimeMs > newest) continue;
     const scan = path.join(packages, `${name}.${p.ending ?? 'glb'}`);
-    run(env.makeScan, '-o', scan, ...p.scan);
+    if (p.sheet) fs.writeFileSync(scan, sheetGlb(p.sheet));
+    else run(env.makeScan, '-o', scan, ...p.scan);
     run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
-    fs.rmSync(scan);
+    if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');
     // Elsewhere, so that a server without ranges finds each kind of tree alone.
     fs.mkdirSync(path.join(packages, 'files'), {recursive: true});

@@ -9,6 +9,7 @@ import {nginxMissing, startNginx} from './nginx.mjs';
 import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
 import './display-tests.mjs';
 import './limits-tests.mjs';
+import './materials-tests.mjs';
 import './viewer-tests.mjs';
 
 /** Of the limit: figures.mjs measures what a quiet machine keeps, one that runs tests does other things, too. */
