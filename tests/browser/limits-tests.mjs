@@ -63,6 +63,23 @@ test('at most eight images are decoded and six requests made at once; every pict
   }
 }, {seconds: 90});
 
+test('at most eight images are decoded at once by three loads of a page', async () => {
+  const b = await common();
+  const page = await labPage(b.browser, b.url, counting);
+  await lab(page, () => window.lab.start({size: 256}));
+  const ids = await lab(page, ([u, o]) => [0, 1, 2].map(() => window.lab.load(u, {load: o})), [`${b.url}/packages/large.texmesh`, kEverything]);
+  const rungs = [];
+  for (const id of ids) {
+    const r = await lab(page, (i) => window.lab.finished(i), id);
+    check(!r.error, JSON.stringify(r.error));
+    rungs.push(r.state.planes.map((p) => p.rungs.join()).join(';'));
+  }
+  check(new Set(rungs).size === 1 && /[1-9]/.test(rungs[0]), `not all have all: ${rungs.join('\n')}`);
+  const {most, now, asked} = await lab(page, () => window.counted);
+  check(most <= 8 && most >= 6 && now === 0 && asked > 60, `${most} of ${asked} images at once, ${now} left`);
+  await page.close();
+}, {seconds: 90});
+
 test('meshes of meshopt', async () => {
   const b = await common();
   const r = await rightFrom(b, b.url, 'meshopt.texmesh', {options: {load: {...kEverything, meshes: 'glb'}}});

@@ -7,6 +7,7 @@ import {startLink} from './link.mjs';
 import {makePackages} from './make-packages.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
 import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
+import './application-tests.mjs';
 import './display-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';

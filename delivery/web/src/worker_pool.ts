@@ -4,7 +4,7 @@ import type {
   DecodeRequest, DocumentDecoder, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './worker_protocol';
 
-/** Images decoded at once, over all workers. */
+/** Images decoded at once, over all workers and loads of a page. */
 const mostAtOnce = 8;
 
 interface Job {
@@ -13,6 +13,16 @@ interface Job {
   worker?: number;
   done: (result: unknown) => void;
   failed: (error: unknown) => void;
+}
+
+/** What waits for its turn, of all loads, and how many are under way. */
+let queue: { pool: WorkerPool; job: Job }[] = [];
+let running = 0;
+function pump(): void {
+  while (queue.length > 0 && running < mostAtOnce) {
+    const { pool, job } = queue.shift()!;
+    pool.post(job);
+  }
 }
 
 /** What is posted takes all of its buffer along, be it the whole package: so in one of its own. */
@@ -72,7 +82,6 @@ export interface PoolOptions {
 /** Workers that decode documents, images and vertex splits. */
 export class WorkerPool {
   private readonly helpers_: Helper[] = [];
-  private readonly queue_: Job[] = [];
   private readonly running_ = new Map<number, { job: Job; worker: number }>();
   private readonly broken_ = new Set<number>(); // whose workers broke once
   private works_ = false; // a worker has answered
@@ -100,7 +109,7 @@ export class WorkerPool {
     return startHere(this.options_.decode ?? (() => this.missing_()), (a) => this.answered_(a));
   }
   private missing_(): never {
-    const error = new Error('workers cannot be had here: give `decode`, the `handle` of texmesh/worker');
+    const error = new Error('workers cannot be had here: give `workerUrl`, the address of dist/worker.js, or `decode`, the `handle` of texmesh/worker');
     if (!this.none) this.onNone?.(error);
     this.none = true;
     throw error;
@@ -128,33 +137,38 @@ export class WorkerPool {
     if (!entry) return closeBitmaps(answer.result); // nobody waits for it any more
     this.works_ ||= !answer.failed;
     this.running_.delete(answer.id);
+    --running;
     const { error } = answer;
     if (answer.failed !== undefined) entry.job.failed(answer.failed);
     else if (!error) entry.job.done(answer.result);
     else if (error.parts) entry.job.failed(new FormatError(...error.parts));
     else entry.job.failed(Object.assign(new Error(error.message), { name: error.name }));
-    this.pump_();
+    pump();
   }
 
-  private pump_(): void {
-    while (this.queue_.length > 0 && this.running_.size < mostAtOnce) this.post_(this.queue_.shift()!);
-  }
-  private post_(job: Job): void {
+  /** Gives a job whose turn it is to the worker that has least to do. */
+  post(job: Job): void {
     const busy = this.helpers_.map(() => 0);
     for (const r of this.running_.values()) ++busy[r.worker];
     const worker = job.worker ?? busy.indexOf(Math.min(...busy));
-    this.running_.set(this.nextId_, { job, worker });
-    // Copied, not handed over: a worker that breaks gives its requests back.
-    this.helpers_[worker].post(this.nextId_++, job.request);
+    const id = this.nextId_++;
+    this.running_.set(id, { job, worker });
+    ++running;
+    try {
+      // Copied, not handed over: a worker that breaks gives its requests back.
+      this.helpers_[worker].post(id, job.request);
+    } catch (failed) {
+      this.answered_({ id, failed }); // what cannot be copied takes nobody's turn
+    }
   }
 
   private ask_(request: WorkerRequest, worker?: number): Promise<unknown> {
     return new Promise((done, failed) => {
       if (this.ended_) return failed(abortError());
       const job = { request, worker, done, failed };
-      if (request.op === 'document') return this.post_(job); // everything waits for it
-      this.queue_.push(job);
-      this.pump_();
+      if (request.op === 'document') return this.post(job); // everything waits for it
+      queue.push({ pool: this, job });
+      pump();
     });
   }
 
@@ -182,17 +196,22 @@ export class WorkerPool {
   closeSplits(key: number): void {
     if (!this.ended_) this.ask_({ op: 'split-close', key }, 0).catch(() => undefined);
   }
+  private get waiting_(): Job[] {
+    return queue.filter(({ pool }) => pool === this).map(({ job }) => job);
+  }
   /** Requests under way or waiting. */
   get pending(): number {
-    return this.queue_.length + this.running_.size;
+    return this.waiting_.length + this.running_.size;
   }
   dispose(): void {
     this.ended_ = true;
     for (const h of this.helpers_) h.end();
     const error = abortError();
     for (const { job } of this.running_.values()) job.failed(error);
-    for (const job of this.queue_) job.failed(error);
+    for (const job of this.waiting_) job.failed(error);
+    queue = queue.filter(({ pool }) => pool !== this);
+    running -= this.running_.size;
     this.running_.clear();
-    this.queue_.length = 0;
+    pump();
   }
 }

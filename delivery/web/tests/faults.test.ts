@@ -453,6 +453,37 @@ describe('documents', () => {
     expect(await rejection(forged.textures())).toBeInstanceOf(FormatError);
     expect(heard).toEqual(['document']);
   });
+  it('and pictures of all loads of a page have their turns one after the other', async () => {
+    let [now, most, all] = [0, 0, 0];
+    let letGo: (() => void)[] = [];
+    const decode = async (): Promise<[unknown, Transferable[]]> => {
+      ++all;
+      most = Math.max(most, ++now);
+      await new Promise<void>((go) => letGo.push(go));
+      --now;
+      return [[], []];
+    };
+    const none = new Uint8Array(0);
+    const pools = [0, 1, 2].map(() => new WorkerPool({ decode }));
+    const ended = [0, 0, 0];
+    const jobs = pools.map((pool, p) => Array.from({ length: 10 }, () =>
+      pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).then(() => ++ended[p], () => -1)));
+    const settle = (): Promise<void> => new Promise((go) => setTimeout(go, 2));
+    await settle();
+    expect([now, all, ...pools.map((p) => p.pending)]).toEqual([8, 8, 10, 10, 10]);
+    pools[0].dispose(); // what it had under way and what waits makes room
+    expect(await Promise.all(jobs[0])).toEqual(Array(10).fill(-1));
+    await settle();
+    expect([all, ...pools.map((p) => p.pending)]).toEqual([16, 0, 10, 10]);
+    most = now = 8; // those of the first are nobody's any more
+    letGo = letGo.slice(8);
+    while (ended[1] + ended[2] < 20) {
+      letGo.splice(0).forEach((go) => go());
+      await settle();
+    }
+    expect([most, now, all, ...ended]).toEqual([8, 0, 28, 0, 10, 10]);
+    pools.forEach((pool) => pool.dispose());
+  });
   it('do not wait behind pictures', async () => {
     const posted: WorkerRequest['op'][] = [];
     const pool = new WorkerPool({
