@@ -66,6 +66,15 @@ class Tiff {
       if (number(at, 2) == tag) return at;
     return 0;
   }
+  /// Another directory, so another picture, follows.
+  bool more() const {
+    if (directory_ == 0) return false;
+    const std::size_t head = big_ ? 8 : 2, size = big_ ? 20 : 12;
+    const std::uint64_t count = number(directory_, head);
+    if (count > bytes_.size() / size) return false;
+    const std::uint64_t next = number(directory_ + head + count * size, big_ ? 8 : 4);
+    return next != 0 && next != directory_ && next < bytes_.size();
+  }
   /// Of an entry with one number of two bytes.
   std::uint32_t short_value(std::size_t entry) const {
     return static_cast<std::uint32_t>(number(entry + (big_ ? 12 : 8), 2));
@@ -133,6 +142,7 @@ void read_tiff(Bytes bytes, ImageMetadata& out) {
   constexpr std::uint32_t kProfile = 34675, kPhotometric = 262, kSeparated = 5;
   read_orientation(bytes, out);
   const Tiff tiff(bytes);
+  out.more_pictures = tiff.more();
   if (const std::size_t at = tiff.entry(kProfile)) {
     take_profile(tiff.far_value(at), out);
   }
@@ -216,6 +226,7 @@ void read_png(Bytes bytes, ImageMetadata& out) {
     if (begins(type, "sRGB")) srgb = true;
     if (begins(type, "iCCP")) take_profile(inflate_profile(body), out);
     if (begins(type, "eXIf")) read_exif(body, out);
+    if (begins(type, "acTL") && length == 8) out.more_pictures = big(body.first(4)) > 1;
     if (begins(type, "cHRM") && length == 32) out.other_primaries = !srgb_primaries(body);
     if (begins(type, "gAMA") && length == 4) {
       const std::uint32_t g = big(body);
@@ -261,6 +272,8 @@ bool rec709_primaries(Bytes chromaticities) {
 }
 
 void read_exr(Bytes bytes, ImageMetadata& out) {
+  constexpr std::uint32_t kParts = 0x1000;
+  out.more_pictures = little(part(bytes, 4, 4)) & kParts;
   for (std::size_t at = 8;;) {
     const std::string_view name = exr_text(bytes, at), type = exr_text(bytes, at);
     const Bytes size = part(bytes, at, 4);

@@ -17,6 +17,7 @@ struct ImageMetadata {
   bool other_primaries = false;
   bool cmyk = false;
   std::string foreign_colours;  // TIFF: what its values are, when not grey, RGB, a palette, YCbCr or inks
+  bool more_pictures = false;   // TIFF with pages, animated PNG, EXR with parts: the first is the image
   int orientation = 1;          // as EXIF counts: 1 = as stored, 2..8 = to be turned or mirrored for display
 };
 

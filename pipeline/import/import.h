@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 3;
+inline constexpr int kImportVersion = 4;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

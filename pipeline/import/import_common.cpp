@@ -68,8 +68,13 @@ void apply_metadata(Model& model, Image& image, const std::string& place, const 
     add_warning(model.notes, "colour-primaries-ignored", place,
                 image.name + " names primaries other than sRGB's without a profile; they are ignored");
   if (metadata.cmyk && metadata.icc_profile.empty())
-    add_info(model.notes, "cmyk-image", place,
-             image.name + " is CMYK without a profile; its inks are taken as ideal ones");
+    add_warning(model.notes, "cmyk-image", place,
+                image.name +
+                    " is CMYK without a profile; its inks are taken as ideal ones, so where it gives colours "
+                    "they may differ from those of its maker");
+  if (metadata.more_pictures)
+    add_info(model.notes, "more-pictures", place,
+             image.name + " holds more than one picture; the first is read");
   if (metadata.orientation != 1)
     add_warning(model.notes, "exif-orientation", place,
                 image.name + " asks to be turned for display (EXIF orientation " +

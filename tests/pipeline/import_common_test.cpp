@@ -265,9 +265,26 @@ TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
   add_image(m, "inks.jpg", resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
   EXPECT_EQ(count_notes(m, "exif-orientation"), 1);
   EXPECT_EQ(count_notes(m, "cmyk-image"), 1);
+  for (const Note& note : m.notes) EXPECT_EQ(note.severity, Severity::kWarning) << note.code;
   EXPECT_EQ(m.images[0].width_px, 8u);
   EXPECT_TRUE(m.images[0].honour_profile);
   EXPECT_FALSE(m.images[1].honour_profile);
+}
+
+TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
+  testing::MemoryResolver resolver;
+  const auto png = testing::png_bytes(8, 8, 3);
+  std::vector<std::uint8_t> frames(png.begin(), png.begin() + 33);  // signature and IHDR
+  frames.insert(frames.end(),
+                {0, 0, 0, 8, 'a', 'c', 'T', 'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xf3, 0x8d, 0x93, 0x70});
+  frames.insert(frames.end(), png.begin() + 33, png.end());
+  resolver.files["frames.png"] = frames;
+  resolver.files["still.png"] = png;
+  Model m;
+  add_image(m, "still.png", resolver, "f", "p", {});
+  EXPECT_EQ(count_notes(m, "more-pictures"), 0);
+  add_image(m, "frames.png", resolver, "f", "p", {});
+  EXPECT_EQ(count_notes(m, "more-pictures"), 1);
 }
 
 }  // namespace

@@ -206,6 +206,33 @@ Bytes exif(std::uint32_t orientation) {
   return out;
 }
 
+TEST(ImageMetadata, MoreThanOnePictureIsSeen) {
+  const auto more = [](ImageFormat format, std::span<const std::uint8_t> bytes) {
+    return read_image_metadata(format, bytes).more_pictures;
+  };
+  Bytes tiff = testing::encode_image("tiff", 8, 8, 3, testing::test_picture(8, 8, 3), OIIO::TypeDesc::UINT8);
+  EXPECT_FALSE(more(ImageFormat::kTiff, tiff));
+  ASSERT_EQ(tiff[0], 'I');
+  const auto at = [&](std::size_t place) {
+    return std::size_t{tiff[place]} | std::size_t{tiff[place + 1]} << 8;
+  };
+  const std::size_t directory = at(4) | at(6) << 16, next = directory + 2 + 12 * at(directory);
+  const Bytes page(tiff.begin() + static_cast<std::ptrdiff_t>(directory), tiff.end());
+  const std::size_t second = tiff.size();
+  for (std::size_t k = 0; k < 4; ++k) tiff[next + k] = static_cast<std::uint8_t>(second >> (8 * k));
+  EXPECT_FALSE(more(ImageFormat::kTiff, tiff)) << "there is nothing";
+  tiff.insert(tiff.end(), page.begin(), page.end());
+  EXPECT_TRUE(more(ImageFormat::kTiff, tiff));
+  for (std::size_t n = 0; n < tiff.size(); ++n) more(ImageFormat::kTiff, std::span(tiff).first(n));
+
+  const Bytes png = testing::png_bytes(8, 8, 3);
+  EXPECT_FALSE(more(ImageFormat::kPng, png));
+  EXPECT_FALSE(more(ImageFormat::kPng, png_with_chunk(png, "acTL", {0, 0, 0, 1, 0, 0, 0, 0})));
+  EXPECT_TRUE(more(ImageFormat::kPng, png_with_chunk(png, "acTL", {0, 0, 0, 9, 0, 0, 0, 0})));
+  EXPECT_FALSE(more(ImageFormat::kExr, Bytes{0x76, 0x2f, 0x31, 1, 2, 0, 0, 0}));
+  EXPECT_TRUE(more(ImageFormat::kExr, Bytes{0x76, 0x2f, 0x31, 1, 2, 0x10, 0, 0}));
+}
+
 TEST(ImageMetadata, ProfilesAreFoundInEveryFormat) {
   const Bytes icc = adobe_icc();
   const Bytes jpeg = jpeg_with_icc(testing::jpeg_bytes(8, 8, 3), icc);
