@@ -151,6 +151,16 @@ void measure_fragment(const TexturePlane& plane, const Pixels& pixels, const Pla
   }
 }
 
+/// What no fragment of a plane is asked to be worse than: a fault of a normal shows in every light, one of
+/// metalness or alpha at every edge, where colours hide it.
+double least_quality(TextureRole role, const LutOptions& options) {
+  const double own = is_colour(role)                ? options.quality_min
+                     : role == TextureRole::kNormal ? options.normal_quality_min
+                     : role == TextureRole::kAlpha  ? options.alpha_quality_min
+                                                    : options.data_quality_min;
+  return std::min(std::max(own, options.quality_min), options.quality_max);
+}
+
 /// Everything that is copied or follows from the options.
 PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors,
                         const PlaneLadder& ladder, std::uint32_t scales, const LutOptions& options) {
@@ -183,7 +193,7 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.allocation = static_cast<std::uint8_t>(options.allocate);
   out.quality_width = static_cast<float>(options.quality_width);
   out.log_width = static_cast<float>(options.log_width);
-  out.quality_min = static_cast<float>(options.quality_min);
+  out.quality_min = static_cast<float>(least_quality(plane.role, options));
   out.quality_max = static_cast<float>(options.quality_max);
   return out;
 }

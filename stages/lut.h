@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 5;
+inline constexpr int kLutVersion = 6;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>
@@ -24,6 +24,7 @@ struct LutOptions {
   double quality_width = 60;                      // dQ of (3.2)
   double log_width = 0.42;                        // dg of the log-quantiser form
   double quality_min = 5, quality_max = 97;       // clip
+  double normal_quality_min = 30, data_quality_min = 18, alpha_quality_min = 18;  // beside quality_min
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("allocate", s.allocate,
@@ -38,6 +39,11 @@ struct LutOptions {
       "dg: how far feature density moves the logarithm of the quantiser; below 0.6 by at most one of the "
       "default rungs");
     v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
+    v("normal_quality_min", s.normal_quality_min, Range{1, 100},
+      "the same for normal maps, where it is more than quality_min; at most quality_max");
+    v("data_quality_min", s.data_quality_min, Range{1, 100},
+      "the same for occlusion, roughness, metalness and other data");
+    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, "the same for alpha channels");
     v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
   }
 };

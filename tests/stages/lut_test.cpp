@@ -357,6 +357,37 @@ TEST(Lut, SizeModelHoldsForBlurredTextures) {  // whose blocks' shortest codes a
   }
 }
 
+TEST(Lut, EveryRoleHasItsOwnLeastQuality) {
+  Scene s = make_scene();
+  const auto least = [&](TextureRole role, const LutOptions& options) {
+    s.fragments.planes[1].role = role;
+    return build(s, options).planes[1].quality_min;
+  };
+  LutOptions options;
+  EXPECT_EQ(least(TextureRole::kAlpha, options), 18);
+  options.normal_quality_min = 41, options.data_quality_min = 42, options.alpha_quality_min = 43;
+  for (const TextureRole role : {TextureRole::kBaseColour, TextureRole::kEmissive, TextureRole::kColour})
+    EXPECT_EQ(least(role, options), 5);
+  EXPECT_EQ(least(TextureRole::kNormal, options), 41);
+  EXPECT_EQ(least(TextureRole::kOcclusionRoughnessMetallic, options), 42);
+  EXPECT_EQ(least(TextureRole::kData, options), 42);
+  EXPECT_EQ(least(TextureRole::kAlpha, options), 43);
+  options.quality_min = 60;
+  EXPECT_EQ(least(TextureRole::kNormal, options), 60) << "the least of all holds for all";
+  options.quality_min = 5, options.quality_max = 40;
+  EXPECT_EQ(least(TextureRole::kNormal, options), 40) << "the highest goes before";
+
+  // It is what the fragments are asked for, and what they cost.
+  options = {.quality_fine = 20, .quality_coarse = 20};
+  options.data_quality_min = 80;
+  s.fragments.planes[1].role = TextureRole::kData;
+  const PackageTables tables = build(s, options);
+  for (const float q : quality_of(tables.planes[1], 0, 0.5)) EXPECT_EQ(q, 80);
+  for (const float q : quality_of(tables.planes[0], 0, 0.5)) EXPECT_LT(q, 40);
+  options.data_quality_min = 18;
+  EXPECT_GT(tables.planes[1].total_bytes[0], build(s, options).planes[1].total_bytes[0]);
+}
+
 TEST(Lut, TablesPassTheirCodec) {
   const PackageTables tables = build(make_scene());
   const auto bytes = write_tables(tables);
