@@ -70,10 +70,20 @@ StageOutputs run_perceptual_values(const StageInputs& in) {
                                          in.context));
 }
 
+/// Progressive files need fragments of 256 px; who sets another least side has it, and is warned.
+FragmentationOptions fragmentation_options(const CompileOptions& options) {
+  FragmentationOptions out = options.fragmentation;
+  if (options.ladder.mode == LadderMode::kProgressive &&
+      out.min_fragment_px == FragmentationOptions{}.min_fragment_px)
+    out.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
+  return out;
+}
+
 StageOutputs run_fragmentation(const StageInputs& in) {
   return with_notes(fragment_textures(in.get<ConditionedMesh>("condition"),
                                       in.get<Materials>("import.materials"), in.get<Images>("import.images"),
-                                      in.get<ScaleMap>("ssf"), in.options.fragmentation, in.context));
+                                      in.get<ScaleMap>("ssf"), fragmentation_options(in.options),
+                                      in.context));
 }
 
 /// With --fill none the source's own texels stay, whatever they cost.
@@ -196,7 +206,7 @@ std::vector<Stage> make_table() {
        "images, mesh -> grids, coverage, feature counts, eta",
        {"condition", "import.materials", "import.images", "ssf"},
        {artefact<Fragments>("fragmentation")},
-       {"fragmentation"},
+       {"fragmentation", "ladder.mode"},
        {"openimageio"},
        true,
        run_fragmentation},

@@ -30,7 +30,8 @@ struct FragmentationOptions {
   static void fields(S& s, V&& v) {
     v("max_fragments", s.max_fragments, Range{1, 256}, "most fragments of one texture");
     v("min_fragment_px", s.min_fragment_px, Range{16, 4096},
-      "least side of a fragment, where the image allows");
+      "least side of a fragment, where the image allows; 256 instead of the default with ladder.mode "
+      "progressive");
     v("fill", s.fill,
       "push-pull = smooth colours where no chart covers the texture; none = the source's texels");
     v("mips", s.mips, "smaller copies of every texture, half by half, for small displays");

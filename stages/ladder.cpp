@@ -21,8 +21,6 @@ namespace {
 constexpr std::size_t kMaxRungs = 16;
 constexpr std::size_t kFragmentsPerTask = 2;
 constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
-// Below that, scans' headers and tables cost more than refinement saves.
-constexpr std::uint32_t kLeastProgressiveSide = 256;
 
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
   throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
@@ -79,8 +77,9 @@ PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, Uncovered
 
 /// What codes a plane, with a note where it is not what the mode asks for.
 Codec codec_of(const TexturePlane& plane, std::size_t index, LadderMode mode, Notes& notes) {
-  const auto stays = [&](const char* code, const std::string& why) {
-    add_info(notes, code, "texture plane " + std::to_string(index), why + ": it is coded as baseline JPEG");
+  const auto stays = [&](const char* code, const std::string& why, Severity severity = Severity::kInfo) {
+    notes.push_back(
+        {severity, code, "texture plane " + std::to_string(index), why + ": it is coded as baseline JPEG"});
     return Codec::kJpeg;
   };
   if (mode == LadderMode::kProgressive) {
@@ -88,7 +87,8 @@ Codec codec_of(const TexturePlane& plane, std::size_t index, LadderMode mode, No
       return Codec::kJpegProgressive;
     return stays("small-fragments-not-progressive",
                  "fragments of " + std::to_string(plane.fragment_width_px) + " x " +
-                     std::to_string(plane.fragment_height_px) + " px are too small for progressive files");
+                     std::to_string(plane.fragment_height_px) + " px are too small for progressive files",
+                 plane.mip == 0 ? Severity::kWarning : Severity::kInfo);
   }
   if (mode == LadderMode::kWebp) {
     if (is_colour(plane.role) && plane.channels == 3) return Codec::kWebp;

@@ -12,7 +12,11 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 7;
+inline constexpr int kLadderVersion = 8;
+
+/// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
+/// than refinement saves.
+inline constexpr std::uint32_t kLeastProgressiveSide = 256;
 
 enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
 template <>
@@ -44,7 +48,8 @@ struct LadderOptions {
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
       "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, where "
-      "fragments have 256 px or more; webp = lossy WebP for colours");
+      "fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = lossy WebP "
+      "for colours");
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");

@@ -124,6 +124,22 @@ TEST_F(CompileCommand, FlagsAndProfileMeanTheSame) {
   EXPECT_NE(by_profile, package_);
 }
 
+TEST_F(CompileCommand, ProgressiveTexturesWorkOrAreWarnedOf) {
+  const auto codec_of = [&](const std::string& bytes) {
+    write_text(folder_ / "x.texmesh", bytes);
+    const CommandResult dumped = texmesh({"dump", folder_ / "x.texmesh", "ladder", "--json"});
+    return Json::parse(dumped.output)["ladder"][0]["codec"].get<std::string>();
+  };
+  EXPECT_EQ(codec_of(package_), "jpeg");
+  EXPECT_EQ(codec_of(compile({"--no-cache", "--ladder", "progressive"})), "jpeg-progressive");
+  const CommandResult small = texmesh({"compile", scan(), "-o", folder_ / "small.texmesh", "--no-cache",
+                                       "--ladder", "progressive", "--fragmentation.min_fragment_px", "64"});
+  EXPECT_EQ(small.exit_code, 0) << small.errors;
+  EXPECT_NE((small.output + small.errors).find("too small for progressive files"), std::string::npos)
+      << small.output << small.errors;
+  EXPECT_EQ(codec_of(read_text(folder_ / "small.texmesh")), "jpeg");
+}
+
 TEST_F(CompileCommand, TheLosslessTopKeepsTheSource) {
   const std::string kept = compile({"--no-cache", "--lossless-top"});
   EXPECT_EQ(kept, compile({"--no-cache", "--ladder.lossless_top", "true", "--jobs", "1"}));

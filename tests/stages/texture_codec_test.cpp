@@ -305,6 +305,7 @@ TEST(LadderModes, WhatAModeCannotCodeIsBaselineWithANote) {
   EXPECT_EQ(small.planes[0].codec, Codec::kJpeg);
   ASSERT_EQ(small.notes.size(), 1u);
   EXPECT_EQ(small.notes[0].code, "small-fragments-not-progressive");
+  EXPECT_EQ(small.notes[0].severity, Severity::kWarning) << "what was asked for is not done";
   const Ladder normal = encode(plane_of(32, TextureRole::kNormal), LadderMode::kWebp);
   EXPECT_EQ(normal.planes[0].codec, Codec::kJpeg);
   ASSERT_EQ(normal.notes.size(), 1u);
