@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/dump.h"
@@ -11,6 +12,7 @@ namespace {
 struct Arguments {
   std::string package;
   std::string part = "summary";
+  std::optional<double> gamma;
   bool json = false;
 };
 
@@ -36,21 +38,38 @@ void add_dump_command(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember(std::vector<std::string>(kDumpParts.begin(), kDumpParts.end())))
       ->type_name("PART")
       ->capture_default_str();
+  c->add_option("--gamma", args->gamma,
+                "Of tables: quality and bytes of every fragment at this Gamma (0 to 1) of the allocation, "
+                "instead of the default "
+                "one, the mean of eta")
+      ->check([](const std::string& text) {
+        double value = -1;
+        return CLI::detail::lexical_cast(text, value) && value >= 0 && value <= 1
+                   ? std::string()
+                   : "expected 0 to 1, found " + text;
+      })
+      ->type_name("G");
   c->add_flag("--json", args->json, "One JSON object, for programs");
   c->footer(
       "Examples:\n"
       "  texmesh dump bust.texmesh                      the page to read first\n"
       "  texmesh dump bust.texmesh ladder               what each texture quality costs\n"
+      "  texmesh dump bust.texmesh tables --gamma 0.3   what each fragment gets then\n"
       "  texmesh dump bust.texmesh scales --json        {\"scales\":[{\"scale\":0,\"triangles\":...}, ...]}\n"
       "  texmesh dump bust.texmesh entries | sort -n -k2   which entries are large\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage.");
   c->callback([args, &exit_code] {
-    PackageReader package(open_store(args->package));
     const DumpPart part = part_of(args->part);
+    if (args->gamma && part != DumpPart::kTables && part != DumpPart::kAll) {
+      std::cerr << "texmesh dump: --gamma: expected with tables or all, found with " << args->part << '\n';
+      exit_code = kExitUsage;
+      return;
+    }
+    PackageReader package(open_store(args->package));
     if (args->json)
-      std::cout << dump_json(package, part).dump() << '\n';
+      std::cout << dump_json(package, part, args->gamma).dump() << '\n';
     else
-      std::cout << dump_text(package, part);
+      std::cout << dump_text(package, part, args->gamma);
     exit_code = kExitOk;
   });
 }

@@ -164,6 +164,7 @@ Json ladder_json(PackageReader& p) {
                        {"table_bytes", figures[r].table_bytes},
                        {"mse", figures[r].mse},
                        {"ssim", figures[r].ssim},
+                       {"surface_ssim", figures[r].surface_ssim},
                        {"path", info.rungs[r].path}});
     planes.push_back({{"plane", k},
                       {"codec", codec_traits(info.codec).id},
@@ -175,8 +176,8 @@ Json ladder_json(PackageReader& p) {
   return {{"ladder", planes}};
 }
 
-Json allocation_json(const PlaneTables& t, std::uint32_t scale) {
-  const AllocationFigures f = allocation_figures(t, scale);
+Json allocation_json(const PlaneTables& t, std::uint32_t scale, std::optional<double> gamma) {
+  const AllocationFigures f = allocation_figures(t, scale, gamma);
   Json q = Json::array(), rungs = Json::array(), bytes = Json::array(), total = Json::array();
   for (std::size_t i = 0; i < t.fragment_count(); ++i) {
     const bool stored = f.fragment_rung[i] != kSkipped;
@@ -191,12 +192,12 @@ Json allocation_json(const PlaneTables& t, std::uint32_t scale) {
           {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
 }
 
-Json tables_json(PackageReader& p) {
+Json tables_json(PackageReader& p, std::optional<double> gamma) {
   Json planes = Json::array();
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
     Json scales = Json::array();
-    for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s));
+    for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s, gamma));
     planes.push_back({{"plane", k},
                       {"allocation", allocation_name(t)},
                       {"quality_width", t.quality_width},
@@ -244,7 +245,7 @@ Json provenance_json(PackageReader& p) {
   return {{"provenance", Json::parse(bytes.begin(), bytes.end())}};
 }
 
-Json part_json(PackageReader& p, DumpPart part) {
+Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
   switch (part) {
     case DumpPart::kSummary:
       return summary_json(p);
@@ -255,7 +256,7 @@ Json part_json(PackageReader& p, DumpPart part) {
     case DumpPart::kLadder:
       return ladder_json(p);
     case DumpPart::kTables:
-      return tables_json(p);
+      return tables_json(p, gamma);
     case DumpPart::kEntries:
       return entries_json(p);
     default:
@@ -265,11 +266,11 @@ Json part_json(PackageReader& p, DumpPart part) {
 
 }  // namespace
 
-Json dump_json(PackageReader& package, DumpPart part) {
-  if (part != DumpPart::kAll) return part_json(package, part);
+Json dump_json(PackageReader& package, DumpPart part, std::optional<double> gamma) {
+  if (part != DumpPart::kAll) return part_json(package, part, gamma);
   Json all = Json::object();
   for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k)
-    all.update(part_json(package, static_cast<DumpPart>(k)));
+    all.update(part_json(package, static_cast<DumpPart>(k), gamma));
   return all;
 }
 

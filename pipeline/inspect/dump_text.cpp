@@ -229,7 +229,8 @@ std::string ladder_text(PackageReader& p) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     TextTable table;
-    for (const char* header : {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "bits/texel"})
+    for (const char* header :
+         {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "surface SSIM", "bits/texel"})
       table.column(header);
     const PlaneTables& t = p.tables().planes[k];
     double texels = 0;
@@ -238,6 +239,7 @@ std::string ladder_text(PackageReader& p) {
     for (std::size_t r = 0; r < figures.size(); ++r)
       table.row({std::to_string(r), std::to_string(figures[r].quality), kilobytes(figures[r].bytes),
                  std::to_string(figures[r].table_bytes), fixed(figures[r].mse, 2), fixed(figures[r].ssim, 4),
+                 fixed(figures[r].surface_ssim, 4),
                  texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
     const TextureInfo& info = p.textures()[k];
     s += plane_title(info, k) + table.text();
@@ -245,19 +247,20 @@ std::string ladder_text(PackageReader& p) {
     if (!info.source_extension.empty())
       s += fmt::format("  {}: the source as it was, {} B{}\n", info.source.path, info.source.bytes,
                        info.source_colours ? "" : ", whose colours were converted for this plane");
-    s += fmt::format("  preview {} x {} px, {} B; means over covered texels\n\n", info.preview_width_px,
-                     info.preview_height_px, info.preview.bytes);
+    s += fmt::format(
+        "  preview {} x {} px, {} B; means over covered texels, surface SSIM over the object's surface\n\n",
+        info.preview_width_px, info.preview_height_px, info.preview.bytes);
   }
   return s.empty() ? "no textures\n" : s;
 }
 
-std::string allocation_text(const PlaneTables& t) {
+std::string allocation_text(const PlaneTables& t, std::optional<double> gamma) {
   TextTable table;
   for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB",
                              "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
     table.column(header);
   for (std::uint32_t s = 0; s <= t.scales; ++s) {
-    const AllocationFigures f = allocation_figures(t, s);
+    const AllocationFigures f = allocation_figures(t, s, gamma);
     std::vector<std::string> row{fmt::format("S_{}", s),   fixed(static_cast<double>(t.quality[s]), 1),
                                  fixed(f.gamma, 3),        fixed(f.quality_min, 1),
                                  fixed(f.quality_mean, 1), fixed(f.quality_max, 1),
@@ -266,6 +269,30 @@ std::string allocation_text(const PlaneTables& t) {
     table.row(std::move(row));
   }
   return table.text();
+}
+
+/// q_i(x, y) and d_i(x, y) of every stored fragment and scale at one Gamma.
+std::string gamma_text(const PlaneTables& t, double gamma) {
+  TextTable table;
+  table.column("fragment");
+  std::vector<AllocationFigures> scales;
+  for (std::uint32_t s = 0; s <= t.scales; ++s) {
+    table.column(fmt::format("q_{}", s));
+    table.column(fmt::format("d_{} B", s));
+    scales.push_back(allocation_figures(t, s, gamma));
+  }
+  for (const std::uint16_t i : t.order) {
+    std::vector<std::string> row{std::to_string(i)};
+    for (const AllocationFigures& f : scales) {
+      row.push_back(fixed(static_cast<double>(f.fragment_quality[i]), 1));
+      row.push_back(std::to_string(f.fragment_bytes[i]));
+    }
+    table.row(std::move(row));
+  }
+  return fmt::format(
+             "  fragments by falling importance at Gamma {}: quality, 0 = skipped, and bytes at S_i\n",
+             shortest(gamma)) +
+         table.text();
 }
 
 std::string measured_text(const QualityTable& q) {
@@ -286,7 +313,7 @@ std::string measured_text(const QualityTable& q) {
          table.text();
 }
 
-std::string tables_text(PackageReader& p) {
+std::string tables_text(PackageReader& p, std::optional<double> gamma) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
@@ -300,10 +327,11 @@ std::string tables_text(PackageReader& p) {
     else
       s += "  no size model: it needs two rungs\n";
     s += fmt::format(
-        "  allocation {}, width {}, q within {} .. {}; D_i at the default Gamma, then by Gamma\n",
-        allocation_name(t), shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
-        shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)));
-    s += allocation_text(t) + "\n";
+        "  allocation {}, width {}, q within {} .. {}; D_i at {}, then by Gamma\n", allocation_name(t),
+        shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
+        shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)),
+        gamma ? "the Gamma asked for" : "the default Gamma");
+    s += allocation_text(t, gamma) + (gamma ? gamma_text(t, *gamma) : "") + "\n";
   }
   return s + measured_text(p.quality());
 }
@@ -349,7 +377,7 @@ std::string provenance_text(PackageReader& p) {
   return s + versions.text();
 }
 
-std::string part_text(PackageReader& p, DumpPart part) {
+std::string part_text(PackageReader& p, DumpPart part, std::optional<double> gamma) {
   switch (part) {
     case DumpPart::kSummary:
       return summary_text(p);
@@ -360,7 +388,7 @@ std::string part_text(PackageReader& p, DumpPart part) {
     case DumpPart::kLadder:
       return ladder_text(p);
     case DumpPart::kTables:
-      return tables_text(p);
+      return tables_text(p, gamma);
     case DumpPart::kEntries:
       return entries_text(p);
     default:
@@ -370,13 +398,13 @@ std::string part_text(PackageReader& p, DumpPart part) {
 
 }  // namespace
 
-std::string dump_text(PackageReader& package, DumpPart part) {
-  if (part != DumpPart::kAll) return part_text(package, part);
+std::string dump_text(PackageReader& package, DumpPart part, std::optional<double> gamma) {
+  if (part != DumpPart::kAll) return part_text(package, part, gamma);
   std::string s;
   for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k) {
     if (k == static_cast<std::size_t>(DumpPart::kScales)) continue;  // stands in the summary
-    s +=
-        (k ? "\n== " + std::string(kDumpParts[k]) + "\n" : "") + part_text(package, static_cast<DumpPart>(k));
+    s += (k ? "\n== " + std::string(kDumpParts[k]) + "\n" : "") +
+         part_text(package, static_cast<DumpPart>(k), gamma);
   }
   return s;
 }

@@ -82,6 +82,9 @@ std::vector<RungFigures> rung_figures(const PlaneTables& t) {
     }
     if (texels > 0) f.mse /= texels, dssim /= texels;
     f.ssim = 1 - dssim;
+    std::vector<std::int16_t> all(fragments, kSkipped);
+    for (const std::uint16_t i : t.order) all[i] = static_cast<std::int16_t>(r);
+    f.surface_ssim = 1 - surface_dssim(t, all);
     rungs.push_back(f);
   }
   return rungs;
@@ -89,9 +92,9 @@ std::vector<RungFigures> rung_figures(const PlaneTables& t) {
 
 std::uint64_t stored_fragments(const PlaneTables& tables) { return tables.order.size(); }
 
-AllocationFigures allocation_figures(const PlaneTables& t, std::uint32_t scale) {
+AllocationFigures allocation_figures(const PlaneTables& t, std::uint32_t scale, std::optional<double> gamma) {
   AllocationFigures f;
-  f.gamma = mean_eta(t, scale);
+  f.gamma = gamma ? *gamma : mean_eta(t, scale);
   f.fragment_quality = quality_of(t, scale, f.gamma);
   f.fragment_rung = rungs_of(t, scale, f.gamma);
   f.fragment_bytes = bytes_of(t, f.fragment_rung);

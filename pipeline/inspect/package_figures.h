@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,11 +34,12 @@ struct RungFigures {
   int quality = 0;
   std::uint64_t bytes = 0, table_bytes = 0;  // of all fragments; of the table stream
   double mse = 0, ssim = 1;                  // means over covered texels
+  double surface_ssim = 1;                   // mean over the object's surface, see surface_weights()
 };
 std::vector<RungFigures> rung_figures(const PlaneTables& tables);
 std::uint64_t stored_fragments(const PlaneTables& tables);
 
-/// The texture quality that the tables ask for at one scale and the default Gamma (the mean of eta).
+/// The texture quality that the tables ask for at one scale and Gamma.
 struct AllocationFigures {
   double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;  // quality 0: skipped
   std::uint64_t bytes = 0;  // of the chosen rungs, table streams not counted
@@ -46,7 +48,9 @@ struct AllocationFigures {
   std::vector<std::int16_t> fragment_rung;
   std::vector<std::uint32_t> fragment_bytes;
 };
-AllocationFigures allocation_figures(const PlaneTables& tables, std::uint32_t scale);
+/// Without `gamma` (0..1): at the default one, the mean of eta.
+AllocationFigures allocation_figures(const PlaneTables& tables, std::uint32_t scale,
+                                     std::optional<double> gamma = {});
 std::string allocation_name(const PlaneTables& tables);  // "thesis", "log" or "rd"
 
 }  // namespace texmesh

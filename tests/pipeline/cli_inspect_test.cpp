@@ -71,6 +71,19 @@ TEST_F(CliInspect, DumpShowsEveryPart) {
       follows_schema(json::parse(texmesh({"dump", kGolden, "scales", "--json"}).output), "dump-scales.v1"));
 }
 
+TEST_F(CliInspect, DumpOfTablesTakesAnyGamma) {
+  const CommandResult own = texmesh({"dump", kGolden, "tables"}),
+                      text = texmesh({"dump", kGolden, "tables", "--gamma", "0.125"}),
+                      data = texmesh({"dump", kGolden, "all", "--gamma", "0.125", "--json"});
+  EXPECT_EQ(text.exit_code, 0) << text.errors;
+  EXPECT_NE(text.output.find("at Gamma 0.125"), std::string::npos) << text.output;
+  EXPECT_EQ(own.output.find("at Gamma 0.125"), std::string::npos) << own.output;
+  for (const json& scale : json::parse(data.output)["tables"][0]["scales"]) EXPECT_EQ(scale["gamma"], 0.125);
+  for (const char* gamma : {"-0.1", "1.01", "nan", "inf", "much"})
+    EXPECT_EQ(texmesh({"dump", kGolden, "tables", "--gamma", gamma}).exit_code, 2) << gamma;
+  EXPECT_EQ(texmesh({"dump", kGolden, "scales", "--gamma", "0.5"}).exit_code, 2) << "nothing of it there";
+}
+
 TEST_F(CliInspect, DumpOfWhatIsNoPackage) {
   write_text(folder / "not.texmesh", "something else");
   for (const std::string& path : {folder / "not.texmesh", folder / "nowhere.texmesh"}) {

@@ -3,6 +3,7 @@
 #include "pipeline/inspect/dump.h"
 #include "pipeline/inspect/option_changes.h"
 #include "pipeline/inspect/package_figures.h"
+#include "pipeline/inspect/text_table.h"
 #include "pipeline/options.h"
 #include "tests/support/packages.h"
 
@@ -70,6 +71,28 @@ TEST_F(Dump, LadderSumsTheFragments) {
   EXPECT_TRUE(says(DumpPart::kLadder, "mean SSIM"));
 }
 
+TEST(RungFigures, WeighQualityByTexelsAndBySurface) {
+  PlaneTables t;
+  t.columns = 3, t.rows = 1;
+  t.rung_quality = {20, 80};
+  t.table_bytes = {1, 2};
+  t.size_bytes = {10, 20, 0, 30, 40, 0};
+  t.mse = {100, 10, 0, 50, 5, 0};
+  t.dssim = {0.4f, 0.1f, 0, 0.2f, 0.05f, 0};
+  t.covered_texels = {300, 100, 0};
+  t.surface_fraction = {0.25f, 0.75f, 0};
+  t.order = {0, 1};
+  const std::vector<RungFigures> figures = rung_figures(t);
+  const std::vector<float> weight = surface_weights(t);
+  for (std::size_t r = 0; r < 2; ++r) {
+    const double a = static_cast<double>(t.dssim[3 * r]), b = static_cast<double>(t.dssim[3 * r + 1]);
+    EXPECT_NEAR(figures[r].ssim, 1 - (3 * a + b) / 4, 1e-9);
+    const double wa = static_cast<double>(weight[0]), wb = static_cast<double>(weight[1]);
+    EXPECT_NEAR(figures[r].surface_ssim, 1 - (wa * a + wb * b) / (wa + wb), 1e-9);
+    EXPECT_GT(figures[r].surface_ssim, figures[r].ssim) << "most of the surface is the better one";
+  }
+}
+
 TEST_F(Dump, TablesGiveTheModelAndTheAllocation) {
   EXPECT_TRUE(says(DumpPart::kTables, "A 300, B 0.5, R 1.02; correlation 0.9800, mean error 5.0 %"))
       << text(DumpPart::kTables);
@@ -80,6 +103,31 @@ TEST_F(Dump, TablesGiveTheModelAndTheAllocation) {
   EXPECT_EQ(scale["bytes_at_gamma"], scale["total_bytes"][10]);
   EXPECT_TRUE(scale["fragment_quality"][3].is_null());
   EXPECT_EQ(j["measured_quality"]["samples"].size(), 4u);
+}
+
+TEST_F(Dump, TablesAtAnyGammaAreThoseOfTheLibrary) {
+  const PlaneTables& t = package.tables().planes[0];
+  EXPECT_EQ(text(DumpPart::kTables).find("by falling importance at Gamma"), std::string::npos);
+  for (const double gamma : {0.0, 0.3, 1.0}) {
+    const std::string page = dump_text(package, DumpPart::kTables, gamma);
+    const Json scales = dump_json(package, DumpPart::kTables, gamma)["tables"][0]["scales"];
+    ASSERT_EQ(scales.size(), t.scales + 1);
+    std::vector<std::string> lines(t.fragment_count());
+    for (std::uint32_t s = 0; s <= t.scales; ++s) {
+      const std::vector<float> quality = quality_of(t, s, gamma);
+      const std::vector<std::uint32_t> spent = bytes_of(t, rungs_of(t, s, gamma));
+      EXPECT_EQ(scales[s]["gamma"], gamma);
+      EXPECT_EQ(scales[s]["bytes_at_gamma"], sum_of(spent));
+      for (const std::uint16_t f : t.order) {
+        EXPECT_EQ(scales[s]["fragment_quality"][f], quality[f]);
+        EXPECT_EQ(scales[s]["fragment_bytes"][f], spent[f]);
+      }
+      const std::string line = fixed(static_cast<double>(quality[t.order[0]]), 1);
+      EXPECT_NE(page.find(line), std::string::npos) << line << "\n" << page;
+    }
+    EXPECT_NE(page.find("at Gamma " + shortest(gamma) + ":"), std::string::npos) << page;
+  }
+  EXPECT_NE(dump_json(package, DumpPart::kTables, 0.0), dump_json(package, DumpPart::kTables, 1.0));
 }
 
 TEST_F(Dump, EntriesStandInContainerOrder) {
