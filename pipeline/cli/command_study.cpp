@@ -53,14 +53,16 @@ struct FragmentArguments {
 struct StudiedImage {
   std::string path;
   std::uint32_t width_px = 0, height_px = 0;
+  bool alpha = false;  // there is one, which is left out
   std::vector<FragmentStudyRow> rows;
 };
 
-/// Colours of an image; its alpha channel is left out.
-Pixels read_pixels(const std::string& path) {
+/// Colours of an image; its alpha channel is left out, and `alpha` says whether there is one.
+Pixels read_pixels(const std::string& path, bool& alpha) {
   const Image image = probe_image(path, read_input_file(path, kMaxImageBytes), {});
   Pixels all = decode_image(image, FloatEncoding::kSrgb);
   const std::uint32_t channels = all.channels < 3 ? 1 : 3;
+  alpha = channels != all.channels;
   if (channels == all.channels) return all;
   Pixels out{all.width_px, all.height_px, channels, {}};
   for (std::size_t k = 0; k < std::size_t{all.width_px} * all.height_px; ++k)
@@ -88,11 +90,13 @@ std::string fragment_text(const StudiedImage& image) {
     within += good, large += is_large, large_within += good && is_large;
   }
   return fmt::format(
-      "{}: {} x {} px\n{}  with shared tables the fragments are no larger than one standard file in {} of {} "
+      "{}: {} x {} px{}\n{}  with shared tables the fragments are no larger than one standard file in {} of "
+      "{} "
       "rows; of those "
       "with fragments of 128 px and more in {} of {}\n",
-      image.path, image.width_px, image.height_px, table.text(), within, image.rows.size(), large_within,
-      large);
+      image.path, image.width_px, image.height_px,
+      image.alpha ? "; its alpha channel, which packages hold as a texture of its own, is left out" : "",
+      table.text(), within, image.rows.size(), large_within, large);
 }
 
 Json fragment_json(const FragmentStudyRow& r) {
@@ -138,14 +142,16 @@ void run_fragments(const FragmentArguments& args) {
   std::vector<StudiedImage> studied;
   Json list = Json::array();
   for (const std::string& path : args.images) {
-    const Pixels pixels = read_pixels(path);
-    studied.push_back(
-        {path, pixels.width_px, pixels.height_px, study_fragments(pixels, options, context_of(args.jobs))});
+    bool alpha = false;
+    const Pixels pixels = read_pixels(path, alpha);
+    studied.push_back({path, pixels.width_px, pixels.height_px, alpha,
+                       study_fragments(pixels, options, context_of(args.jobs))});
     if (!args.json) std::cout << fragment_text(studied.back()) << std::flush;
     Json rows = Json::array();
     for (const FragmentStudyRow& r : studied.back().rows) rows.push_back(fragment_json(r));
     list.push_back(
         {{"image", path}, {"width_px", pixels.width_px}, {"height_px", pixels.height_px}, {"rows", rows}});
+    if (alpha) list.back()["alpha_left_out"] = true;
   }
   if (args.json)
     std::cout << Json{{"fragments", list}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';

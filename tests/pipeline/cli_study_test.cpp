@@ -33,12 +33,16 @@ TEST_F(StudyCommand, FragmentsAsTableCsvAndJson) {
   ASSERT_EQ(text.exit_code, 0) << text.errors;
   EXPECT_NE(text.output.find("160 x 96 px"), std::string::npos) << text.output;
   EXPECT_NE(text.output.find("4^2"), std::string::npos) << text.output;
+  EXPECT_EQ(text.output.find("alpha channel"), text.output.rfind("alpha channel")) << "of one of the two";
+  EXPECT_NE(text.output.find("alpha channel"), std::string::npos) << text.output;
   EXPECT_NE(text.output.find("4x3"), std::string::npos) << "48 px in rows of 32 px: " << text.output;
   const CommandResult machine =
       texmesh({"study", "fragments", rgba, grey, "--grids", "1,2,4", "--qualities", "20,80", "--json"});
   ASSERT_EQ(machine.exit_code, 0) << machine.errors;
   const Json document = Json::parse(machine.output);
   ASSERT_EQ(document["fragments"].size(), 2u);
+  EXPECT_EQ(document["fragments"][0].value("alpha_left_out", false), true);
+  EXPECT_FALSE(document["fragments"][1].contains("alpha_left_out"));
   std::istringstream csv(read_text(folder / "x.csv"));
   std::string line;
   std::getline(csv, line);
