@@ -12,9 +12,14 @@
 #include "stages/lut.h"
 #include "stages/zim.h"
 #include "tests/bench/bench_model.h"
+#include "tests/support/fill_curves.h"
 
 namespace texmesh {
 namespace {
+
+using testing::bytes_at;
+using testing::fill_curve;
+using testing::FillPoint;
 
 bool covered(const TexturePlane& plane, std::uint32_t x, std::uint32_t y) {
   return plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
@@ -68,10 +73,6 @@ void leave_whole_blocks(Pixels& pixels, const TexturePlane& plane) {
     }
 }
 
-struct Point {
-  double bytes = 0, psnr = 0;
-};
-
 /// Means of 8 x 8 texels that are covered in part, as a client that halves what it shows three times has
 /// them: there uncovered texels are seen, too. [planes, fragments, blocks] x channels.
 std::vector<double> mixed_means(const Fragments& fragments, const std::vector<std::size_t>& shown,
@@ -112,11 +113,10 @@ double rms_difference(const std::vector<double>& a, const std::vector<double>& b
 
 constexpr std::size_t kMiddleRung = 5, kTopRung = 9;  // qualities 53 and 97
 struct Measured {
-  std::vector<Point> rungs;
+  std::vector<FillPoint> rungs;
   std::vector<double> mixed_middle, mixed_top;
 };
 
-/// Per rung, over the planes: bytes of the fragments, PSNR of luma over covered texels.
 Measured measure(const Fragments& fragments, const std::vector<std::size_t>& shown,
                  const std::vector<Pixels>& pixels, Uncovered uncovered, const RunContext& context) {
   LadderOptions options;
@@ -124,34 +124,8 @@ Measured measure(const Fragments& fragments, const std::vector<std::size_t>& sho
   const Predictors predictors = predict_quality(fragments, pixels, {}, context);
   const Ladder ladder = encode_ladder(fragments, pixels, options, context);
   const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, {}, context);
-  Measured measured{std::vector<Point>(tables.planes[shown[0]].rung_count()),
-                    mixed_means(fragments, shown, ladder, kMiddleRung),
-                    mixed_means(fragments, shown, ladder, kTopRung)};
-  std::vector<Point>& out = measured.rungs;
-  for (std::size_t r = 0; r < out.size(); ++r) {
-    double error = 0, texels = 0;
-    for (const std::size_t p : shown) {
-      const PlaneTables& t = tables.planes[p];
-      for (const std::uint16_t f : t.order) {
-        const std::size_t at = r * t.fragment_count() + f;
-        out[r].bytes += t.size_bytes[at];
-        error += static_cast<double>(t.mse[at]) * t.covered_texels[f];
-        texels += t.covered_texels[f];
-      }
-    }
-    out[r].psnr = 10 * std::log10(65025 * texels / error);
-  }
-  return measured;
-}
-
-double bytes_at(const std::vector<Point>& curve, double psnr) {
-  for (std::size_t k = 1; k < curve.size(); ++k) {
-    const Point &a = curve[k - 1], &b = curve[k];
-    if (psnr < a.psnr || psnr > b.psnr) continue;
-    const double t = (psnr - a.psnr) / (b.psnr - a.psnr);
-    return std::exp(std::log(a.bytes) + t * (std::log(b.bytes) - std::log(a.bytes)));
-  }
-  return 0;
+  return {fill_curve(tables, shown), mixed_means(fragments, shown, ladder, kMiddleRung),
+          mixed_means(fragments, shown, ladder, kTopRung)};
 }
 
 /// How many uncovered texels equal their four neighbours: what the source's background costs.
@@ -200,14 +174,15 @@ void print_model(const std::string& path) {
   const std::vector<Pixels> ours =
       fill_planes(shown_only, model.images, Fill::kPushPull, context, PartBlocks::kSmooth);
 
-  const std::vector<Point> reference = measure(shown_only, shown, source, Uncovered::kKept, context).rungs;
+  const std::vector<FillPoint> reference =
+      measure(shown_only, shown, source, Uncovered::kKept, context).rungs;
   std::cout << fmt::format("{:<22} {:5.1f} {:5.1f} ", model_name(path), 100 * texels / stored_texels,
                            100 * flat_share(shown_only, shown, source));
   Measured free;
   for (const std::vector<Pixels>* pixels : {&std::as_const(nearest), &ours}) {
     const Measured measured =
         measure(shown_only, shown, *pixels, pixels == &ours ? Uncovered::kFree : Uncovered::kKept, context);
-    const std::vector<Point>& curve = measured.rungs;
+    const std::vector<FillPoint>& curve = measured.rungs;
     if (pixels == &ours) free = measured;
     double sum = 0;
     int count = 0;
@@ -224,7 +199,7 @@ void print_model(const std::string& path) {
   }
   std::vector<Pixels> whole = ours;
   for (std::size_t p = 0; p < whole.size(); ++p) leave_whole_blocks(whole[p], shown_only.planes[p]);
-  const std::vector<Point> least = measure(shown_only, shown, whole, Uncovered::kKept, context).rungs;
+  const std::vector<FillPoint> least = measure(shown_only, shown, whole, Uncovered::kKept, context).rungs;
   const Measured kept = measure(shown_only, shown, ours, Uncovered::kKept, context);
   std::cout << fmt::format(
       "   {:.3f} {:.3f} {:.3f}   {:.0f} kB {:.2f} dB at quality 53   {:.2f} {:.2f} ({:.2f})\n",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -135,10 +136,13 @@ TEST(FragmentGrid, FollowsItsRules) {
   std::vector<std::array<std::uint32_t, 2>> sizes{
       {1, 1},         {32, 32},   {678, 2199}, {2048, 2048}, {4096, 4096}, {8192, 8192}, {65500, 1},
       {65500, 65500}, {130, 130}, {518, 429},  {16, 20000},  {4096, 2048}, {1024, 1024}, {512, 512}};
-  for (int k = 0; k < 500; ++k) sizes.push_back({1 + random.next() % 9000, 1 + random.next() % 9000});
+  const bool all = std::getenv("TEXMESH_FULL") != nullptr;
+  for (int k = 0; k < (all ? 500 : 30); ++k)
+    sizes.push_back({1 + random.next() % 9000, 1 + random.next() % 9000});
   for (const auto& [w, h] : sizes)
     for (const std::uint32_t most : {256u, 64u, 5u, 1u})
       for (const std::uint32_t least : {128u, 16u, 500u}) {
+        if (!all && std::min(w, h) > 60000 && least != 128) continue;  // a second each
         const FragmentGrid g = choose_grid(w, h, {}, most, least);
         const auto axis = [&](std::uint32_t size, std::uint32_t side, std::uint32_t count) {
           EXPECT_EQ(side % 16, 0u);
