@@ -88,11 +88,24 @@ export async function closeCommon() {
   await b?.server.close();
 }
 
-/** The longest chain of requests of which each began after the one before had ended. */
-export function roundTrips(requests) {
+/** Of each request: how many, itself counted, began one after the other before it had ended. */
+function depths(requests) {
   const depth = requests.map(() => 0);
   const order = requests.map((_, i) => i).sort((a, c) => requests[a].started - requests[c].started);
   for (const i of order)
     depth[i] = 1 + Math.max(0, ...order.filter((j) => requests[j].ended <= requests[i].started).map((j) => depth[j]));
-  return Math.max(0, ...depth);
+  return depth;
+}
+
+/** What a picture that stood `at` had to wait for. Other requests may go on beside those that it is made of; what one of those waited for counts. */
+export function waitedFor(requests, at) {
+  const made = ['manifest', 'first-picture', 'mesh', 'preview'];
+  const before = requests.filter((q) => q.ended <= at);
+  const depth = depths(before);
+  // Of what was still coming, the share that its time makes likely.
+  const share = (q) => (q.ended <= at ? 1 : Math.max(0, Math.min(1, (at - q.firstByte) / (q.ended - q.firstByte))));
+  return {
+    roundTrips: Math.max(0, ...depth.filter((_, i) => made.includes(before[i].kind))),
+    bytes: requests.reduce((sum, q) => sum + (q.started < at ? share(q) * q.received : 0), 0),
+  };
 }

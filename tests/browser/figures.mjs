@@ -2,7 +2,7 @@
 // viewer shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
 // TEXMESH_FIGURE_PACKAGES. The machine should have nothing else to do.
 import {execFileSync} from 'node:child_process';
-import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, roundTrips, run, serve} from './browser.mjs';
+import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, run, serve, waitedFor} from './browser.mjs';
 import {startLink} from './link.mjs';
 
 const kScans = {sea_turtle: 'sea_turtle/sea_turtle.glb', marble_bust_4k: 'marble_bust_4k/marble_bust_01_4k.obj', yurt: 'yurt/yurt.glb'};
@@ -72,11 +72,9 @@ async function firstPictures() {
     const id = await load(page, name, {load: {time: 4, autoRefine: false}});
     const r = await finished(page, id);
     const shown = r.events.find((e) => e.name === 'first-picture');
-    const before = r.requests.filter((q) => q.ended <= shown.at);
-    const needed = before.filter((q) => ['manifest', 'first-picture', 'mesh', 'preview', 'stream'].includes(q.kind));
-    const bytes = before.reduce((sum, q) => sum + q.received, 0);
-    row(`first picture, ${name}: round trips`, roundTrips(needed), '<= 2', roundTrips(needed) <= 2);
-    row(`first picture, ${name}: package bytes`, bytes, '<= 60 000', bytes <= 60000);
+    const {roundTrips, bytes} = waitedFor(r.requests, shown.at);
+    row(`first picture, ${name}: round trips`, roundTrips, '<= 2', roundTrips <= 2);
+    row(`first picture, ${name}: package bytes`, Math.round(bytes), '<= 60 000', bytes <= 60000);
     row(`first picture, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
     await page.close();
   }

@@ -1,6 +1,6 @@
 // The client library in a real browser: what it shows is what the compiler stored, whatever the server does.
 import {
-  check, closeCommon, common, lab, labPage, labRoots, near, packages, path, pictures, roundTrips, serve, startView,
+  check, closeCommon, common, lab, labPage, labRoots, near, packages, path, pictures, serve, startView, waitedFor,
 } from './browser.mjs';
 import {runAll, test} from './harness.mjs';
 import {startLink} from './link.mjs';
@@ -106,18 +106,14 @@ test('nothing is fetched twice', async () => {
   await server.close();
 });
 
-const kFirst = ['manifest', 'first-picture', 'mesh', 'preview', 'stream'];
-
 test('the first picture takes two round trips', () => throttled({}, async (page, link, url) => {
   const r = await loaded(null, page, url, {load: {time: 3, autoRefine: false}});
   check(!r.error, JSON.stringify(r.error));
   const shown = r.events.find((e) => e.name === 'first-picture');
   check(shown, 'no first picture');
-  const before = r.requests.filter((q) => q.ended <= shown.at);
-  // Tables and textures that are asked for meanwhile do not hold it up.
-  const trips = roundTrips(before.filter((q) => kFirst.includes(q.kind)));
-  check(trips <= 2, `${trips} round trips`);
-  check(before.reduce((sum, q) => sum + q.received, 0) <= 60000, 'more than 60 KB');
+  const {roundTrips, bytes} = waitedFor(r.requests, shown.at);
+  check(roundTrips <= 2, `${roundTrips} round trips`);
+  check(bytes <= 60000, `${bytes} bytes`);
 }));
 
 test('a deadline is kept on a slow link', () => throttled({}, async (page, link, url) => {

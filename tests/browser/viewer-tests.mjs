@@ -89,6 +89,31 @@ test('viewer: original and current side by side', () => withViewer('?pkg=package
   check(await page.locator('#divider').isHidden(), 'the border stays');
 }), {seconds: 90});
 
+test('viewer: all of it is in view at home; panel and plot have the height that decides', () => withViewer('?pkg=packages/large.texmesh&time=1', async (page) => {
+  await phase(page, 'done');
+  const seen = async () => {
+    await settled(page);
+    return page.evaluate(() => {
+      const {session: {live, inner}, stage} = window.texmeshViewer;
+      const {boundsMin: min, boundsMax: max, objectHeight} = live.manifest;
+      const centre = stage.camera.position.clone().fromArray(min.map((v, k) => (v + max[k]) / 2));
+      const px = (distance) => (objectHeight / distance / 2 / Math.tan((stage.camera.fov * Math.PI) / 360)) * stage.renderer.domElement.height;
+      return {
+        panel: document.getElementById('figure-size').textContent, live: live.displayedPx, decides: inner.model.state.displayedPx,
+        middle: px(stage.camera.position.distanceTo(centre)), bound: px(objectHeight / 50),
+      };
+    });
+  };
+  const [home, near] = [await seen(), (await zoom(10), await seen())];
+  for (const s of [home, near])
+    check(s.live === s.decides && Number(s.panel.replace(/[^0-9.]/g, '')) === Math.round(s.decides), JSON.stringify(s));
+  check(Math.abs(home.decides / home.middle - 1) < 1e-3, `at home ${JSON.stringify(home)}`);
+  check(near.decides > 2 * home.decides && near.decides < 0.5 * near.bound, `near ${JSON.stringify(near)}`);
+  async function zoom(times) {
+    for (let i = 0; i < times; i++) await page.locator('#view').press('+');
+  }
+}));
+
 test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
   await phase(page, 'done');
   const eye = () => page.evaluate(() => window.texmeshViewer.stage.camera.position.toArray());

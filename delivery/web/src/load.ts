@@ -162,6 +162,7 @@ export class ModelLoad implements LoadedModel {
     documents.catch(() => undefined);
     await first.bytes;
     await this.loadScale_(coarsest.scale).shown;
+    this.update(this.context_.view.camera); // by what is there, not by its bounds alone
     this.events_.emit('first-picture', { scale: coarsest.scale, bytes: client.received });
     shown();
     this.enter_('tables');

@@ -298,7 +298,8 @@ export class TextureLoad {
     const { manifest } = this.load_.reader;
     if (rule && rule !== 'measured') return selectScale(manifest, heightPx, part, rule);
     const scale = selectScale(manifest, heightPx, part);
-    return this.quality_ ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
+    const hidden = part?.clipped && part.widthPx === 0;
+    return this.quality_ && !hidden ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
   }
   /** The list of what may be fetched, with the bytes that fetching takes. */
   private listOf_(data: PackageData, choices: readonly PlaneChoice[], scale: number): FragmentList {

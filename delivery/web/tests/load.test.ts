@@ -40,6 +40,20 @@ describe('a load', () => {
     expect([l.model.state.phase, server.log.length]).toEqual(['cancelled', asked]);
     l.dispose();
   });
+  it('takes the scale that the visible part asks for (Fig. 7.5)', async () => {
+    const narrow = { widthPx: 300, heightPx: 2, clipped: true }; // an error may be no more than half of its 2 px
+    const nothing = { widthPx: 0, heightPx: 0, clipped: true };
+    const wanted: number[] = [];
+    for (const display of [{ heightPx: 20 }, { heightPx: 20, part: narrow }, { heightPx: 4000 }, { heightPx: 4000, part: nothing }]) {
+      const l = await loading(url, fakeServer(files), { display });
+      await l.model.done;
+      wanted.push(l.model.state.wantedScale);
+      await l.model.refine();
+      wanted.push(l.model.state.wantedScale);
+      l.dispose();
+    }
+    expect(wanted).toEqual([1, 1, 0, 0, 0, 0, 1, 1]);
+  });
   it('does not ask again and again for what cannot be had', async () => {
     const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
     const l = await loading(url, server, { time: 1 });

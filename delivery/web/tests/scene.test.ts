@@ -1,6 +1,6 @@
 import {
   BackSide, BoxGeometry, BufferGeometry, DoubleSide, FrontSide, Group, Material, Mesh, MeshStandardMaterial, OrthographicCamera, PerspectiveCamera, SphereGeometry,
-  Vector2, WebGLRenderer,
+  Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { describe, expect, it } from 'vitest';
 import { displayOf } from '../src/camera';
@@ -53,6 +53,42 @@ describe('the display', () => {
     const gone = displayOf(manifest, object, away, renderer(800, 600));
     expect(gone.part).toEqual({ widthPx: 0, heightPx: 0, clipped: true });
     expect(selectScale(manifest, gone.heightPx, gone.part)).toBe(manifest.scales.at(-1)!.scale);
+  });
+  // A ball that touches all sides of the bounds and none of their corners.
+  const centre = manifest.boundsMin.map((least, i) => (least + manifest.boundsMax[i]) / 2) as [number, number, number];
+  const ball = (share = 0.5): Group => {
+    const mesh = new Mesh(new SphereGeometry(share, 48, 24), new MeshStandardMaterial());
+    mesh.position.set(...centre);
+    mesh.scale.fromArray(manifest.boundsMax.map((most, i) => most - manifest.boundsMin[i]));
+    return new Group().add(mesh);
+  };
+  const middleOf = (heights: number): number =>
+    displayedHeightPx(manifest.objectHeight, heights * manifest.objectHeight, { fovDegrees: 45, viewportPx: 600 });
+  it('of a whole object is whole, whatever is cut off of the corners of its bounds', () => {
+    const camera = lookAt(manifest, 3);
+    for (let heights = 3; displayOf(manifest, object, camera, renderer(600, 600)).part?.clipped === false; heights *= 0.99) lookAt(manifest, heights, camera);
+    const heights = camera.position.distanceTo(new Vector3(...centre)) / manifest.objectHeight;
+    const seen = displayOf(manifest, ball(), camera, renderer(600, 600));
+    expect(seen.part?.clipped).toBe(false);
+    expect(seen.heightPx).toBeCloseTo(middleOf(heights), 3);
+  });
+  it('grows without a jump while more and more is cut off', () => {
+    const camera = lookAt(manifest, 3);
+    let before = displayOf(manifest, ball(), camera, renderer(600, 600));
+    let clipped = 0;
+    for (let heights = 3; heights > 0.75; heights *= 0.98) {
+      const now = displayOf(manifest, ball(), lookAt(manifest, heights, camera), renderer(600, 600));
+      expect(now.heightPx).toBeGreaterThanOrEqual(before.heightPx);
+      expect(now.heightPx / before.heightPx).toBeLessThan(1.12);
+      clipped += Number(now.part!.clipped);
+      before = now;
+    }
+    expect(clipped).toBeGreaterThan(5);
+    expect(before.heightPx).toBeGreaterThan(1.5 * middleOf(0.75)); // what is near decides
+  });
+  it('within the bounds counts how far the surface is', () => {
+    const inside = displayOf(manifest, ball(0.05), lookAt(manifest, 0.3), renderer(600, 600));
+    expect(inside.heightPx).toBeLessThan(middleOf(0.15));
   });
   it('of an orthographic camera has nothing to do with distance', () => {
     const camera = new OrthographicCamera(-1, 1, 1, -1, 0, 100);

@@ -84,13 +84,6 @@ export function start(query: URLSearchParams): void {
     if (session.live.scale === null) showError(error, packageUrl);
     else session.problem(error);
   };
-  stage.onView = () => {
-    const m = session.live.manifest;
-    if (m) {
-      session.live.displayedPx = stage.displayedHeightPx(m.objectHeight);
-      panel.update(session.live);
-    }
-  };
   wireTools(stage, session);
   byId('toggle').setAttribute('aria-expanded', String(!document.body.classList.contains('wide')));
   Object.assign(window, { texmeshViewer: { stage, session, choices } });

@@ -28,6 +28,7 @@ export class Session {
     stage.onFrame = () => {
       this.model?.update(stage.camera);
       this.original?.model.update(stage.camera);
+      this.look();
     };
   }
 
@@ -179,7 +180,7 @@ export class Session {
     const on: LoadedModel['on'] = (name, f) => model.on(name, (e) => {
       if (turn !== this.turn) return;
       f(e);
-      l.displayedPx = model.state.displayedPx;
+      this.look();
       this.changed();
     });
     on('first-picture', (e) => {
@@ -223,6 +224,14 @@ export class Session {
       this.stage.draw();
     });
     on('error', (e) => { if (!e.fatal) this.problem(e.error); }); // a fatal one rejects `done`
+  }
+
+  /** The displayed height that decides about scale and planes. */
+  private look(): void {
+    const px = this.model?.state.displayedPx ?? 0;
+    if (px === this.live.displayedPx) return;
+    this.live.displayedPx = px;
+    this.changed();
   }
 
   private decision(e: DecisionEvent, origin: number): void {

@@ -7,7 +7,6 @@ import { graphics, idle, pixelRatio, turn } from './gpu';
 
 const kFieldOfViewDegrees = 32;
 const kTurnDegrees = 6; // per press of an arrow key
-const kMargin = 0.95; // of the sphere round the box, which hardly any object fills
 
 /**
  * The picture: a camera that goes round the object by mouse, touch and keyboard, and two scenes of which the left one is shown
@@ -19,8 +18,6 @@ export class Stage {
   readonly original = new Scene();
   /** Called before each frame; e.g. the library's look at the camera. */
   onFrame: () => void = () => {};
-  /** Called when the camera, or the size of the picture, has changed. */
-  onView: () => void = () => {};
 
   private made: WebGLRenderer | null = null;
   private becoming: Promise<void> | null = null;
@@ -37,10 +34,7 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.dampingFactor = 0.12;
-    this.controls.addEventListener('change', () => {
-      this.draw();
-      this.onView();
-    });
+    this.controls.addEventListener('change', () => this.draw());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement ?? canvas);
     canvas.addEventListener('keydown', (e) => this.key(e));
     canvas.addEventListener('webglcontextrestored', () => this.draw());
@@ -79,13 +73,13 @@ export class Stage {
     this.home();
   }
 
-  /** The whole object from a little above, its front to the left. */
+  /** The whole object, the sphere round its box, from a little above, its front to the left. */
   home(): void {
     const centre = this.bounds.getCenter(new Vector3());
     const radius = Math.max(this.bounds.getSize(new Vector3()).length() / 2, 1e-9);
     const half = MathUtils.degToRad(kFieldOfViewDegrees) / 2;
     const narrow = Math.min(1, this.camera.aspect);
-    const distance = (kMargin * radius) / Math.sin(Math.atan(Math.tan(half) * narrow));
+    const distance = radius / Math.sin(Math.atan(Math.tan(half) * narrow));
     this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72), MathUtils.degToRad(28))).add(centre);
     this.camera.near = distance / 500;
     this.camera.far = distance * 20;
@@ -95,15 +89,6 @@ export class Stage {
     this.controls.maxDistance = distance * 8;
     this.controls.update();
     this.draw();
-    this.onView();
-  }
-
-  /** Height of the object's box on the screen in device pixels, as the step functions count it. */
-  displayedHeightPx(objectHeight: number): number {
-    const centre = this.bounds.getCenter(new Vector3());
-    const distance = Math.max(this.camera.position.distanceTo(centre), this.camera.near);
-    const scale = (this.heightPx * pixelRatio()) / (2 * Math.tan(MathUtils.degToRad(kFieldOfViewDegrees) / 2));
-    return (objectHeight / distance) * scale;
   }
 
   /** Shows the original in the left `share` of the picture; 0 = not at all. */
@@ -159,7 +144,6 @@ export class Stage {
     this.camera.position.setFromSpherical(s).add(this.controls.target);
     this.controls.update();
     this.draw();
-    this.onView();
   }
 
   /** Comes nearer by a factor below 1, goes away by one above. */
@@ -169,7 +153,6 @@ export class Stage {
     this.camera.position.copy(this.controls.target).add(offset.setLength(length));
     this.controls.update();
     this.draw();
-    this.onView();
   }
 
   private key(e: KeyboardEvent): void {
@@ -201,7 +184,6 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     // A canvas that was resized is empty until the next frame: draw at once, or it flickers.
     this.render();
-    this.onView();
   }
 
   /** The renderer's buffer as large as the picture; made anew only when it has another size. */
