@@ -22,7 +22,7 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
     near = Math.min(near, eye.distanceTo(p));
     p.applyMatrix4(toView);
     ++all;
-    // A point behind the eye makes them larger than any screen.
+    // A point behind the eye makes it larger than any screen.
     const behind = p.z >= 0 && !orthographic;
     p.applyMatrix4(camera.projectionMatrix);
     const x = ((p.x + 1) / 2) * size.x;
@@ -31,7 +31,7 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
     rect.x1 = behind ? 1e9 : Math.max(rect.x1, x);
     rect.y0 = behind ? -1e9 : Math.min(rect.y0, y);
     rect.y1 = behind ? 1e9 : Math.max(rect.y1, y);
-    if (behind || Math.max(Math.abs(p.x), Math.abs(p.y)) > 1) ++outside;
+    if (behind || Math.abs(p.x) > 1 || Math.abs(p.y) > 1) ++outside;
   });
   const part = clipTo(rect, { x0: 0, y0: 0, x1: size.x, y1: size.y });
   if (orthographic) {
@@ -59,8 +59,8 @@ function pointsOf(object: Object3D, box: Box3, use: (p: Vector3) => void): void 
       use(p.fromBufferAttribute(attributes.position, index.getX(k)).applyMatrix4(o.matrixWorld));
     }
   });
-  for (let k = 0; none && k < 27; ++k) {
-    p.set(k % 3, Math.floor(k / 3) % 3, Math.floor(k / 9)).multiplyScalar(0.5);
-    use(p.multiply(box.getSize(new Vector3())).add(box.min).applyMatrix4(object.matrixWorld));
+  for (let k = 0; none && k < 8; ++k) {
+    p.set(k & 1, (k >> 1) & 1, k >> 2).multiply(box.getSize(new Vector3()));
+    use(p.add(box.min).applyMatrix4(object.matrixWorld));
   }
 }
