@@ -14,7 +14,9 @@ export interface Display {
 
 /** What GLTFLoader (three/addons) offers and this library uses. */
 export interface GltfLoaderLike {
+  /** Adds an extension of the loader. */
   register(callback: (parser: any) => any): unknown;
+  /** Reads a GLB. */
   parseAsync(data: ArrayBuffer, path: string): Promise<unknown>;
 }
 
@@ -38,6 +40,7 @@ export interface LoadOptions {
   time?: number;
   /** How the time is spent; htca is another name of htc. Default guard. */
   policy?: Policy | 'htca';
+  /** Which fragment of the plan is fetched next. Default credit. */
   order?: HtcOrder;
   /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
   beta0BytesS?: number;
@@ -64,6 +67,7 @@ export interface LoadOptions {
   decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
+  /** Cancels the load, as LoadedModel.cancel does. */
   signal?: AbortSignal;
 }
 
@@ -74,22 +78,31 @@ export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refi
 export interface DecisionEvent {
   /** k = 1 .. n */
   position: number;
+  /** Texture plane of the fragments. */
   plane: number;
-  /** The first, and all: neighbours of one rung are fetched together where a request takes longer than its bytes. */
+  /** The first. */
   fragment: number;
+  /** All: neighbours of one rung are fetched together where a request takes longer than its bytes. */
   fragments: number[];
+  /** Importance. */
   eta: number;
   /** -1: skipped */
   rung: number;
+  /** What is fetched. */
   bytes: number;
-  /** theta_k, the seconds it may take, and gamma_k, those it took (undefined until it has ended). */
+  /** theta_k: it may take so long. */
   plannedSeconds: number;
+  /** gamma_k: it took so long; undefined until it has ended. */
   actualSeconds?: number;
+  /** Time that earlier ones have saved, or, below 0, lost. */
   creditSeconds: number;
+  /** Throughput that the decision supposes. */
   bytesPerSecond: number;
-  /** Seconds after the first request for a fragment. */
+  /** When it was asked for, seconds after the first request for a fragment. */
   issued: number;
+  /** When it had come, on the same clock; undefined until then. */
   done?: number;
+  /** Nothing is fetched: the preview stays. */
   skipped: boolean;
 }
 
@@ -105,7 +118,9 @@ export interface LoadEvents {
   plane: { at: number; base: number; plane: number; widthPx: number; heightPx: number };
   /** A fragment is in its texture. */
   fragment: { at: number; plane: number; fragment: number; rung: number };
+  /** The plan has decided about fragments, or their transfer has ended. */
   decision: DecisionEvent & { at: number };
+  /** More bytes, or another phase. */
   progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
   /** The timed part is over: limit and what it took, seconds from the same start. */
   deadline: { at: number; limit: number; actual: number; skipped: number };
@@ -122,12 +137,17 @@ export interface LoadEvents {
 
 /** A texture as it is composed. */
 export interface ComposedPlane {
-  /** Full-size plane, and the plane that is shown: it or a mip of it. */
+  /** Full-size plane. */
   base: number;
+  /** The plane that is shown: it or a mip of it. */
   plane: number;
+  /** Image of the package that it holds. */
   image: number;
+  /** What the image says of the surface: base-colour, normal and so on. */
   role: string;
+  /** Texels of the shown plane across. */
   widthPx: number;
+  /** And down. */
   heightPx: number;
   /** Rung of each fragment in the texture; -1: the preview. */
   rungs: Int16Array;
@@ -137,16 +157,21 @@ export interface ComposedPlane {
 
 /** State of a load, for panels and tests. */
 export interface LoadState {
+  /** Where the load stands. */
   phase: LoadPhase;
   /** Scale in the scene; -1: none yet. */
   scale: number;
   /** Scale that the display asks for. */
   wantedScale: number;
+  /** Displayed height that decides, device px. */
   displayedPx: number;
+  /** Textures that are being composed, in no order. */
   planes: readonly ComposedPlane[];
   /** Bytes received by this package so far. */
   bytes: number;
+  /** Throughput as it is estimated now; 0: nothing is known yet. */
   throughputBytesS: number;
+  /** Round trip, seconds. */
   rttS: number;
   /** Fragments whose transfer, decoding or upload is under way. */
   pending: number;
@@ -156,11 +181,13 @@ export interface LoadState {
 export interface LoadedModel {
   /** What was added to the scene; in the frame of the package's meshes (Manifest.origin). */
   readonly object: Object3D;
+  /** How it stands now; a new object each time. */
   readonly state: LoadState;
   /** When the first picture stands in the scene. */
   readonly firstPicture: Promise<void>;
   /** When the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
   readonly done: Promise<void>;
+  /** Calls the listener at every such event; what it returns ends that. */
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
   /**
    * The view may have changed: call it for every frame, or when the camera moves. Picks the scale (with hysteresis),

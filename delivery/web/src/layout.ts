@@ -1,12 +1,18 @@
 // Paths of a package's entries (format/SPEC.md, section 3).
 
-/** Documents and the vertex-split stream. */
+/** The manifest: everything begins with it. */
 export const manifestPath = 'manifest.json';
+/** Where every entry is, with its digest. */
 export const indexPath = 'index.bin';
+/** Bytes and dssim of fragments, by plane. */
 export const tablesPath = 'tables.bin';
+/** The texture planes. */
 export const texturesPath = 'textures.json';
+/** Measured SSIM by scale and texture quality. */
 export const qualityPath = 'quality.json';
+/** How the package was made. */
 export const provenancePath = 'provenance.json';
+/** The vertex-split stream. */
 export const splitStreamPath = 'mesh/stream.bin';
 
 const digits = (n: number, least: number): string => String(n).padStart(least, '0');

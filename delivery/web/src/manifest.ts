@@ -8,6 +8,7 @@ export const bootstrapBytes = 16384;
 export const anyDisplayPx = 1e9;
 /** Version of the format that this reader is for. */
 export const formatMajor = 1;
+/** Minor version: packages of later ones can be read, too. */
 export const formatMinor = 1;
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp', 'mips'];

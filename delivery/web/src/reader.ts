@@ -22,6 +22,7 @@ export * from './prediction';
 export * from './scale_choice';
 export * from './link_model';
 export * from './delivery_plan';
+/** Functions whose results have the same bits everywhere. */
 export * as portable from './portable_math';
 export { toHex } from './bytes';
 export { sha256 } from './sha256';
