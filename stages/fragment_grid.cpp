@@ -91,9 +91,10 @@ std::string reason_of(const FragmentGrid& g, const Candidate& chosen, std::size_
     why = "least overhead of " + text(candidates) + " grids";
   return text(g.width_px) + " x " + text(g.height_px) + " px in " + text(g.columns) + " x " + text(g.rows) +
          " fragments of " + text(g.fragment_width_px) + " x " + text(g.fragment_height_px) + " px, " +
-         text(chosen.stored) + " stored (" + why + "; overhead " + tenths(chosen.overhead(), 100000) +
-         " kB a rung: " + text(chosen.stored) + " fragments of " + text(kFragmentOverhead / 100) + " B, " +
-         tenths(chosen.filled, 1000) + "k uncovered texels)";
+         text(chosen.stored) + " stored (" + why + "; overhead weighed as " +
+         tenths(chosen.overhead(), 100000) + " kB: " + text(chosen.stored) + " fragments at " +
+         text(kFragmentOverhead / 100) + " B, " + tenths(chosen.filled, 1000) +
+         "k uncovered texels at 0.01 B)";
 }
 
 /// The part of a convex polygon with lo <= axis <= hi.
