@@ -53,6 +53,29 @@ double hermite(const std::vector<double>& x, const std::vector<double>& y, std::
          y[k + 1] * (t * t * (3 - 2 * t)) + h * slope(k + 1) * (t * t * (t - 1));
 }
 
+/// What holds a plane's axis: a quality, and the part of the way between the rungs around it.
+struct AxisKnot {
+  double quality, position;
+};
+
+/// Where a quality lies on the plane's axis: its fineness at rungs and without knots; between knots and rungs
+/// linear in fineness.
+double axis_at(const PlaneTables& t, double quality) {
+  const auto above = std::upper_bound(t.rung_quality.begin(), t.rung_quality.end(), quality);
+  if (t.knot_quality.empty() || above == t.rung_quality.begin() || above == t.rung_quality.end())
+    return fineness(quality);
+  AxisKnot a{static_cast<double>(*(above - 1)), 0}, b{static_cast<double>(*above), 1};
+  const double low = fineness(a.quality), high = fineness(b.quality);
+  for (std::size_t k = 0; k < t.knot_quality.size(); ++k) {
+    const AxisKnot knot{static_cast<double>(t.knot_quality[k]), static_cast<double>(t.knot_position[k])};
+    if (knot.quality > a.quality && knot.quality <= quality) a = knot;
+    if (knot.quality < b.quality && knot.quality > quality) b = knot;
+  }
+  const double from = fineness(a.quality);
+  const double part = (fineness(quality) - from) / (fineness(b.quality) - from);
+  return low + (a.position + part * (b.position - a.position)) * (high - low);
+}
+
 }  // namespace
 
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality) {
@@ -65,11 +88,42 @@ double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, doubl
     y.push_back(portable::log(bytes));
   }
   if (x.empty()) return 0;
-  const double at = fineness(quality);
+  const double at = axis_at(tables, quality);
   if (at <= x.front()) return portable::exp(y.front());
   if (at >= x.back()) return portable::exp(y.back());
   const auto k = static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), at) - x.begin()) - 1;
   return portable::exp(hermite(x, y, k, at));
+}
+
+std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
+                                  const std::vector<double>& rung_bytes,
+                                  const std::vector<std::uint8_t>& knot_quality,
+                                  const std::vector<double>& knot_bytes) {
+  constexpr int kHalvings = 20;  // finer than what is stored
+  std::vector<double> x, y;
+  for (std::size_t r = 0; r < rung_quality.size(); ++r) {
+    x.push_back(fineness(rung_quality[r]));
+    y.push_back(portable::log(rung_bytes[r]));
+  }
+  std::vector<float> out;
+  std::size_t last_rung = 0;
+  for (std::size_t k = 0; k < knot_quality.size(); ++k) {
+    const auto above = std::upper_bound(rung_quality.begin(), rung_quality.end(), knot_quality[k]);
+    const auto rung = static_cast<std::size_t>(above - rung_quality.begin()) - 1;
+    const double width = x[rung + 1] - x[rung], wanted = portable::log(knot_bytes[k]);
+    double low = 0, high = 1;
+    if (y[rung + 1] > y[rung])
+      for (int step = 0; step < kHalvings; ++step) {
+        const double middle = (low + high) / 2;
+        (hermite(x, y, rung, x[rung] + middle * width) < wanted ? low : high) = middle;
+      }
+    else
+      low = high = (fineness(knot_quality[k]) - x[rung]) / width;
+    const auto found = static_cast<float>((low + high) / 2);
+    out.push_back(k > 0 && rung == last_rung ? std::max(found, out.back()) : found);
+    last_rung = rung;
+  }
+  return out;
 }
 
 }  // namespace texmesh

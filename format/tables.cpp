@@ -100,6 +100,23 @@ void check_order(const PlaneTables& t, const std::string& place) {
             "fragment " + std::to_string(f));
 }
 
+/// Each knot lies between two rungs, further on than the one before.
+void check_knots(const PlaneTables& t, const std::string& place) {
+  require_count(t.knot_position, t.knot_quality.size(), place + "/knot_position");
+  require_range(t.knot_position, 0, 1, place + "/knot_position");
+  std::size_t above = 0;  // rung
+  for (std::size_t k = 0; k < t.knot_quality.size(); ++k) {
+    const std::uint8_t q = t.knot_quality[k];
+    const bool rises = k == 0 || q > t.knot_quality[k - 1];
+    const std::size_t before = above;
+    while (above < t.rung_count() && t.rung_quality[above] < q) ++above;
+    require(rises && above > 0 && above < t.rung_count() && t.rung_quality[above] != q,
+            place + "/knot_quality", "strictly rising, between rungs", std::to_string(q));
+    require(k == 0 || above != before || t.knot_position[k] >= t.knot_position[k - 1],
+            place + "/knot_position", "not falling between two rungs", std::to_string(t.knot_position[k]));
+  }
+}
+
 /// Everything that holds for the tables of a plane. `rounding` is how far fractions may be out of their
 /// range: a writer tolerates what arithmetic does and clamps it, a reader nothing.
 void check_plane(const PlaneTables& t, float rounding, const std::string& place) {
@@ -109,6 +126,7 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   require_range(t.mse, 0, kLargestMse, place + "/mse");
   require_range(t.dssim, -rounding, kLargestDssim, place + "/dssim");
   require_range(t.skip_dssim, -rounding, kLargestDssim, place + "/skip_dssim");
+  check_knots(t, place);
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
     require_range(*v, -rounding, 1 + rounding, place + "/predictors");
@@ -133,6 +151,8 @@ float from_unit16(std::uint16_t v) { return static_cast<float>(v / 65535.0); }
 constexpr std::uint64_t kExtensionFixed = 4;
 constexpr std::uint8_t kHasSkipDssim = 1;
 constexpr std::uint8_t kIncremental = 2;
+constexpr std::uint8_t kHasKnots = 4;
+constexpr std::uint8_t kAllFlags = kHasSkipDssim | kIncremental | kHasKnots;
 
 std::uint64_t section_bytes(std::uint64_t f, std::uint64_t r, std::uint64_t n, std::uint64_t order,
                             std::uint64_t size_width, std::uint64_t feature_width) {
@@ -171,9 +191,15 @@ Bytes write_section(const PlaneTables& t) {
   for (const auto v : t.quality) out.f32(v);
   for (const auto v : t.total_bytes) out.u64(v);
   out.u8(t.allocation);
-  out.u8((t.skip_dssim.empty() ? 0u : kHasSkipDssim) | (t.incremental ? kIncremental : 0u));
+  out.u8((t.skip_dssim.empty() ? 0u : kHasSkipDssim) | (t.incremental ? kIncremental : 0u) |
+         (t.knot_quality.empty() ? 0u : kHasKnots));
   out.number(0, 2);
   for (const auto v : t.skip_dssim) out.u16(to_half(std::max(v, 0.0f)));
+  if (!t.knot_quality.empty()) {
+    out.u8(t.knot_quality.size());
+    out.raw(t.knot_quality);
+    for (const auto v : t.knot_position) out.u16(to_unit16(v));
+  }
   return out.take();
 }
 
@@ -221,11 +247,17 @@ void read_extension(BytesIn& in, PlaneTables& t, int minor) {
   if (std::min<std::uint8_t>(allocation, 1) != t.allocation)
     in.fail("the allocation of the section's head, or 2 where that is 1", std::to_string(allocation));
   t.allocation = allocation;
-  if (minor <= kFormatMinor && (flags > (kHasSkipDssim | kIncremental) || in.number(2) != 0))
-    in.fail("flags 0 to 3 and 2 zero bytes", "others");
+  if (minor <= kFormatMinor && (flags > kAllFlags || in.number(2) != 0))
+    in.fail("flags 0 to 7 and 2 zero bytes", "others");
   t.incremental = (flags & kIncremental) != 0;
   if (minor > kFormatMinor) in.raw(2);
   if (flags & kHasSkipDssim) fill(t.skip_dssim, t.fragment_count(), [&] { return read_half(in); });
+  if (flags & kHasKnots) {
+    const std::uint8_t knots = in.u8();
+    if (knots == 0) in.fail("at least one knot", "none");
+    fill(t.knot_quality, knots, [&] { return in.u8(); });
+    fill(t.knot_position, knots, [&] { return from_unit16(in.u16()); });
+  }
   if (minor <= kFormatMinor) in.finish();
 }
 

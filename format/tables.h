@@ -29,6 +29,11 @@ struct PlaneTables {
       order;  // fragments that are stored, by falling importance (eta_0, surface, index)
   // [F], 1 - SSIM when the preview stands for the fragment, binary16; empty: format 1.0 did not say
   std::vector<float> skip_dssim;
+  // Where sizes between two rungs are (format 1.1; empty: not measured): whole qualities that lie between
+  // rungs, strictly rising, and the part of the way from the rung below to the one above that the bytes have
+  // gone there, 0..1, not falling between two rungs, stored as multiples of 1 / 65535
+  std::vector<std::uint8_t> knot_quality;
+  std::vector<float> knot_position;
   // [N * F], index scale * F + fragment:
   std::vector<std::uint32_t> features;  // f_i < 2^24
   // [N]:
@@ -48,8 +53,9 @@ struct PlaneTables {
   static void archive(S& s, A& a) {
     a(s.columns, s.rows, s.scales, s.incremental, s.rung_quality, s.table_bytes, s.size_bytes, s.digest,
       s.mse, s.dssim, s.covered_texels, s.surface_fraction, s.z, s.i, s.zeta, s.m, s.vqp, s.order,
-      s.skip_dssim, s.features, s.quality, s.total_bytes, s.allocation, s.quality_width, s.log_width,
-      s.quality_min, s.quality_max, s.model_a, s.model_b, s.model_r, s.model_correlation, s.model_error);
+      s.skip_dssim, s.knot_quality, s.knot_position, s.features, s.quality, s.total_bytes, s.allocation,
+      s.quality_width, s.log_width, s.quality_min, s.quality_max, s.model_a, s.model_b, s.model_r,
+      s.model_correlation, s.model_error);
   }
 };
 
@@ -105,8 +111,16 @@ std::vector<std::int16_t> allocate_rd(const PlaneTables& tables, std::uint64_t b
                                       const std::vector<float>& weights = {});
 
 /// Bytes that the fragment's stream would have at a quality that no rung has: monotone cubic interpolation of
-/// log bytes between the rungs (exact there), constant outside them; 0 when it is not stored.
+/// log bytes between the rungs (exact there) along the plane's knots, constant outside them; 0 when it is not
+/// stored.
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality);
+/// The knots' positions with which interpolated_bytes() of a stream of `rung_bytes` [R] > 0 at `rung_quality`
+/// is `knot_bytes` at `knot_quality`, as far as they lie between those of the rungs around them. Where these
+/// do not rise the knots lie as without any. Same bits everywhere.
+std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
+                                  const std::vector<double>& rung_bytes,
+                                  const std::vector<std::uint8_t>& knot_quality,
+                                  const std::vector<double>& knot_bytes);
 
 struct PackageTables {
   std::vector<PlaneTables> planes;

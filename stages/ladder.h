@@ -8,11 +8,12 @@
 #include "format/fields.h"
 #include "format/note.h"
 #include "stages/fragmentation.h"
+#include "stages/size_knots.h"
 #include "stages/texture_codec.h"
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 8;
+inline constexpr int kLadderVersion = 9;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.
@@ -96,9 +97,12 @@ struct PlaneLadder {
       preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
                 // mips are means of (stages/halve_pixels.h); mips have none
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
+  // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
+  // of its source's quantisers away
+  SizeKnots knots;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px);
+    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px, s.knots);
   }
 };
 struct Ladder {

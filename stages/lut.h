@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 6;
+inline constexpr int kLutVersion = 7;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>

@@ -333,6 +333,21 @@ Json viewing(PackageReader& package) {
           {"scale_error_p95_rms_max_at_700_px", errors}};
 }
 
+/// Sizes along knots between every two rungs, which the golden packages do not have.
+Json sizes_along_knots(PlaneTables t) {
+  for (std::size_t r = 0; r + 1 < t.rung_count(); ++r)
+    for (const int k : {1, 2})
+      if (t.rung_quality[r] + k < t.rung_quality[r + 1]) {
+        t.knot_quality.push_back(static_cast<std::uint8_t>(t.rung_quality[r] + k));
+        t.knot_position.push_back(0.375f * static_cast<float>(k));
+      }
+  Json sizes = Json::array();
+  for (const std::uint16_t f : t.order)
+    for (const double quality : {3.0, 12.0, 33.0, 54.0, 77.5, 99.0})
+      sizes.push_back({f, quality, interpolated_bytes(t, f, quality)});
+  return {{"quality", t.knot_quality}, {"position", t.knot_position}, {"fragment_quality_bytes", sizes}};
+}
+
 Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
   Json scales = Json::array();
   for (const std::uint32_t scale : {0u, t.scales / 2, t.scales}) {
@@ -358,6 +373,7 @@ Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
           {"surface_weights", surface_weights(t)},
           {"scales", scales},
           {"fragment_quality_bytes", sizes},
+          {"knots", sizes_along_knots(t)},
           {"budget_rungs", rd}};
 }
 

@@ -33,6 +33,11 @@ inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::u
     for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) v->push_back(f < stored ? fraction() : 0);
     if (f < stored) t.order.push_back(static_cast<std::uint16_t>(stored - 1 - f));
   }
+  if (rungs > 1 && rungs <= 30) {  // between the first two, which lie apart
+    t.knot_quality = {static_cast<std::uint8_t>(t.rung_quality[0] + 1),
+                      static_cast<std::uint8_t>(t.rung_quality[0] + 2)};
+    t.knot_position = {0.25f, 0.625f};
+  }
   for (std::uint32_t k = 0; k <= scales; ++k) {
     for (std::size_t f = 0; f < fragments; ++f) t.features.push_back(f < stored ? random() % 3000 : 0);
     t.quality.push_back(80 - 40 * static_cast<float>(k) / static_cast<float>(scales + 1));

@@ -57,6 +57,10 @@ TEST(Tables, RoundTrip) {
   EXPECT_EQ(b.allocation, 1);
   ASSERT_EQ(b.skip_dssim.size(), 6u);
   for (std::size_t f = 0; f < 6; ++f) EXPECT_NEAR(b.skip_dssim[f], a.skip_dssim[f], a.skip_dssim[f] / 2048);
+  EXPECT_EQ(b.knot_quality, (std::vector<std::uint8_t>{6, 7}));
+  ASSERT_EQ(b.knot_position.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(b.knot_position[k], a.knot_position[k], 0.5001 / 65535);
+  EXPECT_TRUE(back.planes[1].knot_quality.empty());
   for (std::size_t i = 0; i < a.mse.size(); ++i) {
     EXPECT_NEAR(b.mse[i], a.mse[i], a.mse[i] / 2048);
     EXPECT_NEAR(b.dssim[i], a.dssim[i], std::max(a.dssim[i] / 2048, 0x1p-25f));
@@ -91,16 +95,17 @@ TEST(Tables, SectionsOfTheFirstMinorVersionAreRead) {
   PlaneTables t = make_tables(3, 2, 2, 1);
   for (const std::uint8_t allocation : {0, 1, 2}) {
     t.allocation = allocation;
-    const Bytes old = as_first_minor(write_tables({{t}}), 4 + 6 * 2);
+    const Bytes old = as_first_minor(write_tables({{t}}), 4 + 6 * 2 + 1 + 2 * 3);
     const PlaneTables back = read_tables(old).planes[0];
     EXPECT_EQ(back.allocation, std::min<int>(allocation, 1));  // what a reader of 1.0 takes rd for
     EXPECT_TRUE(back.skip_dssim.empty());
+    EXPECT_TRUE(back.knot_quality.empty());
     EXPECT_EQ(back.total_bytes, t.total_bytes);
     EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].allocation, allocation);
     // Written again it is of this version and says that it does not know.
     EXPECT_TRUE(read_tables(write_tables({{back}})).planes[0].skip_dssim.empty());
     // Neither form passes for the other.
-    EXPECT_THROW(read_tables(as_first_minor(write_tables({{t}}), 3 + 6 * 2)), FormatError);
+    EXPECT_THROW(read_tables(as_first_minor(write_tables({{t}}), 3 + 6 * 2 + 1 + 2 * 3)), FormatError);
     Bytes newer = old;
     newer[6] = 1;
     EXPECT_THROW(read_tables(newer), FormatError);
@@ -209,7 +214,34 @@ TEST(Tables, WriterRefusesBadTables) {
   refused([](PlaneTables& t) { t.allocation = 3; });
   refused([](PlaneTables& t) { t.skip_dssim.pop_back(); });
   refused([](PlaneTables& t) { t.skip_dssim[0] = 2.5f; });
+  refused([](PlaneTables& t) { t.knot_position.pop_back(); });
+  refused([](PlaneTables& t) { t.knot_position[1] = 1.1f; });
+  refused([](PlaneTables& t) { t.knot_position[1] = 0.2f; });
+  refused([](PlaneTables& t) { t.knot_quality[1] = t.knot_quality[0]; });
+  refused([](PlaneTables& t) { t.knot_quality[0] = t.rung_quality[0]; });
+  refused([](PlaneTables& t) { t.knot_quality[1] = t.rung_quality[1]; });
+  refused([](PlaneTables& t) { t.knot_quality[1] = static_cast<std::uint8_t>(t.rung_quality[1] + 1); });
   refused([](PlaneTables& t) { t.model_r = std::numeric_limits<float>::infinity(); });
+}
+
+TEST(Tables, KnotsMayFallFromRungToRung) {
+  PlaneTables t = make_tables(1, 1, 3, 0);
+  t.knot_quality = {6, 7, static_cast<std::uint8_t>(t.rung_quality[1] + 1)};
+  t.knot_position = {0.5f, 1, 0};
+  const PlaneTables back = read_tables(write_tables({{t}})).planes[0];
+  EXPECT_EQ(back.knot_quality, t.knot_quality);
+  EXPECT_EQ(back.knot_position[1], 1);
+  EXPECT_EQ(back.knot_position[2], 0);
+  // Flag bit 2 promises at least one.
+  t.knot_quality.clear(), t.knot_position.clear();
+  Bytes bytes = write_tables({{t}});
+  const TablesHead head = read_tables_head(bytes);
+  bytes[bytes.size() - 5] = 5;  // flags, 2 bytes 0, one half
+  bytes.push_back(0);
+  ++bytes[16];
+  const Sha256 digest = sha256(std::span(bytes).subspan(head.bytes));
+  std::copy(digest.begin(), digest.end(), bytes.begin() + 20);
+  EXPECT_THROW(read_tables(bytes), FormatError);
 }
 
 TEST(Tables, FractionsMayLeaveTheirRangeByRoundingOnly) {

@@ -248,6 +248,22 @@ function hermite(x: number[], y: number[], k: number, at: number): number {
   );
 }
 
+/** Where a quality lies on the plane's axis: its fineness at rungs and without knots. */
+function axisAt(t: PlaneTables, quality: number): number {
+  const above = t.rungQuality.findIndex((q) => q > quality);
+  if (t.knotQuality.length === 0 || above <= 0) return fineness(quality);
+  let [a, b, aPosition, bPosition] = [t.rungQuality[above - 1], t.rungQuality[above], 0, 1];
+  const low = fineness(a);
+  const high = fineness(b);
+  t.knotQuality.forEach((q, k) => {
+    if (q > a && q <= quality) [a, aPosition] = [q, t.knotPosition[k]];
+    if (q < b && q > quality) [b, bPosition] = [q, t.knotPosition[k]];
+  });
+  const from = fineness(a);
+  const part = (fineness(quality) - from) / (fineness(b) - from);
+  return low + (aPosition + part * (bPosition - aPosition)) * (high - low);
+}
+
 /** Bytes that a fragment would have at a quality that no rung has; exact at rungs, 0 when it is not stored. */
 export function interpolatedBytes(t: PlaneTables, fragment: number, quality: number): number {
   const x: number[] = [];
@@ -260,7 +276,7 @@ export function interpolatedBytes(t: PlaneTables, fragment: number, quality: num
     y.push(log(bytes));
   }
   if (x.length === 0) return 0;
-  const at = fineness(quality);
+  const at = axisAt(t, quality);
   if (at <= x[0]) return exp(y[0]);
   if (at >= x[x.length - 1]) return exp(y[y.length - 1]);
   let k = 0;

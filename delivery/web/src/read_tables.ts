@@ -93,9 +93,15 @@ function readExtension(input: BytesIn, t: PlaneTables, minor: number): void {
     input.fail("the allocation of the section's head, or 2 where that is 1", `${allocation}`);
   t.allocation = allocation;
   const reserved = input.u16();
-  if (minor <= formatMinor && (flags > 3 || reserved !== 0)) input.fail('flags 0 to 3 and 2 zero bytes', 'others');
+  if (minor <= formatMinor && (flags > 7 || reserved !== 0)) input.fail('flags 0 to 7 and 2 zero bytes', 'others');
   t.incremental = (flags & 2) !== 0;
   if (flags & 1) t.skipDssim = fill(new Float32Array(fragmentCount(t)), () => readHalf(input));
+  if (flags & 4) {
+    const knots = input.u8();
+    if (knots === 0) input.fail('at least one knot', 'none');
+    t.knotQuality = input.raw(knots);
+    t.knotPosition = fill(new Float32Array(knots), () => input.u16() / 65535);
+  }
   if (minor <= formatMinor) input.finish();
 }
 
@@ -105,7 +111,7 @@ function emptyTables(): PlaneTables {
     columns: 0, rows: 0, scales: 0, incremental: false,
     rungQuality: new Uint8Array(0), tableBytes: new Uint32Array(0), sizeBytes: new Uint32Array(0),
     digest: new Uint8Array(0), mse: none, dssim: none, coveredTexels: new Uint32Array(0), surfaceFraction: none,
-    z: none, i: none, zeta: none, m: none, vqp: none, order: new Uint16Array(0), skipDssim: none,
+    z: none, i: none, zeta: none, m: none, vqp: none, order: new Uint16Array(0), skipDssim: none, knotQuality: new Uint8Array(0), knotPosition: none,
     features: new Uint32Array(0), quality: none, totalBytes: new Float64Array(0), allocation: 1,
     qualityWidth: 60, logWidth: 0.7, qualityMin: 5, qualityMax: 97,
     modelA: 0, modelB: 0, modelR: 0, modelCorrelation: 0, modelError: 0,
@@ -145,6 +151,13 @@ function checkPlane(t: PlaneTables, place: string): void {
   within(t.mse, 0, 65025, 'mse');
   within(t.dssim, 0, 2, 'dssim');
   within(t.skipDssim, 0, 2, 'skipDssim');
+  t.knotQuality.forEach((q, k) => {
+    const above = t.rungQuality.findIndex((r) => r >= q);
+    const before = k > 0 ? t.knotQuality[k - 1] : 0;
+    require(q > before && above > 0 && t.rungQuality[above] !== q, 'knotQuality', 'rising, between rungs', q);
+    if (before > t.rungQuality[above - 1])
+      require(t.knotPosition[k] >= t.knotPosition[k - 1], 'knotPosition', 'not falling', t.knotPosition[k]);
+  });
   within(t.surfaceFraction, 0, 1, 'surfaceFraction');
   within(t.quality, 0, 100, 'quality');
   const listed = new Uint8Array(f);

@@ -38,6 +38,9 @@ export interface PlaneTables {
   order: Uint16Array;
   /** [F] 1 - SSIM when the preview stands for the fragment; empty: format 1.0 did not say. */
   skipDssim: Float32Array;
+  /** Qualities between rungs, rising, and the part of the way between these that bytes have gone there. */
+  knotQuality: Uint8Array;
+  knotPosition: Float32Array;
   /** [N * F] feature points f_i, index scale * F + fragment. */
   features: Uint32Array;
   /** [N] Q_i */

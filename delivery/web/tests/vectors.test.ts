@@ -124,6 +124,9 @@ function checkTables(table: t.PlaneTables, v: Json): void {
   }
   for (const [fragment, quality, bytes] of v.fragment_quality_bytes)
     expectBits([t.interpolatedBytes(table, fragment, quality)], [bytes], `bytes of ${fragment} at ${quality}`);
+  const bent = { ...table, knotQuality: v.knots.quality, knotPosition: v.knots.position };
+  for (const [fragment, quality, bytes] of v.knots.fragment_quality_bytes)
+    expectBits([t.interpolatedBytes(bent, fragment, quality)], [bytes], `bytes of ${fragment} at ${quality}, knots`);
   for (const [budget, rungs] of v.budget_rungs) expectBits(t.allocateRd(table, budget), rungs, `budget ${budget}`);
 }
 
