@@ -31,6 +31,33 @@ for (const [name, form] of [['maps', 'highest'], ['maps', 'lowest'], ['progressi
   });
 }
 
+test('a mip that is shown equals the C++ reconstruction, uploaded by fragments into one texture', async () => {
+  const b = await common();
+  const page = await labPage(b.browser, b.url, () => {
+    window.uploads = {storage: [], images: [], parts: []};
+    const wrap = (name, note) => {
+      const own = WebGL2RenderingContext.prototype[name];
+      WebGL2RenderingContext.prototype[name] = function (...all) { note(all); return own.apply(this, all); };
+    };
+    wrap('texStorage2D', ([, , , w, h]) => window.uploads.storage.push(`${w} x ${h}`));
+    wrap('texImage2D', (all) => { if (all.length > 6) window.uploads.images.push(Math.max(all[3], all[4])); });
+    wrap('texSubImage2D', ([, level, , , w, h]) => { if (level === 0 && typeof w === 'number') window.uploads.parts.push([w, h]); });
+  });
+  await lab(page, () => window.lab.start({size: 256}));
+  const r = await loaded(null, page, `${b.url}/packages/large.texmesh`, {px: 150, load: {time: 1e9, rung: kTop, autoRefine: false}});
+  check(!r.error, JSON.stringify(r.error));
+  const [shown] = r.state.planes;
+  check(shown.plane !== shown.base && shown.widthPx < 2048, `plane ${shown.plane} of ${shown.base}`);
+  const d = await comparePlane(page, r.id, shown.base, 'large', kTopQuality);
+  check(d.n > 0 && d.most <= 3, `differs by ${d.most}`);
+  const {storage, images, parts} = await lab(page, () => window.uploads);
+  const size = `${shown.widthPx} x ${shown.heightPx}`;
+  check(storage.filter((s) => s === size).length === 1, `made: ${storage}`);
+  check(!images.some((px) => px >= shown.widthPx), `whole pictures of ${images} px`);
+  check(parts.length > 3 && parts.filter(([w, h]) => w >= shown.widthPx && h >= shown.heightPx).length <= 1, `uploads: ${JSON.stringify(parts.slice(0, 20))}`);
+  await page.close();
+});
+
 for (const meshes of ['glb', 'stream'])
   test(`meshes equal the C++ scales: ${meshes}`, async () => {
     const b = await common();
@@ -274,16 +301,25 @@ test('no frame is empty while scales and textures arrive', () => throttled({byte
   const id = await lab(page, (u) => window.lab.load(u, {frames: 1, load: {time: 5, autoRefine: false}}), url);
   const r = await lab(page, (i) => window.lab.finished(i), id);
   check(!r.error, JSON.stringify(r.error));
-  const covered = await lab(page, (i) => window.lab.loads[i].frames.map((f) => {
-    let n = 0;
-    for (let k = 0; k < f.data.length; k += 4) n += Math.abs(f.data[k] - 128) + Math.abs(f.data[k + 1] - 128) + Math.abs(f.data[k + 2] - 128) > 12;
-    return n;
-  }), id);
+  const [covered, light] = await lab(page, (i) => {
+    const seen = window.lab.loads[i].frames.map((f) => {
+      let [n, sum] = [0, 0];
+      for (let k = 0; k < f.data.length; k += 4) {
+        if (Math.abs(f.data[k] - 128) + Math.abs(f.data[k + 1] - 128) + Math.abs(f.data[k + 2] - 128) <= 12) continue;
+        ++n;
+        sum += 0.2126 * f.data[k] + 0.7152 * f.data[k + 1] + 0.0722 * f.data[k + 2];
+      }
+      return [n, sum / Math.max(n, 1)];
+    });
+    return [seen.map(([n]) => n), seen.map(([, mean]) => mean)];
+  }, id);
   const last = covered[covered.length - 1];
   const first = covered.findIndex((n) => n > last / 2);
   check(first >= 0 && covered.length > 5, `${covered.length} frames`);
   // The coarsest scale's outline differs by a tenth.
   for (const n of covered.slice(first)) near(n, last, last * 0.15, 'covered pixels of a frame');
+  // A frame without its texture would be lighter or darker.
+  for (const mean of light.slice(first)) near(mean, light.at(-1), 0.03 * light.at(-1), 'mean light of a frame');
 }), {seconds: 60});
 
 test('a model without textures', async () => {

@@ -63,14 +63,27 @@ for (const [name, options] of [
   }, options), {seconds: 90});
 }
 
-test('viewer: fragments by importance, bytes and skipped', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+test('viewer: fragments by importance, rung, bytes and skipped', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
   await phase(page, 'done');
-  for (const by of ['η', 'bytes', 'skipped']) {
+  const painted = () => page.evaluate(() => {
+    const c = document.querySelector('.map canvas');
+    const {data} = c.getContext('2d').getImageData(0, 0, c.width, c.height);
+    const colours = new Set();
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] === 255) colours.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+    return {colours: colours.size, all: [...data].reduce((sum, v, i) => (sum * 31 + v * (i % 7 + 1)) % 1000003, 0)};
+  });
+  const seen = {};
+  for (const by of ['rung', 'η', 'bytes', 'skipped']) {
     await page.getByRole('button', {name: by, exact: true}).click();
     await settled(page);
     await page.locator('.map').scrollIntoViewIfNeeded();
     await page.locator('.map').screenshot({path: path.join(pictures, `map-${by === 'η' ? 'eta' : by}.png`)});
+    seen[by] = await painted();
   }
+  // Importance and bytes are shades, one for nearly every fragment; the others a few colours.
+  check(seen['η'].colours > 20 && seen.bytes.colours > 20, JSON.stringify(seen));
+  check([seen.rung, seen.skipped].every(({colours}) => colours >= 1 && colours <= 12), JSON.stringify(seen));
+  check(new Set(Object.values(seen).map(({all}) => all)).size === 4, `maps that are the same: ${JSON.stringify(seen)}`);
   const box = await page.locator('.map canvas').boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   check(/fragment \d+/.test(await page.locator('.hint').textContent()), 'no word under the pointer');
@@ -114,6 +127,23 @@ test('viewer: all of it is in view at home; panel and plot have the height that 
   check(Math.abs(home.decides / home.middle - 1) < 1e-3, `at home ${JSON.stringify(home)}`);
   check(near.decides > 2 * home.decides && near.decides < 0.5 * near.bound, `near ${JSON.stringify(near)}`);
 }));
+
+test('viewer: cap, policy, rung and time by hand, then loaded again', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+  await phase(page, 'done');
+  const free = await live(page, (x) => x.bytes);
+  await page.locator('#cap').selectOption({value: '62500'});
+  await page.locator('#policy').selectOption('htc');
+  await page.locator('#reload').click();
+  await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
+  const capped = await live(page, (x) => ({bytes: x.bytes, s: x.doneS}));
+  check(capped.bytes < 62500 * capped.s * 1.1 + 16384 && capped.bytes < free, JSON.stringify([free, capped]));
+  await page.locator('#cap').selectOption({index: 0});
+  await page.locator('#rung').selectOption('0');
+  await page.locator('#reload').click();
+  await phase(page, 'done');
+  const rungs = await live(page, (x) => [...x.rungs.values()].flatMap((r) => [...r]));
+  check(rungs.includes(0) && Math.max(...rungs) === 0, `rungs ${rungs}`);
+}), {seconds: 90});
 
 test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
   await phase(page, 'done');
