@@ -106,7 +106,7 @@ test('coming nearer during a load: it ends in time, with what the new view asks 
   const far = (await lab(page, (i) => window.lab.report(i), id)).state.wantedScale;
   await lab(page, () => {
     const {camera, centre, radius} = window.lab.stage();
-    camera.position.sub(centre).setLength(radius * 2.2).add(centre);
+    camera.position.sub(centre).setLength(radius * 1.2).add(centre);
     camera.updateMatrixWorld();
   });
   const r = await lab(page, (i) => window.lab.finished(i), id);

@@ -280,7 +280,7 @@ test('scale and texture follow the display', async () => {
   // Nearer: a finer scale, finer planes.
   await lab(page, (i) => {
     const {camera, centre, radius} = window.lab.stage();
-    camera.position.sub(centre).setLength(radius * 1.6).add(centre);
+    camera.position.sub(centre).setLength(radius * 0.9).add(centre);
     camera.updateMatrixWorld();
     window.lab.loads[i].model.update(camera);
   }, id);
