@@ -2,3 +2,4 @@
 
 export { SplitShapes } from './split_shape';
 export { TextureLoad } from './texture_load';
+export { PatientRanges } from './store_troubles';

@@ -165,6 +165,7 @@ export class ModelLoad implements LoadedModel {
     this.update(this.context_.view.camera); // by what is there, not by its bounds alone
     this.events_.emit('first-picture', { scale: coarsest.scale, bytes: client.received });
     shown();
+    import('./store_troubles').catch(() => undefined); // before the server that has it may be what fails
     this.enter_('tables');
     await (await part).timedPart(await documents);
     this.phase_ = 'refining';

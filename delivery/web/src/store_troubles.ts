@@ -3,7 +3,7 @@ import { Answer, GetOptions, HttpClient, HttpOptions, concat, nowS, shownUrl, sl
 import { Source, RangeReader, ReadOptions, rangeRequest, sameOrigin } from './store';
 import { Throughput, defaultThroughput } from './throughput';
 
-// What happens once something has failed, or where there are mirrors: loaded then.
+// What happens once something has failed, or where there are mirrors: loaded then, or as soon as a first picture stands.
 
 const silenceFactor = 4;
 const leastPatienceRtts = 8;
