@@ -42,7 +42,7 @@ class JpegCodec : public TextureCodec {
     std::vector<PixelWindow> whole, part;
     for (const PixelWindow& window : sample) (wholly_covered(window) ? whole : part).push_back(window);
     std::vector<Training> training(rungs.size());
-    for_each(context, rungs.size(), [&](std::size_t r) { training[r] = train_plainly(r, sample, whole); });
+    for_each(context, rungs.size(), [&](std::size_t r) { training[r] = train_plainly(r, whole, part); });
     if (!part.empty()) count_masked(part, context, training);
     for_each(context, rungs.size(), [&](std::size_t r) {
       JpegCoder coder(kind_of(plane_, plane_.qualities[r]));
@@ -79,16 +79,16 @@ class JpegCodec : public TextureCodec {
 
   /// Counts the symbols of wholly covered windows. Which symbols masked blocks take depends on the bits of
   /// symbols: those of plain blocks for a start.
-  Training train_plainly(std::size_t r, std::span<const PixelWindow> sample,
-                         std::span<const PixelWindow> whole) const {
+  Training train_plainly(std::size_t r, std::span<const PixelWindow> whole,
+                         std::span<const PixelWindow> part) const {
     const JpegKind kind = kind_of(plane_, plane_.qualities[r]);
     JpegCoder coder(kind);
     Training out;
     out.counts.resize(coder.tables().size());
     for (const PixelWindow& window : whole) coder.count_symbols(window, out.counts);
-    if (whole.size() == sample.size()) return out;
-    SymbolCounts all(out.counts.size());
-    for (const PixelWindow& window : sample) coder.count_symbols(window, all);
+    if (part.empty()) return out;
+    SymbolCounts all = out.counts;
+    for (const PixelWindow& window : part) coder.count_symbols(window, all);
     out.masked = masked_rung(kind, coder.quantisers(), tables_for(coder, all));
     return out;
   }
