@@ -205,6 +205,18 @@ TEST(RungsOf, FollowTheAllocation) {
   }
 }
 
+/// Sizes of fragment 0 never fall, and stay at those of the outer rungs outside of them.
+void expect_rising(const PlaneTables& t, double first, double last) {
+  double before = 0;
+  for (double q = 1; q <= 100; q += 0.25) {
+    const double v = interpolated_bytes(t, 0, q);
+    EXPECT_GE(v, before * (1 - 1e-12)) << q;
+    before = v;
+  }
+  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 1), first);
+  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 100), last);
+}
+
 TEST(InterpolatedBytes, ExactAtRungsAndMonotoneBetween) {
   PlaneTables t = make_tables(2, 1, 6, 0);
   t.knot_quality.clear(), t.knot_position.clear();
@@ -212,14 +224,7 @@ TEST(InterpolatedBytes, ExactAtRungsAndMonotoneBetween) {
   const std::vector<std::uint32_t> sizes{700, 1100, 2500, 2500, 9000, 30000};
   for (std::size_t r = 0; r < 6; ++r) t.size_bytes[r * 2] = sizes[r];
   for (std::size_t r = 0; r < 6; ++r) EXPECT_EQ(interpolated_bytes(t, 0, t.rung_quality[r]), sizes[r]);
-  double before = 0;
-  for (double q = 1; q <= 100; q += 0.25) {
-    const double v = interpolated_bytes(t, 0, q);
-    EXPECT_GE(v, before * (1 - 1e-12)) << q;
-    before = v;
-  }
-  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 1), 700);
-  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 100), 30000);
+  expect_rising(t, 700, 30000);
   EXPECT_NEAR(interpolated_bytes(t, 0, 40), 2500, 1e-6);
   EXPECT_EQ(interpolated_bytes(t, 1, 50), 0);  // not stored
   // Sizes that are a power of the mean of 1 / (step + 1) are met everywhere: its logarithm at the rungs, and
@@ -252,14 +257,7 @@ TEST(InterpolatedBytes, KnotsBendTheWayBetweenRungs) {
   const std::vector<double> met{750, 1200, 2500, 2500, 2500, 8000, 8900};
   for (std::size_t k = 0; k < met.size(); ++k)
     EXPECT_NEAR(interpolated_bytes(t, 0, t.knot_quality[k]), met[k], met[k] * 1e-4) << k;
-  double before = 0;
-  for (double q = 1; q <= 100; q += 0.25) {
-    const double v = interpolated_bytes(t, 0, q);
-    EXPECT_GE(v, before * (1 - 1e-12)) << q;
-    before = v;
-  }
-  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 1), 700);
-  EXPECT_DOUBLE_EQ(interpolated_bytes(t, 0, 100), 30000);
+  expect_rising(t, 700, 30000);
   // Where there is no knot, and with one where the quality lies anyway, nothing changes.
   PlaneTables plain = t;
   plain.knot_quality.clear(), plain.knot_position.clear();
