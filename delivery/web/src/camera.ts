@@ -1,7 +1,7 @@
-import { Box3, Camera, Matrix4, Mesh, Object3D, OrthographicCamera, PerspectiveCamera, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Box3, Camera, Matrix4, Mesh, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { Display } from './api';
 import type { Manifest } from './manifest';
-import { clipTo, displayedHeightPx } from './viewing';
+import { clipTo } from './viewing';
 
 /** Corners of triangles that are looked at: of one mesh, or of each of several. */
 const mostPoints = 600;
@@ -34,16 +34,13 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
     if (behind || Math.abs(p.x) > 1 || Math.abs(p.y) > 1) ++outside;
   });
   const part = clipTo(rect, { x0: 0, y0: 0, x1: size.x, y1: size.y });
-  if (orthographic) {
-    const c = camera as OrthographicCamera;
-    return { heightPx: (height * c.zoom * size.y) / Math.abs(c.top - c.bottom), part };
-  }
   const middle = eye.distanceTo(box.getCenter(new Vector3()).applyMatrix4(object.matrixWorld));
   // The more is cut off, the more what is near the eye decides, not the object's middle.
   const share = Math.min(1, (2 * outside) / all);
   const distance = middle + share * Math.min(0, Math.max(near, height / 50) - middle);
-  const fovDegrees = (camera as PerspectiveCamera).getEffectiveFOV?.() ?? 45;
-  return { heightPx: displayedHeightPx(height, Math.max(distance, 1e-9 * height), { fovDegrees, viewportPx: size.y }), part };
+  // The projection tells how much of half the picture a length takes: at the distance 1, or at all.
+  const perLength = (camera.projectionMatrix.elements[5] * size.y) / 2 / (orthographic ? 1 : Math.max(distance, 1e-9 * height));
+  return { heightPx: height * Math.abs(perLength), part };
 }
 
 /** Points of the surface, in the world: what is cut off of the bounds alone is nothing. Until a mesh is there, the bounds'. */

@@ -3,35 +3,22 @@
 
 const ln2Hi = 6.93147180369123816490e-1;
 const ln2Lo = 1.90821492927058770002e-10;
+const rootOfHalf = 0.7071067811865475244;
 const pio2Hi = 1.57079632673412561417;
 const pio2Lo = 6.0771005065061922493e-11;
 
 export const pi = 3.14159265358979323846;
 
-const bits = new DataView(new ArrayBuffer(8));
-
-/** 2^k for -1022 <= k <= 1023, without a power function. */
+/** 2^k for |k| < 1000, without a power function. */
 function powerOfTwo(k: number): number {
-  bits.setUint32(0, (k + 1023) << 20);
-  bits.setUint32(4, 0);
-  return bits.getFloat64(0);
+  let power = 1;
+  for (; k > 0; --k) power *= 2;
+  for (; k < 0; ++k) power /= 2;
+  return power;
 }
 
-/** value * 2^k with one rounding, for normal values near 1. */
-function scaledByPower(value: number, k: number): number {
-  if (k > 1023) return value * powerOfTwo(1023) * powerOfTwo(k - 1023);
-  if (k >= -1021) return value * powerOfTwo(k);
-  return value * powerOfTwo(k + 200) * powerOfTwo(-200);
-}
-
-/** Nearest whole number, ties to even: what nearbyint does. */
-function nearestInteger(x: number): number {
-  const below = Math.floor(x);
-  const rest = x - below;
-  if (rest < 0.5) return below;
-  if (rest > 0.5) return below + 1;
-  return below % 2 === 0 ? below : below + 1;
-}
+/** Nearest whole number, ties to even, of what is far below 2^52: above that there are no fractions to keep. */
+const nearestInteger = (x: number): number => x + 6755399441055744 - 6755399441055744;
 
 function sinReduced(r: number): number {
   const z = r * r;
@@ -73,36 +60,23 @@ function atanPositive(tangent: number): number {
 
 /** e to the power of x. */
 export function exp(x: number): number {
-  if (Number.isNaN(x)) return x;
   if (x > 709.78) return Infinity;
   if (x < -745.2) return 0;
   const q = nearestInteger(x / (ln2Hi + ln2Lo));
   const r = x - q * ln2Hi - q * ln2Lo;
   let s = 1;
   for (let k = 14; k >= 1; --k) s = 1 + s * (r / k);
-  return scaledByPower(s, q);
+  // By halves, so that no power is out of range and there is one rounding.
+  return s * powerOfTwo(q >> 1) * powerOfTwo(q - (q >> 1));
 }
 
 /** Natural logarithm of x > 0. */
 export function log(x: number): number {
-  if (!(x > 0)) return x === 0 ? -Infinity : NaN;
-  if (x === Infinity) return x;
+  if (!(x > 0 && x < Infinity)) return Math.log(x); // which is exact there
   let e = 0;
-  let value = x;
-  if (value < 2.2250738585072014e-308) {
-    value *= powerOfTwo(60);
-    e = -60;
-  }
-  bits.setFloat64(0, value);
-  const high = bits.getUint32(0);
-  e += (high >>> 20) - 1022;
-  bits.setUint32(0, (high & 0x000fffff) | (1022 << 20));
-  let m = bits.getFloat64(0); // in [0.5, 1)
-  if (m < 0.7071067811865475244) {
-    m *= 2;
-    --e;
-  }
-  const f = (m - 1) / (m + 1);
+  for (; x < rootOfHalf; x *= 2) --e;
+  for (; x >= 2 * rootOfHalf; x /= 2) ++e;
+  const f = (x - 1) / (x + 1);
   const z = f * f;
   let s = 0;
   for (let k = 23; k >= 1; k -= 2) s = 1 / k + z * s;
@@ -111,7 +85,7 @@ export function log(x: number): number {
 
 /** Of |x| <= 1e6. */
 export function sin(x: number): number {
-  return sinQuadrant(x, 0);
+  return sinQuadrant(x + 0, 0); // 0 of -0, as in C++
 }
 
 /** Of |x| <= 1e6. */
