@@ -1,7 +1,8 @@
 import type { PackageData } from './fragment_list';
 import { HtcOptions, defaultHtcOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './link_model';
-import { Manifest, bootstrapBytes } from './manifest';
+import { bootstrapBytes } from './layout';
+import type { Manifest } from './manifest';
 import type { QualityTable } from './quality_table';
 import { InTime, choiceInTime, finerWhereSeen } from './scale_choice';
 import { StepRule, selectScale } from './viewing';

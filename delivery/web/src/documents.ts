@@ -1,23 +1,32 @@
+import { toHex } from './bytes';
 import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { IndexHead, parseIndexPage, readIndexHead } from './index_table';
 import * as layout from './layout';
-import { EntryRef, Manifest, mostManifestPreviews } from './manifest';
+import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { missingFeature, readTextures } from './read_textures';
+import { sha256 } from './sha256';
 import { PlaneTables, TablesHead, fragmentCount, rungCount } from './tables';
 import { TextureInfo, fullSizePlanes } from './textures';
 
-// What is decoded after the manifest, and checked against it and against each other: in workers, or here where there are none. Digests
+// What is decoded and checked, meshes by themselves, documents against the manifest and against each other: in workers, or here where there are none. Digests
 // have been checked before.
 
 export { readIndex } from './index_table';
+export { requireOwnBytes } from './own_bytes';
 export { readQuality as quality } from './quality_table';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 
 function require(good: boolean, file: string, place: string, expected: string, found: unknown): asserts good {
   if (!good) throw new FormatError(file, place, expected, String(found));
+}
+
+/** manifest.json and its SHA-256; of the first bytes of a container where that has a name. */
+export async function manifest(bytes: Uint8Array, container = ''): Promise<{ parsed: Manifest; id: string }> {
+  const json = container ? manifestOfContainer(bytes, container) : bytes;
+  return { parsed: readManifest(json), id: toHex(await sha256(json)) };
 }
 
 /** The head, or more, of index.bin. */

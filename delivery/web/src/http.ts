@@ -77,8 +77,8 @@ export interface Answer {
   url: string;
   /** Strong ones only. */
   etag: string;
-  /** Of Content-Range, when it may be read. */
-  range?: { first: number; last: number; total: number };
+  /** Of Content-Range, when it may be read: first and last byte, bytes of the file. */
+  range?: number[];
   /** The body ended as it should. */
   complete: boolean;
   tooLong: boolean;
@@ -121,14 +121,11 @@ export function shownUrl(url: string): string {
 
 /** Whether an error says that somebody cancelled. */
 export function isAbort(error: unknown): boolean {
-  return error instanceof Error && error.name === 'AbortError';
+  return (error as Partial<Error>)?.name === 'AbortError';
 }
 
-/** As the browser names it. */
-export function absolute(url: string): string {
-  const here = globalThis.location?.href;
-  return here && URL.canParse(url, here) ? new URL(url, here).href : url;
-}
+/** As the browser names it; a URL that somebody has answered at. */
+export const absolute = (url: string): string => new URL(url, globalThis.location?.href).href;
 
 /** What cancelled calls throw. */
 export function abortError(): Error {
@@ -139,11 +136,10 @@ export function throwIfAborted(signal?: AbortSignal): void {
   if (signal?.aborted) throw abortError();
 }
 
+/** First and last byte, bytes of the file; undefined where it does not say so. */
 function contentRange(text: string): Answer['range'] {
-  const m = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text);
-  if (!m) return undefined;
-  const [first, last, total] = m.slice(1).map(Number);
-  return first <= last && last < total ? { first, last, total } : undefined;
+  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
+  return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
 }
 
 /** Requests to one or more servers: a window of connections, stalls, a cap; one try each. */
@@ -151,10 +147,11 @@ export class HttpClient {
   readonly options: HttpOptions;
   /** Least time from asking to the answer's head, without the first request, which opens the connection. */
   rttS = 0;
-  private readonly waits_: number[] = []; // of the last requests
   received = 0;
-  requests = 0;
-  onRequest?: (record: RequestRecord) => void;
+  /** Those that have ended. */
+  readonly records: RequestRecord[] = [];
+  readonly listeners = new Set<(record: RequestRecord) => void>();
+  private readonly waits_: number[] = []; // of the last requests
   private active_ = 0;
   private readonly waiting_: (() => void)[] = [];
   private limit_: number;
@@ -168,128 +165,109 @@ export class HttpClient {
   /** What a request takes to be answered, in the middle of the last ones: servers and busy pages add to the round trip. */
   get latencyS(): number {
     const sorted = [...this.waits_].sort((a, b) => a - b);
-    return sorted.length > 0 ? sorted[sorted.length >> 1] : this.rttS;
-  }
-
-  private async enter_(): Promise<void> {
-    if (this.active_ >= this.limit_) await new Promise<void>((go) => this.waiting_.push(go));
-    else ++this.active_;
-  }
-  private leave_(): void {
-    const next = this.waiting_.shift();
-    if (next) next();
-    else --this.active_;
+    return sorted[sorted.length >> 1] ?? this.rttS;
   }
 
   /** One GET; network problems come back in the answer, only cancelling throws. */
   async get(url: string, get: GetOptions): Promise<Answer> {
-    const { signal, range, kind, stallTimeoutS = this.options.stallTimeoutS } = get;
+    const { options } = this;
+    const { range, ifRange, maxBytes, kind, signal, stallTimeoutS = options.stallTimeoutS, onBytes, reload } = get;
     throwIfAborted(signal);
-    await this.enter_();
+    if (this.active_ < this.limit_) ++this.active_;
+    else await new Promise<void>((go) => this.waiting_.push(go));
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    signal?.addEventListener('abort', cancel);
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
     };
-    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false };
-    const stall = stallTimer(stallTimeoutS, cancel);
+    const chunks: Uint8Array[] = [];
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const alive = (): void => {
+      clearTimeout(timer);
+      timer = setTimeout(() => {
+        answer.problem = `no byte for ${stallTimeoutS.toFixed(1)} s`;
+        cancel();
+      }, stallTimeoutS * 1000);
+    };
+    signal?.addEventListener('abort', cancel);
     try {
       throwIfAborted(signal);
-      await this.transfer_(get, abort.signal, answer, record, stall);
-    } catch (error) {
-      if (signal?.aborted) throw abortError();
-      answer.problem = stall.fired ? `no byte for ${stallTimeoutS.toFixed(1)} s` : String((error as Error).message);
-    } finally {
-      stall.stop();
-      signal?.removeEventListener('abort', cancel);
-      if (!answer.complete) cancel();
-      this.leave_();
-      record.ended = nowS();
-      record.status = answer.status;
-      record.ok = answer.complete && answer.status === (range ? 206 : 200);
-      this.note_(url, record);
-    }
-    return answer;
-  }
-
-  private async transfer_(get: GetOptions, signal: AbortSignal, answer: Answer, record: RequestRecord, stall: StallTimer): Promise<void> {
-    const { range, ifRange } = get;
-    const headers: Record<string, string> = {};
-    if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
-    if (ifRange) headers['If-Range'] = ifRange;
-    const cache = get.reload ? 'reload' : range ? this.options.rangeCache : 'default';
-    const response = await (this.options.fetch ?? globalThis.fetch)(answer.url, { headers, signal, cache });
-    stall.restart();
-    record.firstByte = nowS();
-    const { status, body } = response;
-    const header = (name: string): string => response.headers.get(name) ?? '';
-    answer.status = status;
-    answer.url = response.url || answer.url;
-    if (header('etag').startsWith('"')) answer.etag = header('etag');
-    answer.range = contentRange(header('content-range'));
-    if (status !== (range ? 206 : 200)) {
-      void body?.cancel().catch(() => undefined);
-      answer.complete = status !== 206;
-      return;
-    }
-    await this.readBody_(body, get, answer, record, stall);
-    // Content-Length, where nothing was decoded on the way.
-    const said = header('content-encoding') ? '' : header('content-length');
-    const length = answer.range && range ? answer.range.last - answer.range.first + 1 : /^\d+$/.test(said) ? +said : answer.body.length;
-    answer.complete = !answer.tooLong && length === answer.body.length;
-  }
-
-  private async readBody_(body: Response['body'], get: GetOptions, answer: Answer, record: RequestRecord, stall: StallTimer): Promise<void> {
-    const chunks: Uint8Array[] = [];
-    const reader = body?.getReader();
-    try {
+      alive();
+      const headers: Record<string, string> = {};
+      if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
+      if (ifRange) headers['If-Range'] = ifRange;
+      const cache = reload ? 'reload' : range ? options.rangeCache : 'default';
+      const response = await (options.fetch ?? globalThis.fetch)(url, { headers, signal: abort.signal, cache });
+      alive();
+      record.firstByte = nowS();
+      const { status, body } = response;
+      record.ok = status === (range ? 206 : 200);
+      const header = (name: string): string => response.headers.get(name) ?? '';
+      const etag = header('etag');
+      Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', range: contentRange(header('content-range')) });
+      const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();
-        stall.restart();
+        alive();
         if (done) break;
         chunks.push(value);
         record.received += value.length;
         this.received += value.length;
-        if (record.received > get.maxBytes) answer.tooLong = true;
-        else get.onBytes?.(record.received);
-        await this.holdBack_(value.length, stall, get.signal);
+        answer.tooLong = record.received > maxBytes;
+        if (!answer.tooLong) onBytes?.(record.received);
+        if (options.capBytesS > 0) {
+          clearTimeout(timer);
+          await this.holdBack_(value.length, signal);
+          alive();
+        }
       }
+      // Content-Length, where nothing was decoded on the way.
+      const length = range && answer.range ? answer.range[1] - answer.range[0] + 1 : header('content-encoding') ? '' : header('content-length');
+      answer.complete = record.ok ? !answer.tooLong && (!/^\d+$/.test(`${length}`) || +length === record.received) : status !== 206;
+    } catch (error) {
+      if (signal?.aborted) throw abortError();
+      answer.problem ||= String((error as Error).message);
     } finally {
-      // What came before a cut is worth keeping.
-      answer.body = chunks.length === 1 ? chunks[0] : concat(chunks, record.received);
+      clearTimeout(timer);
+      signal?.removeEventListener('abort', cancel);
+      if (!answer.complete || !record.ok) cancel(); // what nobody reads
+      (this.waiting_.shift() ?? (() => --this.active_))();
+      answer.body = concat(chunks, record.received); // what came before a cut is worth keeping
+      record.ok &&= answer.complete;
+      record.status = answer.status;
+      record.ended = nowS();
+      this.note_(record);
     }
+    return answer;
   }
 
   /** Waits as long as the cap wants. */
-  private async holdBack_(bytes: number, stall: StallTimer, signal?: AbortSignal): Promise<void> {
-    if (!(this.options.capBytesS > 0)) return;
-    const now = nowS();
-    this.capFreeS_ = Math.max(now, this.capFreeS_) + bytes / this.options.capBytesS;
-    stall.stop();
-    if (this.capFreeS_ > now) await sleepS(this.capFreeS_ - now, signal);
+  private async holdBack_(bytes: number, signal?: AbortSignal): Promise<void> {
+    this.capFreeS_ = Math.max(nowS(), this.capFreeS_) + bytes / this.options.capBytesS;
+    await sleepS(this.capFreeS_ - nowS(), signal);
     throwIfAborted(signal);
-    stall.restart();
   }
 
-  private note_(url: string, record: RequestRecord): void {
-    if (record.ok && record.firstByte >= 0 && this.requests > 0) {
-      const wait = record.firstByte - record.started;
-      this.rttS = this.rttS > 0 ? Math.min(this.rttS, wait) : wait;
+  private note_(record: RequestRecord): void {
+    const { url, ok, firstByte, started, status } = record;
+    if (ok && this.records.length > 0) {
+      const wait = firstByte - started;
+      this.rttS = Math.min(this.rttS || wait, wait);
       if (this.waits_.push(wait) > latencySamples) this.waits_.shift();
     }
-    ++this.requests;
-    if (this.requests <= 4 && typeof performance.getEntriesByName === 'function') {
-      const timing = performance.getEntriesByName(absolute(url), 'resource').at(-1) as PerformanceResourceTiming | undefined;
+    if (this.records.push(record) <= 4 && status > 0) {
+      const timing = performance.getEntriesByName?.(absolute(url), 'resource').at(-1) as PerformanceResourceTiming | undefined;
       if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit_ = this.options.streams;
     }
-    this.onRequest?.(record);
+    for (const listener of this.listeners) listener(record);
   }
 }
 
 /** Pieces of `total` bytes as one. */
 export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array {
+  if (chunks.length === 1) return chunks[0];
   const out = new Uint8Array(total);
   let at = 0;
   for (const c of chunks) {
@@ -299,28 +277,6 @@ export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array
   return out;
 }
 
-/** Aborts after so many seconds without a restart. */
-interface StallTimer {
-  fired: boolean;
-  restart(): void;
-  stop(): void;
-}
-function stallTimer(seconds: number, onStall: () => void): StallTimer {
-  let timer: ReturnType<typeof setTimeout>;
-  const stop = (): void => clearTimeout(timer);
-  const fire = (): void => {
-    stall.fired = true;
-    onStall();
-  };
-  const restart = (): void => {
-    stop();
-    timer = setTimeout(fire, seconds * 1000);
-  };
-  const stall: StallTimer = { fired: false, restart, stop };
-  restart();
-  return stall;
-}
-
 /** Whether what could not be had will not be there later on, either. */
 export function isForGood(error: unknown): boolean {
   return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
@@ -328,5 +284,5 @@ export function isForGood(error: unknown): boolean {
 
 /** For messages. */
 export function whatCame(a: Answer): string {
-  return a.problem !== '' ? a.problem : a.status === 0 ? 'no answer' : `status ${a.status}`;
+  return a.problem || (a.status > 0 ? `status ${a.status}` : 'no answer');
 }

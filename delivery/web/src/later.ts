@@ -2,4 +2,3 @@
 
 export { SplitShapes } from './split_shape';
 export { TextureLoad } from './texture_load';
-export { PatientRanges } from './store_troubles';

@@ -1,5 +1,9 @@
-// Paths of a package's entries (format/SPEC.md, section 3).
+// Paths of a package's entries (format/SPEC.md, section 3), and numbers that all its readers go by.
 
+/** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
+export const bootstrapBytes = 16384;
+/** "Enough at any size": displayPx... of S_0 and the last step's upToPx. */
+export const anyDisplayPx = 1e9;
 /** The manifest: everything begins with it. */
 export const manifestPath = 'manifest.json';
 /** Where every entry is, with its digest. */

@@ -11,7 +11,7 @@ import { MaterialSet, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
 import { wholeObject } from './viewing';
-import { WorkerPool } from './worker_pool';
+import type { WorkerPool } from './worker_pool';
 
 /** A picture that waits for its programs no longer than this. */
 const mostCompileS = 0.5;
@@ -47,10 +47,11 @@ export class ModelLoad implements LoadedModel {
     private readonly reader_: PackageReader,
     private readonly scene_: Object3D,
     private readonly options_: LoadOptions,
+    pool: WorkerPool,
     startS: number,
     private readonly forget_: () => void = () => undefined,
   ) {
-    this.context_ = this.makeContext_(startS);
+    this.context_ = this.makeContext_(startS, pool);
     this.object.name = reader_.manifest.title || 'texmesh';
     options_.signal?.addEventListener('abort', this.cancel_);
     if (options_.signal?.aborted) this.cancel();
@@ -72,10 +73,9 @@ export class ModelLoad implements LoadedModel {
     });
     this.done.catch(() => undefined);
   }
-  private makeContext_(startS: number): LoadContext {
+  private makeContext_(startS: number, pool: WorkerPool): LoadContext {
     const { reader_: reader, options_: options, materialSet_: materials, object } = this;
     const fail = (error: unknown, what: string): void => this.fail_(error, what);
-    const pool = new WorkerPool(options);
     pool.onNone = (error) => this.fail_(error, 'workers');
     return {
       reader,
@@ -165,7 +165,6 @@ export class ModelLoad implements LoadedModel {
     this.update(this.context_.view.camera); // by what is there, not by its bounds alone
     this.events_.emit('first-picture', { scale: coarsest.scale, bytes: client.received });
     shown();
-    import('./store_troubles').catch(() => undefined); // before the server that has it may be what fails
     this.enter_('tables');
     await (await part).timedPart(await documents);
     this.phase_ = 'refining';

@@ -2,10 +2,6 @@ import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
 
-/** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
-export const bootstrapBytes = 16384;
-/** "Enough at any size": displayPx... of S_0 and the last step's upToPx. */
-export const anyDisplayPx = 1e9;
 /** Version of the format that this reader is for. */
 export const formatMajor = 1;
 /** Minor version: packages of later ones can be read, too. */
@@ -169,7 +165,7 @@ function readScales(at: JsonAt): ManifestScale[] {
       glb: readRef({ at: field as JsonAt['at'] }, layout.meshPath(scale)),
       major: field('major').boolean(),
       ...numbers(lengths, largest),
-      ...numbers(heights, anyDisplayPx),
+      ...numbers(heights, layout.anyDisplayPx),
       floor: floors ? field('floor').text(100) : '',
     };
   });
@@ -179,13 +175,13 @@ function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   let before: ManifestStep = { upToPx: -1, scale: Infinity };
   const steps = at.each(1, 100, (pair) => {
     pair.array(2, 2);
-    const step = { upToPx: pair.at(0).number(0, anyDisplayPx), scale: pair.at(1).integer(0, 100) };
+    const step = { upToPx: pair.at(0).number(0, layout.anyDisplayPx), scale: pair.at(1).integer(0, 100) };
     if (!scales.some((s) => s.scale === step.scale)) pair.at(1).fail('a scale of the package', `${step.scale}`);
     if (step.upToPx <= before.upToPx) pair.at(0).fail('a rising number', 'another');
     if (step.scale >= before.scale) pair.at(1).fail('a finer scale', `${step.scale}`);
     return (before = step);
   });
-  if (before.upToPx !== anyDisplayPx || before.scale !== 0) at.at(steps.length - 1).fail('1e9 and scale 0', 'another step');
+  if (before.upToPx !== layout.anyDisplayPx || before.scale !== 0) at.at(steps.length - 1).fail('1e9 and scale 0', 'another step');
   return steps;
 }
 
@@ -216,7 +212,7 @@ function readFirstPicture(
  * features. FormatError names the place in the document.
  */
 export function readManifest(json: Uint8Array): Manifest {
-  const at = parseJson(json, layout.manifestPath, bootstrapBytes);
+  const at = parseJson(json, layout.manifestPath, layout.bootstrapBytes);
   const version = readVersion(at);
   const bounds = at.at('bounds');
   const [boundsMin, boundsMax] = ['min', 'max'].map((name) => readVector(bounds.at(name)));
@@ -251,7 +247,7 @@ export function manifestOfContainer(head: Uint8Array, file: string): Uint8Array 
   if (text(0, 10) !== 'PK\x03\x04\n\0\0\0\0\0' || text(30, 43) !== layout.manifestPath || head.length < 64)
     throw new FormatError(file, 'byte 0', 'a texmesh package', 'something else');
   const bytes = new DataView(head.buffer, head.byteOffset).getUint32(22, true);
-  const room = Math.min(head.length, bootstrapBytes) - 64;
+  const room = Math.min(head.length, layout.bootstrapBytes) - 64;
   if (bytes > room) throw new FormatError(file, 'entry manifest.json', `at most ${room} bytes`, `${bytes}`);
   return head.subarray(64, 64 + bytes);
 }

@@ -4,6 +4,7 @@ import { InputError } from './errors';
 import { nowS } from './http';
 import { ModelLoad } from './load';
 import { OpenOptions, PackageReader } from './package_reader';
+import { PoolOptions, WorkerPool } from './worker_pool';
 
 export { FormatError, InputError, TexmeshError } from './errors';
 export type * from './reader';
@@ -21,6 +22,8 @@ const names = {
 export class TexmeshPackage extends PackageReader {
   private readonly loads_ = new Set<LoadedModel>();
   private loaded_ = false;
+  /** For documents, until a load has it. */
+  pool?: WorkerPool;
 
   /**
    * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
@@ -35,8 +38,15 @@ export class TexmeshPackage extends PackageReader {
     }
     if (!(time >= -Infinity)) throw new InputError('options', 'time', 'seconds', String(time));
     if (typeof display === 'number' && !(display >= 0)) throw new InputError('options', 'display', 'pixels', String(display));
+    let { pool } = this;
+    if (!pool || pool.none || options.workerUrl || options.decode) {
+      pool?.dispose();
+      pool = new WorkerPool(options);
+    } else pool.grow(options.workers);
+    this.pool = undefined;
+    this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
-    const load = new ModelLoad(this, scene, { ...options, policy }, this.loaded_ ? nowS() : this.openedS, forget);
+    const load = new ModelLoad(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
     this.loaded_ = true;
     this.loads_.add(load);
     return load;
@@ -46,6 +56,7 @@ export class TexmeshPackage extends PackageReader {
   override dispose(): void {
     for (const load of this.loads_) load.dispose();
     this.loads_.clear();
+    this.pool?.dispose();
     super.dispose();
   }
 }
@@ -54,6 +65,14 @@ export class TexmeshPackage extends PackageReader {
  * Opens a package: one request of 16 KiB. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
-export function open(url: string, options: OpenOptions = {}): Promise<TexmeshPackage> {
-  return TexmeshPackage.openUrl(url, options);
+export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {
+  const pool = new WorkerPool({ ...options, workers: 1 }); // it comes while the manifest does
+  try {
+    const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);
+    opened.pool = pool;
+    return opened;
+  } catch (error) {
+    pool.dispose();
+    throw error;
+  }
 }

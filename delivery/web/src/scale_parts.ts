@@ -1,7 +1,6 @@
 import { BufferGeometry, Material, Mesh, Object3D, Texture } from 'three';
 import type { GltfLoaderLike } from './api';
 import { FormatError } from './errors';
-import { imageSize, mostPreviewPx } from './image_size';
 
 /** What this library uses of GLTFLoader's result and parser. */
 export interface ParsedGltf {
@@ -47,46 +46,6 @@ export function disposeTexture(texture: Texture): void {
   (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
 }
 
-/** What of a GLB's JSON makes loaders ask somebody, or make room for pictures. */
-interface Embedding {
-  buffers?: { uri?: unknown }[];
-  images?: { uri?: unknown; bufferView?: number }[];
-  bufferViews?: Record<number, { buffer?: unknown; byteOffset?: number; byteLength?: number; extensions?: unknown } | undefined>;
-}
-
-/** JSON and bytes of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
-function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
-  const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
-  const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
-  const end = 20 + at(12);
-  const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
-  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'a GLB of JSON and bytes');
-  let json: unknown;
-  try {
-    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end)));
-  } catch {
-    // told below
-  }
-  require(typeof json === 'object' && json, 'JSON in its GLB');
-  return { json, bytes: glb.subarray(end + 8) };
-}
-
-/**
- * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. Its pictures, which loaders decode, are no
- * larger than previews. FormatError otherwise.
- */
-export function requireOwnBytes(glb: Uint8Array): void {
-  const { json, bytes } = partsOfGlb(glb);
-  for (const list of [json.buffers ?? [], json.images ?? []])
-    require(Array.isArray(list) && list.every((item) => item && item.uri === undefined), 'buffers and images within the file');
-  for (const { bufferView = -1 } of json.images ?? []) {
-    const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
-    require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'pictures as they are');
-    const [width, height] = imageSize(bytes.subarray(at, at + length));
-    require(width > 0 && width <= mostPreviewPx && height > 0 && height <= mostPreviewPx, 'previews');
-  }
-}
-
 /**
  * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
  * shared with the first scale.
@@ -107,7 +66,6 @@ export async function parseScale(
         return Promise.resolve(texture);
       },
     }));
-  requireOwnBytes(glb);
   const data = glb.byteOffset === 0 && glb.byteLength === glb.buffer.byteLength ? glb.buffer : glb.slice().buffer;
   return (await loader.parseAsync(data as ArrayBuffer, '')) as ParsedGltf;
 }

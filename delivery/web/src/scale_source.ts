@@ -132,6 +132,7 @@ export class ScaleSource {
     const coarsest = scale === this.coarsestScale_.scale && this.coarsestFile_;
     const glb = await (coarsest || this.reader_.scaleGlb(scale, { signal }));
     arrived();
+    await this.reader_.decoded(signal, 'requireOwnBytes', glb);
     const gltf = await parseScale(this.options_.gltfLoader(), glb, this.firstGltf_ !== undefined);
     this.firstGltf_ ??= gltf;
     this.materials_.adopt(gltf, meshesOf(gltf.scene), this.added_);

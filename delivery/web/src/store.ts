@@ -1,6 +1,7 @@
 import { FormatError, InputError } from './errors';
-import { Answer, GetOptions, HttpClient, RequestKind, concat, isAbort, shownUrl, sleepS, whatCame } from './http';
-import { bootstrapBytes, manifestOfContainer } from './manifest';
+import { Answer, HttpClient, RequestKind, concat, isAbort, shownUrl, sleepS, throwIfAborted, whatCame } from './http';
+import { bootstrapBytes } from './layout';
+import { Asking, Mirror, Mirrors } from './mirrors';
 
 /** How a package's bytes are read: ranges of a container, files of a tree, or one whole container. */
 export type PackageForm = 'range' | 'files' | 'whole';
@@ -27,6 +28,7 @@ export interface PackageStore {
   readonly form: PackageForm;
   /** For messages. */
   readonly name: string;
+  /** The bytes of manifest.json; of a container that is read by ranges, its first bytes. */
   manifest(signal?: AbortSignal): Promise<Uint8Array>;
   /** Exactly these bytes of an entry. */
   read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
@@ -36,95 +38,68 @@ export interface PackageStore {
   dispose(): void;
 }
 
-/** What a server has shown of a container so far. */
-export interface Source {
-  /** Where its answers come from. */
-  at: string;
-  etag: string;
-  /** Bytes of the container; -1 = not known. */
-  total: number;
-}
-/** Who reads ranges once something has failed: PatientRanges. */
-export interface RangeReader {
-  /** What a server said that knows no ranges. */
-  noRanges?: InputError;
-  /** `first` is an answer of the first URL that is not what was asked for. */
-  fetch(offset: number, bytes: number, how: ReadOptions, first?: Answer): Promise<Uint8Array>;
-}
-
 /** Whether an answer from there is read without asking the server first (CORS). */
-export function sameOrigin(url: string): boolean {
+function sameOrigin(url: string): boolean {
   const here = globalThis.location;
   return !here || new URL(url, here.href).origin === here.origin;
 }
 
-/** Asks for a range of the container that reading began with. */
-export function rangeRequest({ at, etag }: Source, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): GetOptions {
-  // If-Range from another origin would cost a preflight request.
-  return { range: { offset, bytes }, ifRange: sameOrigin(at) ? etag : '', maxBytes: bytes, kind, signal, onBytes };
+/** Whether asking again may help. */
+function mayRetry({ status, complete, tooLong }: Answer): boolean {
+  if (status === 200 || status === 206) return !complete && !tooLong;
+  return status === 0 || status === 408 || status === 429 || status >= 500;
 }
 
-/** Whether an answer is what rangeRequest asked for; then what it says of the container is kept. */
-function isAsAsked(source: Source, a: Answer, offset: number, bytes: number): boolean {
-  const { range, etag } = a;
-  const total = range ? range.total : source.total;
-  const wanted = offset > 0 || total < 0 ? bytes : Math.min(bytes, total);
-  const good =
-    a.status === 206 && a.complete && (!source.etag || !etag || etag === source.etag) && (source.total < 0 || total === source.total) &&
-    // Another origin may keep the header to itself; then only the length tells.
-    (range ? range.first === offset : !sameOrigin(a.url)) && (a.body.length === wanted || (offset === 0 && total < 0));
-  if (good) Object.assign(source, { at: a.url, etag: source.etag || etag, total });
-  return good;
+/** Waits longer from try to try; gives false when there have been enough, or the answer says that another would be no better. */
+export function retriesOf({ options }: HttpClient, signal?: AbortSignal): (a: Answer) => Promise<boolean> {
+  let [left, delayS] = [options.retries, options.retryDelayS];
+  return async (a) => {
+    if (!mayRetry(a) || left-- <= 0) return false;
+    await sleepS(delayS, signal);
+    throwIfAborted(signal);
+    delayS *= 2;
+    return true;
+  };
 }
-
-const troubles = () => import('./store_troubles');
-/** Without a byte from the first of several mirrors, before anything is known of them. */
-const firstPatienceS = 0.7;
 
 /** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
 class RangeStore implements PackageStore {
   readonly form = 'range';
+  /** What a server said that knows no ranges. */
+  noRanges?: InputError;
   private parts_: { begin: number; bytes: Uint8Array }[] = [];
-  private readonly source_: Source;
-  private patient_?: RangeReader;
+  private readonly mirrors_: Mirrors;
 
-  constructor(
-    private readonly urls_: readonly string[],
-    private readonly client_: HttpClient,
-  ) {
-    this.source_ = { at: urls_[0], etag: '', total: -1 };
-    if (urls_.length > 1) this.becomePatient_().catch(() => undefined);
-  }
-  get noRanges(): InputError | undefined {
-    return this.patient_?.noRanges;
+  constructor(urls: readonly string[], client: HttpClient) {
+    this.mirrors_ = new Mirrors(urls, client);
   }
   get name(): string {
-    return shownUrl(this.urls_[0]);
+    return shownUrl(this.mirrors_.all[0].url);
   }
 
-  async manifest(signal?: AbortSignal): Promise<Uint8Array> {
-    const bytes = await this.fetch_(0, bootstrapBytes, { kind: 'manifest', signal });
-    this.parts_.push({ begin: 0, bytes });
-    return manifestOfContainer(bytes, this.name);
+  manifest(signal?: AbortSignal): Promise<Uint8Array> {
+    return this.read({ path: '', offset: 0, bytes: bootstrapBytes }, 0, bootstrapBytes, { kind: 'manifest', signal });
   }
 
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     const begin = place.offset + offset;
     const end = begin + bytes;
-    const chunks = this.known_(begin, end);
-    const from = chunks.reduce((at, c) => at + c.length, begin);
-    if (from < end) chunks.push(await this.fetch_(from, end - from, how));
-    let got = chunks.length === 1 ? chunks[0] : concat(chunks, bytes);
-    let isNew = from < end;
-    try {
-      await how.verify?.(got);
-    } catch (error) {
-      if (!(error instanceof FormatError)) throw error;
-      this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
-      got = await this.fetch_(begin, bytes, how, error);
-      isNew = true;
-    }
-    if (isNew && !how.once) {
+    const known = this.known_(begin, end);
+    const from = known.reduce((at, c) => at + c.length, begin);
+    let got: Uint8Array | undefined;
+    if (from > begin)
+      try {
+        if (from < end) known.push(await this.fetch_(from, end - from, { ...how, verify: undefined }));
+        got = concat(known, bytes);
+        await how.verify?.(got);
+        if (from === end) return got;
+      } catch (error) {
+        if (!(error instanceof FormatError) || !how.verify) throw error;
+        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
+        got = undefined;
+      }
+    got ??= await this.fetch_(begin, bytes, how);
+    if (!how.once) {
       this.parts_ = this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end);
       this.parts_.push({ begin, bytes: got });
     }
@@ -141,24 +116,65 @@ class RangeStore implements PackageStore {
     return chunks;
   }
 
-  private async fetch_(offset: number, bytes: number, how: ReadOptions, damaged?: Error): Promise<Uint8Array> {
-    const { urls_: urls, client_: client, source_: source } = this;
-    const { stallTimeoutS: most } = client.options;
-    let first: Answer | undefined;
-    const beyond = offset > 0 && source.total >= 0 && offset + bytes > source.total; // told below
-    if (!this.patient_ && !damaged && !beyond) {
-      const stallTimeoutS = urls.length > 1 ? Math.min(firstPatienceS, most) : most;
-      first = await client.get(urls[0], { ...rangeRequest(source, offset, bytes, how), stallTimeoutS });
-      if (isAsAsked(source, first, offset, bytes)) return first.body;
-    }
-    const patient = await this.becomePatient_().catch(() => {
-      throw damaged ?? new InputError(this.name, `byte ${offset}`, 'an answer with status 206', first ? whatCame(first) : 'another');
+  private fetch_(offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    return this.mirrors_.ask(bytes, async (m, asking) => {
+      const got = await this.fetchFrom_(m, asking, offset, bytes, how);
+      await how.verify?.(got);
+      return got;
     });
-    return patient.fetch(offset, bytes, { ...how, verify: damaged && how.verify }, first);
   }
-  private async becomePatient_(): Promise<RangeReader> {
-    const { PatientRanges } = await troubles().catch(() => sleepS(this.client_.options.retryDelayS).then(troubles));
-    return (this.patient_ ??= new PatientRanges(this.urls_, this.client_, this.source_));
+  /** A cut transfer goes on where it broke. */
+  private async fetchFrom_(m: Mirror, asking: Asking, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): Promise<Uint8Array> {
+    const { client } = this.mirrors_;
+    const again = retriesOf(client, signal);
+    const chunks: Uint8Array[] = [];
+    for (let have = 0; ; ) {
+      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before room is made
+      const before = have;
+      const range = { offset: offset + have, bytes: bytes - have };
+      const a = await client.get(m.url, {
+        range, kind, signal, maxBytes: range.bytes, ...asking,
+        ifRange: sameOrigin(m.at) ? m.etag : '', // from another origin it would cost a preflight request
+        onBytes: (n) => onBytes?.(before + n),
+      });
+      m.at = a.url;
+      if (a.status === 206) {
+        this.checkRange_(m, a, range);
+        chunks.push(a.body);
+        have += a.body.length;
+      }
+      this.refuse_(m, a, offset, bytes);
+      const wanted = m.total < 0 ? (offset > 0 ? bytes : have) : Math.min(bytes, m.total - offset);
+      if (a.status === 206 && a.complete) {
+        this.require_(m, have === wanted, offset, `${wanted} bytes`, have);
+        return concat(chunks, have);
+      }
+      if ((asking.elsewhere && have === before) || !(await again(a)))
+        throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206', whatCame(a));
+    }
+  }
+  private require_({ url }: Mirror, good: boolean, offset: number, expected: string, found: unknown): void {
+    if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
+  }
+
+  /** Answers after which there is no use in trying again. */
+  private refuse_(m: Mirror, { status, tooLong }: Answer, offset: number, bytes: number): void {
+    if (status === 200 && m.total < 0)
+      throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
+    this.require_(m, status !== 200, offset, 'the file that reading began with', 'status 200: it was replaced, or the server no longer answers ranges');
+    this.require_(m, status !== 416, offset, 'a longer file', 'status 416');
+    this.require_(m, !tooLong, offset, `${bytes} bytes`, 'more');
+  }
+  /** Whether it is of the file that reading began with, and what was asked for. */
+  private checkRange_(m: Mirror, { range, etag, url }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
+    this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');
+    m.etag ||= etag;
+    // Another origin may keep the header to itself; then only the length tells.
+    if (!range) return this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
+    const [first, last, total] = range;
+    this.require_(m, m.total < 0 || total === m.total, offset, `a file of ${m.total} bytes`, total);
+    this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset, 'the range that was asked for', `${first}-${last}`);
+    m.total = total;
   }
 
   dispose(): void {

@@ -3,12 +3,12 @@ import { requireDigest } from './digests';
 import { fragmentFilePath, isValidEntryPath } from './entry_paths';
 import { FormatError, InputError } from './errors';
 import { FragmentFiles, readFragmentFiles } from './fragment_files';
-import { HttpClient, isAbort, shownUrl } from './http';
-import { manifestPath } from './layout';
-import { bootstrapBytes, manifestOfContainer } from './manifest';
+import { GetOptions, HttpClient, isAbort, shownUrl, whatCame } from './http';
+import { bootstrapBytes, manifestPath } from './layout';
+import { manifestOfContainer } from './manifest';
+import { Asking, Mirror, Mirrors } from './mirrors';
 import type { PackageReader } from './package_reader';
-import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';
-import { Mirror, Mirrors, fromMirrors, getWhole } from './store_troubles';
+import { OpenedStore, PackageStore, Place, ReadOptions, retriesOf } from './store';
 
 // For servers that know no ranges; loaded when one is met.
 
@@ -42,6 +42,17 @@ export async function fragmentFile(
   return got;
 }
 
+/** A whole file; with retries, unless somebody else has it. */
+async function getWhole(client: HttpClient, url: string, how: GetOptions, elsewhere: boolean): Promise<Uint8Array> {
+  const again = retriesOf(client, how.signal);
+  for (;;) {
+    const a = await client.get(url, how);
+    if (a.status === 200 && a.complete) return a.body;
+    if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
+    if (elsewhere || !(await again(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
+  }
+}
+
 /** Whole files of a tree, beside the container or by itself: for servers without ranges. */
 export class TreeStore implements PackageStore {
   readonly form = 'files';
@@ -49,11 +60,8 @@ export class TreeStore implements PackageStore {
   private readonly mirrors_: Mirrors;
   private readonly from_ = new Map<string, Mirror>(); // who was asked last
 
-  constructor(
-    roots: readonly string[],
-    private readonly client_: HttpClient,
-  ) {
-    this.mirrors_ = new Mirrors(roots);
+  constructor(roots: readonly string[], client: HttpClient) {
+    this.mirrors_ = new Mirrors(roots, client);
   }
   get name(): string {
     return shownUrl(this.mirrors_.all[0].url);
@@ -62,25 +70,20 @@ export class TreeStore implements PackageStore {
     return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest', signal });
   }
   async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const take = async (reload: boolean): Promise<Uint8Array> => {
-      const whole = await this.file_(place.path, place.bytes, how, reload);
-      if (whole.length !== place.bytes)
-        throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
-      const part = whole.subarray(offset, offset + bytes);
-      await how.verify?.(part);
-      return part;
-    };
-    for (let again = false; ; again = true)
+    for (let reload = false; ; reload = true)
       try {
-        return await take(again);
+        const whole = await this.file_(place.path, place.bytes, how, reload);
+        if (whole.length !== place.bytes)
+          throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
+        const part = whole.subarray(offset, offset + bytes);
+        await how.verify?.(part);
+        return part;
       } catch (error) {
         if (!(error instanceof FormatError)) throw error;
         this.files_.delete(place.path);
         // Damaged on the way, perhaps: elsewhere, or once more, past caches.
-        const elsewhere = this.mirrors_.alive > 1;
         const from = this.from_.get(place.path);
-        if (elsewhere && from) this.mirrors_.failed(from, 0);
-        else if (again) throw error;
+        if (!(from && this.mirrors_.failed(from)) && reload) throw error;
       }
   }
   /** A file of the tree; a failed one may be asked for again. */
@@ -92,34 +95,28 @@ export class TreeStore implements PackageStore {
         throw error;
       });
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
-    const wanted = fromMirrors(this.mirrors_, this.client_, maxBytes, (m, patienceS) => {
+    const wanted = this.mirrors_.ask(maxBytes, (m, asking) => {
       this.from_.set(path, m);
-      return this.ask_(m, path, maxBytes, how, patienceS, reload);
+      return this.get_(m, path, maxBytes, how, { ...asking, reload });
     });
     if (how.once) return wanted;
     this.files_.set(path, wanted);
     wanted.catch(() => this.files_.delete(path));
     return wanted;
   }
-  private ask_(m: Mirror, path: string, maxBytes: number, how: ReadOptions, stallTimeoutS: number, reload: boolean): Promise<Uint8Array> {
-    const { kind, signal, onBytes } = how;
-    const elsewhere = this.mirrors_.alive > 1;
-    return getWhole(this.client_, joinUrl(m.url, path), maxBytes, { kind, signal, onBytes, reload, stallTimeoutS }, elsewhere);
+  private get_(m: Mirror, path: string, maxBytes: number, { kind, signal, onBytes }: ReadOptions, asking: Asking): Promise<Uint8Array> {
+    return getWhole(this.mirrors_.client, joinUrl(m.url, path), { kind, signal, onBytes, maxBytes, ...asking }, asking.elsewhere);
   }
   extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
-    return fromMirrors(this.mirrors_, this.client_, Math.min(maxBytes, bootstrapBytes), async (m, patienceS) => {
-      const take = async (reload: boolean): Promise<Uint8Array> => {
-        const got = await this.ask_(m, path, maxBytes, how, patienceS, reload);
+    return this.mirrors_.ask(Math.min(maxBytes, bootstrapBytes), async (m, asking) => {
+      try {
+        const got = await this.get_(m, path, maxBytes, how, asking);
         await how.verify?.(got);
         return got;
-      };
-      try {
-        return await take(false);
       } catch (error) {
         // Nobody has to have it.
         if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found)) return undefined;
-        if (!(error instanceof FormatError) || this.mirrors_.alive > 1) throw error;
-        return take(true); // past caches
+        throw error;
       }
     });
   }
@@ -193,10 +190,9 @@ export async function openWithoutRanges(urls: readonly string[], client: HttpCli
       if (!(error instanceof InputError)) throw error;
     }
   }
-  const whole = new Mirrors(urls);
-  return fromMirrors(whole, client, bootstrapBytes, async (m, stallTimeoutS) => {
-    const how = { kind: 'other', signal, stallTimeoutS } as const;
-    const bytes = await getWhole(client, m.url, client.options.maxWholeBytes, how, whole.alive > 1);
+  return new Mirrors(urls, client).ask(bootstrapBytes, async (m, { elsewhere, ...asking }) => {
+    const how = { kind: 'other', signal, maxBytes: client.options.maxWholeBytes, ...asking } as const;
+    const bytes = await getWhole(client, m.url, how, elsewhere);
     return opened(openBytes(bytes, shownUrl(m.url)), signal);
   });
 }

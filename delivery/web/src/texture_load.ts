@@ -87,7 +87,6 @@ export class TextureLoad {
   /** Reads what decisions are made from. */
   async documents(): Promise<PackageData> {
     this.load_.pool.start();
-    this.load_.reader.decodeDocument = this.load_.pool.decodeDocument;
     const [whole] = await Promise.all([
       this.load_.reader.prefetchDocuments(this.load_.signal),
       this.load_.scales.openStream(this.load_.signal),

@@ -1,4 +1,5 @@
-import { anyDisplayPx, Manifest, ManifestScale, ManifestStep } from './manifest';
+import { anyDisplayPx } from './layout';
+import type { Manifest, ManifestScale, ManifestStep } from './manifest';
 import { cos, pi, sin } from './portable_math';
 
 // From how an object is looked at to the scale that is enough: format/viewing.h. Lengths on screen are device px;

@@ -1,11 +1,11 @@
 import { describe, expect, it, vi } from 'vitest';
-import { FormatError, InputError, PackageReader } from '../src/reader';
+import { FormatError, PackageReader, TexmeshError } from '../src/reader';
 import { FaultKind, fakeServer } from './fake_server';
 import { golden } from './support';
 
-// Pages whose server does not give the part for failures, perhaps because it is what fails.
+// Pages whose server does not give the part for servers without ranges, perhaps because it is what fails.
 let asked = 0;
-vi.mock('../src/store_troubles', () => {
+vi.mock('../src/store_files', () => {
   ++asked;
   throw new Error('not there');
 });
@@ -19,7 +19,7 @@ const open = (fault?: FaultKind, from = 0, ranges = true): Promise<PackageReader
 const rejection = (what: Promise<unknown>): Promise<Error> =>
   what.then(() => { throw new Error('it should have failed'); }, (error: Error) => error);
 
-describe('without the part for failures', () => {
+describe('without the part for servers without ranges', () => {
   it('all is read from a server that is well, and nobody asks for it', async () => {
     const reader = await open();
     await reader.prefetchDocuments();
@@ -33,7 +33,7 @@ describe('without the part for failures', () => {
     for (const from of [0, 1])
       it(`${fault} from request ${from} on is told for what it is`, async () => {
         const error = await rejection(open(fault, from).then((r) => r.scaleGlb(0)));
-        expect(error).toBeInstanceOf(InputError);
+        expect(error).toBeInstanceOf(TexmeshError);
         expect(error.message).toContain(words);
       });
   it('so are damaged bytes', async () => {

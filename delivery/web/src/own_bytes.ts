@@ -1,0 +1,46 @@
+import { FormatError } from './errors';
+import { imageSize, mostPreviewPx } from './image_size';
+
+/** What of a GLB's JSON makes loaders ask somebody, or make room for pictures. */
+interface Embedding {
+  buffers?: { uri?: unknown }[];
+  images?: { uri?: unknown; bufferView?: number }[];
+  bufferViews?: Record<number, { buffer?: unknown; byteOffset?: number; byteLength?: number; extensions?: unknown } | undefined>;
+}
+
+function require(good: unknown, what: string): asserts good {
+  if (!good) throw new FormatError('mesh', '', what, 'something else');
+}
+
+/** JSON and bytes of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
+function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
+  const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
+  const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
+  const end = 20 + at(12);
+  const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
+  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'a GLB of JSON and bytes');
+  let json: unknown;
+  try {
+    json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end)));
+  } catch {
+    // told below
+  }
+  require(typeof json === 'object' && json, 'JSON in its GLB');
+  return { json, bytes: glb.subarray(end + 8) };
+}
+
+/**
+ * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. Its pictures, which loaders decode, are no
+ * larger than previews. FormatError otherwise.
+ */
+export function requireOwnBytes(glb: Uint8Array): void {
+  const { json, bytes } = partsOfGlb(glb);
+  for (const list of [json.buffers ?? [], json.images ?? []])
+    require(Array.isArray(list) && list.every((item) => item && item.uri === undefined), 'buffers and images within the file');
+  for (const { bufferView = -1 } of json.images ?? []) {
+    const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
+    require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'pictures as they are');
+    const [width, height] = imageSize(bytes.subarray(at, at + length));
+    require(width > 0 && width <= mostPreviewPx && height > 0 && height <= mostPreviewPx, 'previews');
+  }
+}
