@@ -1,4 +1,4 @@
-import { Box3, Camera, Matrix4, Mesh, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Box3, Camera, Mesh, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { Display } from './api';
 import type { Manifest } from './manifest';
 import { clipTo } from './viewing';
@@ -14,13 +14,12 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   const box = new Box3(new Vector3(...manifest.boundsMin), new Vector3(...manifest.boundsMax));
   const height = manifest.objectHeight * object.matrixWorld.getMaxScaleOnAxis();
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
-  const toView = new Matrix4().copy(camera.matrixWorld).invert();
   const orthographic = (camera as OrthographicCamera).isOrthographicCamera;
   const rect = { x0: Infinity, y0: Infinity, x1: -Infinity, y1: -Infinity };
   let [near, outside, all] = [Infinity, 0, 0];
   pointsOf(object, box, (p) => {
     near = Math.min(near, eye.distanceTo(p));
-    p.applyMatrix4(toView);
+    p.applyMatrix4(camera.matrixWorldInverse);
     ++all;
     // A point behind the eye makes it larger than any screen.
     const behind = p.z >= 0 && !orthographic;

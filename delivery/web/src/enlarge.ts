@@ -1,4 +1,4 @@
-import { PlaneComposer, ownLevels } from './composer';
+import { type PlaneComposer, ownLevels } from './composer';
 import type { WorkerPool } from './worker_pool';
 
 // Where the processor draws for want of a GPU, and for previews of their own; loaded when it is needed.
@@ -10,15 +10,12 @@ const mostPieces = 4;
 /** Some pixels for the GPU; `drop` instead of `run` where nobody wants them any more. */
 export interface Work {
   pixels: number;
-  fragment?: number;
   run(): void;
-  drop?(): void;
+  drop(): void;
 }
 /** The texture set that asks. */
 export interface Enlarging {
   pool: WorkerPool;
-  /** Fragments of the plane that have come. */
-  come(): Set<number | undefined>;
   enqueue(work: Work): void;
   ended(): boolean;
 }
@@ -35,7 +32,7 @@ interface Piece {
  */
 export async function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, how: Enlarging): Promise<void> {
   const running = new Set<Promise<void>>();
-  for (const piece of pieces(next, how)) {
+  for (const piece of pieces(next)) {
     const done = enlargePiece(next, image, piece, how).finally(() => running.delete(done));
     done.catch(() => undefined); // the first to fail is told
     running.add(done);
@@ -43,19 +40,17 @@ export async function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImag
     if (how.ended()) break;
   }
   await Promise.all(running);
-  next.filled = true;
 }
 
 /** Runs of neighbours that have not come when it is their turn. */
-function* pieces(next: PlaneComposer, how: Enlarging): Generator<Piece> {
+function* pieces(next: PlaneComposer): Generator<Piece> {
   const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
   const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));
   const most = Math.max(1, Math.floor(stripPx / (width * rise)));
   for (let row = 0; row < rows; ++row)
     for (let y = row * height; y < Math.min((row + 1) * height, next.heightPx); y += rise)
       for (let from = 0, to = 0; from < columns; from = to) {
-        const come = how.come();
-        const lacks = (column: number): boolean => column < columns && !come.has(row * columns + column);
+        const lacks = (column: number): boolean => column < columns && !next.come.has(row * columns + column);
         to = from + 1;
         if (!lacks(from)) continue;
         while (to - from < most && lacks(to)) ++to;

@@ -1,4 +1,4 @@
 // What the build makes one part of, loaded while the first picture comes.
 
 export { SplitShapes } from './split_shape';
-export { TextureLoad } from './texture_load';
+export { textureLoad } from './texture_load';

@@ -1,5 +1,5 @@
-import { Camera, Group, Material, Object3D, Scene } from 'three';
-import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadState, LoadedModel } from './api';
+import { Camera, Group, Object3D, Scene } from 'three';
+import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadedModel } from './api';
 import { displayOf } from './camera';
 import { InputError } from './errors';
 import { Emitter } from './events';
@@ -10,7 +10,6 @@ import type { PackageReader } from './package_reader';
 import { MaterialSet, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
-import { wholeObject } from './viewing';
 import type { WorkerPool } from './worker_pool';
 
 /** A picture that waits for its programs no longer than this. */
@@ -20,377 +19,325 @@ const retryScaleS = { first: 2, most: 60 };
 /** Limits beyond are none: timers and plans end there. */
 const longestS = 1e5;
 
-/** Everything about one package in one scene; made by TexmeshPackage.load. */
-export class ModelLoad implements LoadedModel {
-  readonly object = new Group();
-  readonly firstPicture: Promise<void>;
-  readonly done: Promise<void>;
-  private readonly events_ = new Emitter<LoadEvents>();
-  private readonly abort_ = new AbortController();
-  private readonly materialSet_ = new MaterialSet();
-  private readonly context_: LoadContext;
-  private textures_?: TextureLoad;
-  private phase_: LoadPhase = 'first-picture';
-  private scaleInTransit_ = -1;
-  private refining_?: Promise<void>;
-  private refineAgain_ = false;
-  private scaleRetry_?: { scale: number; timer: ReturnType<typeof setTimeout> };
-  private scaleRetryS_ = retryScaleS.first;
-  private restoring_?: Promise<void>;
-  private disposed_ = false;
-  private readonly offRequest_: () => void;
-  private readonly cancel_ = (): void => this.cancel();
-  private readonly contextLost_ = (): void => this.events_.emit('context', { lost: true });
-  private readonly contextRestored_ = (): void => void (this.restoring_ = this.restore_());
+interface Override {
+  scale?: number;
+  rung?: number;
+}
 
-  constructor(
-    private readonly reader_: PackageReader,
-    private readonly scene_: Object3D,
-    private readonly options_: LoadOptions,
-    pool: WorkerPool,
-    startS: number,
-    private readonly forget_: () => void = () => undefined,
-  ) {
-    this.context_ = this.makeContext_(startS, pool);
-    this.object.name = reader_.manifest.title || 'texmesh';
-    options_.signal?.addEventListener('abort', this.cancel_);
-    if (options_.signal?.aborted) this.cancel();
-    const { domElement: canvas } = options_.renderer;
-    canvas?.addEventListener('webglcontextlost', this.contextLost_);
-    canvas?.addEventListener('webglcontextrestored', this.contextRestored_);
-    this.offRequest_ = reader_.onRequest((record) => {
-      this.events_.emit('request', record);
-      this.progress_();
-    });
-    let shown: () => void = () => undefined;
-    let notShown: (error: unknown) => void = () => undefined;
-    this.firstPicture = new Promise((done, failed) => ((shown = done), (notShown = failed)));
-    this.firstPicture.catch(() => undefined);
-    this.done = this.run_(shown).catch((error: unknown) => {
-      notShown(error);
-      this.ended_(error);
-      throw error;
-    });
-    this.done.catch(() => undefined);
-  }
-  private makeContext_(startS: number, pool: WorkerPool): LoadContext {
-    const { reader_: reader, options_: options, materialSet_: materials, object } = this;
-    const fail = (error: unknown, what: string): void => this.fail_(error, what);
-    pool.onNone = (error) => this.fail_(error, 'workers');
-    return {
-      reader,
-      options,
-      pool,
-      materials,
-      object,
-      scales: new ScaleSource(reader, options, materials, pool, (slot) => this.textures_?.adopt(slot), fail),
-      signal: this.abort_.signal,
-      limitS: (options.time ?? 5) > longestS ? Infinity : (options.time ?? 5),
-      override: this.snapped_(options),
-      view: { display: this.readDisplay_(options.camera), camera: options.camera },
-      shownScale: -1,
-      wantedScale: -1,
-      beta0: 0,
-      expectedBytes: 0,
-      elapsedS: () => nowS() - startS,
-      emit: (name, event) => this.events_.emit(name, event),
-      fail,
-      enter: (phase) => this.enter_(phase),
-      lostScale: (error, scale) => this.lostScale_(error, scale),
-      showScale: (scale) => this.loadScale_(scale),
-    };
-  }
+/** Everything about one package in one scene, from `startS` on; `forget` is called at its end. */
+export function loadModel(
+  reader: PackageReader,
+  scene: Object3D,
+  options: LoadOptions,
+  pool: WorkerPool,
+  startS: number,
+  forget: () => void,
+): LoadedModel {
+  const { manifest, client } = reader;
+  const { renderer, autoRefine = true, time = 5 } = options;
+  const events = new Emitter<LoadEvents>();
+  const abort = new AbortController();
+  const disposed = new AbortController();
+  const { signal } = abort;
+  const materials = new MaterialSet();
+  const object = new Group();
+  object.name = manifest.title || 'texmesh';
+  pool.onNone = (error) => fail(error, 'workers');
+  let phase: LoadPhase = 'first-picture';
+  let coming: Promise<TextureLoad>;
+  let textures: TextureLoad | undefined;
+  let lastView = '';
+  let inTransit = -1; // scale
+  let retryScale = -1;
+  let retryTimer: ReturnType<typeof setTimeout> | undefined;
+  let retryS = retryScaleS.first;
+  let refining: Promise<void> | undefined;
+  let refineAgain = false;
+  let restoring: Promise<void> | undefined;
+  const scales = new ScaleSource(reader, options, materials, pool, () => textures?.adopt(), fail);
+  const load: LoadContext = {
+    reader, options, pool, materials, object, scales, signal, fail, enter, lostScale,
+    limitS: time > longestS ? Infinity : time,
+    override: snapped(options),
+    view: { display: readDisplay(options.camera), camera: options.camera },
+    shownScale: -1,
+    wantedScale: -1,
+    beta0: 0,
+    expectedBytes: 0,
+    elapsedS: () => nowS() - startS,
+    emit: (name, event) => events.emit(name, event),
+    showScale: loadScale,
+  };
 
-  on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void {
-    return this.events_.on(name, listener);
+  function fail(error: unknown, what: string, fatal = false): void {
+    if (isAbort(error) || disposed.signal.aborted) return;
+    events.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
   }
-  get state(): LoadState {
-    const { shownScale, wantedScale, view, beta0 } = this.context_;
-    const { client } = this.reader_;
-    return {
-      phase: this.phase_,
-      scale: shownScale,
-      wantedScale,
-      displayedPx: view.display.heightPx,
-      planes: this.textures_?.planes ?? [],
-      bytes: client.received,
-      throughputBytesS: this.textures_?.throughputBytesS ?? beta0,
-      rttS: client.rttS,
-      pending: this.textures_?.pending ?? 0,
-    };
+  function progress(): void {
+    events.emit('progress', { phase, bytes: client.received, bytesExpected: Math.max(client.received, load.expectedBytes) });
   }
-  get materials(): readonly Material[] {
-    return this.materialSet_.all;
+  function enter(next: LoadPhase): void {
+    throwIfAborted(signal);
+    phase = next;
+    progress();
   }
-
-  private ended_(error: unknown): void {
-    const cancelled = isAbort(error) || this.abort_.signal.aborted;
-    this.phase_ = cancelled ? 'cancelled' : 'failed';
-    if (!cancelled) this.fail_(error, 'load', true);
-    this.abort_.abort();
-    this.endRetry_();
-    this.context_.pool.dispose();
-  }
-  private fail_(error: unknown, what: string, fatal = false): void {
-    if (isAbort(error) || this.disposed_) return;
-    this.events_.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
-  }
-  private progress_(): void {
-    const bytes = this.reader_.client.received;
-    const bytesExpected = Math.max(bytes, this.context_.expectedBytes);
-    this.events_.emit('progress', { phase: this.phase_, bytes, bytesExpected });
-  }
-  private enter_(phase: LoadPhase): void {
-    throwIfAborted(this.abort_.signal);
-    this.phase_ = phase;
-    this.progress_();
+  const resting = (): boolean => phase === 'refining' || phase === 'done';
+  /** Nothing is left to fetch. */
+  function finish(): void {
+    phase = 'done';
+    events.emit('done', {});
+    progress();
   }
 
   // ---- the course of a load
 
-  private async run_(shown: () => void): Promise<void> {
-    await Promise.resolve(); // listeners are added after the constructor
-    throwIfAborted(this.abort_.signal);
-    const { manifest, client } = this.reader_;
-    const coarsest = manifest.scales[manifest.scales.length - 1];
-    this.context_.expectedBytes = client.received + coarsest.glb.bytes;
-    this.enter_('first-picture');
+  async function showFirst(): Promise<void> {
+    await null; // listeners are added when the caller has the model
+    throwIfAborted(signal);
+    const { scale, glb } = manifest.scales.at(-1)!;
+    load.expectedBytes = client.received + glb.bytes;
+    enter('first-picture');
     // On a slow link nothing shares it with the first picture; what comes next is asked for just before its end.
-    const first = this.context_.scales.coarsest(this.abort_.signal);
-    const part = import('./texture_load').then(({ TextureLoad }) => (this.textures_ = new TextureLoad(this.context_)));
-    const documents = Promise.all([part, first.almostThere]).then(([textures]) => textures.documents());
-    documents.catch(() => undefined);
+    const first = scales.coarsest(signal);
+    coming = Promise.all([import('./texture_load'), first.almostThere]).then(([part]) => part.textureLoad(load));
+    coming.catch(() => undefined);
     await first.bytes;
-    await this.loadScale_(coarsest.scale).shown;
-    this.update(this.context_.view.camera); // by what is there, not by its bounds alone
-    this.events_.emit('first-picture', { scale: coarsest.scale, bytes: client.received });
-    shown();
-    this.enter_('tables');
-    await (await part).timedPart(await documents);
-    this.phase_ = 'refining';
-    if (this.options_.autoRefine ?? true) void this.refine();
+    await loadScale(scale).shown;
+    model.update(load.view.camera); // by what is there, not by its bounds alone
+    events.emit('first-picture', { scale, bytes: client.received });
+  }
+  async function showInTime(): Promise<void> {
+    enter('tables');
+    textures = await coming;
+    await textures.timedPart();
+    phase = 'refining';
+    if (autoRefine) void model.refine();
   }
 
   // ---- scales
 
   /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
-  private loadScale_(scale: number): { arrived: Promise<void>; shown: Promise<void> } {
-    this.scaleInTransit_ = scale;
+  function loadScale(scale: number): { arrived: Promise<void>; shown: Promise<void> } {
+    inTransit = scale;
     const show = (k: number): void => {
       // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
-      if (this.scaleInTransit_ === scale && (k === scale || k < this.context_.shownScale)) this.showScale_(k);
+      if (inTransit === scale && (k === scale || k < load.shownScale)) showScale(k);
     };
-    const load = this.context_.scales.load(scale, this.context_.signal, show);
-    const shown = load.shape.then(async (shape) => {
-      if (this.context_.shownScale < 0) await this.compiled_(shape);
+    const { arrived, shape } = scales.load(scale, signal, show);
+    const shown = shape.then(async (its) => {
+      if (load.shownScale < 0) await compiled(its);
       show(scale);
     });
-    return { arrived: load.arrived, shown };
+    return { arrived, shown };
   }
   /** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
-  private async compiled_(shape: Object3D): Promise<void> {
-    const { renderer } = this.options_;
-    let root = this.scene_;
+  async function compiled(shape: Object3D): Promise<void> {
+    const goOn = (): void => throwIfAborted(signal);
+    let root = scene;
     while (root.parent) root = root.parent;
     await sleepS(0);
-    throwIfAborted(this.context_.signal);
-    renderer.compile?.(shape, this.context_.view.camera ?? new Camera(), root as Scene);
+    goOn();
+    renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
     await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
-    await programsReady(renderer, mostCompileS, () => throwIfAborted(this.context_.signal));
-    for (const material of this.materialSet_.all)
-      for (const [, texture] of texturesOf(material)) {
-        await sleepS(0);
-        throwIfAborted(this.context_.signal);
-        renderer.initTexture?.(texture);
-      }
+    await programsReady(renderer, mostCompileS, goOn);
+    for (const [, texture] of materials.all.flatMap(texturesOf)) {
+      await sleepS(0);
+      goOn();
+      renderer.initTexture(texture);
+    }
     await gpuIdle(renderer, mostCompileS);
   }
   /** In one turn of the page: what is drawn next is the new scale, whole. */
-  private showScale_(scale: number): void {
-    throwIfAborted(this.context_.signal);
-    const shape = this.context_.scales.shape(scale)!;
-    const [before] = this.object.children;
-    if (before && before !== shape) this.object.remove(before);
-    if (before !== shape) this.object.add(shape);
-    if (!this.object.parent) this.scene_.add(this.object);
-    this.context_.shownScale = scale;
-    const triangles = this.reader_.manifest.scales.find((s) => s.scale === scale)?.triangles ?? 0;
-    this.events_.emit('scale', { scale, triangles });
+  function showScale(scale: number): void {
+    throwIfAborted(signal);
+    const shape = scales.shape(scale)!;
+    if (object.children[0] !== shape) object.clear().add(shape);
+    if (!object.parent) scene.add(object);
+    load.shownScale = scale;
+    events.emit('scale', { scale, triangles: manifest.scales.find((s) => s.scale === scale)!.triangles });
   }
 
   // ---- following the view
 
-  private readDisplay_(camera?: Camera): Display {
-    const { display } = this.options_;
-    const said = typeof display === 'function' ? display() : display;
-    if (typeof said === 'number') return { heightPx: said, part: wholeObject };
-    if (said) return said;
-    if (camera) return displayOf(this.reader_.manifest, this.object, camera, this.options_.renderer);
-    return { heightPx: 1000, part: wholeObject };
+  function readDisplay(camera?: Camera): Display {
+    const { display } = options;
+    const said = (typeof display === 'function' ? display() : display) ?? (camera ? displayOf(manifest, object, camera, renderer) : 1000);
+    return typeof said === 'number' ? { heightPx: said } : said;
   }
-
-  private lastView_ = '';
-  update(camera: Camera | undefined = this.options_.camera): void {
-    if (this.disposed_ || this.context_.signal.aborted) return;
-    camera?.updateMatrixWorld();
-    this.object.updateWorldMatrix(true, false);
-    const display = this.readDisplay_(camera);
-    const { heightPx, part } = display;
-    const seen = camera ? [camera.matrixWorld, camera.projectionMatrix, this.object.matrixWorld] : [];
-    const numbers = [heightPx, part?.widthPx ?? 0, part?.heightPx ?? 0, ...seen.flatMap((m) => m.elements)];
-    const key = numbers.map((v) => v.toPrecision(4)).join();
-    if (key === this.lastView_) return;
-    this.lastView_ = key;
-    this.context_.view = { display, camera };
-    if (this.resting_) this.follow_();
-  }
-  setOverride(override: { scale?: number; rung?: number }): void {
-    this.context_.override = this.snapped_(override);
-    this.endRetry_();
-    if (this.resting_) this.follow_(true);
-    else this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
-  }
-
   /** A scale that the package has, as near as possible. InputError: no numbers of scale or rung. */
-  private snapped_({ scale, rung }: { scale?: number; rung?: number }): { scale?: number; rung?: number } {
+  function snapped({ scale, rung }: Override): Override {
     for (const [name, v] of Object.entries({ scale, rung }))
       if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
-    if (scale === undefined) return { rung };
-    const away = (k: number): number => Math.abs(k - scale);
-    const scales = this.reader_.manifest.scales.map((s) => s.scale);
-    return { scale: scales.reduce((best, k) => (away(k) < away(best) ? k : best)), rung };
+    const away = (k: number): number => Math.abs(k - scale!);
+    const near = manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
+    return { scale: scale === undefined ? scale : near, rung };
   }
-
-  private follow_(always = false): void {
-    void this.followScale_();
-    if (always || (this.options_.autoRefine ?? true)) void this.refine();
-  }
-  private get resting_(): boolean {
-    return this.phase_ === 'refining' || this.phase_ === 'done';
+  function follow(always = autoRefine): void {
+    void followScale();
+    if (always) void model.refine();
   }
   /** Loads the scale that the view asks for, if it is another one. */
-  private async followScale_(scale = this.scaleForView_()): Promise<void> {
-    if (scale === this.context_.wantedScale || scale === this.scaleRetry_?.scale) return;
-    this.context_.wantedScale = scale;
+  async function followScale(scale = scaleForView()): Promise<void> {
+    if (scale === load.wantedScale || scale === retryScale) return;
+    load.wantedScale = scale;
     try {
-      await this.loadScale_(scale).shown;
-      this.scaleRetryS_ = retryScaleS.first;
+      await loadScale(scale).shown;
+      retryS = retryScaleS.first;
     } catch (error) {
-      this.lostScale_(error, scale);
+      lostScale(error, scale);
     }
   }
   /** What is shown stays; the scale, or what is wanted by then, is asked for again a little later. */
-  private lostScale_(error: unknown, scale: number): void {
-    this.fail_(error, `scale ${scale}`);
-    if (this.context_.wantedScale === scale) this.context_.wantedScale = this.context_.shownScale;
-    if (this.abort_.signal.aborted) return;
-    this.endRetry_();
-    const timer = setTimeout(() => {
-      this.endRetry_();
-      void this.followScale_(this.resting_ ? undefined : scale);
-    }, 1000 * this.scaleRetryS_);
-    this.scaleRetry_ = { scale, timer };
-    this.scaleRetryS_ = Math.min(2 * this.scaleRetryS_, retryScaleS.most);
+  function lostScale(error: unknown, scale: number): void {
+    fail(error, `scale ${scale}`);
+    if (load.wantedScale === scale) load.wantedScale = load.shownScale;
+    endRetry();
+    if (signal.aborted) return;
+    retryScale = scale;
+    retryTimer = setTimeout(() => {
+      retryScale = -1;
+      void followScale(resting() ? undefined : scale);
+    }, 1000 * retryS);
+    retryS = Math.min(2 * retryS, retryScaleS.most);
   }
-  private endRetry_(): void {
-    clearTimeout(this.scaleRetry_?.timer);
-    this.scaleRetry_ = undefined;
+  function endRetry(): void {
+    clearTimeout(retryTimer);
+    retryScale = -1;
   }
   /** The scale that the view asks for, by a little more than the last time. */
-  private scaleForView_(): number {
-    if (this.context_.override.scale !== undefined) return this.context_.override.scale;
-    const { heightPx, part } = this.context_.view.display;
-    const at = (px: number): number => this.textures_!.scaleFor(px, part);
-    const now = at(heightPx);
-    if (this.context_.wantedScale < 0) return now;
-    const finer = at(heightPx / hysteresis);
-    const coarser = at(heightPx * hysteresis);
-    if (finer < this.context_.wantedScale) return now;
-    return coarser > this.context_.wantedScale ? coarser : this.context_.wantedScale;
+  function scaleForView(): number {
+    const { override, wantedScale, view: { display } } = load;
+    const at = (factor: number): number => override.scale ?? textures!.scaleFor(display.heightPx * factor, display.part);
+    if (wantedScale < 0 || override.scale !== undefined || at(1 / hysteresis) < wantedScale) return at(1);
+    return Math.max(at(hysteresis), wantedScale);
   }
-
-  refine(): Promise<void> {
-    this.refineAgain_ = true;
-    return (this.refining_ ??= this.refineAll_());
-  }
-  private async refineAll_(): Promise<void> {
+  async function refineAll(): Promise<void> {
     try {
-      if (!this.resting_) await this.done;
-      await this.restoring_;
-      if (!this.abort_.signal.aborted) await this.refineRounds_();
+      if (!resting()) await done;
+      await restoring;
+      if (!signal.aborted) await refineRounds(textures!);
     } finally {
-      this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own
+      refining = undefined; // what is asked for from now on, by listeners too, is a turn of its own
     }
-    if (this.abort_.signal.aborted) return;
-    if (this.refineAgain_) return this.refine();
-    this.phase_ = 'done';
-    this.events_.emit('done', {});
-    this.progress_();
+    if (signal.aborted) return;
+    if (refineAgain) return model.refine();
+    finish();
   }
-  private async refineRounds_(): Promise<void> {
-    this.phase_ = 'refining';
-    const textures = this.textures_!;
-    const scale = this.followScale_(); // the time may have allowed a coarser one only
+  async function refineRounds({ forgetLosses, finerPlanes, refineSome, composed }: TextureLoad): Promise<void> {
+    phase = 'refining';
+    const scale = followScale(); // the time may have allowed a coarser one only
     try {
-      while (this.refineAgain_) {
-        this.refineAgain_ = false;
-        textures.forgetLosses();
-        await textures.finerPlanes();
-        while (!this.refineAgain_ && (await textures.refineSome()));
-        if (this.refineAgain_) continue;
-        await textures.composed();
+      while (refineAgain) {
+        refineAgain = false;
+        forgetLosses();
+        await finerPlanes();
+        while (!refineAgain && (await refineSome()));
+        if (refineAgain) continue;
+        await composed();
         await scale; // the view may have changed meanwhile
       }
     } catch (error) {
-      this.fail_(error, 'refining');
+      fail(error, 'refining');
     }
   }
-
   /** three.js makes geometries and pictures of its own anew; what was composed is gone. */
-  private async restore_(): Promise<void> {
-    this.events_.emit('context', { lost: false });
-    if (this.abort_.signal.aborted) return;
-    const over = this.resting_;
-    if (over) this.enter_('refining');
+  async function restore(): Promise<void> {
+    events.emit('context', { lost: false });
+    if (signal.aborted) return;
+    const over = resting();
+    if (over) enter('refining');
     try {
-      await this.textures_?.restore();
+      await textures?.restore();
     } catch (error) {
-      if (isAbort(error)) return;
-      this.fail_(error, 'textures after a lost context');
+      fail(error, 'textures after a lost context');
     }
-    if (!over) return;
-    if (this.options_.autoRefine ?? true) return void this.refine();
-    this.phase_ = 'done';
-    this.events_.emit('done', {});
-    this.progress_();
+    if (!over || signal.aborted) return;
+    if (autoRefine) void model.refine();
+    else finish();
   }
 
-  // ---- end
-
-  readPlane(base: number): Uint8Array {
-    return this.textures_?.readPlane(base) ?? new Uint8Array(0);
-  }
-  cancel(): void {
-    this.abort_.abort();
-    this.endRetry_();
-    if (this.phase_ !== 'failed') this.phase_ = 'cancelled';
-  }
-  dispose(): void {
-    if (this.disposed_) return;
-    this.disposed_ = true;
-    this.cancel();
-    this.offRequest_();
-    this.options_.signal?.removeEventListener('abort', this.cancel_);
-    const { domElement: canvas } = this.options_.renderer;
-    canvas?.removeEventListener('webglcontextlost', this.contextLost_);
-    canvas?.removeEventListener('webglcontextrestored', this.contextRestored_);
-    this.forget_();
-    this.object.removeFromParent();
-    this.object.clear();
-    this.context_.scales.dispose();
-    this.textures_?.dispose();
-    this.materialSet_.dispose();
-    this.context_.pool.dispose();
-    this.events_.clear();
-  }
+  const firstPicture = showFirst();
+  const done = firstPicture.then(showInTime).catch((error: unknown) => {
+    const cancelled = isAbort(error) || signal.aborted;
+    if (!cancelled) fail(error, 'load', true);
+    model.cancel();
+    phase = cancelled ? 'cancelled' : 'failed';
+    pool.dispose();
+    throw error;
+  });
+  done.catch(() => undefined);
+  const model: LoadedModel = {
+    object,
+    firstPicture,
+    done,
+    on: (name, listener) => events.on(name, listener),
+    get state() {
+      return {
+        phase,
+        scale: load.shownScale,
+        wantedScale: load.wantedScale,
+        displayedPx: load.view.display.heightPx,
+        planes: textures?.planes() ?? [],
+        bytes: client.received,
+        throughputBytesS: textures?.throughputBytesS() ?? load.beta0,
+        rttS: client.rttS,
+        pending: textures?.pending() ?? 0,
+      };
+    },
+    get materials() {
+      return materials.all;
+    },
+    update(camera = options.camera) {
+      if (signal.aborted) return;
+      camera?.updateMatrixWorld();
+      object.updateWorldMatrix(true, false);
+      const display = readDisplay(camera);
+      const { heightPx, part } = display;
+      const seen = camera ? [camera.matrixWorld, camera.projectionMatrix, object.matrixWorld] : [];
+      const numbers = [heightPx, part?.widthPx ?? 0, part?.heightPx ?? 0, ...seen.flatMap((m) => m.elements)];
+      const view = numbers.map((v) => v.toPrecision(4)).join();
+      if (view === lastView) return;
+      lastView = view;
+      load.view = { display, camera };
+      if (resting()) follow();
+    },
+    refine() {
+      refineAgain = true;
+      return (refining ??= refineAll());
+    },
+    setOverride(override) {
+      load.override = snapped(override);
+      endRetry();
+      done.then(() => follow(true), () => undefined); // once the timed part is over
+    },
+    cancel() {
+      abort.abort();
+      endRetry();
+      if (phase !== 'failed') phase = 'cancelled';
+    },
+    dispose() {
+      if (disposed.signal.aborted) return;
+      model.cancel();
+      disposed.abort();
+      offRequest();
+      forget();
+      object.removeFromParent().clear();
+      scales.dispose();
+      textures?.dispose();
+      materials.dispose();
+      pool.dispose();
+      events.clear();
+    },
+    readPlane: (base) => textures?.readPlane(base) ?? new Uint8Array(0),
+  };
+  const whileThere = { signal: disposed.signal };
+  options.signal?.addEventListener('abort', model.cancel, whileThere);
+  if (options.signal?.aborted) model.cancel();
+  renderer.domElement?.addEventListener('webglcontextlost', () => events.emit('context', { lost: true }), whileThere);
+  renderer.domElement?.addEventListener('webglcontextrestored', () => (restoring = restore()), whileThere);
+  const offRequest = reader.onRequest((record) => {
+    events.emit('request', record);
+    progress();
+  });
+  return model;
 }

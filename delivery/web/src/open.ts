@@ -2,7 +2,7 @@ import type { Object3D } from 'three';
 import type { LoadOptions, LoadedModel } from './api';
 import { InputError } from './errors';
 import { nowS } from './http';
-import { ModelLoad } from './load';
+import { loadModel } from './load';
 import { OpenOptions, PackageReader } from './package_reader';
 import { PoolOptions, WorkerPool } from './worker_pool';
 
@@ -46,7 +46,7 @@ export class TexmeshPackage extends PackageReader {
     this.pool = undefined;
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
-    const load = new ModelLoad(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
+    const load = loadModel(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
     this.loaded_ = true;
     this.loads_.add(load);
     return load;

@@ -18,14 +18,14 @@ interface GltfJson {
   materials?: unknown[];
 }
 
-const imageName = /^texture\/(\d+)$/;
+/** Number of the package's image that is called so; -1: none. */
+const imageNumber = (name = ''): number => Number(/^texture\/(\d+)$/.exec(name)?.[1] ?? -1);
 
 /** Number of the source image that a texture of a GLB shows; -1 when it is none of the package's. */
 function imageOfTexture(json: GltfJson, index: number | undefined): number {
-  const def = index === undefined ? undefined : json.textures?.[index];
+  const def = json.textures?.[index ?? -1];
   const source = def?.source ?? Object.values(def?.extensions ?? {}).find((e) => e.source !== undefined)?.source;
-  const match = imageName.exec(json.images?.[source ?? -1]?.name ?? '');
-  return match ? Number(match[1]) : -1;
+  return imageNumber(json.images?.[source ?? -1]?.name);
 }
 
 /** A texture in a material, by the name of the slot. */
@@ -34,6 +34,9 @@ export interface Slot {
   name: string;
   image: number;
 }
+
+/** What a material has, seen as its textures by the name of their slot. */
+export const texturesIn = (material: Material) => material as unknown as Record<string, Texture | null | undefined>;
 
 /** Textures of a material by the name of their slot. */
 export function texturesOf(material: Material): [string, Texture][] {
@@ -111,8 +114,8 @@ export class MaterialSet {
     }
     this.byKey_.set(key, material);
     for (const [name, texture] of texturesOf(material)) {
-      const match = imageName.exec(texture.name);
-      const image = match ? Number(match[1]) : imageOfTexture(parser.json, parser.associations.get(texture)?.textures);
+      const own = imageNumber(texture.name);
+      const image = own < 0 ? imageOfTexture(parser.json, parser.associations.get(texture)?.textures) : own;
       if (image < 0) continue;
       const slot = { material, name, image };
       this.slots.push(slot);
@@ -120,15 +123,6 @@ export class MaterialSet {
     }
     return material;
   }
-  textureAt(slot: Slot): Texture | null {
-    return (slot.material as unknown as Record<string, Texture | null>)[slot.name];
-  }
-  setTexture(slot: Slot, texture: Texture): void {
-    const m = slot.material as unknown as Record<string, Texture | null>;
-    if (!m[slot.name]) slot.material.needsUpdate = true;
-    m[slot.name] = texture;
-  }
-
   dispose(): void {
     for (const material of this.byKey_.values()) {
       for (const [, texture] of texturesOf(material)) disposeTexture(texture);

@@ -8,7 +8,8 @@ import { Emitter } from '../src/events';
 import { Manifest, PackageReader, displayedHeightPx, selectScale } from '../src/reader';
 import { MaterialSet, ParsedGltf } from '../src/scale_parts';
 import { SplitShapes } from '../src/split_shape';
-import { VisibleSurface } from '../src/visibility';
+import type { TextureInfo } from '../src/textures';
+import { seenShares } from '../src/visibility';
 import { handle } from '../src/worker';
 import { WorkerPool } from '../src/worker_pool';
 import { Fault, fakeServer } from './fake_server';
@@ -101,13 +102,14 @@ describe('the display', () => {
 describe('the visible surface', () => {
   const sphere = new Mesh(new SphereGeometry(1, 64, 32), new MeshStandardMaterial());
   const root = new Group().add(sphere);
-  const surface = new VisibleSurface(root, [sphere], () => new Set([7]));
+  const plane = { columns: 4, rows: 1, widthPx: 64, heightPx: 16, fragmentWidthPx: 16, fragmentHeightPx: 16 } as TextureInfo;
+  const seenBy = (eye: PerspectiveCamera): Float32Array => seenShares(plane, root, eye, () => true);
   const camera = new PerspectiveCamera(45, 1, 0.1, 100);
   camera.position.set(0, 0, 5);
   camera.lookAt(0, 0, 0);
   camera.updateMatrixWorld();
   it('is what is turned to the camera', () => {
-    const seen = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    const seen = seenBy(camera);
     // u runs from -x over +z, +x to -z: the camera at +z sees the quarters around it.
     expect(seen[0]).toBeGreaterThan(0.2);
     expect(seen[1]).toBeGreaterThan(0.2);
@@ -115,11 +117,11 @@ describe('the visible surface', () => {
   });
   it('is also what is turned away, where the material has two sides; and only that, where it has the back alone', () => {
     const { material } = sphere;
-    const front = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    const front = seenBy(camera);
     material.side = DoubleSide; // applications may change it at any time
-    expect(Math.min(...surface.ofImage(7, 4, 1, camera, root, [0.25, 1]))).toBeGreaterThan(0.9);
+    expect(Math.min(...seenBy(camera))).toBeGreaterThan(0.9);
     material.side = BackSide;
-    const back = surface.ofImage(7, 4, 1, camera, root, [0.25, 1]);
+    const back = seenBy(camera);
     back.forEach((share, f) => expect(share + front[f]).toBeCloseTo(1, 2));
     material.side = FrontSide;
   });
@@ -128,17 +130,20 @@ describe('the visible surface', () => {
       mirrored.scale.z = -1;
       mirrored.updateMatrixWorld(true);
       root.updateMatrixWorld(true);
-      const seen = new VisibleSurface(root, [sphere], () => new Set([7])).ofImage(7, 4, 1, camera, root, [0.25, 1]);
+      const seen = seenBy(camera);
       expect(seen[2] + seen[3]).toBeGreaterThan(2.5 * (seen[0] + seen[1])); // what was behind is in front
       mirrored.scale.z = 1;
       root.updateMatrixWorld(true);
     }
   });
+  it('of a mesh that does not show the plane may be seen or not', () => {
+    expect([...seenShares(plane, root, camera, () => false)]).toEqual([0.5, 0.5, 0.5, 0.5]);
+  });
   it('ends at the border of the view', () => {
     const away = camera.clone();
     away.lookAt(5, 0, 5);
     away.updateMatrixWorld();
-    expect(Math.max(...surface.ofImage(7, 4, 1, away, root, [0.25, 1]))).toBe(0);
+    expect(Math.max(...seenBy(away))).toBe(0);
   });
 });
 
