@@ -16,7 +16,7 @@ const slicePx = 1 << 19;
  * Slices that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn. It is not
  * waited for longer than longestFenceS.
  */
-const mostBehind = 2;
+const mostBehind = 3;
 const longestFenceS = 0.25;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
@@ -41,6 +41,8 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
   let pumping = false;
   let disposed = false;
   let mipsAt = 0;
+  let pixels = 0; // since the last of the fences that the GPU may not have passed
+  const behind: Promise<void>[] = [];
 
   /** Where materials that are there show this plane: coverage beside the colours that it belongs to, where they ask for it. */
   function slotsOf(base: number): Slot[] {
@@ -88,15 +90,16 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
   }
   async function pump(): Promise<void> {
     pumping = true;
-    const behind: Promise<void>[] = [];
     for (await sleepS(0); queue.length > 0; await sleepS(0)) {
       const start = performance.now();
-      for (let pixels = 0; queue.length > 0 && pixels < slicePx && performance.now() - start < sliceMs; ) {
+      while (queue.length > 0 && pixels < slicePx && performance.now() - start < sliceMs) {
         const work = queue.shift()!;
         pixels += work.pixels;
         work.run();
       }
       if (start - mipsAt > mipsEveryMs || queue.length === 0) finish();
+      if (pixels < slicePx) continue;
+      pixels = 0;
       behind.push(gpuIdle(renderer, longestFenceS));
       if (behind.length > mostBehind) await behind.shift();
     }
