@@ -1,18 +1,18 @@
+import { clamp, sumOf } from './numbers';
 import { exp, log } from './portable_math';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
 
 // From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3), and what a budget is best
 // spent on: the same as format/allocation.cpp, format/rate_distortion.cpp and format/size_curve.cpp, bit for bit.
 
-const clamp = (v: number, least: number, most: number): number => Math.min(Math.max(v, least), most);
+/** Every index of a typed array with a value > 0. */
+const positive = (values: Uint32Array): number[] => [...values.keys()].filter((i) => values[i] > 0);
 
 /** What a client must have of a fragment to show it at a rung; 0 when it is not stored there. */
 export function bytesToShow(t: PlaneTables, rung: number, fragment: number): number {
-  const n = fragmentCount(t);
-  const own = t.sizeBytes[rung * n + fragment];
-  if (!t.incremental || own === 0) return own;
-  let bytes = 0;
-  for (let r = 0; r <= rung; ++r) bytes += t.sizeBytes[r * n + fragment];
+  const own = (r: number): number => t.sizeBytes[r * fragmentCount(t) + fragment];
+  let bytes = own(rung);
+  if (t.incremental && bytes > 0) for (let r = 0; r < rung; ++r) bytes += own(r);
   return bytes;
 }
 
@@ -26,32 +26,18 @@ const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 
 
 /** eta_i (3.1) of one scale: feature counts min-max over covered fragments; 0 for the others. [F] */
 export function etaOf(t: PlaneTables, scale: number): Float32Array {
-  const n = fragmentCount(t);
-  const features = t.features.subarray(scale * n, (scale + 1) * n);
-  let low = 0xffffffff;
-  let high = 0;
-  for (let f = 0; f < n; ++f) {
-    if (t.coveredTexels[f] === 0) continue;
-    low = Math.min(low, features[f]);
-    high = Math.max(high, features[f]);
-  }
-  const eta = new Float32Array(n);
-  if (high <= low) return eta;
-  for (let f = 0; f < n; ++f) if (t.coveredTexels[f] > 0) eta[f] = (features[f] - low) / (high - low);
+  const covered = positive(t.coveredTexels);
+  const features = (f: number): number => t.features[scale * fragmentCount(t) + f];
+  const rising = covered.map(features).sort((a, b) => a - b);
+  const [low, high] = [rising[0], rising[rising.length - 1]];
+  const eta = new Float32Array(fragmentCount(t));
+  if (high > low) for (const f of covered) eta[f] = (features(f) - low) / (high - low);
   return eta;
 }
 
 /** The default Gamma: mean of eta over covered fragments. */
 export function meanEta(t: PlaneTables, scale: number): number {
-  const eta = etaOf(t, scale);
-  let sum = 0;
-  let covered = 0;
-  for (let f = 0; f < eta.length; ++f) {
-    if (t.coveredTexels[f] === 0) continue;
-    sum += eta[f];
-    ++covered;
-  }
-  return covered > 0 ? sum / covered : 0;
+  return sumOf(etaOf(t, scale)) / Math.max(positive(t.coveredTexels).length, 1);
 }
 
 /** q_i(x, y): the quality that the tables' allocation asks for, clipped. [F] */
@@ -86,25 +72,18 @@ export function nearestRung(t: PlaneTables, quality: number): number {
  * What a fragment's quality is worth: its surface fraction, with the area per texel capped at the 99th percentile of
  * all covered texels. [F]
  */
-export function surfaceWeights(t: PlaneTables): Float32Array {
-  const densities: { areaPerTexel: number; texels: number; fragment: number }[] = [];
-  let texels = 0;
-  for (let f = 0; f < fragmentCount(t); ++f) {
-    const covered = t.coveredTexels[f];
-    if (covered === 0) continue;
-    densities.push({ areaPerTexel: t.surfaceFraction[f] / covered, texels: covered, fragment: f });
-    texels += covered;
-  }
-  const weights = new Float32Array(fragmentCount(t));
-  densities.sort((a, b) => a.areaPerTexel - b.areaPerTexel);
-  let below = 0;
-  let cap = 0;
-  for (const d of densities) {
+export function surfaceWeights({ coveredTexels, surfaceFraction }: PlaneTables): Float32Array {
+  const area = (f: number): number => surfaceFraction[f] / coveredTexels[f]; // per texel
+  const covered = positive(coveredTexels).sort((a, b) => area(a) - area(b));
+  const texels = sumOf(coveredTexels);
+  let [below, cap] = [0, 0];
+  for (const f of covered) {
     if (100 * below >= 99 * texels) break;
-    below += d.texels;
-    cap = d.areaPerTexel;
+    below += coveredTexels[f];
+    cap = area(f);
   }
-  for (const d of densities) weights[d.fragment] = Math.min(d.areaPerTexel, cap) * d.texels;
+  const weights = new Float32Array(coveredTexels.length);
+  for (const f of covered) weights[f] = Math.min(area(f), cap) * coveredTexels[f];
   return weights;
 }
 
@@ -115,47 +94,32 @@ export interface RdCurve {
   loss: number[];
 }
 
-interface Step {
-  slope: number;
-  curve: number;
-  way: number;
-  bytes: number;
-}
-
-/** Walks along the lower convex hull of a curve from way 0; the slopes fall. */
-function addSteps(curve: RdCurve, index: number, steps: Step[]): void {
-  for (let at = 0; ; ) {
-    let best: Step = { slope: 0, curve: index, way: 0, bytes: 0 };
-    for (let way = 1; way < curve.bytes.length; ++way) {
-      if (curve.bytes[way] <= curve.bytes[at] || curve.loss[way] >= curve.loss[at]) continue;
-      const bytes = curve.bytes[way] - curve.bytes[at];
-      const slope = (curve.loss[at] - curve.loss[way]) / bytes;
-      if (slope > best.slope || (slope === best.slope && bytes > best.bytes)) best = { slope, curve: index, way, bytes };
-    }
-    if (best.way === 0) return;
-    steps.push(best);
-    at = best.way;
-  }
-}
-
 /** Per curve the way to show it, so that least is lost within the budget (section 8, Rate-distortion). */
 export function spendBytes(curves: readonly RdCurve[], budgetBytes: number): number[] {
-  const steps: Step[] = [];
-  curves.forEach((curve, c) => addSteps(curve, c, steps));
-  steps.sort((a, b) => b.slope - a.slope);
-  const way = new Array<number>(curves.length).fill(0);
-  const ended = new Array<boolean>(curves.length).fill(false);
-  let left = budgetBytes;
-  for (const step of steps) {
-    if (ended[step.curve]) continue;
-    if (step.bytes > left) {
-      ended[step.curve] = true;
-      continue;
+  const steps: { slope: number; curve: number; way: number; bytes: number }[] = [];
+  // Along the lower convex hull of each curve from way 0; the slopes fall.
+  curves.forEach(({ bytes, loss }, curve) => {
+    for (let at = 0; ; ) {
+      let best = { slope: 0, curve, way: 0, bytes: Infinity };
+      bytes.forEach((all, way) => {
+        const more = all - bytes[at];
+        const slope = (loss[at] - loss[way]) / more;
+        if (more > 0 && (slope > best.slope || (slope === best.slope && more > best.bytes))) best = { slope, curve, way, bytes: more };
+      });
+      if (best.way === 0) return;
+      steps.push(best);
+      at = best.way;
     }
-    left -= step.bytes;
-    way[step.curve] = step.way;
+  });
+  const ways = curves.map(() => 0);
+  const full = new Set<number>();
+  for (const { curve, way, bytes } of steps.sort((a, b) => b.slope - a.slope)) {
+    if (bytes > budgetBytes) full.add(curve);
+    if (full.has(curve)) continue;
+    budgetBytes -= bytes;
+    ways[curve] = way;
   }
-  return way;
+  return ways;
 }
 
 /** The curves of a plane's stored fragments, in index order; weights default to surfaceWeights(). */
@@ -207,79 +171,69 @@ const lumaQuantisers = [
   72, 92, 95, 98, 112, 100, 103, 99,
 ];
 
-/** Log of the mean of 1 / (step + 1): how fine a whole quality quantises. Strictly rising. */
-function finenessAt(quality: number): number {
+/** Log of the mean of 1 / (step + 1), by whole quality: how fine it quantises. Strictly rising. */
+const finenessOfWhole = /* @__PURE__ */ Array.from({ length: 101 }, (_, quality) => {
   const percent = quality < 50 ? Math.trunc(5000 / quality) : 200 - 2 * quality;
-  let sum = 0;
-  for (const q of lumaQuantisers) sum += 1 / (clamp(Math.trunc((q * percent + 50) / 100), 1, 255) + 1);
-  return log(sum / 64);
-}
+  const step = (q: number): number => clamp(Math.trunc((q * percent + 50) / 100), 1, 255);
+  return log(sumOf(lumaQuantisers.map((q) => 1 / (step(q) + 1))) / 64);
+});
 function fineness(quality: number): number {
   const q = clamp(quality, 1, 100);
   const below = Math.trunc(q);
-  const low = finenessAt(below);
-  const part = q - below;
-  return part > 0 ? low + part * (finenessAt(below + 1) - low) : low;
+  const low = finenessOfWhole[below];
+  return q > below ? low + (q - below) * (finenessOfWhole[below + 1] - low) : low;
 }
 
-/** Slope of the monotone cubic (Fritsch and Butland 1984) at an inner knot. */
-function knotSlope(widthBefore: number, secantBefore: number, widthAfter: number, secantAfter: number): number {
-  if (secantBefore * secantAfter <= 0) return 0;
-  const a = 2 * widthAfter + widthBefore;
-  const b = widthAfter + 2 * widthBefore;
-  return (a + b) / (a / secantBefore + b / secantAfter);
-}
-
-/** Value at `at` between the knots k and k + 1. */
-function hermite(x: number[], y: number[], k: number, at: number): number {
-  const secant = (i: number): number => (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+/** The monotone cubic (Fritsch and Butland 1984) through points, between the k-th and the next. */
+function hermite(x: readonly number[], y: readonly number[], k: number, at: number): number {
+  const width = (i: number): number => x[i + 1] - x[i];
+  const secant = (i: number): number => (y[i + 1] - y[i]) / width(i);
   const slope = (i: number): number => {
     if (i === 0) return secant(0);
     if (i + 1 === x.length) return secant(i - 1);
-    return knotSlope(x[i] - x[i - 1], secant(i - 1), x[i + 1] - x[i], secant(i));
+    const [before, after] = [secant(i - 1), secant(i)];
+    if (before * after <= 0) return 0;
+    const a = 2 * width(i) + width(i - 1);
+    const b = width(i) + 2 * width(i - 1);
+    return (a + b) / (a / before + b / after);
   };
-  const h = x[k + 1] - x[k];
+  const h = width(k);
   const t = (at - x[k]) / h;
+  const rest = 1 - t;
   return (
-    y[k] * ((1 + 2 * t) * (1 - t) * (1 - t)) +
-    h * slope(k) * (t * (1 - t) * (1 - t)) +
+    y[k] * ((1 + 2 * t) * rest * rest) +
+    h * slope(k) * (t * rest * rest) +
     y[k + 1] * (t * t * (3 - 2 * t)) +
     h * slope(k + 1) * (t * t * (t - 1))
   );
 }
 
 /** Where a quality lies on the plane's axis: its fineness at rungs and without knots. */
-function axisAt(t: PlaneTables, quality: number): number {
-  const above = t.rungQuality.findIndex((q) => q > quality);
-  if (t.knotQuality.length === 0 || above <= 0) return fineness(quality);
-  let [a, b, aPosition, bPosition] = [t.rungQuality[above - 1], t.rungQuality[above], 0, 1];
-  const low = fineness(a);
-  const high = fineness(b);
-  t.knotQuality.forEach((q, k) => {
-    if (q > a && q <= quality) [a, aPosition] = [q, t.knotPosition[k]];
-    if (q < b && q > quality) [b, bPosition] = [q, t.knotPosition[k]];
+function axisAt({ rungQuality, knotQuality, knotPosition }: PlaneTables, quality: number): number {
+  const above = rungQuality.findIndex((q) => q > quality);
+  if (knotQuality.length === 0 || above <= 0) return fineness(quality);
+  const [first, last] = [rungQuality[above - 1], rungQuality[above]];
+  let [from, to] = [{ q: first, at: 0 }, { q: last, at: 1 }];
+  knotQuality.forEach((q, k) => {
+    const knot = { q, at: knotPosition[k] };
+    if (q > first && q <= quality) from = knot;
+    if (q > quality && q < to.q) to = knot;
   });
-  const from = fineness(a);
-  const part = (fineness(quality) - from) / (fineness(b) - from);
-  return low + (aPosition + part * (bPosition - aPosition)) * (high - low);
+  const start = fineness(from.q);
+  const part = (fineness(quality) - start) / (fineness(to.q) - start);
+  const low = fineness(first);
+  return low + (from.at + part * (to.at - from.at)) * (fineness(last) - low);
 }
 
 /** Bytes that a fragment would have at a quality that no rung has; exact at rungs, 0 when it is not stored. */
 export function interpolatedBytes(t: PlaneTables, fragment: number, quality: number): number {
-  const x: number[] = [];
-  const y: number[] = [];
-  for (let r = 0; r < rungCount(t); ++r) {
-    const bytes = bytesToShow(t, r, fragment);
-    if (bytes <= 0) continue;
-    if (quality === t.rungQuality[r]) return bytes;
-    x.push(fineness(t.rungQuality[r]));
-    y.push(log(bytes));
-  }
-  if (x.length === 0) return 0;
-  const at = axisAt(t, quality);
-  if (at <= x[0]) return exp(y[0]);
-  if (at >= x[x.length - 1]) return exp(y[y.length - 1]);
+  const stored = [...t.rungQuality].map((q, r) => ({ q, bytes: bytesToShow(t, r, fragment) })).filter(({ bytes }) => bytes > 0);
+  const exact = stored.find(({ q }) => q === quality);
+  if (exact || stored.length === 0) return exact?.bytes ?? 0;
+  const x = stored.map(({ q }) => fineness(q));
+  const y = stored.map(({ bytes }) => log(bytes));
+  const at = clamp(axisAt(t, quality), x[0], x[x.length - 1]);
   let k = 0;
-  while (x[k + 1] <= at) ++k;
-  return exp(hermite(x, y, k, at));
+  while (k + 2 < x.length && x[k + 1] <= at) ++k;
+  return exp(at > x[0] ? hermite(x, y, k, at) : y[0]);
 }

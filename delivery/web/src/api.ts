@@ -1,5 +1,5 @@
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
-import type { HtcOrder, Policy } from './harmonic_time';
+import type { HtcOrder, Policy } from './time_plan';
 import type { RequestRecord } from './http';
 import type { StepRule, VisiblePart } from './viewing';
 import type { DecodeHere } from './worker_pool';

@@ -1,5 +1,5 @@
 import type { PackageData } from './fragment_list';
-import { HtcOptions, defaultHtcOptions } from './harmonic_time';
+import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './link_model';
 import { bootstrapBytes } from './layout';
 import type { Manifest } from './manifest';
@@ -85,7 +85,8 @@ export function planDelivery(data: PackageData, quality: QualityTable, request: 
       const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
       const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : moved / Math.max(1e-9, meshS - manifestS - link.rttS);
       const throughput = { ...request.htc.throughput, initialBytesS };
-      return { htc: { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput }, linkBytesS: link.bytesS };
+      const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
+      return { plan: planOptions(htc), linkBytesS: link.bytesS };
     },
   });
   let at = steps.next();

@@ -1,9 +1,10 @@
 import { bytesToShow, etaOf, interpolatedBytes, meanEta, qualityOf, spendBytes, surfaceWeights } from './allocation';
 import { InputError } from './errors';
-import type { FragmentOffer } from './harmonic_time';
+import { FragmentOffer, bytesAtRung } from './time_plan';
 import type { Manifest } from './manifest';
+import { clamp, sumOf } from './numbers';
 import { log, pow } from './portable_math';
-import { PlaneTables, fragmentCount, rungCount } from './tables';
+import { PlaneTables, fragmentCount } from './tables';
 import { TextureInfo, fullSizePlanes } from './textures';
 
 /** What decisions about textures are made from. Tables may lack planes that nobody asks about. */
@@ -54,16 +55,7 @@ const lossUnit = 2 ** 40;
 export function roleWeight(role: string): number {
   if (role === 'base-colour') return 1;
   if (role === 'emissive') return 0.7;
-  if (role === 'normal' || role === 'alpha') return 0.5;
-  return 0.3;
-}
-
-/** Rungs of a plane whose quality is within the limits, as near as there are any. */
-function limitRung(t: PlaneTables, quality: number, low: boolean): number {
-  let rung = low ? rungCount(t) - 1 : 0;
-  if (low) while (rung > 0 && t.rungQuality[rung - 1] >= quality) --rung;
-  else while (rung + 1 < rungCount(t) && t.rungQuality[rung + 1] <= quality) ++rung;
-  return rung;
+  return role === 'normal' || role === 'alpha' ? 0.5 : 0.3;
 }
 
 function tablesOf(data: PackageData, plane: number): PlaneTables {
@@ -72,43 +64,33 @@ function tablesOf(data: PackageData, plane: number): PlaneTables {
   return t;
 }
 
+/** What is lost where the preview stands for a fragment. */
+const skippedLoss = (t: PlaneTables, fragment: number): number => t.skipDssim[fragment] ?? 1;
+
 function addPlane(data: PackageData, plane: number, options: ListOptions, list: FragmentList): void {
   const t = tablesOf(data, plane);
   const role = roleWeight(data.textures[plane].role);
-  const scale = Math.min(Math.max(options.scale, 0), t.scales);
+  const scale = clamp(options.scale, 0, t.scales);
   const eta = etaOf(t, scale);
   const weights = surfaceWeights(t);
   const quality = qualityOf(t, scale, options.gamma < 0 ? meanEta(t, scale) : options.gamma);
-  const low = limitRung(t, options.qualityLow, true);
-  const high = limitRung(t, options.qualityHigh, false);
-  const fragments = fragmentCount(t);
+  // Rungs whose quality is within the limits, as near as there are any.
+  const rungs = [...t.rungQuality.keys()];
+  const highRung = Math.max(t.rungQuality.filter((q) => q <= options.qualityHigh).length - 1, 0);
+  const lowRung = Math.min(t.rungQuality.filter((q) => q < options.qualityLow).length, rungs.length - 1, highRung);
   for (const f of t.order) {
     const weight = role * weights[f];
-    const bytes: number[] = [];
-    const skipped = t.skipDssim.length === 0 ? 1 : t.skipDssim[f];
-    const loss = [weight * skipped];
-    let showsMore = false;
-    for (let r = 0; r < rungCount(t); ++r) {
-      const dssim = t.dssim[r * fragments + f];
-      bytes.push(bytesToShow(t, r, f));
-      loss.push(weight * dssim);
-      showsMore ||= dssim < skipped;
-    }
+    const bytes = rungs.map((r) => bytesToShow(t, r, f));
+    const dssim = [skippedLoss(t, f), ...rungs.map((r) => t.dssim[r * fragmentCount(t) + f])];
+    const loss = dssim.map((d) => weight * d);
     if (!bytes.every((b) => b > 0 && b <= 0xffffffff)) continue;
     list.totalWeight += weight;
-    if (!showsMore) {
+    if (!dssim.some((d) => d < dssim[0])) {
       list.previewLoss += loss[0];
       continue;
     }
     list.fragments.push({ plane, fragment: f });
-    list.offers.push({
-      bytes,
-      loss,
-      eta: eta[f] * weight,
-      plannedBytes: Math.max(1, interpolatedBytes(t, f, quality[f])),
-      lowRung: Math.min(low, high),
-      highRung: high,
-    });
+    list.offers.push({ bytes, loss, eta: eta[f] * weight, plannedBytes: Math.max(1, interpolatedBytes(t, f, quality[f])), lowRung, highRung });
   }
 }
 
@@ -130,55 +112,31 @@ export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
   return Array.from({ length: fullSizePlanes(textures) }, (_, p) => ({ base: p, plane: p }));
 }
 
-/** Covered texels of a plane and the share of the surface that it has. */
-function coverOf(t: PlaneTables): { texels: number; surface: number } {
-  let texels = 0;
-  let surface = 0;
-  for (let f = 0; f < fragmentCount(t); ++f) {
-    texels += t.coveredTexels[f];
-    surface += t.surfaceFraction[f];
-  }
-  return { texels, surface };
-}
-
 /** Area of the object; where the package does not say it that of the bounding box. */
-function surfaceOf(m: Manifest): number {
-  if (m.surfaceArea > 0) return m.surfaceArea;
-  const [x, y, z] = m.boundsMin.map((least, i) => m.boundsMax[i] - least);
-  return 2 * (x * y + y * z + z * x);
+function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
+  const [x, y, z] = boundsMin.map((least, i) => boundsMax[i] - least);
+  return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
 }
 
-/** How often the texels of a full-size plane may be halved until one stands for a pixel. */
+/** How often the texels of a full-size plane may be halved until one stands for a pixel; at least 0. */
 function displayLevel(data: PackageData, base: number, displayedPx: number): number {
-  const cover = coverOf(tablesOf(data, base));
-  const surface = surfaceOf(data.manifest);
-  if (!(cover.surface > 0) || !(surface > 0) || !(cover.texels > 0)) return 0;
-  const texelsPerUnit = Math.sqrt(cover.texels / (cover.surface * surface));
-  return log(texelsPerUnit / (displayedPx / data.manifest.objectHeight)) / ln2;
-}
-
-/** The plane of a texture with the largest mip that is at most `level`. */
-function planeAt(textures: readonly TextureInfo[], base: number, level: number): number {
-  let best = base;
-  let bestMip = 0;
-  textures.forEach((t, p) => {
-    if (t.mip === 0 || t.base !== base || t.mip <= bestMip || t.mip > level) return;
-    bestMip = t.mip;
-    best = p;
-  });
-  return best;
+  const { coveredTexels, surfaceFraction } = tablesOf(data, base);
+  const texelsPerArea = sumOf(coveredTexels) / (sumOf(surfaceFraction) * surfaceOf(data.manifest));
+  if (!(texelsPerArea > 0 && texelsPerArea < Infinity)) return 0;
+  return Math.max(0, log(Math.sqrt(texelsPerArea) / (displayedPx / data.manifest.objectHeight)) / ln2);
 }
 
 /** Levels below the display's: of base colours and of everything else, which often costs more and shows less. */
-interface Coarser {
-  colour: number;
-  other: number;
-}
-function planesAt(data: PackageData, displayedPx: number, coarser: Coarser): PlaneChoice[] {
-  return fullSize(data.textures).map(({ base }) => {
-    const colour = roleWeight(data.textures[base].role) === 1;
-    const level = Math.max(0, displayLevel(data, base, displayedPx)) + (colour ? coarser.colour : coarser.other);
-    return { base, plane: planeAt(data.textures, base, level) };
+type Coarser = readonly [colour: number, other: number];
+
+function planesAt(data: PackageData, displayedPx: number, [colour, other]: Coarser): PlaneChoice[] {
+  const { textures } = data;
+  return fullSize(textures).map(({ base }) => {
+    const level = displayLevel(data, base, displayedPx) + (roleWeight(textures[base].role) === 1 ? colour : other);
+    // Its largest mip that is at most as coarse.
+    const mips = textures.map((t) => (t.mip > 0 && t.base === base && t.mip <= level ? t.mip : 0));
+    const mip = Math.max(...mips);
+    return { base, plane: mip > 0 ? mips.indexOf(mip) : base };
   });
 }
 
@@ -187,77 +145,52 @@ function planesAt(data: PackageData, displayedPx: number, coarser: Coarser): Pla
  * px). Needs the tables of the full-size planes.
  */
 export function planesForDisplay(data: PackageData, displayedPx: number): PlaneChoice[] {
-  return planesAt(data, displayedPx, { colour: 0, other: 0 });
+  return planesAt(data, displayedPx, [0, 0]);
 }
 
 /** Surface-weighted mean of what the previews lose. */
 function previewLoss(t: PlaneTables): number {
   if (t.skipDssim.length === 0) return 1;
   const weights = surfaceWeights(t);
-  let sum = 0;
-  let weight = 0;
-  for (const f of t.order) {
-    sum += weights[f] * t.skipDssim[f];
-    weight += weights[f];
-  }
-  return weight > 0 ? sum / weight : 0;
+  const of = [...t.order];
+  const weight = sumOf(of.map((f) => weights[f]));
+  return weight > 0 ? sumOf(of.map((f) => weights[f] * t.skipDssim[f])) / weight : 0;
 }
 
 /** What the picture loses, as 1 - SSIM over the surface, because mips stand for textures that have more texels. */
 export function mipLoss(data: PackageData, planes: readonly PlaneChoice[], displayedPx: number): number {
-  let loss = 0;
-  let weight = 0;
-  for (const choice of planes) {
-    const base = data.textures[choice.base];
-    const shown = data.textures[choice.plane];
-    const t = tablesOf(data, choice.base);
-    const w = roleWeight(base.role) * coverOf(t).surface;
+  let [loss, weight] = [0, 0];
+  for (const { base, plane } of planes) {
+    const { role, widthPx, previewWidthPx } = data.textures[base];
+    const { mip } = data.textures[plane];
+    const t = tablesOf(data, base);
+    const w = roleWeight(role) * sumOf(t.surfaceFraction);
     weight += w;
-    if (shown.mip === 0) continue;
-    const display = Math.max(0, displayLevel(data, choice.base, displayedPx));
-    const preview = log(base.widthPx / base.previewWidthPx) / ln2;
-    const missing = shown.mip - display;
-    const all = preview - display;
-    if (missing <= 0) continue;
-    loss += w * previewLoss(t) * (missing < all ? pow(missing / all, mipExponent) : 1);
+    const display = displayLevel(data, base, displayedPx);
+    const missing = mip - display;
+    const all = log(widthPx / previewWidthPx) / ln2 - display;
+    if (mip > 0 && missing > 0) loss += w * previewLoss(t) * (missing < all ? pow(missing / all, mipExponent) : 1);
   }
   return weight > 0 ? Math.min(1, loss / weight) : 0;
 }
 
-/** The best texture that so many bytes can show. */
-export interface TextureBudget {
+/** How bytes are best spent on textures. */
+export interface TextureSpending {
   planes: PlaneChoice[];
   list: FragmentList;
-  /** By offer; -1 = skipped. */
-  rungs: number[];
-  /** Of fragments, at most the budget. */
-  bytes: number;
+  /** By offer; 0 = skipped, or one more than its rung. */
+  ways: number[];
   /** Predicted 1 - SSIM over the surface, loss by mips included. */
   dssim: number;
 }
 
-function spendOn(
-  data: PackageData,
-  planes: PlaneChoice[],
-  displayedPx: number,
-  options: Partial<ListOptions>,
-  budget: number,
-): TextureBudget {
+function spendOn(data: PackageData, planes: PlaneChoice[], displayedPx: number, options: Partial<ListOptions>, budget: number): TextureSpending {
   const list = fragmentList(data, planes, options);
   const total = Math.max(list.totalWeight, 1e-300);
-  const curves = list.offers.map((f) => ({
-    bytes: [0, ...f.bytes],
-    loss: f.loss.map((l) => Math.floor((l / total) * lossUnit)),
-  }));
+  const curves = list.offers.map(({ bytes, loss }) => ({ bytes: [0, ...bytes], loss: loss.map((l) => Math.floor((l / total) * lossUnit)) }));
   const ways = spendBytes(curves, budget);
-  let loss = list.previewLoss;
-  let bytes = 0;
-  ways.forEach((way, i) => {
-    bytes += curves[i].bytes[way];
-    loss += list.offers[i].loss[way];
-  });
-  const dssim = 1 - (1 - loss / total) * (1 - mipLoss(data, planes, displayedPx));
-  return { planes, list, rungs: ways.map((way) => way - 1), bytes, dssim };
+  const loss = ways.reduce((sum, way, i) => sum + list.offers[i].loss[way], list.previewLoss);
+  return { planes, list, ways, dssim: 1 - (1 - loss / total) * (1 - mipLoss(data, planes, displayedPx)) };
 }
 
 /** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
@@ -266,27 +199,32 @@ export function* budgetSteps(
   displayedPx: number,
   options: Partial<ListOptions>,
   bytes: number,
-): Generator<TextureBudget> {
-  const spend = (c: Coarser): TextureBudget =>
-    spendOn(data, planesAt(data, displayedPx, c), displayedPx, options, bytes);
-  let at: Coarser = { colour: 0, other: 0 };
-  let best = spend(at);
-  for (let better = true; better; ) {
+): Generator<TextureSpending> {
+  const spend = (c: Coarser): TextureSpending => spendOn(data, planesAt(data, displayedPx, c), displayedPx, options, bytes);
+  let from: Coarser | undefined = [0, 0];
+  let best = spend(from);
+  while (from) {
     // Downhill; every step makes something coarser.
-    better = false;
-    const from = at;
-    for (const step of [{ colour: 1, other: 1 }, { colour: 0, other: 1 }, { colour: 1, other: 0 }]) {
-      const to = { colour: from.colour + step.colour, other: from.other + step.other };
-      if (Math.max(to.colour, to.other) > mostCoarser) continue;
+    const [colour, other]: Coarser = from;
+    from = undefined;
+    for (const to of [[colour + 1, other + 1], [colour, other + 1], [colour + 1, other]] as const) {
+      if (Math.max(...to) > mostCoarser) continue;
       yield best;
       const now = spend(to);
       if (now.dssim >= best.dssim) continue;
       best = now;
-      at = to;
-      better = true;
+      from = to;
     }
   }
   yield best;
+}
+
+/** The best texture that so many bytes can show. */
+export interface TextureBudget extends TextureSpending {
+  /** By offer; -1 = skipped. */
+  rungs: number[];
+  /** Of fragments, at most the budget. */
+  bytes: number;
 }
 
 /**
@@ -299,7 +237,7 @@ export function textureForBudget(
   options: Partial<ListOptions>,
   bytes: number,
 ): TextureBudget {
-  let best: TextureBudget | undefined;
-  for (const step of budgetSteps(data, displayedPx, options, bytes)) best = step;
-  return best!;
+  const best = [...budgetSteps(data, displayedPx, options, bytes)].pop()!;
+  const rungs = best.ways.map((way) => way - 1);
+  return { ...best, rungs, bytes: sumOf(best.list.offers.map((f, i) => bytesAtRung(f, rungs[i]))) };
 }

@@ -1,5 +1,5 @@
 import type { FragmentList, ListedFragment } from './fragment_list';
-import type { FragmentOffer } from './harmonic_time';
+import type { FragmentOffer } from './time_plan';
 import type { RequestRecord } from './http';
 
 /** Offers of neighbours that are fetched and decided together. */

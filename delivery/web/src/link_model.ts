@@ -1,6 +1,7 @@
 // delivery/cpp/network_model and simulation for one server on a link of constant rate: the same arithmetic, the same bits.
 
-import { FragmentOffer, HarmonicTimePlan, HtcOptions } from './harmonic_time';
+import { sumOf } from './numbers';
+import { FragmentOffer, HtcStep, TimePlanOptions, bytesAtRung, timePlan } from './time_plan';
 
 /** A link as a plan supposes it. */
 export interface LinkOptions {
@@ -11,12 +12,13 @@ export interface LinkOptions {
   connections: number;
 }
 
-interface Flow {
-  number: number;
-  bytesLeft: number;
-  /** When its first byte may come; infinite while it waits for a connection. */
-  startsS: number;
-  rate: number;
+/** Requests over a link, from the first to the last moment at which something changes. */
+export interface LinkModel<T> {
+  readonly nowS: number;
+  /** Asks for bytes now. */
+  request(what: T, bytes: number): void;
+  /** Runs until a request is complete and gives it; undefined: none ever will be. */
+  advance(): T | undefined;
 }
 
 const serverBytesS = 1e12;
@@ -27,7 +29,7 @@ const never = 1e9;
 
 /** An even share of `capacity` for each, what a capped one leaves going to the others. */
 function shareEvenly(capacity: number, caps: readonly number[]): number[] {
-  const order = caps.map((_, i) => i).sort((a, b) => caps[a] - caps[b]);
+  const order = [...caps.keys()].sort((a, b) => caps[a] - caps[b]);
   const rates: number[] = [];
   order.forEach((i, k) => {
     rates[i] = Math.min(caps[i], capacity / (order.length - k));
@@ -36,63 +38,43 @@ function shareEvenly(capacity: number, caps: readonly number[]): number[] {
   return rates;
 }
 
-/** Requests over a link, from the first to the last moment at which something changes. */
-export class LinkModel {
-  nowS = 0;
-  private busy_ = 0;
-  private readonly flows_: Flow[] = []; // by order of request
-
-  constructor(private readonly options_: LinkOptions) {}
-
-  /** Asks for bytes now; the number is the caller's own. */
-  request(number: number, bytes: number): void {
-    this.flows_.push({ number, bytesLeft: Math.max(bytes, doneBytes), startsS: Infinity, rate: 0 });
-    this.startWaiting_();
-  }
-  private startWaiting_(): void {
-    for (const f of this.flows_)
-      if (f.startsS === Infinity && this.busy_ < this.options_.connections) {
-        f.startsS = this.nowS + this.options_.rttS;
-        ++this.busy_;
+/** From `nowS` on. */
+export function linkModel<T>({ bytesS, rttS, connections }: LinkOptions, nowS = 0): LinkModel<T> {
+  const flows: { what: T; bytesLeft: number; startsS?: number }[] = []; // by order of request
+  return {
+    get nowS() {
+      return nowS;
+    },
+    request(what, bytes) {
+      flows.push({ what, bytesLeft: Math.max(bytes, doneBytes) });
+    },
+    advance() {
+      for (;;) {
+        const ended = flows.findIndex((f) => f.bytesLeft <= doneBytes);
+        if (ended >= 0) return flows.splice(ended, 1)[0].what;
+        if (nowS >= never) return undefined;
+        let next = never;
+        const active = flows.slice(0, connections).filter((f) => {
+          f.startsS ??= nowS + rttS; // when its first byte may come
+          if (f.startsS > nowS) next = Math.min(next, f.startsS);
+          return f.startsS <= nowS;
+        });
+        const rates = shareEvenly(bytesS, shareEvenly(serverBytesS, active.map(() => noCap)));
+        active.forEach((f, i) => (next = Math.min(next, nowS + f.bytesLeft / rates[i])));
+        active.forEach((f, i) => {
+          f.bytesLeft -= rates[i] * (next - nowS);
+          // Rounding may leave a sliver that no step of time can move.
+          if (next + f.bytesLeft / rates[i] <= next) f.bytesLeft = 0;
+        });
+        nowS = next;
       }
-  }
-  private shareRates_(): void {
-    const active = this.flows_.filter((f) => ((f.rate = 0), f.startsS <= this.nowS));
-    const caps = shareEvenly(serverBytesS, active.map(() => noCap));
-    shareEvenly(this.options_.bytesS, caps).forEach((rate, i) => (active[i].rate = rate));
-  }
-  /** Runs until a request is complete and gives its number, or until `untilS`. */
-  advance(untilS = never): number | undefined {
-    for (;;) {
-      const i = this.flows_.findIndex((f) => f.bytesLeft <= doneBytes);
-      if (i >= 0) {
-        const [ended] = this.flows_.splice(i, 1);
-        --this.busy_;
-        this.startWaiting_();
-        return ended.number;
-      }
-      if (this.nowS >= untilS) return undefined;
-      this.shareRates_();
-      let next = untilS;
-      for (const f of this.flows_) {
-        if (f.startsS > this.nowS) next = Math.min(next, f.startsS);
-        if (f.rate > 0) next = Math.min(next, this.nowS + f.bytesLeft / f.rate);
-      }
-      const seconds = next - this.nowS;
-      this.nowS = next;
-      for (const f of this.flows_) {
-        f.bytesLeft -= f.rate * seconds;
-        // Rounding may leave a sliver that no step of time can move.
-        if (f.rate > 0 && f.bytesLeft > 0 && next + f.bytesLeft / f.rate <= next) f.bytesLeft = 0;
-      }
-    }
-  }
+    },
+  };
 }
 
 /** When so many bytes asked for at `fromS` are complete on an otherwise idle link. */
 export function fetchedS(link: LinkOptions, fromS: number, bytes: number): number {
-  const model = new LinkModel(link);
-  while (model.nowS < fromS) model.advance(fromS);
+  const model = linkModel(link, fromS);
   model.request(0, bytes);
   model.advance();
   return model.nowS;
@@ -108,22 +90,22 @@ export interface Simulated {
   /** After the first request. */
   endS: number;
 }
-/** Plays a plan over a link. */
-export function simulate(offers: readonly FragmentOffer[], options: HtcOptions, link: LinkOptions): Simulated {
-  const plan = new HarmonicTimePlan(offers, options);
-  const model = new LinkModel(link);
+/** Plays a plan over a link; in no time (a limit <= 0) nothing is transferred. */
+export function simulate(offers: readonly FragmentOffer[], options: TimePlanOptions, link: LinkOptions): Simulated {
+  const rungs = offers.map(() => -1);
   let endS = 0;
-  while (!plan.finished) {
-    for (let s = plan.next(model.nowS); s; s = plan.next(model.nowS)) model.request(s.offer, s.bytes);
-    if (plan.finished) break;
-    const ended = model.advance();
-    if (ended === undefined) break;
-    endS = model.nowS;
-    plan.completed(ended, endS);
+  if (options.timeLimitS > 0) {
+    const plan = timePlan(offers, options);
+    const model = linkModel<HtcStep>(link);
+    for (;;) {
+      for (let s = plan.next(model.nowS); s; s = plan.next(model.nowS)) model.request(s, s.bytes);
+      const step = model.advance();
+      if (!step) break;
+      endS = model.nowS;
+      plan.ended(step, endS, true);
+    }
+    for (const s of plan.steps) rungs[s.offer] = s.rung;
   }
-  const rungs = plan.rungs();
-  let [loss, bytes] = [0, 0];
-  for (const s of plan.steps) bytes += s.rung < 0 ? 0 : s.bytes;
-  rungs.forEach((rung, i) => (loss += offers[i].loss[rung + 1]));
-  return { rungs, bytes, loss, endS };
+  const bytes = sumOf(offers.map((f, i) => bytesAtRung(f, rungs[i])));
+  return { rungs, bytes, endS, loss: sumOf(offers.map((f, i) => f.loss[rungs[i] + 1])) };
 }

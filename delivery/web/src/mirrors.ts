@@ -1,6 +1,6 @@
 import { FormatError, TexmeshError } from './errors';
 import { HttpClient, nowS } from './http';
-import { Throughput } from './throughput';
+import { TransferRate, transferRate } from './throughput';
 
 const silenceFactor = 4;
 const leastPatienceRtts = 8;
@@ -15,7 +15,7 @@ export interface Mirror {
   etag: string;
   /** Bytes of the container; -1 = not known. */
   total: number;
-  throughput: Throughput;
+  throughput: TransferRate;
   owedBytes: number;
   lastS: number;
 }
@@ -36,7 +36,7 @@ export class Mirrors {
     urls: readonly string[],
     readonly client: HttpClient,
   ) {
-    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1, throughput: new Throughput(), owedBytes: 0, lastS: 0 }));
+    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1, throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
   }
   private get alive_(): Mirror[] {
     return this.all.filter((m) => m.alive);
@@ -55,7 +55,7 @@ export class Mirrors {
   async ask<T>(bytes: number, ask: (m: Mirror, how: Asking) => Promise<T>): Promise<T> {
     for (let reload = false; ; ) {
       const { rttS, options } = this.client;
-      const expectedS = (k: Mirror): number => (k.owedBytes + bytes) / k.throughput.bytesS();
+      const expectedS = (k: Mirror): number => (k.owedBytes + bytes) / k.throughput.recentBytesS();
       const [m, ...others] = this.alive_.sort((a, b) => expectedS(a) - expectedS(b));
       const elsewhere = others.length > 0;
       const patienceS = Math.max(leastPatienceS, leastPatienceRtts * rttS, silenceFactor * expectedS(m));

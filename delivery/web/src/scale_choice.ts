@@ -1,8 +1,8 @@
-import { FragmentList, PackageData, PlaneChoice, TextureBudget, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
-import { HtcOptions } from './harmonic_time';
-import { LinkOptions, simulate } from './link_model';
+import { FragmentList, PackageData, PlaneChoice, TextureSpending, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
+import { Simulated, simulate } from './link_model';
 import { equivalentQuality, predictedSsim } from './prediction';
 import type { QualityTable } from './quality_table';
+import type { TimePlanOptions } from './time_plan';
 
 /** A coarser scale has to look better by this much of SSIM. */
 const worthwhile = 1e-4;
@@ -23,24 +23,14 @@ export function finerWhereSeen(table: QualityTable, scale: number, displayedPx: 
   return table.scales[i];
 }
 
-/** SSIM of a scale with textures as good as the table knows them. */
-function bestSsim(table: QualityTable, scale: number): number {
-  return table.rungs.reduce((best, q) => Math.max(best, predictedSsim(table, scale, q)), 0);
-}
-
 /** A scale and textures as they can be had in a time. */
-export interface InTime {
+export interface InTime extends Simulated {
   scale: number;
   planes: PlaneChoice[];
   list: FragmentList;
-  /** By offer of the list; -1 = skipped. */
-  rungs: number[];
-  bytes: number;
   /** 1 - SSIM of the textures as displayed, and the picture's predicted SSIM. */
   textureDssim: number;
   ssim: number;
-  /** Of the last fragment, after the first request for one. */
-  endS: number;
   /** No time is left after the mesh. */
   late: boolean;
 }
@@ -53,27 +43,24 @@ export interface InTimeRequest {
   only?: boolean;
   connections: number;
   /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
-  afterMesh(scale: number): { htc: HtcOptions; linkBytesS: number };
+  afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
 }
 
 /** Textures beside one scale; the generator gives the page a turn between its steps. */
 function* texturesInTime(data: PackageData, quality: QualityTable, request: InTimeRequest, scale: number): Generator<void, InTime> {
   const { displayedPx, connections } = request;
-  const { htc, linkBytesS } = request.afterMesh(scale);
-  const budget = Math.floor(Math.max(0, htc.timeLimitS) * htc.throughput.initialBytesS);
-  let spent: TextureBudget | undefined;
+  const { plan, linkBytesS } = request.afterMesh(scale);
+  const { timeLimitS, initialBytesS, rttS } = plan;
+  const budget = Math.floor(Math.max(0, timeLimitS) * initialBytesS);
+  let spent: TextureSpending | undefined;
   for (spent of budgetSteps(data, displayedPx, { scale }, budget)) yield;
   const { list, planes } = spent!;
-  const link: LinkOptions = { bytesS: linkBytesS, rttS: htc.rttS, connections };
-  const played =
-    htc.timeLimitS > 0
-      ? simulate(list.offers, htc, link)
-      : { rungs: list.offers.map(() => -1), bytes: 0, endS: 0, loss: list.offers.reduce((sum, o) => sum + o.loss[0], 0) };
+  const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections });
   yield;
   const shown = list.totalWeight > 0 ? (played.loss + list.previewLoss) / list.totalWeight : 0;
   const textureDssim = 1 - (1 - shown) * (1 - mipLoss(data, planes, displayedPx));
   const ssim = predictedSsim(quality, scale, equivalentQuality(data, planesForDisplay(data, displayedPx), textureDssim));
-  return { scale, planes, list, textureDssim, ssim, rungs: played.rungs, bytes: played.bytes, endS: played.endS, late: htc.timeLimitS <= 0 };
+  return { scale, planes, list, textureDssim, ssim, late: timeLimitS <= 0, ...played };
 }
 
 /**
@@ -87,7 +74,8 @@ export function* choiceInTime(data: PackageData, quality: QualityTable, request:
     if (scale < request.wanted || (request.only && scale !== request.wanted)) continue;
     // A mesh that comes too late is no picture in the time.
     const least: number = !best || best.late ? -1 : best.ssim + worthwhile;
-    if (bestSsim(quality, scale) <= least) continue;
+    // With textures as good as the table knows them.
+    if (!quality.rungs.some((q) => predictedSsim(quality, scale, q) > least)) continue;
     const now = yield* texturesInTime(data, quality, request, scale);
     if (now.ssim > least) best = now;
   }

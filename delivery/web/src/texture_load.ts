@@ -3,13 +3,13 @@ import type { PlaneComposer } from './composer';
 import { InputError } from './errors';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { groupBytes, groupedList, throughputOf } from './groups';
-import { HarmonicTimePlan, HtcOptions, HtcStep, Policy, defaultHtcOptions } from './harmonic_time';
 import { isAbort, isForGood, sleepS, throwIfAborted } from './http';
 import { mostPreviewPx } from './image_size';
 import { LoadContext, hysteresis } from './load_context';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { textureSet } from './texture_set';
 import { TextureInfo, fullSizePlanes } from './textures';
+import { HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from './time_plan';
 import { TimedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
 import { upgradesInOrder } from './upgrades';
@@ -57,7 +57,7 @@ export async function textureLoad(load: LoadContext) {
   const fates = new Map<string, Fate>(); // by keyOf
   let losses = 0;
   let barren = 0; // rounds of refining that brought nothing, one after the other
-  let plan: HarmonicTimePlan | undefined;
+  let plan: TimePlan | undefined;
   const newSet = () => textureSet(options.renderer, textures, load.materials, pool);
   let set = newSet();
   const transfers = new Transfers(reader, textures, pool, {
@@ -273,10 +273,9 @@ export async function textureLoad(load: LoadContext) {
   const leftS = (): number => limitS - load.elapsedS();
   /** A share of the time left, for timers. */
   const timeS = (share: number): Promise<void> => sleepS(Math.min(longestTimerS, Math.max(0, share * leftS())));
-  function htc(timeLimitS: number): HtcOptions {
-    const defaults = defaultHtcOptions();
-    const throughput = { ...defaults.throughput, initialBytesS: Math.max(1, load.beta0) };
-    return { ...defaults, policy: options.policy as Policy, order: options.order ?? 'credit', timeLimitS, rttS: client.latencyS, throughput };
+  function planOptions(timeLimitS: number): TimePlanOptions {
+    const { policy, order = 'credit' } = options;
+    return { policy: policy as Policy, order, timeLimitS, rttS: client.latencyS, initialBytesS: Math.max(1, load.beta0) };
   }
   /** The scale that is enough at a displayed height: by the rule, or finer where that was measured to be seen. */
   function scaleFor(heightPx: number, part: VisiblePart | undefined): number {
@@ -294,7 +293,7 @@ export async function textureLoad(load: LoadContext) {
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / load.beta0 + client.latencyS : 0);
     const steps = choiceInTime(data, quality!, {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined, connections: client.options.connections,
-      afterMesh: (scale) => ({ htc: htc(leftS() - composeS - meshS(scales.bytesOf(scale))), linkBytesS: load.beta0 }),
+      afterMesh: (scale) => ({ plan: planOptions(leftS() - composeS - meshS(scales.bytesOf(scale))), linkBytesS: load.beta0 }),
     });
     for (let step = steps.next(); ; step = steps.next()) {
       if (step.done) return step.value!;
@@ -335,7 +334,7 @@ export async function textureLoad(load: LoadContext) {
   async function fetchInTime(fragments: FragmentList, timeLimitS: number): Promise<void> {
     const bytesEach = wholeRungs() ? Infinity : groupBytes(load.beta0, client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    plan = new HarmonicTimePlan(list.offers, htc(timeLimitS));
+    plan = timePlan(list.offers, planOptions(timeLimitS));
     const decided = (s: HtcStep): void => {
       const group = list.groups[s.offer];
       if (s.doneS < 0) for (const f of group) fates.set(keyOf(f, s.rung), 'comes');

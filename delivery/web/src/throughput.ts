@@ -1,3 +1,46 @@
+/** What transfers that have ended say of a connection or a group of them: delivery/cpp/throughput.h. */
+export interface TransferRate {
+  /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
+  add(bytes: number, seconds: number): void;
+  /** Bytes over seconds of at most so many samples (default 10). */
+  recentBytesS(samples?: number): number;
+  /** The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0. */
+  meanBytesS(seconds: number): number;
+}
+
+const leastSeconds = 1e-9;
+const none = { allBytes: 0, allSeconds: 0 };
+
+/** `initialBytesS` is beta_0, until there is a sample; > 0. */
+export function transferRate(initialBytesS: number): TransferRate {
+  const ended: { bytes: number; seconds: number; allBytes: number; allSeconds: number }[] = []; // all: up to each
+  return {
+    add(bytes, duration) {
+      const seconds = Math.max(duration, leastSeconds);
+      const { allBytes, allSeconds } = ended.at(-1) ?? none;
+      ended.push({ bytes, seconds, allBytes: allBytes + bytes, allSeconds: allSeconds + seconds });
+    },
+    recentBytesS(samples = 10) {
+      let [bytes, seconds] = [0, 0];
+      for (const sample of ended.slice(-samples).reverse()) {
+        bytes += sample.bytes;
+        seconds += sample.seconds;
+      }
+      return seconds > 0 ? bytes / seconds : initialBytesS;
+    },
+    meanBytesS(seconds) {
+      const { allBytes, allSeconds } = ended.at(-1) ?? none;
+      const from = allSeconds - seconds;
+      if (from <= 0) return (allBytes - from * initialBytesS) / seconds;
+      const at = ended.findIndex((sample) => sample.allSeconds > from); // -1: the last, by rounding
+      const cut = ended.at(at)!;
+      const before = ended[at - 1] ?? none;
+      const part = (cut.allSeconds - from) / (cut.allSeconds - before.allSeconds);
+      return (allBytes - cut.allBytes + part * (cut.allBytes - before.allBytes)) / seconds;
+    },
+  };
+}
+
 /**
  * How the throughput of the next transfer is guessed from those that have ended: the last one's; bytes over seconds of
  * the last `samples` (harmonic); an exponentially weighted mean.
@@ -25,69 +68,34 @@ export const defaultThroughput: ThroughputOptions = {
   initialBytesS: 1e5,
 };
 
-const ringSize = 64;
-const leastSeconds = 1e-9;
-const none = { bytes: 0, seconds: 0 };
+const mostSamples = 64;
 
-/** Throughput of a connection or a group of them: delivery/cpp/throughput.h. */
-export class Throughput {
-  private readonly ring_: { bytes: number; seconds: number }[] = [];
-  private readonly sums_: { bytes: number; seconds: number }[] = []; // of all samples up to each
-  private count_ = 0;
+/** A TransferRate with every estimator. */
+export class Throughput implements TransferRate {
+  private readonly rate_: TransferRate;
   private mean_: number;
 
   constructor(private readonly options_: ThroughputOptions = defaultThroughput) {
+    this.rate_ = transferRate(options_.initialBytesS);
     this.mean_ = options_.initialBytesS;
   }
 
-  /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
   add(bytes: number, seconds: number): void {
-    const sample = { bytes, seconds: Math.max(seconds, leastSeconds) };
-    this.ring_[this.count_++ % ringSize] = sample;
-    const before = this.sums_[this.sums_.length - 1] ?? none;
-    this.sums_.push({ bytes: before.bytes + sample.bytes, seconds: before.seconds + sample.seconds });
+    this.rate_.add(bytes, seconds);
     const weight = this.options_.ewma * Math.min(1, bytes / this.options_.smallBytes);
-    this.mean_ += weight * (sample.bytes / sample.seconds - this.mean_);
+    this.mean_ += weight * (bytes / Math.max(seconds, leastSeconds) - this.mean_);
   }
 
   /** Bytes per second by the estimator chosen. */
   bytesS(): number {
-    if (this.count_ === 0) return this.options_.initialBytesS;
-    if (this.options_.estimator === 'last') return this.recentBytesS(1);
-    if (this.options_.estimator === 'harmonic') return this.recentBytesS(Math.max(this.options_.samples, 1));
-    return this.mean_;
+    const { estimator, samples } = this.options_;
+    if (estimator === 'ewma') return this.mean_;
+    return this.recentBytesS(estimator === 'last' ? 1 : Math.max(samples, 1));
   }
-
-  /** Bytes over seconds of at most so many samples. */
-  recentBytesS(samples: number): number {
-    const n = Math.min(samples, this.count_, ringSize);
-    if (n === 0) return this.options_.initialBytesS;
-    let bytes = 0;
-    let seconds = 0;
-    for (let i = 1; i <= n; ++i) {
-      const s = this.ring_[(this.count_ - i) % ringSize];
-      bytes += s.bytes;
-      seconds += s.seconds;
-    }
-    return bytes / seconds;
+  recentBytesS(samples = defaultThroughput.samples): number {
+    return this.rate_.recentBytesS(Math.min(samples, mostSamples));
   }
-
-  /** The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0. */
   meanBytesS(seconds: number): number {
-    const last = this.sums_.length - 1;
-    const all = this.sums_[last] ?? none;
-    const from = all.seconds - seconds;
-    if (from <= 0) return (all.bytes - from * this.options_.initialBytesS) / seconds;
-    let low = 0; // the first sum that ends after `from`, or the last
-    let high = last;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.sums_[middle].seconds > from) high = middle;
-      else low = middle + 1;
-    }
-    const cut = this.sums_[low];
-    const before = this.sums_[low - 1] ?? none;
-    const part = (cut.seconds - from) / (cut.seconds - before.seconds);
-    return (all.bytes - cut.bytes + part * (cut.bytes - before.bytes)) / seconds;
+    return this.rate_.meanBytesS(seconds);
   }
 }

@@ -1,6 +1,6 @@
 import type { GroupedList } from './groups';
-import type { HarmonicTimePlan, HtcStep } from './harmonic_time';
 import { nowS, throwIfAborted } from './http';
+import type { HtcStep, TimePlan } from './time_plan';
 import type { Transfers, Wish } from './transfers';
 
 /** Who hears of it. */
@@ -20,7 +20,7 @@ export class TimedFetch {
   private end_: () => void = () => undefined;
 
   constructor(
-    private readonly plan_: HarmonicTimePlan,
+    private readonly plan_: TimePlan,
     private readonly list_: GroupedList,
     private readonly transfers_: Transfers,
     private readonly signal_: AbortSignal,
@@ -64,7 +64,7 @@ export class TimedFetch {
           this.ended_(wish, false);
         },
       );
-    if (this.plan_.finished || (this.signal_.aborted && this.waiting_.size === 0)) this.end_();
+    if (this.plan_.finished() || (this.signal_.aborted && this.waiting_.size === 0)) this.end_();
   }
 
   private ended_(wish: Wish, well: boolean): void {
@@ -72,10 +72,9 @@ export class TimedFetch {
     this.waiting_.set(wish.offer, left);
     if (left > 0) return;
     this.waiting_.delete(wish.offer);
-    const at = nowS() - this.startS_;
-    if (well) this.plan_.completed(wish.offer, at);
-    else this.plan_.failed(wish.offer, at);
-    this.hooks_.decided(this.steps_.get(wish.offer)!);
+    const step = this.steps_.get(wish.offer)!;
+    this.plan_.ended(step, nowS() - this.startS_, well);
+    this.hooks_.decided(step);
     queueMicrotask(() => this.pump_());
   }
 }

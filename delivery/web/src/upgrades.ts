@@ -1,4 +1,4 @@
-import type { FragmentOffer } from './harmonic_time';
+import type { FragmentOffer } from './time_plan';
 
 /** What may be fetched after the deadline: an upgrade of a fragment to a higher rung. */
 export interface Upgrade {

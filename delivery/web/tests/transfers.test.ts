@@ -1,10 +1,11 @@
 import { describe, expect, it } from 'vitest';
 import {
-  FormatError, FragmentList, HarmonicTimePlan, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize,
+  FormatError, FragmentList, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize, planOptions,
 } from '../src/reader';
 import { finerWhereSeen } from '../src/scale_choice';
 import { defaultDeliveryRequest, planDelivery } from '../src/delivery_plan';
 import { groupBytes, groupedList, throughputOf } from '../src/groups';
+import { timePlan } from '../src/time_plan';
 import { TimedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
 import { WorkerPool } from '../src/worker_pool';
@@ -164,7 +165,7 @@ describe('a timed fetch', () => {
   async function fetchInTime(fault: Fault | undefined, mostS: number, signal = new AbortController().signal) {
     const s = await setUp(fault);
     const list = groupedList(s.list, 2000, 60000);
-    const plan = new HarmonicTimePlan(list.offers, { ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 });
+    const plan = timePlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
     const ended: HtcStep[] = [];
     const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
     const fetch = new TimedFetch(plan, list, s.transfers, signal, { decided, lost: () => undefined });
@@ -175,9 +176,8 @@ describe('a timed fetch', () => {
     const t = await fetchInTime(undefined, 10);
     await t.run;
     await t.settled();
-    expect(t.plan.finished).toBe(true);
-    const rungs = t.plan.rungs();
-    const wanted = t.list.groups.flatMap((g, i) => (rungs[i] < 0 ? [] : g));
+    expect(t.plan.finished()).toBe(true);
+    const wanted = t.plan.steps.flatMap((s) => (s.rung < 0 ? [] : t.list.groups[s.offer]));
     expect(t.decoded.length).toBe(wanted.length);
     expect(bytesAskedTwice(t.server.log, url)).toBe(0);
     expect(new Set(t.ended.map((step) => step.offer)).size).toBe(t.list.offers.length);
@@ -187,8 +187,8 @@ describe('a timed fetch', () => {
     const begin = performance.now();
     await t.run;
     expect(performance.now() - begin).toBeLessThan(3000);
-    expect(t.plan.finished).toBe(true);
-    expect(t.plan.rungs()).toContain(-1);
+    expect(t.plan.finished()).toBe(true);
+    expect(t.plan.steps.map((s) => s.rung)).toContain(-1);
   });
   it('can be cancelled', async () => {
     const abort = new AbortController();
