@@ -1,4 +1,4 @@
 // What the build makes one part of, loaded while the first picture comes.
 
-export { SplitShapes } from './split_shape';
+export { splitShapes } from './split_shape';
 export { textureLoad } from './texture_load';

@@ -1,6 +1,5 @@
-import { BufferGeometry, Material, Mesh, Object3D, Texture } from 'three';
+import { Material, Mesh, Object3D, Texture } from 'three';
 import type { GltfLoaderLike } from './api';
-import { FormatError } from './errors';
 
 /** What this library uses of GLTFLoader's result and parser. */
 export interface ParsedGltf {
@@ -69,12 +68,7 @@ export async function parseScale(
         return Promise.resolve(texture);
       },
     }));
-  const data = glb.byteOffset === 0 && glb.byteLength === glb.buffer.byteLength ? glb.buffer : glb.slice().buffer;
-  return (await loader.parseAsync(data as ArrayBuffer, '')) as ParsedGltf;
-}
-
-function require(good: unknown, what: string): asserts good {
-  if (!good) throw new FormatError('mesh', '', what, 'something else');
+  return (await loader.parseAsync(glb.slice().buffer, '')) as ParsedGltf;
 }
 
 /** All meshes beneath an object. */
@@ -136,17 +130,4 @@ export class MaterialSet {
 /** Frees the geometries beneath an object. */
 export function disposeGeometries(object: Object3D): void {
   for (const mesh of meshesOf(object)) mesh.geometry.dispose();
-}
-
-/** The material that a mesh of the vertex-split stream gets: that of the GLB with this number. */
-export async function materialFor(gltf: ParsedGltf, index: number, geometry: BufferGeometry): Promise<Mesh> {
-  const materials = gltf.parser.json.materials ?? [];
-  const material =
-    index < materials.length ? ((await gltf.parser.getDependency('material', index)) as Material) : undefined;
-  const fallback = meshesOf(gltf.scene)[0]?.material as Material | undefined;
-  const chosen = material ?? fallback;
-  require(chosen, `material ${index}`);
-  const mesh = new Mesh(geometry, chosen);
-  gltf.parser.assignFinalMaterial(mesh);
-  return mesh;
 }

@@ -69,9 +69,8 @@ export class ScaleSource {
     const cheap = meshes === 'stream' || (meshes !== 'glb' && form !== 'files');
     if (!manifest.stream || manifest.scales.length < 2 || !cheap) return;
     try {
-      const { SplitShapes } = await import('./split_shape');
-      this.splits_ = new SplitShapes(this.reader_, this.pool_, this.materials_, this.added_);
-      await this.splits_.open(signal);
+      const { splitShapes } = await import('./split_shape');
+      this.splits_ = await splitShapes(this.reader_, this.pool_, this.materials_, this.added_, signal);
       this.splitsOpen_ = true;
     } catch (error) {
       if (isAbort(error)) throw error;

@@ -7,7 +7,7 @@ import { displayOf } from '../src/camera';
 import { Emitter } from '../src/events';
 import { Manifest, PackageReader, displayedHeightPx, selectScale } from '../src/reader';
 import { MaterialSet, ParsedGltf } from '../src/scale_parts';
-import { SplitShapes } from '../src/split_shape';
+import { splitShapes } from '../src/split_shape';
 import type { TextureInfo } from '../src/textures';
 import { seenShares } from '../src/visibility';
 import { handle } from '../src/worker';
@@ -160,9 +160,8 @@ describe('scales out of the vertex-split stream', () => {
   };
   async function shapes() {
     const fromMemory = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
-    const splits = new SplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined);
     const { signal } = new AbortController();
-    await splits.open(signal);
+    const splits = await splitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
     return { splits, signal };
   }
   it('have the triangles and bounds of the manifest', async () => {
@@ -189,9 +188,8 @@ describe('scales out of the vertex-split stream', () => {
         url.startsWith('http://host') && range?.[0] === stream!.offset && (mirrors.length > 0 || damaged === 0) && ++damaged > 0 && 'flip-last';
       const server = fakeServer({ '/a.texmesh': golden('v1.1-scan') }, { fault });
       const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
-      const splits = new SplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined);
       const { signal } = new AbortController();
-      await splits.open(signal);
+      const splits = await splitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
       const mesh = await splits.load(0, gltf, signal, () => undefined, () => undefined);
       expect(mesh.geometry.index!.count / 3).toBe(manifest.scales[0].triangles);
       expect(damaged).toBeGreaterThan(0);
