@@ -1,5 +1,6 @@
 import { toHex } from './bytes';
 import { codecTraits } from './codec';
+import * as paths from './entry_paths';
 import { FormatError } from './errors';
 import { IndexHead, parseIndexPage, readIndexHead } from './index_table';
 import * as layout from './layout';
@@ -32,7 +33,7 @@ export async function manifest(bytes: Uint8Array, container = ''): Promise<{ par
 /** The head, or more, of index.bin. */
 export function indexHead(bytes: Uint8Array, { index: { headBytes } }: Manifest): IndexHead {
   const head = readIndexHead(bytes);
-  require(head.bytes === headBytes, layout.indexPath, 'head', `${headBytes} bytes`, head.bytes);
+  require(head.bytes === headBytes, paths.indexPath, 'head', `${headBytes} bytes`, head.bytes);
   return head;
 }
 
@@ -43,7 +44,7 @@ export function indexPage(bytes: Uint8Array, plane: number, count: number, minor
   for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
     const e = entries.get(ref.path);
     const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
-    require(!!same, layout.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+    require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
   }
   return entries;
 }
@@ -51,26 +52,26 @@ export function indexPage(bytes: Uint8Array, plane: number, count: number, minor
 /** textures.json. */
 export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
-  require(planes.length === planeCount, layout.texturesPath, '', `${planeCount} planes`, planes.length);
+  require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
   const feature = missingFeature(planes, requiredFeatures);
-  require(feature === '', layout.manifestPath, '/requiredFeatures', feature, 'a codec without it');
+  require(feature === '', paths.manifestPath, '/requiredFeatures', feature, 'a codec without it');
   const full = fullSizePlanes(planes);
   const mips = requiredFeatures.includes('mips');
   const mipCount = planes.length - full;
-  require(mips === mipCount > 0, layout.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
+  require(mips === mipCount > 0, paths.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
   const said = previews.length === Math.min(full, mostManifestPreviews);
-  require(said, layout.manifestPath, '', 'previews of the full-size planes', previews.length);
+  require(said, paths.manifestPath, '', 'previews of the full-size planes', previews.length);
   return planes;
 }
 
 /** The head, or more, of tables.bin. */
 export function tablesHead(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): TablesHead {
   const head = readTablesHead(bytes);
-  require(head.bytes === ref.headBytes, layout.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
-  require(head.planes.length === planeCount, layout.tablesPath, '', `${planeCount} planes`, head.planes.length);
+  require(head.bytes === ref.headBytes, paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
+  require(head.planes.length === planeCount, paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
   const last = head.planes[planeCount - 1];
   const end = last ? last.offset + last.bytes : head.bytes;
-  require(end === ref.bytes, layout.tablesPath, '', `${end} bytes`, ref.bytes);
+  require(end === ref.bytes, paths.tablesPath, '', `${end} bytes`, ref.bytes);
   return head;
 }
 
@@ -90,7 +91,7 @@ export function planeTables(
 ): PlaneDocument {
   const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
   const requireHere = (good: boolean, expected: string, found: unknown): void =>
-    require(good, layout.tablesPath, `texture plane ${plane}`, expected, found);
+    require(good, paths.tablesPath, `texture plane ${plane}`, expected, found);
   const { columns, rows, rungQuality, order, sizeBytes } = tables;
   const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
   requireHere(columns === info.columns && rows === info.rows && sameRungs, 'the grid and rungs of textures.json', 'others');

@@ -1,5 +1,20 @@
 // Paths that only documents and trees of files ask for.
 
+/** The manifest: everything begins with it. */
+export const manifestPath = 'manifest.json';
+/** Where every entry is, with its digest. */
+export const indexPath = 'index.bin';
+/** Bytes and dssim of fragments, by plane. */
+export const tablesPath = 'tables.bin';
+/** The texture planes. */
+export const texturesPath = 'textures.json';
+/** Measured SSIM by scale and texture quality. */
+export const qualityPath = 'quality.json';
+/** How the package was made. */
+export const provenancePath = 'provenance.json';
+/** mesh/s07.glb */
+export const meshPath = (scale: number): string => `mesh/s${String(scale).padStart(2, '0')}.glb`;
+
 /** texture/3/r07/0123.jpg, in trees made with `unpack --fragments files` only. */
 export const fragmentFilePath = (plane: number, rung: number, fragment: number, extension: string): string =>
   `texture/${plane}/r${String(rung).padStart(2, '0')}/${String(fragment).padStart(4, '0')}.${extension}`;

@@ -1,6 +1,3 @@
-/** Previews are no larger: GPUs that take less are none. */
-export const mostPreviewPx = 4096;
-
 /**
  * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for them; 0, 0 where it is none, or
  * decoders may find another frame than the first one here: behind markers that have no length.

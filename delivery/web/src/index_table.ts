@@ -1,12 +1,12 @@
 import { toHex } from './bytes';
 import { BytesIn } from './bytes_in';
-import { isValidEntryPath } from './entry_paths';
+import * as paths from './entry_paths';
 import { FormatError } from './errors';
 import * as layout from './layout';
 import { EntryRef, formatMajor, formatMinor } from './manifest';
 import { sha256 } from './sha256';
 
-const file = layout.indexPath;
+const file = paths.indexPath;
 const noPlane = 0xffffffff;
 
 /** One page of index.bin: the entries of a plane, or (plane -1) of none. */
@@ -75,7 +75,7 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   const bytes = input.u64();
   const digest = input.raw(32);
   const path = input.text(input.u8());
-  if (!isValidEntryPath(path) || path === layout.manifestPath || path === layout.indexPath)
+  if (!paths.isValidEntryPath(path) || path === paths.manifestPath || path === paths.indexPath)
     input.fail('a valid path of an entry', path);
   if (offset % 64 !== 0 || offset === 0) input.fail('an offset that is a multiple of 64', `${offset}`);
   if (layout.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);

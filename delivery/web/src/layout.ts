@@ -4,25 +4,13 @@
 export const bootstrapBytes = 16384;
 /** "Enough at any size": displayPx... of S_0 and the last step's upToPx. */
 export const anyDisplayPx = 1e9;
-/** The manifest: everything begins with it. */
-export const manifestPath = 'manifest.json';
-/** Where every entry is, with its digest. */
-export const indexPath = 'index.bin';
-/** Bytes and dssim of fragments, by plane. */
-export const tablesPath = 'tables.bin';
-/** The texture planes. */
-export const texturesPath = 'textures.json';
-/** Measured SSIM by scale and texture quality. */
-export const qualityPath = 'quality.json';
-/** How the package was made. */
-export const provenancePath = 'provenance.json';
+/** Previews are no larger: GPUs that take less are none. */
+export const mostPreviewPx = 4096;
 /** The vertex-split stream. */
 export const splitStreamPath = 'mesh/stream.bin';
 
 const digits = (n: number, least: number): string => String(n).padStart(least, '0');
 
-/** mesh/s07.glb */
-export const meshPath = (scale: number): string => `mesh/s${digits(scale, 2)}.glb`;
 /** preview/003.jpg */
 export const previewPath = (plane: number): string => `preview/${digits(plane, 3)}.jpg`;
 /** texture/3/tables.pack */

@@ -1,3 +1,4 @@
+import * as paths from './entry_paths';
 import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
@@ -162,7 +163,7 @@ function readScales(at: JsonAt): ManifestScale[] {
       scale,
       triangles: field('triangles').integer(1, 0xffffffff),
       vertices: field('vertices').integer(1, 0xffffffff),
-      glb: readRef({ at: field as JsonAt['at'] }, layout.meshPath(scale)),
+      glb: readRef({ at: field as JsonAt['at'] }, paths.meshPath(scale)),
       major: field('major').boolean(),
       ...numbers(lengths, largest),
       ...numbers(heights, layout.anyDisplayPx),
@@ -212,7 +213,7 @@ function readFirstPicture(
  * features. FormatError names the place in the document.
  */
 export function readManifest(json: Uint8Array): Manifest {
-  const at = parseJson(json, layout.manifestPath, layout.bootstrapBytes);
+  const at = parseJson(json, paths.manifestPath, layout.bootstrapBytes);
   const version = readVersion(at);
   const bounds = at.at('bounds');
   const [boundsMin, boundsMax] = ['min', 'max'].map((name) => readVector(bounds.at(name)));
@@ -232,11 +233,11 @@ export function readManifest(json: Uint8Array): Manifest {
     scales,
     steps: readSteps(at.at('steps'), scales),
     ...readFirstPicture(at, scales[scales.length - 1].glb, version.requiredFeatures),
-    index: readPagedRef(at.at('index'), layout.indexPath),
-    tables: readPagedRef(at.at('tables'), layout.tablesPath),
-    textures: readRef(at.at('textures'), layout.texturesPath),
-    quality: readRef(at.at('quality'), layout.qualityPath),
-    provenance: readRef(at.at('provenance'), layout.provenancePath),
+    index: readPagedRef(at.at('index'), paths.indexPath),
+    tables: readPagedRef(at.at('tables'), paths.tablesPath),
+    textures: readRef(at.at('textures'), paths.texturesPath),
+    quality: readRef(at.at('quality'), paths.qualityPath),
+    provenance: readRef(at.at('provenance'), paths.provenancePath),
     ...(at.has('stream') ? { stream: readStream(at.at('stream')) } : {}),
   };
 }
@@ -244,7 +245,7 @@ export function readManifest(json: Uint8Array): Manifest {
 /** The bytes of manifest.json from the first bytes of a container (section 2). */
 export function manifestOfContainer(head: Uint8Array, file: string): Uint8Array {
   const text = (begin: number, end: number): string => String.fromCharCode(...head.subarray(begin, end));
-  if (text(0, 10) !== 'PK\x03\x04\n\0\0\0\0\0' || text(30, 43) !== layout.manifestPath || head.length < 64)
+  if (text(0, 10) !== 'PK\x03\x04\n\0\0\0\0\0' || text(30, 43) !== paths.manifestPath || head.length < 64)
     throw new FormatError(file, 'byte 0', 'a texmesh package', 'something else');
   const bytes = new DataView(head.buffer, head.byteOffset).getUint32(22, true);
   const room = Math.min(head.length, layout.bootstrapBytes) - 64;

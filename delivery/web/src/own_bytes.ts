@@ -1,5 +1,6 @@
 import { FormatError } from './errors';
-import { imageSize, mostPreviewPx } from './image_size';
+import { imageSize } from './image_size';
+import { mostPreviewPx } from './layout';
 
 /** What of a GLB's JSON makes loaders ask somebody, or make room for pictures. */
 interface Embedding {

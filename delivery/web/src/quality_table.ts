@@ -1,5 +1,5 @@
+import { qualityPath } from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
-import { qualityPath } from './layout';
 
 /** Measured quality of scale x rung samples: quality.json (format/SPEC.md, section 11). */
 export interface QualityTable {

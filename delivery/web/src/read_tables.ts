@@ -1,7 +1,7 @@
 import { BytesIn } from './bytes_in';
 import { toHex } from './bytes';
+import { tablesPath as file } from './entry_paths';
 import { FormatError } from './errors';
-import { tablesPath as file } from './layout';
 import { formatMajor, formatMinor } from './manifest';
 import { sha256 } from './sha256';
 import { PlaneTables, TablesHead, fragmentCount, gammaSteps } from './tables';

@@ -1,6 +1,6 @@
 import { CodecId, codecTraits, isCodec } from './codec';
 import { JsonAt, parseJson } from './json_fields';
-import * as layout from './layout';
+import * as paths from './entry_paths';
 import { TextureInfo, fullSizePlanes } from './textures';
 
 const mostSide = 1 << 20;
@@ -95,7 +95,7 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
 
 /** Strict; FormatError names the place in the document. */
 export function readTextures(json: Uint8Array): TextureInfo[] {
-  const list = parseJson(json, layout.texturesPath, 32 << 20).at('textures');
+  const list = parseJson(json, paths.texturesPath, 32 << 20).at('textures');
   const textures: TextureInfo[] = [];
   for (let i = 0, n = list.array(0, 10000); i < n; ++i) textures.push(readTexture(list.at(i)));
   checkMips(list, textures);

@@ -1,10 +1,10 @@
 import { codecTraits } from './codec';
 import { requireDigest } from './digests';
-import { fragmentFilePath, isValidEntryPath } from './entry_paths';
+import { fragmentFilePath, isValidEntryPath, manifestPath } from './entry_paths';
 import { FormatError, InputError } from './errors';
 import { FragmentFiles, readFragmentFiles } from './fragment_files';
 import { GetOptions, HttpClient, isAbort, shownUrl, whatCame } from './http';
-import { bootstrapBytes, manifestPath } from './layout';
+import { bootstrapBytes } from './layout';
 import { manifestOfContainer } from './manifest';
 import { Asking, Mirror, Mirrors } from './mirrors';
 import type { PackageReader } from './package_reader';

@@ -4,13 +4,13 @@ import { InputError } from './errors';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
 import { groupBytes, groupedList, throughputOf } from './groups';
 import { isAbort, isForGood, sleepS, throwIfAborted } from './http';
-import { mostPreviewPx } from './image_size';
+import { mostPreviewPx } from './layout';
 import { LoadContext, hysteresis } from './load_context';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { textureSet } from './texture_set';
 import { TextureInfo, fullSizePlanes } from './textures';
 import { HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from './time_plan';
-import { TimedFetch } from './timed_fetch';
+import { timedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
 import { upgradesInOrder } from './upgrades';
 import { VisiblePart, selectScale } from './viewing';
@@ -353,7 +353,7 @@ export async function textureLoad(load: LoadContext) {
         skipped: s.rung < 0,
       });
     };
-    await new TimedFetch(plan, list, transfers, signal, { decided, lost }).run(timeLimitS + mostLate * limitS);
+    await timedFetch(plan, list, transfers, signal, timeLimitS + mostLate * limitS, { decided, lost });
     if (!wholeRungs()) await spendRest(fragments);
   }
   /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */

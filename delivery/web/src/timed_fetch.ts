@@ -10,71 +10,53 @@ export interface TimedFetchHooks {
   lost(wish: Wish, error: unknown): void;
 }
 
-/** Plays a plan over the network: asks for what it says, tells it what has come. */
-export class TimedFetch {
-  private readonly startS_ = nowS();
-  private readonly waiting_ = new Map<number, number>(); // by offer: fragments of it that have not ended
-  private readonly steps_ = new Map<number, HtcStep>(); // by offer
-  private readonly stop_ = new AbortController();
-  private told_ = 0;
-  private end_: () => void = () => undefined;
-
-  constructor(
-    private readonly plan_: TimePlan,
-    private readonly list_: GroupedList,
-    private readonly transfers_: Transfers,
-    private readonly signal_: AbortSignal,
-    private readonly hooks_: TimedFetchHooks,
-  ) {}
-
-  /** Until everything has come or was given up; what has not come after `mostS` seconds is. */
-  async run(mostS: number): Promise<void> {
-    const stop = (): void => this.stop_.abort();
-    this.signal_.addEventListener('abort', stop);
-    const timer = setTimeout(stop, mostS * 1000);
-    try {
-      await new Promise<void>((ended) => {
-        this.end_ = ended;
-        this.pump_();
-      });
-      throwIfAborted(this.signal_);
-    } finally {
-      clearTimeout(timer);
-      this.signal_.removeEventListener('abort', stop);
-    }
-  }
-
-  private pump_(): void {
+/**
+ * Plays a plan over the network: asks for what it says, tells it what has come. Until everything has come or was given up; what has not
+ * come after `mostS` seconds is.
+ */
+export async function timedFetch(
+  plan: TimePlan,
+  { groups }: GroupedList,
+  transfers: Transfers,
+  signal: AbortSignal,
+  mostS: number,
+  hooks: TimedFetchHooks,
+): Promise<void> {
+  const startS = nowS();
+  const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
+  const abort = new AbortController();
+  const stop = (): void => abort.abort();
+  signal.addEventListener('abort', stop);
+  const timer = setTimeout(stop, mostS * 1000);
+  let told = 0;
+  const pump = (end: () => void): void => {
     const wishes: Wish[] = [];
-    const next = (): HtcStep | undefined => (this.signal_.aborted ? undefined : this.plan_.next(nowS() - this.startS_));
-    for (let step = next(); step; step = next()) {
+    for (let step; !signal.aborted && (step = plan.next(nowS() - startS)); ) {
       const { offer, rung } = step;
-      this.steps_.set(offer, step);
-      this.waiting_.set(offer, this.list_.groups[offer].length);
-      for (const f of this.list_.groups[offer]) wishes.push({ ...f, rung, offer });
+      underWay.set(offer, { step, left: groups[offer].length });
+      for (const f of groups[offer]) wishes.push({ ...f, rung, offer });
     }
-    while (this.told_ < this.plan_.steps.length) this.hooks_.decided(this.plan_.steps[this.told_++]);
-    if (wishes.length > 0)
-      void this.transfers_.fetch(
-        wishes,
-        { gapBytes: 0, mostBytes: Infinity, signal: this.stop_.signal },
-        (wish) => this.ended_(wish, true),
-        (wish, error) => {
-          this.hooks_.lost(wish, error);
-          this.ended_(wish, false);
-        },
-      );
-    if (this.plan_.finished() || (this.signal_.aborted && this.waiting_.size === 0)) this.end_();
-  }
-
-  private ended_(wish: Wish, well: boolean): void {
-    const left = this.waiting_.get(wish.offer)! - 1;
-    this.waiting_.set(wish.offer, left);
-    if (left > 0) return;
-    this.waiting_.delete(wish.offer);
-    const step = this.steps_.get(wish.offer)!;
-    this.plan_.ended(step, nowS() - this.startS_, well);
-    this.hooks_.decided(step);
-    queueMicrotask(() => this.pump_());
+    while (told < plan.steps.length) hooks.decided(plan.steps[told++]);
+    const ended = ({ offer }: Wish, well: boolean): void => {
+      const group = underWay.get(offer)!;
+      if (--group.left > 0) return;
+      underWay.delete(offer);
+      plan.ended(group.step, nowS() - startS, well);
+      hooks.decided(group.step);
+      queueMicrotask(() => pump(end));
+    };
+    const lost = (wish: Wish, error: unknown): void => {
+      hooks.lost(wish, error);
+      ended(wish, false);
+    };
+    if (wishes.length > 0) void transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
+    if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
+  };
+  try {
+    await new Promise<void>(pump);
+    throwIfAborted(signal);
+  } finally {
+    clearTimeout(timer);
+    signal.removeEventListener('abort', stop);
   }
 }

@@ -26,27 +26,26 @@ export interface TransferHooks {
 /** Fragments at a border may reach so far beyond their plane. */
 const beyondPx = 1024;
 
-interface Part {
-  wish: Wish;
-  rung: number;
-  offset: number;
-  bytes: number;
-  job: Job;
-}
 /** A wish under way: the streams it still lacks. */
 interface Job {
   wish: Wish;
+  /** Rung of the first stream. */
   first: number;
-  streams: (Uint8Array | undefined)[];
+  streams: Uint8Array[];
   missing: number;
   failed: boolean;
 }
-interface Group {
-  plane: number;
+/** A stream of a job, within its rung's pack. */
+interface Part {
+  job: Job;
   rung: number;
   offset: number;
   bytes: number;
-  parts: Part[];
+}
+/** Who hears when all bytes of a wish are there (before they are checked), and when they cannot be had. */
+interface Askers {
+  arrived(wish: Wish): void;
+  failed(wish: Wish, error: unknown): void;
 }
 /** How requests are made of wishes. */
 export interface GroupOptions {
@@ -56,6 +55,9 @@ export interface GroupOptions {
   signal?: AbortSignal;
 }
 
+/** Further from each other than packs are long: files are not joined. */
+const ofFiles = 2 ** 40;
+
 /**
  * Fetches fragments: streams of one rung that stand together by one request, lower rungs of incremental codecs once
  * only, decoding off the main thread.
@@ -63,7 +65,8 @@ export interface GroupOptions {
 export class Transfers {
   private readonly planes_ = new Map<number, PlaneFiles>();
   private readonly held_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
-  private underWay_ = 0; // requests and decodes
+  /** Requests and fragments being decoded. */
+  pending = 0;
 
   constructor(
     private readonly reader_: PackageReader,
@@ -72,10 +75,6 @@ export class Transfers {
     private readonly hooks_: TransferHooks,
   ) {}
 
-  /** Requests and fragments being decoded. */
-  get pending(): number {
-    return this.underWay_;
-  }
   /** Must have been called for the planes of all wishes. */
   async prepare(planes: readonly number[], signal?: AbortSignal): Promise<void> {
     await Promise.all(
@@ -87,10 +86,6 @@ export class Transfers {
   filesOf(plane: number): PlaneFiles {
     return this.planes_.get(plane)!;
   }
-  private incremental_(plane: number): boolean {
-    const { tables, complete } = this.filesOf(plane);
-    return tables.incremental && !complete;
-  }
   /** Bytes of a fragment at a rung: of what has to be fetched at most. */
   bytesOf(plane: number, rung: number, fragment: number): number {
     const { complete, tables } = this.filesOf(plane);
@@ -101,138 +96,95 @@ export class Transfers {
    * Fetches wishes. `arrived` is called when all bytes of one are there (before they are checked), `failed` when they
    * cannot be had. Resolves when every wish has arrived or failed.
    */
-  async fetch(
-    wishes: readonly Wish[],
-    options: GroupOptions,
-    arrived: (wish: Wish) => void,
-    failed: (wish: Wish, error: unknown) => void,
-  ): Promise<void> {
-    ++this.underWay_; // what has arrived is not decoded before its request has ended
-    try {
-      const files = wishes.filter((w) => this.filesOf(w.plane).complete);
-      const parts = wishes.filter((w) => !this.filesOf(w.plane).complete).flatMap((w) => this.partsOf_(w, options, arrived));
-      await Promise.all([
-        ...files.map((w) => this.fetchFile_(w, options, arrived, failed)),
-        ...groupsOf(parts, options).map((g) => this.fetchGroup_(g, options, arrived, failed)),
-      ]);
-    } finally {
-      --this.underWay_;
-    }
+  async fetch(wishes: readonly Wish[], options: GroupOptions, arrived: Askers['arrived'], failed: Askers['failed']): Promise<void> {
+    ++this.pending; // what has arrived is not decoded before its request has ended
+    const parts = wishes.flatMap((wish) => this.partsOf_(wish, arrived, options.signal));
+    await Promise.all(groupsOf(parts, options).map((group) => this.fetchGroup_(group, { arrived, failed }, options.signal)));
+    --this.pending;
   }
 
-  private partsOf_(wish: Wish, options: GroupOptions, arrived: (wish: Wish) => void): Part[] {
-    const { tables, offsets } = this.filesOf(wish.plane);
-    const n = fragmentCount(tables);
-    const incremental = this.incremental_(wish.plane);
-    const held = incremental ? (this.held_.get(`${wish.plane}/${wish.fragment}`) ?? []) : [];
-    const first = incremental ? 0 : wish.rung;
-    const job: Job = { wish, first, streams: [], missing: 0, failed: false };
+  private partsOf_(wish: Wish, arrived: Askers['arrived'], signal?: AbortSignal): Part[] {
+    const { plane, fragment } = wish;
+    const { tables, offsets, complete } = this.filesOf(plane);
+    const incremental = tables.incremental && !complete;
+    const streams = [...((incremental && this.held_.get(`${plane}/${fragment}`)) || [])];
+    const job: Job = { wish, first: incremental ? 0 : wish.rung, streams, missing: 0, failed: false };
     const parts: Part[] = [];
-    for (let rung = first; rung <= wish.rung; ++rung) {
-      job.streams.push(held[rung - first]);
-      if (job.streams[rung - first]) continue;
-      const at = rung * n + wish.fragment;
-      parts.push({ wish, rung, offset: offsets[at], bytes: tables.sizeBytes[at], job });
-      ++job.missing;
+    for (let rung = job.first + streams.length; rung <= wish.rung; ++rung) {
+      const at = rung * fragmentCount(tables) + fragment;
+      const offset = complete ? fragment * ofFiles : offsets[at];
+      parts.push({ job, rung, offset, bytes: complete ? this.bytesOf(plane, rung, fragment) : tables.sizeBytes[at] });
     }
+    streams.length = wish.rung + 1 - job.first;
+    job.missing = parts.length;
     if (parts.length === 0) {
       arrived(wish);
-      void this.decode_(job, options.signal);
+      void this.decode_(job, signal);
     }
     return parts;
   }
 
-  private async fetchGroup_(
-    group: Group,
-    options: GroupOptions,
-    arrived: (wish: Wish) => void,
-    failed: (wish: Wish, error: unknown) => void,
-  ): Promise<void> {
-    const pack = this.filesOf(group.plane).packs[group.rung];
-    const said = new Set<Part>();
+  private async fetchGroup_(parts: Part[], { arrived, failed }: Askers, signal?: AbortSignal): Promise<void> {
+    const { job, rung, offset: begin } = parts[0];
+    const { plane, fragment } = job.wish;
+    const { complete, packs } = this.filesOf(plane);
+    let said = 0;
     // The plan hears of each fragment when its last byte comes, though the answer ends later.
     const say = (upTo: number): void => {
-      for (const p of group.parts)
-        if (!said.has(p) && p.offset + p.bytes - group.offset <= upTo) {
-          said.add(p);
-          if (--p.job.missing === 0 && !p.job.failed) arrived(p.wish);
-        }
+      for (let p; (p = parts[said]) && endOf(p) - begin <= upTo; ++said) if (--p.job.missing === 0 && !p.job.failed) arrived(p.job.wish);
     };
     try {
-      const got = await this.reader_.store.read(pack, group.offset, group.bytes, {
-        kind: 'texture', once: this.reader_.form !== 'files', signal: options.signal, onBytes: say,
-      });
-      for (const p of group.parts) {
-        const at = p.offset - group.offset;
-        p.job.streams[p.rung - p.job.first] = got.subarray(at, at + p.bytes);
-      }
+      const got = complete
+        ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
+        : await this.reader_.store.read(packs[rung], begin, endOf(parts[parts.length - 1]) - begin, {
+            kind: 'texture', once: this.reader_.form !== 'files', signal, onBytes: say,
+          });
+      for (const p of parts) p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);
       say(Infinity);
-      for (const p of group.parts)
-        if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job, options.signal);
+      for (const p of parts) if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job, signal);
     } catch (error) {
-      for (const p of group.parts) {
-        if (p.job.failed) continue;
+      parts.forEach((p, i) => {
+        if (p.job.failed) return;
         p.job.failed = true;
-        if (said.has(p) && p.job.missing === 0) this.hooks_.lost(p.wish, error);
-        else failed(p.wish, error);
-      }
-    }
-  }
-
-  private async fetchFile_(
-    wish: Wish,
-    options: GroupOptions,
-    arrived: (wish: Wish) => void,
-    failed: (wish: Wish, error: unknown) => void,
-  ): Promise<void> {
-    try {
-      const file = await this.reader_.fragmentFile(wish.plane, wish.rung, wish.fragment, options.signal);
-      arrived(wish);
-      void this.decode_({ wish, first: wish.rung, streams: [file], missing: 0, failed: false }, options.signal);
-    } catch (error) {
-      failed(wish, error);
+        if (i < said && p.job.missing === 0) this.hooks_.lost(p.job.wish, error);
+        else failed(p.job.wish, error);
+      });
     }
   }
 
   private async decode_(job: Job, signal?: AbortSignal): Promise<void> {
-    const { plane, fragment } = job.wish;
-    ++this.underWay_;
+    const { plane, fragment, rung } = job.wish;
+    ++this.pending;
     try {
-      try {
-        this.hooks_.decoded(job.wish, await this.decodeStreams_(job, signal));
-      } catch (error) {
+      const levels = await this.decodeStreams_(job, signal).catch(async (error: unknown) => {
         if (!(error instanceof FormatError) || this.filesOf(plane).complete) throw error;
         // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
         this.held_.delete(`${plane}/${fragment}`);
-        for (let rung = job.first; rung <= job.wish.rung; ++rung)
-          job.streams[rung - job.first] = await this.reader_.fragment(plane, rung, fragment, signal);
-        this.hooks_.decoded(job.wish, await this.decodeStreams_(job, signal));
-      }
+        for (let r = job.first; r <= rung; ++r) job.streams[r - job.first] = await this.reader_.fragment(plane, r, fragment, signal);
+        return this.decodeStreams_(job, signal);
+      });
+      this.hooks_.decoded(job.wish, levels);
     } catch (error) {
       this.hooks_.lost(job.wish, error);
     } finally {
-      --this.underWay_;
+      --this.pending;
     }
   }
-  private async decodeStreams_(job: Job, signal?: AbortSignal): Promise<Levels> {
-    const { plane, fragment, rung } = job.wish;
-    const { tables, complete } = this.filesOf(plane);
-    const streams = job.streams as Uint8Array[];
+  private async decodeStreams_({ wish: { plane, fragment, rung }, first, streams }: Job, signal?: AbortSignal): Promise<Levels> {
+    const { tables: t, complete } = this.filesOf(plane);
     const { codec, fragmentWidthPx, fragmentHeightPx, widthPx, heightPx } = this.textures_[plane];
-    // A plane that the GPU can hold says how much room there is; the sides of its only fragment may say anything.
-    const most: [number, number] = [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)];
-    if (complete) {
-      const digests = [complete[rung].get(fragment)!.sha256];
-      return this.pool_.decode({ codec, tables: new Uint8Array(0), streams, digests, complete: true, levels: ownLevels, most });
-    }
-    const digests = streams.map((_, i) => {
-      const at = 8 * ((job.first + i) * fragmentCount(tables) + fragment);
-      return tables.digest.slice(at, at + 8);
-    });
+    const digestOf = (at: number): Uint8Array => t.digest.subarray(8 * at, 8 * at + 8);
     const levels = await this.pool_.decode({
-      codec, tables: await this.reader_.tableStream(plane, job.first, signal), streams, digests, complete: false, levels: ownLevels, most,
+      codec,
+      tables: complete ? new Uint8Array(0) : await this.reader_.tableStream(plane, first, signal),
+      streams,
+      digests: complete ? [complete[rung].get(fragment)!.sha256] : streams.map((_, i) => digestOf((first + i) * fragmentCount(t) + fragment)),
+      complete: !!complete,
+      levels: ownLevels,
+      // A plane that the GPU can hold says how much room there is; the sides of its only fragment may say anything.
+      most: [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)],
     });
-    if (this.incremental_(plane)) this.held_.set(`${plane}/${fragment}`, streams);
+    if (t.incremental && !complete) this.held_.set(`${plane}/${fragment}`, streams);
     return levels;
   }
 
@@ -242,22 +194,18 @@ export class Transfers {
   }
 }
 
+const endOf = (p: Part): number => p.offset + p.bytes;
+
 /** Parts of one rung that stand together (or nearly) become one range. */
-function groupsOf(parts: readonly Part[], options: GroupOptions): Group[] {
-  const sorted = [...parts].sort(
-    (a, b) => a.wish.plane - b.wish.plane || a.rung - b.rung || a.offset - b.offset,
-  );
-  const groups: Group[] = [];
-  for (const p of sorted) {
-    const g = groups[groups.length - 1];
-    const end = g ? g.offset + g.bytes : 0;
-    const joins =
-      g && g.plane === p.wish.plane && g.rung === p.rung && p.offset - end <= options.gapBytes &&
-      p.offset + p.bytes - g.offset <= options.mostBytes;
-    if (joins) {
-      g.bytes = p.offset + p.bytes - g.offset;
-      g.parts.push(p);
-    } else groups.push({ plane: p.wish.plane, rung: p.rung, offset: p.offset, bytes: p.bytes, parts: [p] });
-  }
+function groupsOf(parts: readonly Part[], { gapBytes, mostBytes }: GroupOptions): Part[][] {
+  const sorted = [...parts].sort((a, b) => a.job.wish.plane - b.job.wish.plane || a.rung - b.rung || a.offset - b.offset);
+  const groups: Part[][] = [];
+  sorted.forEach((p, i) => {
+    const before = sorted[i - 1];
+    const group = groups[groups.length - 1];
+    const joins = before?.job.wish.plane === p.job.wish.plane && before.rung === p.rung && p.offset - endOf(before) <= gapBytes;
+    if (joins && endOf(p) - group[0].offset <= mostBytes) group.push(p);
+    else groups.push([p]);
+  });
   return groups;
 }

@@ -6,7 +6,7 @@ import { finerWhereSeen } from '../src/scale_choice';
 import { defaultDeliveryRequest, planDelivery } from '../src/delivery_plan';
 import { groupBytes, groupedList, throughputOf } from '../src/groups';
 import { timePlan } from '../src/time_plan';
-import { TimedFetch } from '../src/timed_fetch';
+import { timedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
 import { WorkerPool } from '../src/worker_pool';
 import { packError } from '../src/worker';
@@ -168,8 +168,7 @@ describe('a timed fetch', () => {
     const plan = timePlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
     const ended: HtcStep[] = [];
     const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
-    const fetch = new TimedFetch(plan, list, s.transfers, signal, { decided, lost: () => undefined });
-    const run = fetch.run(mostS);
+    const run = timedFetch(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });
     return { ...s, list, plan, ended, run };
   }
   it('ends when every offer was decided and has come', async () => {
