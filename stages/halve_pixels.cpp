@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "format/errors.h"
@@ -49,12 +50,13 @@ struct Taps {
 struct Axis {
   std::vector<Taps> taps;
   std::uint64_t whole = 0;  // sum of the weights of each output
+  bool even = false;        // all weights are 1
 };
 
 Axis axis_of(std::uint32_t size, std::uint32_t divisor) {
   const std::uint32_t less = (size + divisor - 1) / divisor, common = std::gcd(size, less);
   const std::uint64_t w = size / common, o = less / common;
-  Axis axis{std::vector<Taps>(less), w};
+  Axis axis{std::vector<Taps>(less), w, o == 1};
   for (std::uint32_t i = 0; i < less; ++i) {
     const std::uint64_t lo = i * w, hi = (i + std::uint64_t{1}) * w;  // in units of 1 / o texels
     Taps& taps = axis.taps[i];
@@ -76,27 +78,30 @@ void put_normal(const std::array<std::uint64_t, 3>& sum, std::uint64_t whole, st
     to[c] = static_cast<std::uint8_t>(std::clamp(std::floor((n[c] / length + 1) * 127.5 + 0.5), 0.0, 255.0));
 }
 
-/// Rows first .. last - 1 of the output.
-template <Halving kKind, std::uint32_t C>
-void reduce(const Pixels& from, const Axis& columns, const Axis& rows, std::size_t first, std::size_t last,
-            Pixels& to) {
+/// Rows first .. last - 1 of the output. kWhole: all weights are 1 (sides are multiples of the divisor),
+/// which takes half the time.
+template <Halving kKind, std::uint32_t C, bool kWhole>
+void reduce_rows(const Pixels& from, const Axis& columns, const Axis& rows, std::size_t first,
+                 std::size_t last, Pixels& to) {
   const LightTables& light = light_tables();
+  using Sum = std::conditional_t<kWhole, std::uint32_t, std::uint64_t>;  // of at most 64 texels of 16 bits
   const std::uint64_t whole = columns.whole * rows.whole;
   std::uint8_t* out = to.data.data() + first * to.width_px * C;
   for (std::size_t y = first; y < last; ++y)
     for (const Taps& column : columns.taps) {
       const Taps& row = rows.taps[y];
-      std::array<std::uint64_t, 3> sum{};
+      std::array<Sum, 3> sum{};
       for (std::uint32_t v = 0; v < row.count; ++v) {
         const std::uint8_t* p = from.at(column.first, row.first + v);
         for (std::uint32_t u = 0; u < column.count; ++u, p += C) {
-          const std::uint64_t weight = row.weight[v] * column.weight[u];
+          const Sum weight = kWhole ? 1 : static_cast<Sum>(row.weight[v] * column.weight[u]);
+#pragma GCC unroll 3  // sums in registers: a third of the time
           for (std::uint32_t c = 0; c < C; ++c)
             sum[c] += weight * (kKind == Halving::kLight ? light.linear[p[c]] : p[c]);
         }
       }
       if constexpr (kKind == Halving::kNormals) {
-        put_normal(sum, whole, out);
+        put_normal({sum[0], sum[1], sum[2]}, whole, out);
       } else {
         for (std::uint32_t c = 0; c < C; ++c) {
           const std::uint64_t mean = (sum[c] + whole / 2) / whole;
@@ -105,6 +110,15 @@ void reduce(const Pixels& from, const Axis& columns, const Axis& rows, std::size
       }
       out += C;
     }
+}
+
+template <Halving kKind, std::uint32_t C>
+void reduce(const Pixels& from, const Axis& columns, const Axis& rows, std::size_t first, std::size_t last,
+            Pixels& to) {
+  if (columns.even && rows.even)
+    reduce_rows<kKind, C, true>(from, columns, rows, first, last, to);
+  else
+    reduce_rows<kKind, C, false>(from, columns, rows, first, last, to);
 }
 
 void check(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind) {

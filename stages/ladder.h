@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 9;
+inline constexpr int kLadderVersion = 10;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.

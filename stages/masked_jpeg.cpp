@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "stages/jpeg_samples.h"
 #include "stages/jpeg_stream.h"
 
 namespace texmesh {
@@ -34,10 +35,6 @@ SymbolCodes codes_of(const HuffmanTable& table) {
       out.bits[table.symbols[index]] = static_cast<std::uint8_t>(l);
     }
   return out;
-}
-
-std::size_t table_pair(const JpegKind& kind, std::size_t component) {
-  return component > (kind.rgb ? 1u : 0u) ? 1 : 0;  // as JpegCoder
 }
 
 // What a block takes at most: 64 symbols of 16 + 11 bits, each byte perhaps with a zero behind it.
@@ -124,25 +121,6 @@ void emit(const CodedBlock& block, int dc_before, std::size_t component, Sink& s
   if (before < 63) sink.ac(0, 0);
 }
 
-/// A component's samples as JPEG has them before chroma is halved, less 128. In libjpeg's integers.
-void component_values(const PixelWindow& image, const JpegKind& kind, std::size_t component,
-                      std::vector<float>& out) {
-  constexpr int kWeights[3][3] = {{19595, 38470, 7471}, {-11059, -21709, 32768}, {32768, -27439, -5329}};
-  constexpr int kOffset[3] = {32768 - (128 << 16), 32767, 32767};
-  out.resize(std::size_t{image.width_px} * image.height_px);
-  const int *m = kWeights[component], offset = kOffset[component];
-  float* to = out.data();
-  for (std::uint32_t y = 0; y < image.height_px; ++y) {
-    const std::uint8_t* p = image.data + y * image.stride_bytes;
-    if (kind.channels == 1 || kind.rgb)
-      for (std::uint32_t x = 0; x < image.width_px; ++x, p += kind.channels)
-        *to++ = static_cast<float>(p[component] - 128);
-    else
-      for (std::uint32_t x = 0; x < image.width_px; ++x, p += 3)
-        *to++ = static_cast<float>((m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + offset) >> 16);
-  }
-}
-
 /// What blocks are, by their weights.
 enum class Seen : std::uint8_t { kNothing, kPart, kAll };
 
@@ -209,9 +187,7 @@ bool wholly_covered(const PixelWindow& image) {
 }
 
 MaskedJpeg::MaskedJpeg(const JpegKind& kind)
-    : kind_(kind),
-      halved_(kind.channels == 3 && !kind.rgb && kind.subsampling == Subsampling::k420),
-      components_(kind.channels) {}
+    : kind_(kind), halved_(halves_chroma(kind)), components_(kind.channels) {}
 
 /// A sample of halved chroma is the mean of its covered texels.
 void MaskedJpeg::halve(Component& chroma) const {
@@ -261,7 +237,7 @@ void MaskedJpeg::load(const PixelWindow& image) {
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& component = components_[c];
     component.width = w, component.height = h;
-    component_values(image, kind_, c, component.values);
+    jpeg_samples(image, kind_, c, component.values);
     if (halved_ && c > 0) halve(component);
   }
 }

@@ -19,12 +19,12 @@ struct SizeKnots {
   }
 };
 
-/// Measures how the bytes of a plane grow between the rungs of its baseline JPEGs: codes `sample` at
-/// `plane.qualities` and at whole qualities between them, about `step` >= 1 apart, all with the standard's
-/// tables. What bends sizes there most are the quantisers of the JPEG that the texture has been before, and
-/// these are the same everywhere in a plane, so that a small sample tells it for all fragments. None for an
-/// empty sample and for fewer than two qualities. Same result for any thread count.
-SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWindow> sample, int step,
+/// Measures how the bytes of a plane of colours grow between the rungs of its baseline JPEGs: what `sample`
+/// takes at `plane.qualities` and at every whole quality between them (jpeg_bits()). What bends sizes there
+/// most are the quantisers of the JPEG that the texture has been before, and these are the same everywhere in
+/// a plane, so that a small sample tells it for all fragments. None for an empty sample and for fewer than
+/// two qualities. Same result for any thread count.
+SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWindow> sample,
                              const RunContext& context);
 
 }  // namespace texmesh

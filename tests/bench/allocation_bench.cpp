@@ -78,7 +78,7 @@ void print_sizes(const std::string& path) {
   const std::vector<std::size_t> shown = colour_planes(model.fragments);
   const std::vector<Pixels> pixels = fill_planes(model.fragments, model.images, Fill::kPushPull, context);
   LadderOptions between;
-  between.rungs = {6, 9, 12, 15, 22, 27, 32, 38, 43, 48, 57, 63, 69, 80, 90, 94};  // no knots
+  between.rungs = {6, 9, 12, 15, 22, 27, 32, 38, 43, 48, 57, 63, 69, 80, 90, 94};  // none of the ladder's
   const Ladder ladder = encode_ladder(model.fragments, pixels, {}, context);
   const Ladder other = encode_ladder(model.fragments, pixels, between, context);
   const Predictors predictors = predict_quality(model.fragments, pixels, {}, context);

@@ -96,7 +96,7 @@ TEST(SizeKnots, LieBetweenRungsAndPassTheTables) {
   const SizeKnots& knots = ladder.planes[0].knots;
   ASSERT_EQ(knots.quality.size(), knots.position.size());
   EXPECT_EQ(knots.quality.front(), 7);  // none between 5 and 6
-  EXPECT_EQ(knots.quality.size(), 1u + 22 / 4 + 67 / 4);
+  EXPECT_EQ(knots.quality.size(), 1u + 21 + 66);
   const PlaneTables t = tables_of(p, ladder);
   EXPECT_EQ(t.knot_quality, knots.quality);
   EXPECT_EQ(t.knot_position, knots.position);
