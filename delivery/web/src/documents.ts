@@ -2,13 +2,13 @@ import { toHex } from './bytes';
 import { codecTraits } from './codec';
 import * as paths from './entry_paths';
 import { FormatError } from './errors';
-import { IndexHead, parseIndexPage, readIndexHead } from './index_table';
+import { parseIndexPage, readIndexHead } from './index_table';
 import * as layout from './layout';
 import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { missingFeature, readTextures } from './read_textures';
 import { sha256 } from './sha256';
-import { PlaneTables, TablesHead, fragmentCount, rungCount } from './tables';
+import { PlaneTables, fragmentCount, rungCount } from './tables';
 import { TextureInfo, fullSizePlanes } from './textures';
 
 // What is decoded and checked, meshes by themselves, documents against the manifest and against each other: in workers, or here where there are none. Digests
@@ -30,15 +30,22 @@ export async function manifest(bytes: Uint8Array, container = ''): Promise<{ par
   return { parsed: readManifest(json), id: toHex(await sha256(json)) };
 }
 
-/** The head, or more, of index.bin. */
-export function indexHead(bytes: Uint8Array, { index: { headBytes } }: Manifest): IndexHead {
-  const head = readIndexHead(bytes);
-  require(head.bytes === headBytes, paths.indexPath, 'head', `${headBytes} bytes`, head.bytes);
-  return head;
+/** A page of index.bin. */
+export interface PageRef extends EntryRef {
+  /** -1: of what belongs to none. */
+  plane: number;
+  entries: number;
+  minor: number;
+}
+/** The pages of index.bin, from its head or more. */
+export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
+  const { bytes: headBytes, pages, minor } = readIndexHead(bytes);
+  require(headBytes === index.headBytes, paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
+  return pages.map((p) => ({ ...p, minor, path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
 }
 
 /** The entries of a page of index.bin by their paths; those of the page without a plane are what the manifest says of them. */
-export function indexPage(bytes: Uint8Array, plane: number, count: number, minor: number, m: Manifest): Map<string, EntryRef> {
+export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
   for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
@@ -64,28 +71,35 @@ export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeat
   return planes;
 }
 
-/** The head, or more, of tables.bin. */
-export function tablesHead(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): TablesHead {
+/** A plane's section of tables.bin. */
+export interface SectionRef extends EntryRef {
+  minor: number;
+}
+/** The sections of tables.bin by plane, from its head or more. */
+export function tableSections(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): SectionRef[] {
   const head = readTablesHead(bytes);
   require(head.bytes === ref.headBytes, paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
   require(head.planes.length === planeCount, paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
   const last = head.planes[planeCount - 1];
   const end = last ? last.offset + last.bytes : head.bytes;
   require(end === ref.bytes, paths.tablesPath, '', `${end} bytes`, ref.bytes);
-  return head;
+  return head.planes.map((s, p) => ({ ...s, minor: head.minor, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
 }
 
-/** Tables of one plane, and where each fragment's stream stands within its rung's entry: [rung * F + fragment]. */
+/** Tables of one plane, and where its fragments are. */
 export interface PlaneDocument {
   tables: PlaneTables;
+  /** By rung. */
+  packs: EntryRef[];
+  /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
   offsets: Float64Array;
 }
 
 /** A section of tables.bin; textures.json and the index speak of the same fragments and bytes. */
 export function planeTables(
   bytes: Uint8Array,
+  { minor }: SectionRef,
   plane: number,
-  minor: number,
   info: TextureInfo,
   entries: Map<string, EntryRef>,
 ): PlaneDocument {
@@ -109,5 +123,5 @@ export function planeTables(
       at += sizeBytes[r * n + f];
     }
   }
-  return { tables, offsets };
+  return { tables, packs: Array.from(tables.rungQuality, (_, r) => entries.get(layout.rungPath(plane, r))!), offsets };
 }

@@ -26,6 +26,7 @@ export interface PagedRef extends EntryRef {
 }
 /** Where the stream of vertex splits stands. */
 export interface StreamRef {
+  path: string;
   offset: number;
   bytes: number;
   headBytes: number;
@@ -122,7 +123,7 @@ function readPagedRef(at: JsonAt, path: string): PagedRef {
 
 function readStream(at: JsonAt): StreamRef {
   const range = readRange(at);
-  return { ...range, ...readHead(at, range.bytes) };
+  return { path: layout.splitStreamPath, ...range, ...readHead(at, range.bytes) };
 }
 
 function readVector(at: JsonAt): Vector3 {

@@ -1,21 +1,36 @@
 import { codecTraits } from './codec';
-import { requireDigest } from './digests';
 import { FormatError, InputError } from './errors';
 import { joinFragment } from './join_fragment';
 import * as layout from './layout';
 import type { ByteRange, EntryRef } from './manifest';
-import type { PackageReader } from './package_reader';
+import { PackageReader, decodeHere } from './package_reader';
 import type { ReadOptions } from './store';
 import { fragmentCount, rungCount } from './tables';
 
 // What a PackageReader offers and loads do not ask for, or only where something was damaged on the way; loaded with the first such call.
 
+/** See PackageReader.index. */
+export async function readIndex(reader: PackageReader): Promise<EntryRef[]> {
+  return decodeHere('readIndex', await reader.readChecked(reader.manifest.index, { kind: 'index' }));
+}
+
+/** See PackageReader.provenance. */
+export async function readProvenance(reader: PackageReader): Promise<unknown> {
+  return JSON.parse(new TextDecoder().decode(await reader.readChecked(reader.manifest.provenance, { kind: 'other' })));
+}
+
+/** See PackageReader.splitStreamHead. */
+export async function splitStreamHead(reader: PackageReader, signal?: AbortSignal): Promise<Uint8Array | undefined> {
+  return (await reader.splitStreamStart(0, signal))?.subarray(0, reader.manifest.stream!.headBytes);
+}
+
 /** See PackageReader.firstPicture. */
-export async function readFirstPicture({ form, manifest, store }: PackageReader, how: Partial<ReadOptions>): Promise<void> {
-  if (form !== 'range') return;
-  const { offset, bytes, sha256: digest } = manifest.firstPicture;
-  const verify = (got: Uint8Array): Promise<void> => requireDigest(got, digest, store.name, 'first picture');
-  await store.read({ path: 'first picture', offset, bytes }, 0, bytes, { kind: 'first-picture', ...how, verify });
+export async function readFirstPicture(reader: PackageReader, how: Partial<ReadOptions>): Promise<void> {
+  if (reader.form !== 'range') return;
+  const { firstPicture, previews } = reader.manifest;
+  const got = await reader.readChecked({ path: 'first picture', ...firstPicture }, { kind: 'first-picture', ...how });
+  // Its digest covers its parts.
+  previews.forEach(({ offset, bytes }, plane) => reader.keepPreview(plane, got.subarray(offset - firstPicture.offset).subarray(0, bytes)));
 }
 
 /** See PackageReader.fragmentRange. */
@@ -43,13 +58,12 @@ export async function fragment(
   signal?: AbortSignal,
 ): Promise<Uint8Array> {
   const { offset, bytes } = await fragmentRange(reader, plane, rung, number);
-  const pack: EntryRef = await reader.find(layout.rungPath(plane, rung), signal);
-  const { form, store } = reader;
-  const place = `fragment ${number} of ${pack.path}`;
-  if (bytes === 0) throw new FormatError(store.name, place, 'a stored fragment', 'none');
-  const digest = await fragmentDigest(reader, plane, rung, number);
-  const verify = (got: Uint8Array): Promise<void> => requireDigest(got, digest, store.name, place);
-  return store.read(pack, offset, bytes, { kind: 'texture', once: form !== 'files', signal, verify });
+  const pack = await reader.find(layout.rungPath(plane, rung), signal);
+  const path = `fragment ${number} of ${pack.path}`;
+  if (bytes === 0) throw new FormatError(reader.store.name, path, 'a stored fragment', 'none');
+  const sha256 = await fragmentDigest(reader, plane, rung, number);
+  const how = { kind: 'texture', once: reader.form !== 'files', signal } as const;
+  return reader.readChecked({ path, offset: pack.offset + offset, bytes, sha256 }, how, pack);
 }
 
 /** See PackageReader.completeFragment. */

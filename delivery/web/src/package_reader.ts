@@ -4,10 +4,11 @@ import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
 import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS } from './http';
 import * as layout from './layout';
-import type { ByteRange, EntryRef, Manifest, PagedRef } from './manifest';
+import type { PlaneDocument } from './documents';
+import type { ByteRange, EntryRef, Manifest, PagedRef, StreamRef } from './manifest';
 import type { QualityTable } from './quality_table';
 import { PackageForm, PackageStore, Place, ReadOptions, StoreMode, openStore } from './store';
-import type { PlaneTables, TablesHead } from './tables';
+import type { PlaneTables } from './tables';
 import type { TextureInfo } from './textures';
 import type { DocumentDecoder, Documents } from './worker_protocol';
 
@@ -27,12 +28,7 @@ export interface OpenOptions extends Partial<HttpOptions> {
 }
 
 /** Where the fragments of a plane are. */
-export interface PlaneFiles {
-  tables: PlaneTables;
-  /** By rung. */
-  packs: EntryRef[];
-  /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
-  offsets: Float64Array;
+export interface PlaneFiles extends PlaneDocument {
   /** Complete files instead of packs, where the package is a tree that has them: [rung] by fragment. */
   complete?: FragmentFiles[number];
 }
@@ -43,6 +39,7 @@ const wholeDocumentBytes = 192 << 10;
 const gapBytes = 4096;
 
 type Decoded<K extends keyof Documents> = Awaited<ReturnType<Documents[K]>>;
+const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef => ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256 });
 /** Decodes documents on this thread. */
 export const decodeHere = (async (name, ...args: unknown[]) => ((await here())[name] as (...of: unknown[]) => unknown)(...args)) as DocumentDecoder;
 /** Elsewhere; on this thread where that fails: there are no workers, or those of a load that has ended. */
@@ -66,25 +63,21 @@ async function decoded<K extends keyof Documents>(
  * the truncated digest in the tables, documents against each other.
  */
 export class PackageReader {
-  readonly manifest: Manifest;
-  /** Package id: SHA-256 of the bytes of manifest.json, in hexadecimal digits. */
-  readonly id: string;
   private readonly once_ = new Map<string, Promise<unknown>>();
-  private readonly planes_ = new Map<number, PlaneFiles>();
+  private readonly planes_ = new Map<number, PlaneDocument>();
 
   constructor(
     readonly store: PackageStore,
     readonly client: HttpClient,
     readonly url: string,
-    manifest: { parsed: Manifest; id: string },
+    readonly manifest: Manifest,
+    /** Package id: SHA-256 of the bytes of manifest.json, in hexadecimal digits. */
+    readonly id: string,
     /** When the first request was made, seconds of performance.now(). */
     readonly openedS: number,
     /** Who decodes documents: loads have workers that do. Where that fails, this thread does. */
     public decodeDocument = decodeHere,
-  ) {
-    this.manifest = manifest.parsed;
-    this.id = manifest.id;
-  }
+  ) {}
 
   /** Reads the manifest of a package at a URL; see OpenOptions. */
   static async openUrl<T extends PackageReader>(
@@ -97,8 +90,8 @@ export class PackageReader {
     const { signal, mode = 'auto', mirrors = [] } = options;
     const openedS = nowS();
     const { store, manifest } = await openStore(url, mirrors, mode, client, signal);
-    const read = await decoded(decoder, signal, 'manifest', manifest, store.form === 'range' ? store.name : '');
-    return new this(store, client, url, read, openedS, decoder);
+    const { parsed, id } = await decoded(decoder, signal, 'manifest', manifest, store.form === 'range' ? store.name : '');
+    return new this(store, client, url, parsed, id, openedS, decoder);
   }
 
   /** Reads a container that is in memory. */
@@ -108,7 +101,8 @@ export class PackageReader {
     name = 'package',
   ): Promise<T> {
     const store = (await import('./store_files')).openBytes(bytes, name);
-    return new this(store, new HttpClient(), name, await decodeHere('manifest', await store.manifest()), nowS());
+    const { parsed, id } = await decodeHere('manifest', await store.manifest());
+    return new this(store, new HttpClient(), name, parsed, id, nowS());
   }
 
   /** Requests so far, those of opening included. */
@@ -155,27 +149,25 @@ export class PackageReader {
       throw error;
     }
   }
-  /** A part of an entry, or all of it; of what comes, these parts are held to their digests. */
-  private read_(place: Place, offset: number, bytes: number, how: ReadOptions, ...parts: EntryRef[]): Promise<Uint8Array> {
+  /** A range of the container within an entry; of what comes, these parts are held to their digests. */
+  private read_(place: Place, range: ByteRange, how: ReadOptions, ...parts: EntryRef[]): Promise<Uint8Array> {
     const verify = async (got: Uint8Array): Promise<void> => {
-      for (const p of parts) {
-        const begin = p.offset - place.offset - offset;
-        await requireDigest(got.subarray(begin, begin + p.bytes), p.sha256, this.store.name, p.path);
-      }
+      for (const { path, offset, bytes, sha256 } of parts)
+        await requireDigest(got.subarray(offset - range.offset).subarray(0, bytes), sha256, this.store.name, path);
     };
-    return this.store.read(place, offset, bytes, { ...how, verify });
+    return this.store.read(place, range, { ...how, verify });
   }
-  private readAll_(ref: EntryRef, how: ReadOptions): Promise<Uint8Array> {
-    return this.read_(ref, 0, ref.bytes, how, ref);
+  /** An entry, or a part of one. */
+  readChecked(part: EntryRef, how: ReadOptions, place: Place = part): Promise<Uint8Array> {
+    return this.read_(place, part, how, part);
   }
   /** A document, or only its head where it is long and that can be had. */
-  private readPaged_(ref: PagedRef, kind: RequestKind, signal?: AbortSignal, all = false): Promise<Uint8Array> {
-    const head = { path: `head of ${ref.path}`, offset: ref.offset, bytes: ref.headBytes, sha256: ref.headSha256 };
-    const part = all || ref.bytes <= wholeDocumentBytes || this.form !== 'range' ? ref : head;
-    return this.read_(ref, 0, part.bytes, { kind, signal }, head, part);
+  private readPaged_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
+    const part = ref.bytes <= wholeDocumentBytes || this.form !== 'range' ? ref : headOf(ref);
+    return this.read_(ref, part, how, headOf(ref), part);
   }
   /** A document, read and decoded once for all who ask. */
-  private document_<K extends 'indexHead' | 'tablesHead' | 'textures' | 'quality'>(
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
     name: K,
     signal: AbortSignal | undefined,
     read: (m: Manifest) => Promise<Uint8Array>,
@@ -193,18 +185,16 @@ export class PackageReader {
 
   /** Every entry but manifest.json and index.bin, in container order. */
   async index(): Promise<EntryRef[]> {
-    return decodeHere('readIndex', await this.readPaged_(this.manifest.index, 'index', undefined, true));
+    return (await more()).readIndex(this);
   }
   /** Entries of a plane by their paths; plane -1: of none. */
   private indexPage_(plane: number, signal?: AbortSignal): Promise<Map<string, EntryRef>> {
+    const how = { kind: 'index', signal } as const;
     const read = async (): Promise<Map<string, EntryRef>> => {
       const { index } = this.manifest;
-      const { pages, minor } = await this.document_('indexHead', signal, () => this.readPaged_(index, 'index', signal));
+      const pages = await this.document_('indexPages', signal, () => this.readPaged_(index, how));
       const page = pages.find((p) => p.plane === plane);
-      if (!page) return new Map();
-      const ref = { ...page, path: `index of plane ${plane}`, offset: index.offset + page.offset };
-      const bytes = await this.read_(index, page.offset, page.bytes, { kind: 'index', signal }, ref);
-      return this.decoded(signal, 'indexPage', bytes, plane, page.entries, minor, this.manifest);
+      return page ? this.decoded(signal, 'indexPage', await this.readChecked(page, how, index), page, this.manifest) : new Map();
     };
     return this.shared_(`index/${plane}`, read, signal);
   }
@@ -216,25 +206,24 @@ export class PackageReader {
   }
   /** The bytes of an entry. */
   async entry(path: string, kind: RequestKind = 'other', signal?: AbortSignal): Promise<Uint8Array> {
-    return this.readAll_(await this.find(path, signal), { kind, signal });
+    return this.readChecked(await this.find(path, signal), { kind, signal });
   }
 
   // ---- documents
 
   /** The texture planes: full-size ones first, then mips. */
   textures(signal?: AbortSignal): Promise<TextureInfo[]> {
-    return this.document_('textures', signal, (m) => this.readAll_(m.textures, { kind: 'textures', signal }));
+    return this.document_('textures', signal, (m) => this.readChecked(m.textures, { kind: 'textures', signal }));
   }
 
   /** Measured quality of scales and rungs. */
   quality(signal?: AbortSignal): Promise<QualityTable> {
-    return this.document_('quality', signal, (m) => this.readAll_(m.quality, { kind: 'quality', signal }));
+    return this.document_('quality', signal, (m) => this.readChecked(m.quality, { kind: 'quality', signal }));
   }
 
   /** What the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
-    const bytes = await this.readAll_(this.manifest.provenance, { kind: 'other' });
-    return JSON.parse(new TextDecoder().decode(bytes));
+    return (await more()).readProvenance(this);
   }
 
   /** Tables of one plane. */
@@ -248,36 +237,33 @@ export class PackageReader {
    */
   async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
     const { tables } = this.manifest;
-    const head = await this.document_('tablesHead', signal, () => this.readPaged_(tables, 'tables', signal));
-    const wanted = [...new Set(planes ?? head.planes.keys())].sort((a, b) => a - b);
-    for (const p of wanted)
-      if (!head.planes[p]) throw new InputError(this.store.name, `texture plane ${p}`, `one of ${head.planes.length}`, 'another');
-    let last = { begin: -Infinity, end: -Infinity };
+    const how = { kind: 'tables', signal } as const;
+    const sections = await this.document_('tableSections', signal, () => this.readPaged_(tables, how));
+    const wanted = [...new Set(planes ?? sections.keys())].sort((a, b) => a - b);
+    let last = { offset: 0, bytes: -Infinity };
     const reads = wanted.map((p) => {
-      const { offset, bytes } = head.planes[p];
-      let run = { begin: offset, end: offset + bytes };
+      const section = sections[p];
+      if (!section) throw new InputError(this.store.name, `texture plane ${p}`, `one of ${sections.length}`, 'another');
+      let run: ByteRange = { offset: section.offset, bytes: section.bytes };
       if (!this.once_.has(`tables/${p}`)) {
-        if (offset - last.end <= gapBytes) [run, last.end] = [last, run.end];
+        if (run.offset - last.offset - last.bytes <= gapBytes) {
+          last.bytes = run.offset + run.bytes - last.offset;
+          run = last;
+        }
         last = run;
       }
-      return () => this.shared_(`tables/${p}`, () => this.planeFiles_(head, p, run, signal), signal);
+      const bytes = async (): Promise<Uint8Array> => {
+        await this.shared_(`tables/${run.offset}+${run.bytes}`, () => this.store.read(tables, run, how), signal);
+        return this.readChecked(section, how, tables);
+      };
+      const read = async (): Promise<void> => {
+        const [got, textures, entries] = await Promise.all([bytes(), this.textures(signal), this.indexPage_(p, signal)]);
+        this.planes_.set(p, await this.decoded(signal, 'planeTables', got, section, p, textures[p], entries));
+      };
+      return () => this.shared_(`tables/${p}`, read, signal);
     });
     await Promise.all(reads.map((read) => read()));
-    return head.planes.map((_, p) => this.planes_.get(p)?.tables);
-  }
-  /** The section of a plane, out of the run of sections that are read together. */
-  private async planeFiles_({ planes, minor }: TablesHead, p: number, run: { begin: number; end: number }, signal?: AbortSignal): Promise<void> {
-    const { tables: ref } = this.manifest;
-    const { offset, bytes, sha256 } = planes[p];
-    const how = { kind: 'tables', signal } as const;
-    const read = async (): Promise<Uint8Array> => {
-      await this.shared_(`tables/${run.begin}-${run.end}`, () => this.store.read(ref, run.begin, run.end - run.begin, how), signal);
-      return this.read_(ref, offset, bytes, how, { path: `texture plane ${p}`, offset: ref.offset + offset, bytes, sha256 });
-    };
-    const [section, textures, entries] = await Promise.all([read(), this.textures(signal), this.indexPage_(p, signal)]);
-    const { tables, offsets } = await this.decoded(signal, 'planeTables', section, p, minor, textures[p], entries);
-    const packs = Array.from(tables.rungQuality, (_, r) => entries.get(layout.rungPath(p, r))!);
-    this.planes_.set(p, { tables, packs, offsets });
+    return sections.map((_, p) => this.planes_.get(p)?.tables);
   }
 
   /** What decisions about textures are made from, with the tables of these planes. */
@@ -296,25 +282,19 @@ export class PackageReader {
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
-    return this.readAll_(s.glb, { kind: 'mesh', once: true, ...how });
+    return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
   /** preview/PPP.jpg of a full-size plane. */
   async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
-    const range = this.manifest.previews[plane];
-    const path = layout.previewPath(plane);
-    // The first picture's digest covers its parts.
-    const picture = this.once_.get('picture');
-    if (range && this.form === 'range' && picture) {
-      await picture;
-      return this.store.read({ path, ...range }, 0, range.bytes, { kind: 'preview', signal });
-    }
-    return this.entry(path, 'preview', signal);
+    return this.shared_(`preview/${plane}`, () => this.entry(layout.previewPath(plane), 'preview', signal), signal);
+  }
+  /** See firstPicture. */
+  keepPreview(plane: number, bytes: Uint8Array): void {
+    this.once_.set(`preview/${plane}`, Promise.resolve(bytes));
   }
   /** What the fragments of a rung have in common. */
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { tableBytes } = await this.planeTables(plane, signal);
-    if (!(rung in tableBytes))
-      throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${tableBytes.length}`, `${rung}`);
     const read = (): Promise<Uint8Array> => this.entry(layout.tableStreamsPath(plane), 'texture', signal);
     const streams = await this.shared_(`streams/${plane}`, read, signal);
     const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
@@ -350,7 +330,7 @@ export class PackageReader {
     const bytes = quality.offset + quality.bytes - index.offset;
     if (bytes > wholeDocumentBytes || bytes <= 0) return false;
     // Whoever takes a document of it holds it to its digest.
-    if (this.form === 'range') await this.store.read({ path: 'documents', offset: index.offset, bytes }, 0, bytes, { kind: 'tables', signal });
+    if (this.form === 'range') await this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
     return true;
   }
 
@@ -365,20 +345,16 @@ export class PackageReader {
 
   /** Head of the vertex-split stream; undefined when the package has none. */
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
-    return (await this.splitStreamStart(0, signal))?.subarray(0, this.manifest.stream!.headBytes);
+    return (await more()).splitStreamHead(this, signal);
   }
   /** The head and so many bytes behind it (or all there are); the head is checked. */
   async splitStreamStart(more: number, signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const { stream: s } = this.manifest;
-    if (!s) return undefined;
-    const path = layout.splitStreamPath;
-    const head = { path: `head of ${path}`, offset: s.offset, bytes: s.headBytes, sha256: s.headSha256 };
-    return this.read_({ path, ...s }, 0, Math.min(s.bytes, s.headBytes + more), { kind: 'stream', signal }, head);
+    return s && this.read_(s, { offset: s.offset, bytes: Math.min(s.bytes, s.headBytes + more) }, { kind: 'stream', signal }, headOf(s));
   }
-  /** Bytes of the vertex-split stream; whoever takes blocks of it checks them by its head. */
+  /** Bytes of the vertex-split stream, which there must be; whoever takes blocks of it checks them by its head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
-    const ref = this.manifest.stream;
-    if (!ref) throw new FormatError(this.store.name, layout.splitStreamPath, 'a stream of vertex splits', 'none');
-    return this.store.read({ path: layout.splitStreamPath, ...ref }, offset, bytes, { kind: 'stream', once: true, ...how });
+    const stream = this.manifest.stream!;
+    return this.store.read(stream, { offset: stream.offset + offset, bytes }, { kind: 'stream', once: true, ...how });
   }
 }

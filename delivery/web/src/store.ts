@@ -1,16 +1,15 @@
 import { FormatError, InputError } from './errors';
 import { Answer, HttpClient, RequestKind, concat, isAbort, shownUrl, sleepS, throwIfAborted, whatCame } from './http';
 import { bootstrapBytes } from './layout';
+import type { ByteRange } from './manifest';
 import { Asking, Mirror, Mirrors } from './mirrors';
 
 /** How a package's bytes are read: ranges of a container, files of a tree, or one whole container. */
 export type PackageForm = 'range' | 'files' | 'whole';
 
 /** What a read needs to know about an entry. */
-export interface Place {
+export interface Place extends ByteRange {
   path: string;
-  offset: number;
-  bytes: number;
 }
 /** How something is read. */
 export interface ReadOptions {
@@ -30,8 +29,8 @@ export interface PackageStore {
   readonly name: string;
   /** The bytes of manifest.json; of a container that is read by ranges, its first bytes. */
   manifest(signal?: AbortSignal): Promise<Uint8Array>;
-  /** Exactly these bytes of an entry. */
-  read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array>;
+  /** Exactly these bytes of an entry, which stand there in the container. */
+  read(place: Place, range: ByteRange, how: ReadOptions): Promise<Uint8Array>;
   /** A file of a tree that is no entry; undefined where there is none, and nothing to verify that it is. */
   extraFile?(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined>;
   /** Forgets what it remembers. */
@@ -78,11 +77,10 @@ class RangeStore implements PackageStore {
   }
 
   manifest(signal?: AbortSignal): Promise<Uint8Array> {
-    return this.read({ path: '', offset: 0, bytes: bootstrapBytes }, 0, bootstrapBytes, { kind: 'manifest', signal });
+    return this.read(undefined, { offset: 0, bytes: bootstrapBytes }, { kind: 'manifest', signal });
   }
 
-  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const begin = place.offset + offset;
+  async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
     const end = begin + bytes;
     const known = this.known_(begin, end);
     const from = known.reduce((at, c) => at + c.length, begin);

@@ -5,7 +5,7 @@ import { FormatError, InputError } from './errors';
 import { FragmentFiles, readFragmentFiles } from './fragment_files';
 import { GetOptions, HttpClient, isAbort, shownUrl, whatCame } from './http';
 import { bootstrapBytes } from './layout';
-import { manifestOfContainer } from './manifest';
+import { ByteRange, manifestOfContainer } from './manifest';
 import { Asking, Mirror, Mirrors } from './mirrors';
 import type { PackageReader } from './package_reader';
 import { OpenedStore, PackageStore, Place, ReadOptions, retriesOf } from './store';
@@ -69,13 +69,14 @@ export class TreeStore implements PackageStore {
   manifest(signal?: AbortSignal): Promise<Uint8Array> {
     return this.file_(manifestPath, bootstrapBytes, { kind: 'manifest', signal });
   }
-  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+  async read(place: Place, { offset, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
     for (let reload = false; ; reload = true)
       try {
         const whole = await this.file_(place.path, place.bytes, how, reload);
         if (whole.length !== place.bytes)
           throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
-        const part = whole.subarray(offset, offset + bytes);
+        const begin = offset - place.offset;
+        const part = whole.subarray(begin, begin + bytes);
         await how.verify?.(part);
         return part;
       } catch (error) {
@@ -141,11 +142,10 @@ class WholeStore implements PackageStore {
   manifest(): Promise<Uint8Array> {
     return Promise.resolve(manifestOfContainer(this.bytes_.subarray(0, bootstrapBytes), this.name));
   }
-  async read(place: Place, offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
-    const begin = place.offset + offset;
-    if (begin + bytes > this.bytes_.length)
-      throw new FormatError(this.name, place.path, `${begin + bytes} bytes`, `${this.bytes_.length}`);
-    const part = this.bytes_.subarray(begin, begin + bytes);
+  async read(place: Place, { offset, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
+    if (offset + bytes > this.bytes_.length)
+      throw new FormatError(this.name, place.path, `${offset + bytes} bytes`, `${this.bytes_.length}`);
+    const part = this.bytes_.subarray(offset, offset + bytes);
     await how.verify?.(part);
     return part;
   }

@@ -136,7 +136,7 @@ export class Transfers {
     try {
       const got = complete
         ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
-        : await this.reader_.store.read(packs[rung], begin, endOf(parts[parts.length - 1]) - begin, {
+        : await this.reader_.store.read(packs[rung], { offset: packs[rung].offset + begin, bytes: endOf(parts.at(-1)!) - begin }, {
             kind: 'texture', once: this.reader_.form !== 'files', signal, onBytes: say,
           });
       for (const p of parts) p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);

@@ -117,8 +117,8 @@ describe('a failure', () => {
     const store = new TreeStore(['http://host/a/'], new HttpClient({ fetch: server.fetch, stallTimeoutS: 30 }));
     const abort = new AbortController();
     const place = { path: 'x.bin', offset: 0, bytes: 3000 };
-    const one = rejection(store.read(place, 0, 10, { kind: 'other', signal: abort.signal }));
-    const other = store.read(place, 0, 10, { kind: 'other' });
+    const one = rejection(store.read(place, { offset: 0, bytes: 10 }, { kind: 'other', signal: abort.signal }));
+    const other = store.read(place, { offset: 0, bytes: 10 }, { kind: 'other' });
     await new Promise((go) => setTimeout(go, 10));
     stalls = false;
     abort.abort();
@@ -134,7 +134,7 @@ it('a tree whose files are others is left for a mirror', async () => {
     if (got.some((b, i) => b !== file[i])) throw new FormatError('x.bin', '', 'these bytes', 'others');
   };
   const read = (roots: string[]): Promise<Uint8Array> =>
-    new TreeStore(roots, new HttpClient({ fetch: server.fetch, ...quick })).read({ path: 'x.bin', offset: 0, bytes: 500 }, 0, 500, { kind: 'other', verify });
+    new TreeStore(roots, new HttpClient({ fetch: server.fetch, ...quick })).read({ path: 'x.bin', offset: 0, bytes: 500 }, { offset: 0, bytes: 500 }, { kind: 'other', verify });
   expect((await read(['http://host/a/', 'http://other/a/'])).length).toBe(500);
   expect(await rejection(read(['http://host/a/']))).toBeInstanceOf(FormatError);
   expect(server.log.length).toBe(4);
@@ -147,9 +147,9 @@ describe('hostile answers', () => {
     const { store } = await openStore(url, [], 'range', client);
     for (const bytes of [3e9, 2 ** 50]) {
       const place = { path: 'mesh/s00.glb', offset: 20000, bytes };
-      expect(await rejection(store.read(place, 0, bytes, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
+      expect(await rejection(store.read(place, place, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
       // Overlapping what is known, too.
-      expect(await rejection(store.read({ ...place, offset: 100 }, 0, bytes, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
+      expect(await rejection(store.read(place, { offset: 100, bytes }, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
     }
     expect(server.log.length).toBe(1);
   });
