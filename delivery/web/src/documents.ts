@@ -89,6 +89,8 @@ export function tableSections(bytes: Uint8Array, { tables: ref, planeCount }: Ma
 /** Tables of one plane, and where its fragments are. */
 export interface PlaneDocument {
   tables: PlaneTables;
+  /** What the fragments of its rungs have in common. */
+  tableStreams: EntryRef;
   /** By rung. */
   packs: EntryRef[];
   /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
@@ -112,7 +114,7 @@ export function planeTables(
   requireHere(tables.incremental === codecTraits(info.codec).incremental, 'tables of the codec in textures.json', 'others');
   const requireSum = (path: string, total: number): void =>
     requireHere(entries.get(path)?.bytes === total, `${path} of ${total} bytes in the index`, entries.get(path)?.bytes ?? 'none');
-  requireSum(layout.tableStreamsPath(plane), sum(tables.tableBytes));
+  requireSum(paths.tableStreamsPath(plane), sum(tables.tableBytes));
   const n = fragmentCount(tables);
   const offsets = new Float64Array(n * rungCount(tables));
   for (let r = 0; r < rungCount(tables); ++r) {
@@ -123,5 +125,7 @@ export function planeTables(
       at += sizeBytes[r * n + f];
     }
   }
-  return { tables, packs: Array.from(tables.rungQuality, (_, r) => entries.get(layout.rungPath(plane, r))!), offsets };
+  const entry = (path: string): EntryRef => entries.get(path)!;
+  const packs = Array.from(tables.rungQuality, (_, r) => entry(layout.rungPath(plane, r)));
+  return { tables, tableStreams: entry(paths.tableStreamsPath(plane)), packs, offsets };
 }

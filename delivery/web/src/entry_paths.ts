@@ -15,6 +15,13 @@ export const provenancePath = 'provenance.json';
 /** mesh/s07.glb */
 export const meshPath = (scale: number): string => `mesh/s${String(scale).padStart(2, '0')}.glb`;
 
+/** texture/3/tables.pack */
+export const tableStreamsPath = (plane: number): string => `texture/${plane}/tables.pack`;
+/** The plane that an entry's page in the index belongs to; -1 = none. */
+export function planeOfPath(path: string): number {
+  const match = /^texture\/(0|[1-9]\d*)\/(tables\.pack|r\d\d+(\.pack|\/\d{4,}\.(jpg|webp)))$/.exec(path);
+  return match ? Number(match[1]) : -1;
+}
 /** texture/3/r07/0123.jpg, in trees made with `unpack --fragments files` only. */
 export const fragmentFilePath = (plane: number, rung: number, fragment: number, extension: string): string =>
   `texture/${plane}/r${String(rung).padStart(2, '0')}/${String(fragment).padStart(4, '0')}.${extension}`;

@@ -9,10 +9,8 @@ export class TexmeshError extends Error {
     readonly expected: string,
     readonly found: string,
   ) {
-    let text = [file, place].filter((part) => part !== '').join(': ');
-    if (expected !== '') text += `${text && ': '}expected ${expected}`;
-    if (found !== '') text += `${text && (expected === '' ? ': ' : ', ')}found ${found}`;
-    super(text);
+    const facts = [expected && `expected ${expected}`, found && `found ${found}`].filter(Boolean).join(', ');
+    super([file, place, facts].filter(Boolean).join(': '));
   }
 }
 

@@ -216,16 +216,16 @@ export class HttpClient {
         record.received += value.length;
         this.received += value.length;
         answer.tooLong = record.received > maxBytes;
-        if (!answer.tooLong) onBytes?.(record.received);
+        if (answer.tooLong) answer.problem = 'more bytes than were asked for';
+        else onBytes?.(record.received);
         if (options.capBytesS > 0) {
           clearTimeout(timer);
           await this.holdBack_(value.length, signal);
           alive();
         }
       }
-      // Content-Length, where nothing was decoded on the way.
-      const length = range && answer.range ? answer.range[1] - answer.range[0] + 1 : header('content-encoding') ? '' : header('content-length');
-      answer.complete = record.ok ? !answer.tooLong && (!/^\d+$/.test(`${length}`) || +length === record.received) : status !== 206;
+      const [first, last] = answer.range ?? [1, record.received];
+      answer.complete = record.ok ? !answer.tooLong && last - first + 1 === record.received : status !== 206;
     } catch (error) {
       if (signal?.aborted) throw abortError();
       answer.problem ||= String((error as Error).message);

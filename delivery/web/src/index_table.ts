@@ -2,7 +2,6 @@ import { toHex } from './bytes';
 import { BytesIn } from './bytes_in';
 import * as paths from './entry_paths';
 import { FormatError } from './errors';
-import * as layout from './layout';
 import { EntryRef, formatMajor, formatMinor } from './manifest';
 import { sha256 } from './sha256';
 
@@ -78,7 +77,7 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   if (!paths.isValidEntryPath(path) || path === paths.manifestPath || path === paths.indexPath)
     input.fail('a valid path of an entry', path);
   if (offset % 64 !== 0 || offset === 0) input.fail('an offset that is a multiple of 64', `${offset}`);
-  if (layout.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);
+  if (paths.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);
   return { path, offset, bytes, sha256: digest };
 }
 

@@ -13,12 +13,5 @@ const digits = (n: number, least: number): string => String(n).padStart(least, '
 
 /** preview/003.jpg */
 export const previewPath = (plane: number): string => `preview/${digits(plane, 3)}.jpg`;
-/** texture/3/tables.pack */
-export const tableStreamsPath = (plane: number): string => `texture/${plane}/tables.pack`;
 /** texture/3/r07.pack */
 export const rungPath = (plane: number, rung: number): string => `texture/${plane}/r${digits(rung, 2)}.pack`;
-/** The plane that an entry's page in the index belongs to; -1 = none. */
-export function planeOfPath(path: string): number {
-  const match = /^texture\/(0|[1-9]\d*)\/(tables\.pack|r\d\d+(\.pack|\/\d{4,}\.(jpg|webp)))$/.exec(path);
-  return match ? Number(match[1]) : -1;
-}

@@ -8,7 +8,7 @@ import { isAbort, nowS, sleepS, throwIfAborted } from './http';
 import { LoadContext, hysteresis } from './load_context';
 import type { PackageReader } from './package_reader';
 import { MaterialSet, texturesOf } from './scale_parts';
-import { ScaleSource } from './scale_source';
+import { scaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
 import type { WorkerPool } from './worker_pool';
 
@@ -54,7 +54,7 @@ export function loadModel(
   let refining: Promise<void> | undefined;
   let refineAgain = false;
   let restoring: Promise<void> | undefined;
-  const scales = new ScaleSource(reader, options, materials, pool, () => textures?.adopt(), fail);
+  const scales = scaleSource(reader, options, materials, pool, signal, () => textures?.adopt(), fail);
   const load: LoadContext = {
     reader, options, pool, materials, object, scales, signal, fail, enter, lostScale,
     limitS: time > longestS ? Infinity : time,
@@ -98,11 +98,10 @@ export function loadModel(
     load.expectedBytes = client.received + glb.bytes;
     enter('first-picture');
     // On a slow link nothing shares it with the first picture; what comes next is asked for just before its end.
-    const first = scales.coarsest(signal);
-    coming = Promise.all([import('./texture_load'), first.almostThere]).then(([part]) => part.textureLoad(load));
+    const { near, shown } = loadScale(scale);
+    coming = Promise.all([import('./texture_load'), near]).then(([part]) => part.textureLoad(load));
     coming.catch(() => undefined);
-    await first.bytes;
-    await loadScale(scale).shown;
+    await shown;
     model.update(load.view.camera); // by what is there, not by its bounds alone
     events.emit('first-picture', { scale, bytes: client.received });
   }
@@ -117,18 +116,18 @@ export function loadModel(
   // ---- scales
 
   /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
-  function loadScale(scale: number): { arrived: Promise<void>; shown: Promise<void> } {
+  function loadScale(scale: number): { near: Promise<void>; arrived: Promise<void>; shown: Promise<void> } {
     inTransit = scale;
     const show = (k: number): void => {
       // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
       if (inTransit === scale && (k === scale || k < load.shownScale)) showScale(k);
     };
-    const { arrived, shape } = scales.load(scale, signal, show);
+    const { near, arrived, shape } = scales.load(scale, show);
     const shown = shape.then(async (its) => {
       if (load.shownScale < 0) await compiled(its);
       show(scale);
     });
-    return { arrived, shown };
+    return { near, arrived, shown };
   }
   /** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
   async function compiled(shape: Object3D): Promise<void> {

@@ -1,4 +1,5 @@
 import { codecTraits } from './codec';
+import { planeOfPath } from './entry_paths';
 import { FormatError, InputError } from './errors';
 import { joinFragment } from './join_fragment';
 import * as layout from './layout';
@@ -12,6 +13,11 @@ import { fragmentCount, rungCount } from './tables';
 /** See PackageReader.index. */
 export async function readIndex(reader: PackageReader): Promise<EntryRef[]> {
   return decodeHere('readIndex', await reader.readChecked(reader.manifest.index, { kind: 'index' }));
+}
+
+/** See PackageReader.find. */
+export function find(reader: PackageReader, path: string, signal?: AbortSignal): Promise<EntryRef> {
+  return reader.findOn(planeOfPath(path), path, signal);
 }
 
 /** See PackageReader.provenance. */

@@ -200,7 +200,11 @@ export class PackageReader {
   }
   /** An entry of the index, of which only the page that has it is read. */
   async find(path: string, signal?: AbortSignal): Promise<EntryRef> {
-    const entry = (await this.indexPage_(layout.planeOfPath(path), signal)).get(path);
+    return (await more()).find(this, path, signal);
+  }
+  /** An entry of that page of the index: of a plane, or (-1) of none. */
+  async findOn(plane: number, path: string, signal?: AbortSignal): Promise<EntryRef> {
+    const entry = (await this.indexPage_(plane, signal)).get(path);
     if (!entry) throw new FormatError(this.store.name, path, 'an entry of the index', 'none');
     return entry;
   }
@@ -286,7 +290,8 @@ export class PackageReader {
   }
   /** preview/PPP.jpg of a full-size plane. */
   async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
-    return this.shared_(`preview/${plane}`, () => this.entry(layout.previewPath(plane), 'preview', signal), signal);
+    const read = async (): Promise<Uint8Array> => this.readChecked(await this.findOn(-1, layout.previewPath(plane), signal), { kind: 'preview', signal });
+    return this.shared_(`preview/${plane}`, read, signal);
   }
   /** See firstPicture. */
   keepPreview(plane: number, bytes: Uint8Array): void {
@@ -295,8 +300,8 @@ export class PackageReader {
   /** What the fragments of a rung have in common. */
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { tableBytes } = await this.planeTables(plane, signal);
-    const read = (): Promise<Uint8Array> => this.entry(layout.tableStreamsPath(plane), 'texture', signal);
-    const streams = await this.shared_(`streams/${plane}`, read, signal);
+    const { tableStreams } = this.planes_.get(plane)!;
+    const streams = await this.shared_(`streams/${plane}`, () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
     const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
     return streams.subarray(begin, begin + tableBytes[rung]);
   }

@@ -136,16 +136,13 @@ class RangeStore implements PackageStore {
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
+      if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
+      this.require_(m, a.status !== 200, offset, 'the file that reading began with', 'status 200: it was replaced, or the server no longer answers ranges');
       if (a.status === 206) {
         this.checkRange_(m, a, range);
         chunks.push(a.body);
         have += a.body.length;
-      }
-      this.refuse_(m, a, offset, bytes);
-      const wanted = m.total < 0 ? (offset > 0 ? bytes : have) : Math.min(bytes, m.total - offset);
-      if (a.status === 206 && a.complete) {
-        this.require_(m, have === wanted, offset, `${wanted} bytes`, have);
-        return concat(chunks, have);
+        if (a.complete) return concat(chunks, have);
       }
       if ((asking.elsewhere && have === before) || !(await again(a)))
         throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206', whatCame(a));
@@ -155,14 +152,6 @@ class RangeStore implements PackageStore {
     if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
   }
 
-  /** Answers after which there is no use in trying again. */
-  private refuse_(m: Mirror, { status, tooLong }: Answer, offset: number, bytes: number): void {
-    if (status === 200 && m.total < 0)
-      throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
-    this.require_(m, status !== 200, offset, 'the file that reading began with', 'status 200: it was replaced, or the server no longer answers ranges');
-    this.require_(m, status !== 416, offset, 'a longer file', 'status 416');
-    this.require_(m, !tooLong, offset, `${bytes} bytes`, 'more');
-  }
   /** Whether it is of the file that reading began with, and what was asked for. */
   private checkRange_(m: Mirror, { range, etag, url }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
     this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');

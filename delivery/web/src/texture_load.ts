@@ -79,7 +79,7 @@ export async function textureLoad(load: LoadContext) {
 
   async function documents(): Promise<PackageData> {
     pool.start();
-    const [whole] = await Promise.all([reader.prefetchDocuments(signal), scales.openStream(signal)]);
+    const [whole] = await Promise.all([reader.prefetchDocuments(signal), scales.openStream()]);
     if (whole) return reader.data(undefined, signal);
     const all = await reader.textures(signal);
     const base = [...Array(fullSizePlanes(all)).keys()];
