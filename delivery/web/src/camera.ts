@@ -1,7 +1,6 @@
 import { Box3, Camera, Mesh, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { Display } from './api';
 import type { Manifest } from './manifest';
-import { clipTo } from './viewing';
 
 /** Corners of triangles that are looked at: of one mesh, or of each of several. */
 const mostPoints = 600;
@@ -15,24 +14,22 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   const height = manifest.objectHeight * object.matrixWorld.getMaxScaleOnAxis();
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const orthographic = (camera as OrthographicCamera).isOrthographicCamera;
-  const rect = { x0: Infinity, y0: Infinity, x1: -Infinity, y1: -Infinity };
+  const screen = new Box3(new Vector3(-1, -1, -Infinity), new Vector3(1, 1, Infinity));
+  const rect = new Box3();
   let [near, outside, all] = [Infinity, 0, 0];
   pointsOf(object, box, (p) => {
     near = Math.min(near, eye.distanceTo(p));
-    p.applyMatrix4(camera.matrixWorldInverse);
-    ++all;
     // A point behind the eye makes it larger than any screen.
-    const behind = p.z >= 0 && !orthographic;
+    const behind = p.applyMatrix4(camera.matrixWorldInverse).z >= 0 && !orthographic;
     p.applyMatrix4(camera.projectionMatrix);
-    const x = ((p.x + 1) / 2) * size.x;
-    const y = ((1 - p.y) / 2) * size.y;
-    rect.x0 = behind ? -1e9 : Math.min(rect.x0, x);
-    rect.x1 = behind ? 1e9 : Math.max(rect.x1, x);
-    rect.y0 = behind ? -1e9 : Math.min(rect.y0, y);
-    rect.y1 = behind ? 1e9 : Math.max(rect.y1, y);
-    if (behind || Math.abs(p.x) > 1 || Math.abs(p.y) > 1) ++outside;
+    if (behind) for (const far of [-1e9, 1e9]) rect.expandByPoint(p.setScalar(far));
+    rect.expandByPoint(p);
+    ++all;
+    if (!screen.containsPoint(p)) ++outside;
   });
-  const part = clipTo(rect, { x0: 0, y0: 0, x1: size.x, y1: size.y });
+  const clipped = !screen.containsBox(rect);
+  const seen = rect.intersect(screen).getSize(new Vector3());
+  const part = { widthPx: (seen.x * size.x) / 2, heightPx: (seen.y * size.y) / 2, clipped };
   const middle = eye.distanceTo(box.getCenter(new Vector3()).applyMatrix4(object.matrixWorld));
   // The more is cut off, the more what is near the eye decides, not the object's middle.
   const share = Math.min(1, (2 * outside) / all);

@@ -1,6 +1,7 @@
 import type { FragmentList, ListedFragment } from './fragment_list';
 import type { FragmentOffer } from './time_plan';
 import type { RequestRecord } from './http';
+import { clamp, sumOf } from './numbers';
 
 /** Offers of neighbours that are fetched and decided together. */
 export interface GroupedList {
@@ -23,42 +24,37 @@ export function groupBytes(bytesS: number, rttS: number, limitS: number): number
 
 /** Fragments of a list joined to groups of about so many bytes each, when `budget` bytes are spent on all. */
 export function groupedList(list: FragmentList, bytesEach: number, budget: number): GroupedList {
-  const grouped: GroupedList = { offers: [], groups: [] };
-  const planned = list.offers.reduce((sum, o) => sum + o.plannedBytes, 0);
-  const factor = budget / Math.max(planned, 1);
-  let open = 0; // expected bytes of the last group
-  list.offers.forEach((o, i) => {
-    const fragment = list.fragments[i];
-    const expected = Math.min(Math.max(o.plannedBytes * factor, o.bytes[0]), o.bytes[o.bytes.length - 1]);
-    const last = grouped.offers.length - 1;
-    if (last < 0 || grouped.groups[last][0].plane !== fragment.plane || open + expected > bytesEach) {
-      grouped.offers.push({ ...o, bytes: [...o.bytes], loss: [...o.loss] });
-      grouped.groups.push([fragment]);
-      open = expected;
-      return;
-    }
-    const g = grouped.offers[last];
-    o.bytes.forEach((b, r) => (g.bytes[r] += b));
-    o.loss.forEach((l, r) => (g.loss[r] += l));
-    g.plannedBytes += o.plannedBytes;
-    g.eta = Math.max(g.eta, o.eta);
-    grouped.groups[last].push(fragment);
+  const factor = budget / Math.max(sumOf(list.offers.map((o) => o.plannedBytes)), 1);
+  const members: number[][] = []; // offers
+  let open = Infinity; // expected bytes of the last group
+  list.offers.forEach(({ plannedBytes, bytes }, i) => {
+    const expected = Math.min(Math.max(plannedBytes * factor, bytes[0]), bytes[bytes.length - 1]);
     open += expected;
+    if (open <= bytesEach && list.fragments[i].plane === list.fragments[i - 1]?.plane) return void members.at(-1)!.push(i);
+    members.push([i]);
+    open = expected;
   });
-  return grouped;
+  const offers = members.map((group): FragmentOffer => {
+    const all = group.map((i) => list.offers[i]);
+    return {
+      ...all[0],
+      bytes: all[0].bytes.map((_, r) => sumOf(all.map((o) => o.bytes[r]))),
+      loss: all[0].loss.map((_, r) => sumOf(all.map((o) => o.loss[r]))),
+      plannedBytes: sumOf(all.map((o) => o.plannedBytes)),
+      eta: Math.max(...all.map((o) => o.eta)),
+    };
+  });
+  return { offers, groups: members.map((group) => group.map((i) => list.fragments[i])) };
 }
 
 /** Bytes per second while bytes were coming: of requests so far, without the time that their answers took to begin. */
 export function throughputOf(requests: readonly RequestRecord[], rttS: number): number {
-  const spans = requests
-    .filter((r) => r.received > 0)
-    .map((r) => ({ from: Math.min(r.started + rttS, r.firstByte), to: r.ended, bytes: r.received }))
-    .sort((a, b) => a.from - b.from);
+  const begun = requests.filter((r) => r.received > 0).map((r) => ({ ...r, from: Math.min(r.started + rttS, r.firstByte) }));
   let [seconds, bytes, end] = [0, 0, 0];
-  for (const s of spans) {
-    seconds += Math.max(0, s.to - Math.max(s.from, end));
-    end = Math.max(end, s.to);
-    bytes += s.bytes;
+  for (const { from, ended, received } of begun.sort((a, b) => a.from - b.from)) {
+    seconds += Math.max(0, ended - Math.max(from, end));
+    end = Math.max(end, ended);
+    bytes += received;
   }
-  return Math.min(Math.max(bytes / Math.max(seconds, 1e-3), 100), 1e9);
+  return clamp(bytes / Math.max(seconds, 1e-3), 100, 1e9);
 }

@@ -33,6 +33,8 @@ const leastRest = 0.004;
 /** Of the bytes that throughput promises. */
 const certain = 0.85;
 const gapBytes = 1024;
+/** What the camera does not see is worth this much of what it sees, while there is time. */
+const unseen = 1e-3;
 const tellsApart = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
 const mostBarren = 3;
@@ -113,14 +115,29 @@ export async function textureLoad(load: LoadContext) {
     for (; pending() > but; await sleepS(0.004)) throwIfAborted(signal);
     if (but === 0) set.finish();
   }
-  /** The list of what may be fetched of the planes shown, with the bytes that fetching takes. */
-  function listOf(scale: number): FragmentList {
+  /**
+   * The list of what may be fetched of the planes shown, with the bytes that fetching takes. Losses count by what the camera sees of a
+   * fragment, the rest of it by `unseen`.
+   */
+  async function listOf(scale: number, unseen: number): Promise<FragmentList> {
+    const seen = new Map<number, Float32Array | undefined>();
+    for (const { plane } of planes()) {
+      await sleepS(0); // the page goes on in between
+      seen.set(plane, shares(plane));
+    }
     const list = fragmentList(data, planes(), { scale });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);
+      offer.loss = offer.loss.map((l) => l * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1));
     });
     return list;
+  }
+  /** Share of each fragment that the camera sees; undefined without a camera. */
+  function shares(plane: number): Float32Array | undefined {
+    const slots = load.materials.slots.filter((s) => s.image === textures[plane].image);
+    const shows = (mesh: Mesh): boolean => [mesh.material].flat().some((m) => slots.some((s) => s.material === m));
+    return load.view.camera && seenShares(textures[plane], load.object, load.view.camera, shows);
   }
   /** A rung comes as a whole, whatever is asked for: a tree without files of fragments. */
   function wholeRungs(): boolean {
@@ -217,47 +234,35 @@ export async function textureLoad(load: LoadContext) {
     });
     return wishes.filter((w) => w.rung >= 0 && (w.replaces ? rungOf(w) !== w.rung : rungOf(w) < w.rung));
   }
-  /** The next rung of the first plane that lacks some. */
+  /** The next rung of what lacks some. */
   function nextRung({ offers, fragments }: FragmentList): Wish[] {
     const open = fragments.flatMap((f, offer): Wish[] => {
       let rung = rungOf(f) + 1;
       while (refused(f, rung)) ++rung;
       return rung < offers[offer].bytes.length ? [{ ...f, rung, offer }] : [];
     });
-    const [first] = [...open].sort((a, b) => a.rung - b.rung);
-    return open.filter((w) => w.rung === first.rung && w.plane === first.plane);
+    const least = Math.min(...open.map((w) => w.rung));
+    return open.filter((w) => w.rung === least);
   }
-  /** What saves most of what the camera sees, up to where nobody can tell the difference. */
-  async function mostSeen(list: FragmentList): Promise<Wish[]> {
-    const seen = new Map<number, Float32Array | undefined>();
-    for (const { plane } of planes()) {
-      await sleepS(0); // the page goes on in between
-      seen.set(plane, shares(plane));
-    }
+  /** What saves most, up to where nobody can tell the difference. */
+  function best(list: FragmentList): Wish[] {
     list.offers.forEach((o, i) => {
       const { plane, fragment } = list.fragments[i];
       const { rungQuality, dssim, columns, rows } = data.tables[plane]!;
       const good = (r: number): boolean => dssim[r * columns * rows + fragment] <= (options.refineTo ?? tellsApart);
       const enough = [...rungQuality.keys()].findIndex(good) + 1 || rungQuality.length;
       o.bytes = o.bytes.slice(0, enough);
-      o.loss = o.loss.map((l) => l * (seen.get(plane)?.[fragment] ?? 1)); // not to be seen: not to be fetched
     });
     const wishes = upgrades(list, refineBytes);
     return wishes.length > 0 ? wishes : upgrades(list, Infinity, 1);
-  }
-  /** Share of each fragment that the camera sees; undefined without a camera. */
-  function shares(plane: number): Float32Array | undefined {
-    const slots = load.materials.slots.filter((s) => s.image === textures[plane].image);
-    const shows = (mesh: Mesh): boolean => [mesh.material].flat().some((m) => slots.some((s) => s.material === m));
-    return load.view.camera && seenShares(textures[plane], load.object, load.view.camera, shows);
   }
   /** Fetches some of what is still wanted, of everything or what the camera sees; false when there is nothing left, or no use in going on. */
   async function refineSome(all = load.override.rung !== undefined): Promise<boolean> {
     await sleepS(0);
     if (pool.none) return false;
     if (all) await composed(); // nothing comes behind what replaces it
-    const list = listOf(Math.max(load.shownScale, 0));
-    const wishes = all ? everything(list) : wholeRungs() ? nextRung(list) : await mostSeen(list);
+    const list = await listOf(Math.max(load.shownScale, 0), 0); // what is not to be seen is not to be fetched
+    const wishes = all ? everything(list) : wholeRungs() ? nextRung(list) : best(list);
     const before = losses;
     const some = wishes.length > 0;
     if (some) barren = (await fetchWishes(wishes)) > 0 ? 0 : barren + 1;
@@ -318,7 +323,7 @@ export async function textureLoad(load: LoadContext) {
     // One that takes longer than it should has coarser scales to show on its way.
     if (meshBytes > load.beta0 * client.latencyS) await Promise.race([mesh.arrived, timeS(meshShare)]);
     load.enter('textures');
-    const list = listOf(scale);
+    const list = await listOf(scale, unseen);
     for (const o of list.offers) load.expectedBytes += o.plannedBytes;
     const fragmentsS = leftS() - composeS;
     if (load.override.rung !== undefined || !Number.isFinite(fragmentsS)) while (await refineSome(true));

@@ -59,7 +59,7 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
       const old = textureAt(slot);
       if (plane.textures.includes(old)) continue;
       const shown = texturesIn(slot.material);
-      slot.material.needsUpdate ||= !shown[slot.name];
+      if (!shown[slot.name]) slot.material.needsUpdate = true;
       shown[slot.name] = plane.view(old);
     }
   }

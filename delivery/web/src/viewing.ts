@@ -45,10 +45,9 @@ function edgeLimit(scales: readonly ManifestScale[], k: number): number {
 }
 
 function limitOf(scales: readonly ManifestScale[], k: number, rule: StepRule): number {
-  if (rule === 'jnd') return scales[k].displayPxJnd;
-  if (rule === 'error') return scales[k].displayPxError;
   if (rule === 'edge') return edgeLimit(scales, k);
-  return Math.min(scales[k].displayPxJnd, scales[k].displayPxError);
+  const { displayPxJnd, displayPxError } = scales[k];
+  return Math.min(rule === 'error' ? Infinity : displayPxJnd, rule === 'jnd' ? Infinity : displayPxError);
 }
 
 /** The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's. */
@@ -129,13 +128,10 @@ function accepts(
   part: VisiblePart,
   rule: StepRule,
 ): boolean {
-  const s = scales[k];
-  const jnd = Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
-  const error = displayedPx <= s.displayPxError;
-  if (rule === 'jnd') return jnd;
-  if (rule === 'error') return error;
   if (rule === 'edge') return displayedPx <= limitOf(scales, k, rule);
-  return jnd && error;
+  const s = scales[k];
+  const seen = Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
+  return (seen || rule === 'error') && (displayedPx <= s.displayPxError || rule === 'jnd');
 }
 
 /**
