@@ -1,8 +1,9 @@
-import { Box3, Camera, Mesh, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Box3, Camera, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { Display } from './api';
 import type { Manifest } from './manifest';
+import { sampleTriangles } from './scale_parts';
 
-/** Corners of triangles that are looked at: of one mesh, or of each of several. */
+/** Triangles whose first corners are looked at. */
 const mostPoints = 600;
 
 /** How a camera shows the object: displayed height in device px, and what of it is seen (Fig. 7.5). */
@@ -17,7 +18,7 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   const screen = new Box3(new Vector3(-1, -1, -Infinity), new Vector3(1, 1, Infinity));
   const rect = new Box3();
   let [near, outside, all] = [Infinity, 0, 0];
-  pointsOf(object, box, (p) => {
+  const see = (p: Vector3): void => {
     near = Math.min(near, eye.distanceTo(p));
     // A point behind the eye makes it larger than any screen.
     const behind = p.applyMatrix4(camera.matrixWorldInverse).z >= 0 && !orthographic;
@@ -26,7 +27,15 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
     rect.expandByPoint(p);
     ++all;
     if (!screen.containsPoint(p)) ++outside;
-  });
+  };
+  // What is cut off of the bounds alone is nothing; until a mesh is there, the bounds decide.
+  const p = new Vector3();
+  sampleTriangles(object, mostPoints, ({ geometry, matrixWorld }, [corner]) =>
+    see(p.fromBufferAttribute(geometry.attributes.position, corner).applyMatrix4(matrixWorld)));
+  for (let k = 0, none = all === 0; none && k < 8; ++k) {
+    p.set(k & 1, (k >> 1) & 1, k >> 2).multiply(box.getSize(new Vector3())).add(box.min);
+    see(p.applyMatrix4(object.matrixWorld));
+  }
   const clipped = !screen.containsBox(rect);
   const seen = rect.intersect(screen).getSize(new Vector3());
   const part = { widthPx: (seen.x * size.x) / 2, heightPx: (seen.y * size.y) / 2, clipped };
@@ -37,23 +46,4 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   // The projection tells how much of half the picture a length takes: at the distance 1, or at all.
   const perLength = (camera.projectionMatrix.elements[5] * size.y) / 2 / (orthographic ? 1 : Math.max(distance, 1e-9 * height));
   return { heightPx: height * Math.abs(perLength), part };
-}
-
-/** Points of the surface, in the world: what is cut off of the bounds alone is nothing. Until a mesh is there, the bounds'. */
-function pointsOf(object: Object3D, box: Box3, use: (p: Vector3) => void): void {
-  const p = new Vector3();
-  let none = true;
-  object.traverse((o) => {
-    const { geometry } = o as Mesh;
-    if (!geometry?.index) return;
-    const { index, attributes } = geometry;
-    for (let k = 0; k < index.count; k += 1 + Math.floor(index.count / mostPoints)) {
-      none = false;
-      use(p.fromBufferAttribute(attributes.position, index.getX(k)).applyMatrix4(o.matrixWorld));
-    }
-  });
-  for (let k = 0; none && k < 8; ++k) {
-    p.set(k & 1, (k >> 1) & 1, k >> 2).multiply(box.getSize(new Vector3()));
-    use(p.add(box.min).applyMatrix4(object.matrixWorld));
-  }
 }

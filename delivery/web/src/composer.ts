@@ -29,8 +29,6 @@ export interface PlaneComposer extends ComposedPlane {
   read(): Uint8Array;
   dispose(): void;
 }
-/** Gives the framebuffer that is read from or drawn to a level of a texture. */
-type Attach = (target: number, texture: WebGLTexture | null, level?: number) => void;
 
 /** A plane to be composed in the renderer's context. */
 export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number): PlaneComposer {
@@ -48,19 +46,22 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
     return storage;
   }
   /** Runs `use` with framebuffers of its own, and leaves the renderer's state as it was. */
-  function withBuffers(use: (attach: Attach) => void): void {
+  function withBuffers(use: () => void): void {
     const targets = [gl.READ_FRAMEBUFFER, gl.DRAW_FRAMEBUFFER];
     const before = [gl.READ_FRAMEBUFFER_BINDING, gl.DRAW_FRAMEBUFFER_BINDING].map((name) => gl.getParameter(name) as WebGLFramebuffer | null);
     const scissor = gl.isEnabled(gl.SCISSOR_TEST);
     gl.disable(gl.SCISSOR_TEST);
     const own = targets.map(() => gl.createFramebuffer());
     targets.forEach((target, i) => gl.bindFramebuffer(target, own[i]));
-    use((target, texture, level = 0) => gl.framebufferTexture2D(target, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level));
+    use();
     targets.forEach((target, i) => gl.bindFramebuffer(target, before[i]));
     own.forEach((buffer) => gl.deleteFramebuffer(buffer));
     if (scissor) gl.enable(gl.SCISSOR_TEST);
   }
-  function copy(attach: Attach, from: WebGLTexture, fromLevel: number, width: number, height: number, to: WebGLTexture, level: number): void {
+  /** The framebuffer that is read from, or drawn to, is a level of a texture. */
+  const attach = (target: number, texture: WebGLTexture, level: number): void =>
+    gl.framebufferTexture2D(target, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level);
+  function copy(from: WebGLTexture, fromLevel: number, width: number, height: number, to: WebGLTexture, level: number): void {
     attach(gl.READ_FRAMEBUFFER, from, fromLevel);
     attach(gl.DRAW_FRAMEBUFFER, to, level);
     gl.blitFramebuffer(0, 0, width, height, 0, 0, side(widthPx, level), side(heightPx, level), gl.COLOR_BUFFER_BIT, gl.LINEAR);
@@ -68,19 +69,19 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
   /** Levels that there are: one, where no view asks for more (filters behind NearestFilter 1003 and LinearFilter 1006). */
   const levelCount = (): number => ([...views.values()].some((v) => v.minFilter > 1006) ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1);
   /** Makes the levels behind one, each of the one before. */
-  function halve(attach: Attach, storage: WebGLTexture, from: number): void {
+  function halve(storage: WebGLTexture, from: number): void {
     for (let level = from + 1; level < levelCount(); ++level)
-      copy(attach, storage, level - 1, side(widthPx, level - 1), side(heightPx, level - 1), storage, level);
+      copy(storage, level - 1, side(widthPx, level - 1), side(heightPx, level - 1), storage, level);
   }
   function fill(from: WebGLTexture, width: number, height: number, to: WebGLTexture): void {
-    withBuffers((attach) => {
-      copy(attach, from, 0, width, height, to, 0);
+    withBuffers(() => {
+      copy(from, 0, width, height, to, 0);
       // Covered everywhere: coverage has a texture of its own.
       const mask = gl.getParameter(gl.COLOR_WRITEMASK) as [boolean, boolean, boolean, boolean];
       gl.colorMask(false, false, false, true);
       gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
       gl.colorMask(...mask);
-      halve(attach, to, 0);
+      halve(to, 0);
     });
   }
 
@@ -117,7 +118,6 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
       for (const storage of storages) {
         renderer.state.bindTexture(gl.TEXTURE_2D, storage);
         for (const name of [gl.UNPACK_FLIP_Y_WEBGL, gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, gl.UNPACK_COLORSPACE_CONVERSION_WEBGL]) gl.pixelStorei(name, 0);
-        gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
         levels.slice(0, levelCount()).forEach((bitmap, level) => {
           const [left, top] = [x >> level, y >> level];
           const width = Math.min(bitmap.width, (widthPx >> level) - left);
@@ -128,13 +128,13 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
       stale = true;
     },
     updateMips() {
-      if (stale) withBuffers((attach) => storages.forEach((storage) => halve(attach, storage, ownLevels - 1)));
+      if (stale) withBuffers(() => storages.forEach((storage) => halve(storage, ownLevels - 1)));
       stale = false;
     },
     read() {
       const pixels = new Uint8Array(4 * widthPx * heightPx);
-      withBuffers((attach) => {
-        attach(gl.READ_FRAMEBUFFER, [...storages][0]);
+      withBuffers(() => {
+        attach(gl.READ_FRAMEBUFFER, [...storages][0], 0);
         gl.readPixels(0, 0, widthPx, heightPx, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
       });
       return pixels;

@@ -7,16 +7,12 @@ import type { WorkerPool } from './worker_pool';
 const stripPx = 1 << 18;
 const mostPieces = 4;
 
-/** Some pixels for the GPU; `drop` instead of `run` where nobody wants them any more. */
-export interface Work {
-  pixels: number;
-  run(): void;
-  drop(): void;
-}
+/** Puts off what gives some pixels to the GPU; resolves when it has been done, or nobody wants it any more. */
+export type Enqueue = (pixels: number, run: () => void) => Promise<void>;
 /** The texture set that asks. */
 export interface Enlarging {
   pool: WorkerPool;
-  enqueue(work: Work): void;
+  enqueue: Enqueue;
   ended(): boolean;
 }
 interface Piece {
@@ -71,15 +67,6 @@ async function enlargePiece(
     .enlarge({ picture, width, height, ...piece, levels: ownLevels })
     .finally(() => picture.close()); // workers have a copy of their own
   const { x0, x1, y0, y1 } = piece;
-  await new Promise<void>((done) => {
-    const end = (): void => {
-      bitmaps.forEach((b) => b.close());
-      done();
-    };
-    const run = (): void => {
-      next.upload(bitmaps, x0, y0);
-      end();
-    };
-    how.enqueue({ pixels: (x1 - x0) * (y1 - y0), run, drop: end });
-  });
+  await how.enqueue((x1 - x0) * (y1 - y0), () => next.upload(bitmaps, x0, y0));
+  bitmaps.forEach((b) => b.close());
 }

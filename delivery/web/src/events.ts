@@ -1,21 +1,20 @@
 /** Listeners by name; one that throws does not keep the others from hearing. */
 export class Emitter<Events> {
-  private readonly listeners_ = new Map<keyof Events, Set<(event: never) => void>>();
+  private readonly listeners_ = new Set<[name: keyof Events, listener: (event: never) => void]>();
 
   on<K extends keyof Events>(name: K, listener: (event: Events[K]) => void): () => void {
-    const set = this.listeners_.get(name) ?? new Set();
-    this.listeners_.set(name, set.add(listener as (event: never) => void));
-    return () => set.delete(listener as (event: never) => void);
+    const entry: [K, (event: never) => void] = [name, listener];
+    this.listeners_.add(entry);
+    return () => this.listeners_.delete(entry);
   }
   /** Every event gets the time. */
   emit<K extends keyof Events>(name: K, event: Omit<Events[K], 'at'>): void {
-    for (const listener of this.listeners_.get(name) ?? []) {
+    for (const [its, listener] of this.listeners_)
       try {
-        listener({ ...event, at: performance.now() } as never);
+        if (its === name) listener({ ...event, at: performance.now() } as never);
       } catch (error) {
         console.error(error);
       }
-    }
   }
   clear(): void {
     this.listeners_.clear();

@@ -80,6 +80,17 @@ export function meshesOf(object: Object3D): Mesh[] {
   return meshes;
 }
 
+/** About `most` triangles of a model, by their corners' places in the attributes. */
+export function sampleTriangles(object: Object3D, most: number, use: (mesh: Mesh, corners: [number, number, number]) => void): void {
+  const meshes = meshesOf(object);
+  const cornersOf = ({ geometry: { index, attributes } }: Mesh): number => (index ?? attributes.position)?.count ?? 0;
+  const step = 3 * Math.ceil(meshes.reduce((sum, mesh) => sum + cornersOf(mesh), 1) / (3 * most));
+  for (const mesh of meshes) {
+    const corner = (k: number): number => mesh.geometry.index?.getX(k) ?? k;
+    for (let k = 0; k + 2 < cornersOf(mesh); k += step) use(mesh, [corner(k), corner(k + 1), corner(k + 2)]);
+  }
+}
+
 /** Materials of all scales: those of the first one that has them. */
 export class MaterialSet {
   readonly slots: Slot[] = [];

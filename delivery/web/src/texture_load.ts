@@ -63,16 +63,14 @@ export async function textureLoad(load: LoadContext) {
   const newSet = () => textureSet(options.renderer, textures, load.materials, pool);
   let set = newSet();
   const transfers = new Transfers(reader, textures, pool, {
-    decoded(wish, levels) {
-      const { fragment, rung, replaces } = wish;
-      const plane = planeOf(wish);
-      const ended = (uploaded: boolean): void => {
-        fates.delete(keyOf(wish, rung));
-        if (uploaded) load.emit('fragment', { plane: wish.plane, fragment, rung });
-      };
-      if (plane && !signal.aborted) return set.upload(plane, levels, wish, (there) => rung > there || (!!replaces && load.override.rung !== undefined), ended);
+    async decoded(wish, levels) {
+      const { plane, fragment, rung, replaces } = wish;
+      const to = planeOf(wish);
+      const better = (there: number): boolean => rung > there || (!!replaces && load.override.rung !== undefined);
+      const shown = to && !signal.aborted && (await set.upload(to, levels, fragment, rung, better));
       levels.forEach((b) => b.close());
-      ended(false);
+      fates.delete(keyOf(wish, rung));
+      if (shown) load.emit('fragment', { plane, fragment, rung });
     },
     lost,
   });
@@ -234,16 +232,6 @@ export async function textureLoad(load: LoadContext) {
     });
     return wishes.filter((w) => w.rung >= 0 && (w.replaces ? rungOf(w) !== w.rung : rungOf(w) < w.rung));
   }
-  /** The next rung of what lacks some. */
-  function nextRung({ offers, fragments }: FragmentList): Wish[] {
-    const open = fragments.flatMap((f, offer): Wish[] => {
-      let rung = rungOf(f) + 1;
-      while (refused(f, rung)) ++rung;
-      return rung < offers[offer].bytes.length ? [{ ...f, rung, offer }] : [];
-    });
-    const least = Math.min(...open.map((w) => w.rung));
-    return open.filter((w) => w.rung === least);
-  }
   /** What saves most, up to where nobody can tell the difference. */
   function best(list: FragmentList): Wish[] {
     list.offers.forEach((o, i) => {
@@ -257,16 +245,16 @@ export async function textureLoad(load: LoadContext) {
     return wishes.length > 0 ? wishes : upgrades(list, Infinity, 1);
   }
   /** Fetches some of what is still wanted, of everything or what the camera sees; false when there is nothing left, or no use in going on. */
-  async function refineSome(all = load.override.rung !== undefined): Promise<boolean> {
+  async function refineSome(all = load.override.rung !== undefined || wholeRungs()): Promise<boolean> {
     await sleepS(0);
     if (pool.none) return false;
     if (all) await composed(); // nothing comes behind what replaces it
     const list = await listOf(Math.max(load.shownScale, 0), 0); // what is not to be seen is not to be fetched
-    const wishes = all ? everything(list) : wholeRungs() ? nextRung(list) : best(list);
+    const wishes = all ? everything(list) : best(list);
     const before = losses;
     const some = wishes.length > 0;
     if (some) barren = (await fetchWishes(wishes)) > 0 ? 0 : barren + 1;
-    await composed(some && !all && !wholeRungs() ? mostPending : 0);
+    await composed(some && !all ? mostPending : 0);
     // What was lost on the way leaves lower rungs to ask for.
     if (some ? barren < mostBarren : losses > before) return true;
     barren = 0;

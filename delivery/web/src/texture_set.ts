@@ -1,6 +1,6 @@
 import { Texture, WebGLRenderer } from 'three';
 import { PlaneComposer, planeComposer } from './composer';
-import type { Work } from './enlarge';
+import type { Enqueue } from './enlarge';
 import type { PlaneChoice } from './fragment_list';
 import { gpuIdle } from './gpu';
 import { sleepS } from './http';
@@ -36,7 +36,7 @@ export type TextureSet = ReturnType<typeof textureSet>;
 /** For the textures of a package in these materials. */
 export function textureSet(renderer: WebGLRenderer, textures: readonly TextureInfo[], materials: MaterialSet, pool: WorkerPool) {
   const planes = new Map<number, PlaneComposer>(); // by full-size plane
-  const queue: Work[] = [];
+  const queue: { pixels: number; run(): void; ended(): void }[] = [];
   let pending = 0;
   let pumping = false;
   let disposed = false;
@@ -83,11 +83,11 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
     mipsAt = performance.now();
     planes.forEach((plane) => plane.updateMips());
   }
-  function enqueue(work: Work): void {
-    if (disposed) return work.drop();
-    queue.push(work);
-    if (!pumping) void pump();
-  }
+  const enqueue: Enqueue = (pixels, run) =>
+    new Promise((ended) => {
+      queue.push({ pixels, run, ended });
+      if (!pumping) void pump();
+    });
   async function pump(): Promise<void> {
     pumping = true;
     for (await sleepS(0); queue.length > 0; await sleepS(0)) {
@@ -95,7 +95,8 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
       while (queue.length > 0 && pixels < slicePx && performance.now() - start < sliceMs) {
         const work = queue.shift()!;
         pixels += work.pixels;
-        work.run();
+        if (!disposed) work.run();
+        work.ended();
       }
       if (start - mipsAt > mipsEveryMs || queue.length === 0) finish();
       if (pixels < slicePx) continue;
@@ -141,33 +142,22 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
     isUsed: (base: number): boolean => slotsOf(base).length > 0,
     /** A material has come with a later scale. */
     adopt: (): void => planes.forEach((plane) => plane.filled && dress(plane)),
-    /** Queues a fragment; `done` when it is in its texture, or was not better than the rung there by then. */
-    upload(
-      plane: PlaneComposer,
-      levels: Levels,
-      { fragment, rung }: { fragment: number; rung: number },
-      better: (there: number) => boolean,
-      done: (uploaded: boolean) => void,
-    ): void {
+    /** Queues a fragment; resolves when it is in its texture, or (false) was not better than the rung there by then. */
+    async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
       ++pending;
       plane.come.add(fragment);
-      const end = (uploaded: boolean): void => {
-        --pending;
-        levels.forEach((b) => b.close());
-        done(uploaded);
-      };
-      const drop = (): void => end(false);
-      const run = (): void => {
-        const wanted = planes.get(plane.base) === plane && better(plane.rungs[fragment]);
-        if (wanted) plane.uploadFragment(levels, fragment, rung);
-        end(wanted);
-      };
-      plane.ready!.then(() => enqueue({ pixels: levels[0].width * levels[0].height, run, drop }), drop);
+      let shown = false;
+      await plane.ready!.catch(() => undefined);
+      await enqueue(levels[0].width * levels[0].height, () => {
+        shown = planes.get(plane.base) === plane && better(plane.rungs[fragment]);
+        if (shown) plane.uploadFragment(levels, fragment, rung);
+      });
+      --pending;
+      return shown;
     },
     finish,
     dispose(): void {
       disposed = true;
-      queue.splice(0).forEach((work) => work.drop());
       planes.forEach((plane) => plane.dispose());
       planes.clear();
     },

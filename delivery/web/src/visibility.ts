@@ -1,5 +1,5 @@
 import { BackSide, Camera, DoubleSide, Frustum, Matrix4, Mesh, Object3D, Triangle, Vector3 } from 'three';
-import { meshesOf } from './scale_parts';
+import { sampleTriangles } from './scale_parts';
 import type { TextureInfo } from './textures';
 
 /** Triangles looked at per model: enough to tell which fragments are seen. */
@@ -17,28 +17,22 @@ export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera,
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const frustum = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
   const [at, uv, middle] = [new Triangle(), new Triangle(), new Vector3()];
-  const meshes = meshesOf(object);
-  const cornersOf = ({ geometry: { index, attributes } }: Mesh): number => index?.count ?? attributes.position?.count ?? 0;
-  const step = 3 * Math.ceil(meshes.reduce((sum, mesh) => sum + cornersOf(mesh), 1) / (3 * mostSamples));
-  for (const mesh of meshes) {
-    const { geometry: { index, attributes }, matrixWorld } = mesh;
-    if (!attributes.uv || !shows(mesh)) continue;
+  const cell = (part: number, px: number, whole: number, count: number): number =>
+    Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
+  sampleTriangles(object, mostSamples, (mesh, places) => {
+    const { geometry: { attributes }, matrixWorld } = mesh;
+    if (!attributes.uv || !shows(mesh)) return;
+    uv.setFromAttributeAndIndices(attributes.uv, ...places).getMidpoint(middle);
+    const f = cell(middle.y, fragmentHeightPx, heightPx, rows) * columns + cell(middle.x, fragmentWidthPx, widthPx, columns);
+    at.setFromAttributeAndIndices(attributes.position, ...places);
+    const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(matrixWorld));
+    const area = at.getArea();
+    all[f] += area;
     const sides = [mesh.material].flat().map((m) => m.side);
     const front = sides.includes(BackSide) === matrixWorld.determinant() < 0; // mirrored: three.js takes the other side for the front
-    for (let k = 0; k + 2 < cornersOf(mesh); k += step) {
-      const [a, b, c] = [k, k + 1, k + 2].map((i) => index?.getX(i) ?? i);
-      uv.setFromAttributeAndIndices(attributes.uv, a, b, c).getMidpoint(middle);
-      const cell = (part: number, px: number, whole: number, count: number): number =>
-        Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
-      const f = cell(middle.y, fragmentHeightPx, heightPx, rows) * columns + cell(middle.x, fragmentWidthPx, widthPx, columns);
-      at.setFromAttributeAndIndices(attributes.position, a, b, c);
-      const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(matrixWorld));
-      const area = at.getArea();
-      all[f] += area;
-      const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
-      if (turned && corners.some((p) => frustum.containsPoint(p))) seen[f] += area;
-    }
-  }
+    const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
+    if (turned && corners.some((p) => frustum.containsPoint(p))) seen[f] += area;
+  });
   // What no sample fell into may be seen.
   return seen.map((area, f) => (all[f] > 0 ? area / all[f] : 0.5));
 }
