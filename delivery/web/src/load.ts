@@ -210,49 +210,44 @@ export function loadModel(
     if (wantedScale < 0 || override.scale !== undefined || at(1 / hysteresis) < wantedScale) return at(1);
     return Math.max(at(hysteresis), wantedScale);
   }
-  async function refineAll(): Promise<void> {
+  /** All that is wanted is there. */
+  async function settle(): Promise<void> {
     try {
       if (!resting()) await done;
-      await restoring;
-      if (!signal.aborted) await refineRounds(textures!);
+      do {
+        await restoring;
+        if (!signal.aborted) await refineRounds(textures!);
+      } while (refineAgain && !signal.aborted);
     } finally {
       refining = undefined; // what is asked for from now on, by listeners too, is a turn of its own
     }
-    if (signal.aborted) return;
-    if (refineAgain) return model.refine();
-    finish();
+    if (!signal.aborted) finish();
   }
   async function refineRounds({ forgetLosses, finerPlanes, refineSome, composed }: TextureLoad): Promise<void> {
     phase = 'refining';
     const scale = followScale(); // the time may have allowed a coarser one only
     try {
-      while (refineAgain) {
+      if (refineAgain) {
         refineAgain = false;
         forgetLosses();
         await finerPlanes();
         while (!refineAgain && (await refineSome()));
-        if (refineAgain) continue;
-        await composed();
-        await scale; // the view may have changed meanwhile
       }
+      await composed();
+      await scale; // the view may have changed meanwhile
     } catch (error) {
       fail(error, 'refining');
     }
   }
   /** three.js makes geometries and pictures of its own anew; what was composed is gone. */
-  async function restore(): Promise<void> {
+  function restore(): void {
     events.emit('context', { lost: false });
     if (signal.aborted) return;
-    const over = resting();
-    if (over) enter('refining');
-    try {
-      await textures?.restore();
-    } catch (error) {
-      fail(error, 'textures after a lost context');
-    }
-    if (!over || signal.aborted) return;
-    if (autoRefine) void model.refine();
-    else finish();
+    restoring = textures?.restore().catch((error) => fail(error, 'textures after a lost context'));
+    if (!resting()) return;
+    enter('refining');
+    refineAgain ||= autoRefine;
+    refining ??= settle();
   }
 
   const firstPicture = showFirst();
@@ -302,7 +297,7 @@ export function loadModel(
     },
     refine() {
       refineAgain = true;
-      return (refining ??= refineAll());
+      return (refining ??= settle());
     },
     setOverride(override) {
       load.override = snapped(override);
@@ -333,7 +328,7 @@ export function loadModel(
   options.signal?.addEventListener('abort', model.cancel, whileThere);
   if (options.signal?.aborted) model.cancel();
   renderer.domElement?.addEventListener('webglcontextlost', () => events.emit('context', { lost: true }), whileThere);
-  renderer.domElement?.addEventListener('webglcontextrestored', () => (restoring = restore()), whileThere);
+  renderer.domElement?.addEventListener('webglcontextrestored', restore, whileThere);
   const offRequest = reader.onRequest((record) => {
     events.emit('request', record);
     progress();

@@ -1,4 +1,5 @@
 import type { Mesh } from 'three';
+import { spendBytes } from './allocation';
 import type { PlaneComposer } from './composer';
 import { InputError } from './errors';
 import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from './fragment_list';
@@ -12,7 +13,6 @@ import { TextureInfo, fullSizePlanes } from './textures';
 import { HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from './time_plan';
 import { timedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
-import { upgradesInOrder } from './upgrades';
 import { VisiblePart, selectScale } from './viewing';
 import { seenShares } from './visibility';
 
@@ -202,25 +202,17 @@ export async function textureLoad(load: LoadContext) {
     throwIfAborted(signal);
     return arrived;
   }
-  /** Upgrades that save most for these bytes, by at most so many requests: over what there will be when all that is under way has come. */
-  function upgrades({ offers, fragments }: FragmentList, left: number, requests = Infinity): Wish[] {
-    const rungs = fragments.map((f, offer) => {
-      let rung = offers[offer].bytes.length - 1;
-      while (rung > rungOf(f) && fates.get(keyOf(f, rung)) !== 'comes') --rung;
-      return Math.max(rung, rungOf(f));
+  /** Upgrades that save most for these bytes, by plane and importance: over what there will be when all that is under way has come. */
+  function upgrades({ offers, fragments }: FragmentList, most: number): Wish[] {
+    const curves = offers.map(({ bytes, loss }, offer) => {
+      const f = fragments[offer];
+      let from = bytes.length - 1;
+      while (from > rungOf(f) && fates.get(keyOf(f, from)) !== 'comes') --from;
+      const may = (rung: number): boolean => rung > from && !refused(f, rung);
+      return { bytes: [0, ...bytes.map((b, rung) => (may(rung) ? b : Infinity))], loss: [loss[from + 1], ...loss.slice(1)] };
     });
-    const taken = new Map<number, Wish & { bytes: number }>();
-    const full = new Set<number>();
-    for (const { offer, rung, bytes } of upgradesInOrder(offers, rungs, false, (o, r) => refused(fragments[o], r))) {
-      const before = taken.get(offer);
-      const more = bytes - (before?.bytes ?? 0);
-      // What is too large leaves room for smaller ones.
-      if (more > left || (!before && taken.size >= requests)) full.add(offer);
-      if (full.has(offer)) continue;
-      left -= more;
-      taken.set(offer, { ...fragments[offer], rung, offer, bytes });
-    }
-    return [...taken.values()];
+    const ways = spendBytes(curves, most);
+    return fragments.map((f, offer): Wish => ({ ...f, offer, rung: ways[offer] - 1 })).filter((w) => w.rung >= 0);
   }
   /** Every fragment at its override's rung, or the highest; at the next below where that one cannot be had. */
   function everything({ offers, fragments }: FragmentList): Wish[] {
@@ -242,7 +234,7 @@ export async function textureLoad(load: LoadContext) {
       o.bytes = o.bytes.slice(0, enough);
     });
     const wishes = upgrades(list, refineBytes);
-    return wishes.length > 0 ? wishes : upgrades(list, Infinity, 1);
+    return wishes.length > 0 ? wishes : upgrades(list, Infinity).slice(0, 1);
   }
   /** Fetches some of what is still wanted, of everything or what the camera sees; false when there is nothing left, or no use in going on. */
   async function refineSome(all = load.override.rung !== undefined || wholeRungs()): Promise<boolean> {
@@ -356,7 +348,7 @@ export async function textureLoad(load: LoadContext) {
       const afterS = restS - client.rttS; // nothing else is on its way
       if (afterS < leastRest * limitS) return;
       // More requests at once would wait for connections.
-      const wishes = upgrades(list, certain * plan!.throughputBytesS() * afterS, 2 * client.options.connections);
+      const wishes = upgrades(list, certain * plan!.throughputBytesS() * afterS).slice(0, 2 * client.options.connections);
       const late = AbortSignal.timeout(Math.ceil(1000 * (restS + mostLate * limitS)));
       if (wishes.length === 0 || (await fetchWishes(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
     }
