@@ -35,7 +35,8 @@ const typescript = (joined) => ({
   load: async (id) => {
     if (!id.endsWith('.ts')) return null;
     const { code, map } = await transform(readFileSync(id, 'utf8'), { loader: 'ts', target: 'es2022', sourcemap: 'external', sourcefile: id });
-    return { code, map };
+    // Declarations of one kind are joined; of the same length, so that maps stay right. No text of ours has that word.
+    return { code: code.replace(/\bconst (?=[\w${[])/g, 'let   '), map };
   },
 });
 
@@ -56,7 +57,8 @@ const internal = [
 function minified(names) {
   const options = {
     module: true, ecma: 2022, nameCache: {}, sourceMap: true,
-    compress: { passes: 3, unsafe_arrows: true, unsafe_methods: true },
+    // Not unsafe_comps, which knows no NaN.
+    compress: { passes: 6, hoist_funs: true, lhs_constants: false, unsafe: true, unsafe_arrows: true, unsafe_methods: true },
     mangle: { properties: { regex: new RegExp(`_$|^(${names.join('|')})$`) } },
   };
   let turn = Promise.resolve();
