@@ -18,16 +18,26 @@ constexpr std::array<int, 64> kLumaQuantisers{
 /// How fine a whole quality quantises: log of the mean of 1 / (step + 1). Unlike g(Q) it knows that steps are
 /// whole numbers from 1 to 255, which is what bends sizes at both ends; 1 instead of the dead zone's half
 /// fitted best. Strictly rising.
-double fineness_at(int quality) {
+double measure_fineness(int quality) {
   const int percent = quality < 50 ? 5000 / quality : 200 - 2 * quality;
   double sum = 0;
   for (const int q : kLumaQuantisers) sum += 1.0 / (std::clamp((q * percent + 50) / 100, 1, 255) + 1);
   return portable::log(sum / 64);
 }
 
+/// Looked up: every fragment's every rung asks.
+double fineness_at(int quality) {
+  static const std::array<double, 101> by_quality = [] {
+    std::array<double, 101> out{};
+    for (int q = 1; q <= 100; ++q) out[static_cast<std::size_t>(q)] = measure_fineness(q);
+    return out;
+  }();
+  return by_quality[static_cast<std::size_t>(quality)];
+}
+
 /// The same for any quality: linear between the whole ones.
 double fineness(double quality) {
-  const double q = std::clamp(quality, 1.0, 100.0);
+  const double q = quality > 1 ? std::min(quality, 100.0) : 1.0;
   const int below = static_cast<int>(q);
   const double low = fineness_at(below), part = q - below;
   return part > 0 ? low + part * (fineness_at(below + 1) - low) : low;
@@ -66,11 +76,13 @@ double axis_at(const PlaneTables& t, double quality) {
     return fineness(quality);
   AxisKnot a{static_cast<double>(*(above - 1)), 0}, b{static_cast<double>(*above), 1};
   const double low = fineness(a.quality), high = fineness(b.quality);
-  for (std::size_t k = 0; k < t.knot_quality.size(); ++k) {
-    const AxisKnot knot{static_cast<double>(t.knot_quality[k]), static_cast<double>(t.knot_position[k])};
-    if (knot.quality > a.quality && knot.quality <= quality) a = knot;
-    if (knot.quality < b.quality && knot.quality > quality) b = knot;
-  }
+  const auto knot = [&t](std::size_t k) {
+    return AxisKnot{static_cast<double>(t.knot_quality[k]), static_cast<double>(t.knot_position[k])};
+  };
+  const auto k = static_cast<std::size_t>(
+      std::upper_bound(t.knot_quality.begin(), t.knot_quality.end(), quality) - t.knot_quality.begin());
+  if (k > 0 && knot(k - 1).quality > a.quality) a = knot(k - 1);
+  if (k < t.knot_quality.size() && knot(k).quality < b.quality) b = knot(k);
   const double from = fineness(a.quality);
   const double part = (fineness(quality) - from) / (fineness(b.quality) - from);
   return low + (a.position + part * (b.position - a.position)) * (high - low);

@@ -54,7 +54,9 @@ class JpegCodec : public TextureCodec {
     return rungs;
   }
 
-  std::unique_ptr<FragmentEncoder> encoder() const override { return std::make_unique<Encoder>(*this); }
+  std::unique_ptr<FragmentEncoder> encoder(std::span<const std::size_t> rungs) const override {
+    return std::make_unique<Encoder>(*this, rungs);
+  }
 
  private:
   /// Of one rung: what masked blocks are to be chosen by, and symbols.
@@ -111,8 +113,10 @@ class JpegCodec : public TextureCodec {
 
   class Encoder : public FragmentEncoder {
    public:
-    explicit Encoder(const JpegCodec& codec) : masked_(kind_of(codec.plane_, codec.plane_.qualities[0])) {
-      for (std::size_t r = 0; r < codec.tables_.size(); ++r) {
+    Encoder(const JpegCodec& codec, std::span<const std::size_t> rungs)
+        : masked_(kind_of(codec.plane_, codec.plane_.qualities[0])) {
+      for (std::size_t k = 0; k < (rungs.empty() ? codec.tables_.size() : rungs.size()); ++k) {
+        const std::size_t r = rungs.empty() ? k : rungs[k];
         const JpegKind kind = kind_of(codec.plane_, codec.plane_.qualities[r]);
         coders_.push_back(std::make_unique<JpegCoder>(kind));
         coders_.back()->use_tables(codec.tables_[r]);

@@ -66,13 +66,15 @@ class ProgressiveCodec : public TextureCodec {
     return rungs;
   }
 
-  std::unique_ptr<FragmentEncoder> encoder() const override { return std::make_unique<Encoder>(*this); }
+  std::unique_ptr<FragmentEncoder> encoder(std::span<const std::size_t> rungs) const override {
+    return std::make_unique<Encoder>(*this, rungs.empty() ? scans_.size() : rungs.size());
+  }
 
  private:
   /// Squared error of the sample at every rung.
   std::vector<double> errors_of_rungs(std::span<const PixelWindow> sample) const {
     std::vector<double> errors(scans_.size());
-    Encoder encoder(*this);
+    Encoder encoder(*this, scans_.size());
     JpegCoder coder(kind_of(plane_, quality_, true));
     for (const PixelWindow& window : sample) {
       std::vector<std::vector<std::uint8_t>> streams(scans_.size());
@@ -115,8 +117,8 @@ class ProgressiveCodec : public TextureCodec {
 
   class Encoder : public FragmentEncoder {
    public:
-    explicit Encoder(const ProgressiveCodec& codec)
-        : scans_(codec.scans_), coder_(kind_of(codec.plane_, codec.quality_, true)) {}
+    Encoder(const ProgressiveCodec& codec, std::size_t rungs)
+        : scans_(codec.scans_), rungs_(rungs), coder_(kind_of(codec.plane_, codec.quality_, true)) {}
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
       body_.clear();
       coder_.append_body(fragment, body_);
@@ -125,7 +127,7 @@ class ProgressiveCodec : public TextureCodec {
         throw StageError("ladder", "progressive file", std::to_string(scans_.back()) + " scans",
                          std::to_string(ends.size()));
       std::size_t begin = 0;
-      for (std::size_t r = 0; r < scans_.size(); ++r) {
+      for (std::size_t r = 0; r < rungs_; ++r) {
         const std::size_t end = ends[scans_[r] - 1];
         streams[r].insert(streams[r].end(), body_.begin() + static_cast<std::ptrdiff_t>(begin),
                           body_.begin() + static_cast<std::ptrdiff_t>(end));
@@ -135,6 +137,7 @@ class ProgressiveCodec : public TextureCodec {
 
    private:
     const std::vector<std::size_t>& scans_;
+    std::size_t rungs_;
     JpegCoder coder_;
     std::vector<std::uint8_t> body_;
   };

@@ -3,6 +3,7 @@
 #include <webp/encode.h>
 
 #include <string>
+#include <utility>
 
 #include "format/errors.h"
 #include "stages/texture_codecs.h"
@@ -73,19 +74,24 @@ class WebpCodec : public TextureCodec {
     for (const int quality : plane_.qualities) rungs.push_back({quality, {}});
     return rungs;
   }
-  std::unique_ptr<FragmentEncoder> encoder() const override { return std::make_unique<Encoder>(plane_); }
+  std::unique_ptr<FragmentEncoder> encoder(std::span<const std::size_t> rungs) const override {
+    if (rungs.empty()) return std::make_unique<Encoder>(plane_.qualities);
+    std::vector<int> qualities;
+    for (const std::size_t r : rungs) qualities.push_back(plane_.qualities[r]);
+    return std::make_unique<Encoder>(std::move(qualities));
+  }
 
  private:
   class Encoder : public FragmentEncoder {
    public:
-    explicit Encoder(const PlaneCoding& plane) : plane_(plane) {}
+    explicit Encoder(std::vector<int> qualities) : qualities_(std::move(qualities)) {}
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
-      for (std::size_t r = 0; r < plane_.qualities.size(); ++r)  // WebPEncode() changes the picture
-        Picture(fragment).encode(plane_.qualities[r], streams[r]);
+      for (std::size_t r = 0; r < qualities_.size(); ++r)  // WebPEncode() changes the picture
+        Picture(fragment).encode(qualities_[r], streams[r]);
     }
 
    private:
-    const PlaneCoding& plane_;
+    std::vector<int> qualities_;
   };
   PlaneCoding plane_;
 };

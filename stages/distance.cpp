@@ -53,7 +53,8 @@ std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
 double box_distance2(Vec3d p, Vec3f lo, Vec3f hi) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
-    const double d = std::max({static_cast<double>(lo[k]) - p[k], p[k] - static_cast<double>(hi[k]), 0.0});
+    const double below = static_cast<double>(lo[k]) - p[k], above = p[k] - static_cast<double>(hi[k]);
+    const double d = std::max(std::max(below, above), 0.0);
     sum += d * d;
   }
   return sum;

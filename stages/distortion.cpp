@@ -35,35 +35,38 @@ DistortionMeter::DistortionMeter(std::vector<std::uint8_t> source, std::vector<s
     }
 }
 
-DistortionMeter::DecodedCell DistortionMeter::decoded_cell(const std::vector<std::uint8_t>& decoded,
-                                                           std::uint32_t column, std::uint32_t row) const {
-  DecodedCell out{0, 0, 0};
-  const std::size_t start = std::size_t{row} * 4 * width_ + column * 4;
+/// A row of cells: first down the columns of texels, which runs in lanes, then four columns each. `sums` is
+/// room for 3 x width.
+void DistortionMeter::sum_cells(const std::vector<std::uint8_t>& decoded, std::uint32_t row,
+                                std::vector<DecodedCell>& out, std::vector<std::uint32_t>& sums) const {
+  const std::size_t width = width_;
+  sums.assign(3 * width, 0);
+  std::uint32_t *sum = sums.data(), *square = sum + width, *product = square + width;
   for (std::size_t y = 0; y < 4; ++y) {
-    const std::size_t at = start + y * width_;
-    for (std::size_t x = 0; x < 4; ++x) {
-      const std::uint32_t value = decoded[at + x] & mask_[at + x];
-      out.sum += value;
-      out.square += value * value;
-      out.product += value * source_[at + x];
+    const std::size_t at = (std::size_t{row} * 4 + y) * width;
+    const std::uint8_t *shown = decoded.data() + at, *mask = mask_.data() + at, *source = source_.data() + at;
+    for (std::size_t x = 0; x < width; ++x) {
+      const auto value = static_cast<std::uint16_t>(shown[x] & mask[x]);
+      sum[x] += value;
+      square[x] += static_cast<std::uint16_t>(value * value);
+      product[x] += static_cast<std::uint16_t>(value * source[x]);
     }
   }
-  return out;
+  const auto four = [](const std::uint32_t* of) { return of[0] + of[1] + of[2] + of[3]; };
+  for (std::size_t c = 0; c < columns_; ++c)
+    out[c] = {four(sum + 4 * c), four(square + 4 * c), four(product + 4 * c)};
 }
 
 Distortion DistortionMeter::against(const std::vector<std::uint8_t>& decoded) const {
   std::uint64_t count = 0, error = 0, weight = 0;
   double similarity = 0;
   std::vector<DecodedCell> above(columns_), here(columns_);
+  std::vector<std::uint32_t> sums;
   for (std::uint32_t r = 0; r < rows_; ++r) {
     above.swap(here);
+    sum_cells(decoded, r, here, sums);
     for (std::uint32_t c = 0; c < columns_; ++c) {
       const SourceCell& s = cells_[std::size_t{r} * columns_ + c];
-      if (s.count == 0) {
-        here[c] = {0, 0, 0};
-        continue;
-      }
-      here[c] = decoded_cell(decoded, c, r);
       count += s.count;
       error += s.square + here[c].square - 2 * std::uint64_t{here[c].product};
     }

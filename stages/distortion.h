@@ -32,8 +32,8 @@ class DistortionMeter {
   struct DecodedCell {
     std::uint32_t sum, square, product;
   };
-  DecodedCell decoded_cell(const std::vector<std::uint8_t>& decoded, std::uint32_t column,
-                           std::uint32_t row) const;
+  void sum_cells(const std::vector<std::uint8_t>& decoded, std::uint32_t row, std::vector<DecodedCell>& out,
+                 std::vector<std::uint32_t>& sums) const;
 
   std::vector<std::uint8_t> source_, mask_;  // source_ is 0 where the mask is
   std::uint32_t width_, columns_, rows_;     // in cells

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "format/portable_math.h"
+#include "stages/block_transform.h"
 #include "stages/parallel.h"
 
 namespace texmesh {
@@ -12,79 +12,23 @@ namespace {
 
 constexpr std::uint32_t kMcu = 16;
 constexpr int kIterations = 16;
-constexpr double kLastThreshold = 8;  // of orthonormal DCT coefficients: about what quality 75 rounds to 0
-constexpr int kSameLevel = 6;         // flat neighbours that differ by no more get one value
+constexpr float kLastThreshold = 8;  // of orthonormal DCT coefficients: about what quality 75 rounds to 0
+constexpr int kSameLevel = 6;        // flat neighbours that differ by no more get one value
 
-using Block = std::array<double, 64>;
 using Mask = std::array<bool, 64>;
 
-/// Orthonormal DCT-II: row k, column n.
-const Block& dct_matrix() {
-  static const Block matrix = [] {
-    Block m{};
-    for (int k = 0; k < 8; ++k)
-      for (int n = 0; n < 8; ++n)
-        m[static_cast<std::size_t>(k * 8 + n)] =
-            (k == 0 ? std::sqrt(0.125) : 0.5) * portable::cos((2 * n + 1) * k * portable::kPi / 16);
-    return m;
-  }();
-  return matrix;
-}
-
-/// The transform along columns: out[k] = sum of m[k][n] x[n] over rows n, or back. Cosines are symmetric
-/// about the middle for even k and antisymmetric for odd k, which halves the products.
-template <bool kInverse>
-void transform_columns(const Block& x, Block& out) {
-  const Block& m = dct_matrix();
-  double even[4][8] = {}, odd[4][8] = {};
-  for (std::size_t n = 0; n < 4; ++n) {
-    if constexpr (kInverse) {
-      for (std::size_t k = 0; k < 8; k += 2)
-        for (std::size_t j = 0; j < 8; ++j) {
-          even[n][j] += m[k * 8 + n] * x[k * 8 + j];
-          odd[n][j] += m[(k + 1) * 8 + n] * x[(k + 1) * 8 + j];
-        }
-    } else {
-      for (std::size_t j = 0; j < 8; ++j) {
-        const double sum = x[n * 8 + j] + x[(7 - n) * 8 + j], difference = x[n * 8 + j] - x[(7 - n) * 8 + j];
-        for (std::size_t k = 0; k < 4; ++k) {
-          even[k][j] += m[2 * k * 8 + n] * sum;
-          odd[k][j] += m[(2 * k + 1) * 8 + n] * difference;
-        }
-      }
-    }
-  }
-  for (std::size_t k = 0; k < 4; ++k)
-    for (std::size_t j = 0; j < 8; ++j) {
-      out[(kInverse ? k : 2 * k) * 8 + j] = kInverse ? even[k][j] + odd[k][j] : even[k][j];
-      out[(kInverse ? 7 - k : 2 * k + 1) * 8 + j] = kInverse ? even[k][j] - odd[k][j] : odd[k][j];
-    }
-}
-
-/// The transform along both axes; the transposes cancel when done twice.
-template <bool kInverse>
-void transform(Block& x) {
-  Block half;
-  for (int axis = 0; axis < 2; ++axis) {
-    transform_columns<kInverse>(x, half);
-    for (std::size_t i = 0; i < 8; ++i)
-      for (std::size_t j = 0; j < 8; ++j) x[i * 8 + j] = half[j * 8 + i];
-  }
-}
-
 /// Unknown values become those of a block with few coefficients that agrees with the known ones.
-void extrapolate(Block& values, const Mask& known) {
-  double threshold = 0, first = 0;
+void extrapolate(BlockValues& values, const Mask& known) {
+  float first = 0;
   for (int step = 0; step < kIterations; ++step) {
-    Block x = values;
-    transform<false>(x);
+    BlockValues x = block_dct(values);
     if (step == 0)
       for (std::size_t k = 1; k < 64; ++k) first = std::max(first, std::fabs(x[k]));
-    if (first <= kLastThreshold) first = kLastThreshold;
-    threshold = first + (kLastThreshold - first) * (step + 1) / kIterations;
+    first = std::max(first, kLastThreshold);
+    const float threshold = first + (kLastThreshold - first) * static_cast<float>(step + 1) / kIterations;
     for (std::size_t k = 1; k < 64; ++k)
       if (std::fabs(x[k]) < threshold) x[k] = 0;
-    transform<true>(x);
+    x = block_inverse_dct(x);
     for (std::size_t k = 0; k < 64; ++k)
       if (!known[k]) values[k] = x[k];
   }
@@ -141,11 +85,11 @@ class Mcu {
   }
 
   void extrapolate_all() {
-    std::array<double, 256> luma;
+    std::array<float, 256> luma;
     for (std::uint32_t y = 0; y < kMcu; ++y)
-      for (std::uint32_t x = 0; x < kMcu; ++x) luma[y * kMcu + x] = luma_at(x, y);
+      for (std::uint32_t x = 0; x < kMcu; ++x) luma[y * kMcu + x] = static_cast<float>(luma_at(x, y));
     for (std::uint32_t b = 0; b < 4; ++b) extrapolate_luma(luma, b % 2 * 8, b / 2 * 8);
-    Block cb{}, cr{};
+    BlockValues cb{}, cr{};
     if (C == 3) extrapolate_chroma(cb, cr);
     std::array<ByteRange, 3> range;
     for (std::uint32_t y = 0; y < kMcu; ++y)
@@ -154,13 +98,14 @@ class Mcu {
     for (std::uint32_t y = 0; y < kMcu; ++y)
       for (std::uint32_t x = 0; x < kMcu; ++x) {
         if (covered(x, y)) continue;
-        const double l = luma[y * kMcu + x];
+        const double l = static_cast<double>(luma[y * kMcu + x]);
         std::uint8_t* to = at(x, y);
         if (C == 1) {
           to[0] = range[0].cut(l);
           continue;
         }
-        const double b = cb[y / 2 * 8 + x / 2], r = cr[y / 2 * 8 + x / 2];
+        const auto b = static_cast<double>(cb[y / 2 * 8 + x / 2]),
+                   r = static_cast<double>(cr[y / 2 * 8 + x / 2]);
         to[0] = range[0].cut(l + 1.402 * r);
         to[1 % C] = range[1].cut(l - 0.344136 * b - 0.714136 * r);
         to[2 % C] = range[2].cut(l + 1.772 * b);
@@ -176,11 +121,11 @@ class Mcu {
     return C == 1 ? p[0] : 0.299 * p[0] + 0.587 * p[1 % C] + 0.114 * p[2 % C];
   }
 
-  void extrapolate_luma(std::array<double, 256>& luma, std::uint32_t left, std::uint32_t top) {
-    Block block;
+  void extrapolate_luma(std::array<float, 256>& luma, std::uint32_t left, std::uint32_t top) {
+    BlockValues block;
     Mask known;
     std::size_t count = 0;
-    double sum = 0;
+    float sum = 0;
     for (std::uint32_t k = 0; k < 64; ++k) {
       const std::uint32_t x = left + k % 8, y = top + k / 8;
       block[k] = luma[y * kMcu + x];
@@ -198,7 +143,7 @@ class Mcu {
 
   /// A chroma sample is known where one of its four texels is: the others then get the same, and JPEG's mean
   /// of the four is what the covered ones have.
-  void extrapolate_chroma(Block& cb, Block& cr) {
+  void extrapolate_chroma(BlockValues& cb, BlockValues& cr) {
     Mask known;
     for (std::uint32_t k = 0; k < 64; ++k) {
       double sums[2][2] = {};  // covered?, blue and red
@@ -214,8 +159,8 @@ class Mcu {
       }
       known[k] = counts[1] > 0;
       const int from = known[k] ? 1 : 0;
-      cb[k] = sums[from][0] / counts[from];
-      cr[k] = sums[from][1] / counts[from];
+      cb[k] = static_cast<float>(sums[from][0] / counts[from]);
+      cr[k] = static_cast<float>(sums[from][1] / counts[from]);
     }
     extrapolate(cb, known);
     extrapolate(cr, known);

@@ -22,14 +22,9 @@ std::size_t measured_channels(const TexturePlane& plane) {
   return is_colour(plane.role) ? 1 : plane.channels;
 }
 
-std::uint8_t measured_value(const std::uint8_t* texel, std::uint32_t channels, std::size_t measured,
-                            std::size_t c) {
-  if (channels == 1 || measured > 1) return texel[c];
-  return static_cast<std::uint8_t>((19595 * texel[0] + 38470 * texel[1] + 7471 * texel[2] + 32768) >> 16);
-}
-
 Samples split_samples(const Pixels& pixels, std::size_t measured) {
   const std::size_t texels = std::size_t{pixels.width_px} * pixels.height_px;
+  if (pixels.channels == 1) return {pixels.data};
   Samples out(measured, std::vector<std::uint8_t>(texels));
   for (std::size_t c = 0; c < measured; ++c)
     for (std::size_t i = 0; i < texels; ++i)

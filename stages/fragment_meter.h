@@ -16,8 +16,11 @@ using Samples = std::vector<std::vector<std::uint8_t>>;
 std::size_t measured_channels(const TexturePlane& plane);
 
 /// Channel `c` of `measured` of a texel with `channels`.
-std::uint8_t measured_value(const std::uint8_t* texel, std::uint32_t channels, std::size_t measured,
-                            std::size_t c);
+inline std::uint8_t measured_value(const std::uint8_t* texel, std::uint32_t channels, std::size_t measured,
+                                   std::size_t c) {
+  if (channels == 1 || measured > 1) return texel[c];
+  return static_cast<std::uint8_t>((19595 * texel[0] + 38470 * texel[1] + 7471 * texel[2] + 32768) >> 16);
+}
 
 /// The measured channels of pixels that have as many, or 1 or 3.
 Samples split_samples(const Pixels& pixels, std::size_t measured);

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kFragmentationVersion = 6;
+inline constexpr int kFragmentationVersion = 7;
 
 enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>

@@ -19,7 +19,7 @@ namespace {
 // Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (16
 // rungs gain 0.1 dB over 10).
 constexpr std::size_t kMaxRungs = 16;
-constexpr std::size_t kFragmentsPerTask = 2;
+constexpr std::size_t kFragmentsPerTask = 1;
 constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
 
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
@@ -199,15 +199,23 @@ void encode_preview(const TexturePlane& plane, const Pixels& pixels, const Ladde
     encode(halved(eighth, eighth.width_px, eighth.height_px, kind));
 }
 
+/// What is encoded of one plane.
+struct PlaneWork {
+  std::vector<std::uint8_t> wanted;  // by fragment, 1 or 0; empty: the plane is left alone
+  std::vector<std::size_t> rungs;    // of the codec's; empty: all
+  std::vector<LadderRung> known;     // fragments stored there are taken as they are
+};
+
 /// A few neighbouring fragments at every rung: what one thread encodes at a time.
 struct EncodeTask {
   std::size_t plane, first, last;
 };
 
-std::vector<EncodeTask> encode_tasks(const Fragments& fragments) {
+std::vector<EncodeTask> encode_tasks(const Fragments& fragments, const std::vector<PlaneWork>& work) {
   std::vector<EncodeTask> tasks;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p)
-    for (std::size_t f = 0; f < fragments.planes[p].fragment_count(); f += kFragmentsPerTask)
+    for (std::size_t f = 0; !work[p].wanted.empty() && f < fragments.planes[p].fragment_count();
+         f += kFragmentsPerTask)
       tasks.push_back({p, f, std::min(f + kFragmentsPerTask, fragments.planes[p].fragment_count())});
   return tasks;
 }
@@ -221,14 +229,15 @@ struct Encoded {
 /// Encoders that no thread uses at the moment. Tasks come plane by plane, so those of other planes go.
 class EncoderPool {
  public:
-  explicit EncoderPool(const std::vector<std::unique_ptr<TextureCodec>>& codecs) : codecs_(codecs) {}
+  EncoderPool(const std::vector<std::unique_ptr<TextureCodec>>& codecs, const std::vector<PlaneWork>& work)
+      : codecs_(codecs), work_(work) {}
   std::unique_ptr<FragmentEncoder> take(std::size_t plane) {
     const std::lock_guard lock(mutex_);
     if (plane > plane_) {
       plane_ = plane;
       free_.clear();
     }
-    if (plane < plane_ || free_.empty()) return codecs_[plane]->encoder();
+    if (plane < plane_ || free_.empty()) return codecs_[plane]->encoder(work_[plane].rungs);
     auto encoder = std::move(free_.back());
     free_.pop_back();
     return encoder;
@@ -240,6 +249,7 @@ class EncoderPool {
 
  private:
   const std::vector<std::unique_ptr<TextureCodec>>& codecs_;
+  const std::vector<PlaneWork>& work_;
   std::mutex mutex_;
   std::size_t plane_ = 0;
   std::vector<std::unique_ptr<FragmentEncoder>> free_;
@@ -274,23 +284,39 @@ class OrderedRungs {
   std::map<std::size_t, Encoded> waiting_;
 };
 
+/// Whether the fragment was there.
+bool take_known(const std::vector<LadderRung>& known, std::size_t fragment, Encoded& out) {
+  if (known.empty() || fragment_stream(known[0], fragment).empty()) return false;
+  for (std::size_t r = 0; r < known.size(); ++r) {
+    const auto stream = fragment_stream(known[r], fragment);
+    out.data[r].insert(out.data[r].end(), stream.begin(), stream.end());
+  }
+  return true;
+}
+
 Encoded encode_task(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, std::size_t rungs,
-                    const EncodeTask& task, FragmentEncoder& encoder) {
+                    const PlaneWork& work, const EncodeTask& task, FragmentEncoder& encoder) {
   Encoded out;
   out.data.resize(rungs);
   out.ends.resize(rungs);
   for (std::size_t f = task.first; f < task.last; ++f) {
-    if (plane.covered_texels[f] > 0) encoder.encode(window_of(plane, pixels, uncovered, f), out.data);
+    if (work.wanted[f] && plane.covered_texels[f] > 0 && !take_known(work.known, f, out))
+      encoder.encode(window_of(plane, pixels, uncovered, f), out.data);
     for (std::size_t r = 0; r < rungs; ++r) out.ends[r].push_back(out.data[r].size());
   }
   return out;
 }
 
+struct Progress {
+  double begin, end;
+};
+
 void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels, Uncovered uncovered,
-                   const std::vector<std::unique_ptr<TextureCodec>>& codecs, std::vector<PlaneLadder>& planes,
+                   const std::vector<std::unique_ptr<TextureCodec>>& codecs,
+                   const std::vector<PlaneWork>& work, std::vector<PlaneLadder>& planes, Progress progress,
                    const RunContext& context) {
-  const std::vector<EncodeTask> tasks = encode_tasks(fragments);
-  EncoderPool encoders(codecs);
+  const std::vector<EncodeTask> tasks = encode_tasks(fragments, work);
+  EncoderPool encoders(codecs, work);
   OrderedRungs rungs(planes, tasks);
   std::atomic<std::size_t> next{0}, done{0};
   parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -298,12 +324,42 @@ void encode_planes(const Fragments& fragments, const std::vector<Pixels>& pixels
       const std::size_t t = next++;  // in order, whatever part of the range a thread was given
       const std::size_t p = tasks[t].plane;
       auto encoder = encoders.take(p);
-      rungs.add(t, encode_task(fragments.planes[p], pixels[p], uncovered, planes[p].rungs.size(), tasks[t],
-                               *encoder));
+      rungs.add(t, encode_task(fragments.planes[p], pixels[p], uncovered, planes[p].rungs.size(), work[p],
+                               tasks[t], *encoder));
       encoders.give_back(p, std::move(encoder));
-      context.report(0.2 + 0.8 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
+      const double part = static_cast<double>(++done) / static_cast<double>(tasks.size());
+      context.report(progress.begin + (progress.end - progress.begin) * part);
     }
   });
+}
+
+/// First what choosing the rungs takes: of mips a few fragments.
+std::vector<PlaneWork> first_work(const Fragments& fragments, double hull_gain) {
+  std::vector<PlaneWork> work(fragments.planes.size());
+  std::vector<std::vector<std::uint8_t>> sample = hull_sample(fragments);
+  for (std::size_t p = 0; p < work.size(); ++p) {
+    if (hull_gain < 0) sample[p].assign(sample[p].size(), 1);
+    work[p].wanted = std::move(sample[p]);
+  }
+  return work;
+}
+
+/// Then, at the rungs that stay, what mips lack. What they have moves from the ladder to the work.
+std::vector<PlaneWork> remaining_work(const std::vector<PlaneWork>& before,
+                                      std::vector<std::vector<std::size_t>> kept,
+                                      std::vector<PlaneLadder>& planes) {
+  std::vector<PlaneWork> work(before.size());
+  for (std::size_t p = 0; p < work.size(); ++p) {
+    const std::vector<std::uint8_t>& had = before[p].wanted;
+    if (std::find(had.begin(), had.end(), 0) == had.end()) continue;
+    work[p].wanted.assign(had.size(), 1);
+    work[p].rungs = std::move(kept[p]);
+    for (LadderRung& rung : planes[p].rungs) {
+      LadderRung empty{rung.quality, rung.tables, {}, {0}};
+      work[p].known.push_back(std::exchange(rung, std::move(empty)));
+    }
+  }
+  return work;
 }
 
 }  // namespace
@@ -335,8 +391,13 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
       encode_preview(fragments.planes[p], pixels[p], options, inner, ladder.planes[p]);
   });
   context.report(0.2);
-  encode_planes(fragments, pixels, options.uncovered, codecs, ladder.planes, context);
-  drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
+  const auto encode = [&](const std::vector<PlaneWork>& work, Progress progress) {
+    encode_planes(fragments, pixels, options.uncovered, codecs, work, ladder.planes, progress, context);
+  };
+  const std::vector<PlaneWork> first = first_work(fragments, options.hull_gain);
+  encode(first, {0.2, 0.85});
+  auto kept = drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
+  encode(remaining_work(first, std::move(kept), ladder.planes), {0.9, 1});
   return ladder;
 }
 

@@ -121,8 +121,9 @@ struct Ladder {
 /// that no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment
 /// has tables and a preview but no data. Works on the pixels as they stand: beside the result it takes some
 /// fragments' streams per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for
-/// pixels that do not fit the planes. Same bytes for any thread count. Rungs of mips that lie off the hull
-/// are dropped (stages/rung_hull.h).
+/// pixels that do not fit the planes. Same bytes for any thread count. Of mips a few
+/// fragments are encoded at every rung, which decide what rungs are worth storing (stages/rung_hull.h), and
+/// then the others at these.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context);
 

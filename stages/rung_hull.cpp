@@ -15,6 +15,9 @@ namespace {
 
 constexpr std::size_t kWindows = 6;
 constexpr std::uint32_t kWindowPx = 128;
+// Mips show their source's windows interpolated. So far from the border of a fragment that one of a mip's
+// fragments, which covers four of the source's, is enough: fewer to encode and to decode.
+constexpr std::uint32_t kInsetPx = 16;
 // Where a mip is what the display shows, 1 - SSIM that its best rung must come down to. Scans of 2048 px:
 // 0.02 is quality 86 to 93 and takes 12 % of the full size's bytes for all mips of a colour; 0.01 would take
 // 20 %.
@@ -40,13 +43,14 @@ std::vector<std::uint8_t> mask_of(const TexturePlane& plane, const Window& w) {
   return out;
 }
 
-/// Of the fragment's middle and corners the one with most covered texels.
-Window window_in(const TexturePlane& plane, std::size_t fragment) {
-  const std::uint32_t w = std::min(kWindowPx, plane.fragment_width_px);
-  const std::uint32_t h = std::min(kWindowPx, plane.fragment_height_px);
-  const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * plane.fragment_width_px;
-  const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * plane.fragment_height_px;
-  const std::uint32_t right = plane.fragment_width_px - w, low = plane.fragment_height_px - h;
+/// Of the fragment's middle and corners, `inset` from its border, the one with most covered texels.
+Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t inset) {
+  if (std::min(plane.fragment_width_px, plane.fragment_height_px) < 4 * inset) inset = 0;
+  const std::uint32_t width = plane.fragment_width_px - 2 * inset, w = std::min(kWindowPx, width);
+  const std::uint32_t height = plane.fragment_height_px - 2 * inset, h = std::min(kWindowPx, height);
+  const auto left = static_cast<std::uint32_t>(fragment % plane.columns) * plane.fragment_width_px + inset;
+  const auto top = static_cast<std::uint32_t>(fragment / plane.columns) * plane.fragment_height_px + inset;
+  const std::uint32_t right = width - w, low = height - h;
   Window best;
   for (const auto& [x, y] : {std::pair{right / 2, low / 2}, std::pair{0u, 0u}, std::pair{right, 0u},
                              std::pair{0u, low}, std::pair{right, low}}) {
@@ -59,18 +63,22 @@ Window window_in(const TexturePlane& plane, std::size_t fragment) {
 }
 
 /// In every `sparseness`-th covered fragment, up to kWindows.
-std::vector<Window> sample_windows(const TexturePlane& plane, std::size_t sparseness) {
+std::vector<Window> sample_windows(const TexturePlane& plane, std::size_t sparseness, std::uint32_t inset) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
     if (plane.covered_texels[f] > 0) covered.push_back(f);
   const std::size_t count = std::min(kWindows, (covered.size() + sparseness - 1) / sparseness);
   std::vector<Window> out;
   for (std::size_t k = 0; k < count; ++k) {
-    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)]);
+    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)], inset);
     if (w.covered > 0) out.push_back(w);
   }
   return out;
 }
+
+/// Of a full-size plane, to be shown by its mips, and of a mip for itself.
+std::vector<Window> chain_windows(const TexturePlane& full) { return sample_windows(full, 4, kInsetPx); }
+std::vector<Window> own_windows(const TexturePlane& mip) { return sample_windows(mip, 1, 0); }
 
 /// Where between two coarse texels a full-size one lies, in 1 / 256.
 struct Place {
@@ -142,18 +150,37 @@ Samples scaled_up(const Patch& patch, const std::vector<Place>& across, const st
   return out;
 }
 
+/// What of a level a window of the full size shows.
+struct Support {
+  std::vector<Place> across, down;
+  Support(const TexturePlane& full, const TexturePlane& plane, const Window& window)
+      : across(places(window.x, window.width, full.width_px, plane.width_px)),
+        down(places(window.y, window.height, full.height_px, plane.height_px)) {}
+  std::uint32_t left() const { return across.front().first; }
+  std::uint32_t right() const { return across.back().second; }
+  std::uint32_t top() const { return down.front().first; }
+  std::uint32_t low() const { return down.back().second; }
+};
+
 /// The window as a level shows it, scaled up to the full size.
 Samples show(const TexturePlane& full, const TexturePlane& plane, const Pixels& pixels,
              const PlaneLadder& ladder, std::size_t rung, const Window& window) {
-  const std::vector<Place> across = places(window.x, window.width, full.width_px, plane.width_px);
-  const std::vector<Place> down = places(window.y, window.height, full.height_px, plane.height_px);
+  const Support s(full, plane, window);
   const Patch patch = decode_patch(plane, pixels, ladder, rung,
-                                   {across.front().first,
-                                    down.front().first,
-                                    across.back().second - across.front().first + 1,
-                                    down.back().second - down.front().first + 1,
-                                    {}});
-  return scaled_up(patch, across, down);
+                                   {s.left(), s.top(), s.right() - s.left() + 1, s.low() - s.top() + 1, {}});
+  return scaled_up(patch, s.across, s.down);
+}
+
+/// The mip's fragments that windows of a full-size plane, or its own, show.
+void mark_shown(const TexturePlane& full, const TexturePlane& mip, const std::vector<Window>& windows,
+                std::vector<std::uint8_t>& marks) {
+  for (const Window& window : windows) {
+    const Support s(full, mip, window);
+    for (std::uint32_t row = s.top() / mip.fragment_height_px; row <= s.low() / mip.fragment_height_px; ++row)
+      for (std::uint32_t column = s.left() / mip.fragment_width_px;
+           column <= s.right() / mip.fragment_width_px; ++column)
+        marks[std::size_t{row} * mip.columns + column] = 1;
+  }
 }
 
 /// The window as the preview shows it.
@@ -214,13 +241,19 @@ double hull_loss(const std::vector<RungPair>& pairs, const std::vector<std::size
   return pairs[hull.back()].loss;
 }
 
-void keep_rungs(std::vector<std::uint8_t> of_rung, PlaneLadder& plane) {
+/// Returns the indices of those that are kept.
+std::vector<std::size_t> keep_rungs(std::vector<std::uint8_t> of_rung, PlaneLadder& plane) {
   if (codec_traits(plane.codec).incremental)
     for (std::size_t r = of_rung.size() - 1; r-- > 0;) of_rung[r] |= of_rung[r + 1];
   std::vector<LadderRung> rungs;
+  std::vector<std::size_t> kept;
   for (std::size_t r = 0; r < of_rung.size(); ++r)
-    if (of_rung[r]) rungs.push_back(std::move(plane.rungs[r]));
+    if (of_rung[r]) {
+      rungs.push_back(std::move(plane.rungs[r]));
+      kept.push_back(r);
+    }
   plane.rungs = std::move(rungs);
+  return kept;
 }
 
 /// Takes mips' vertices off the hull as long as it hardly rises without them.
@@ -255,10 +288,24 @@ std::size_t nearest_of_level(const std::vector<RungPair>& pairs, const std::vect
   return nearest;
 }
 
+/// How many times the covered texels of the fragments that the ladder holds the plane has.
+double times_held(const TexturePlane& plane, const PlaneLadder& ladder) {
+  double all = 0, held = 0;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
+    all += plane.covered_texels[f];
+    if (!fragment_stream(ladder.rungs[0], f).empty()) held += plane.covered_texels[f];
+  }
+  return held > 0 ? all / held : 1;
+}
+
 /// The plane's rungs as pairs, losses 0.
-void add_pairs(const PlaneLadder& plane, std::size_t level, std::vector<RungPair>& pairs) {
+void add_pairs(const TexturePlane& fragments, const PlaneLadder& plane, std::size_t level,
+               std::vector<RungPair>& pairs) {
+  const double times = times_held(fragments, plane);
   for (std::size_t r = 0; r < plane.rungs.size(); ++r) {
-    std::uint64_t bytes = plane.rungs[r].data.size() + plane.rungs[r].tables.size();
+    std::uint64_t bytes =
+        static_cast<std::uint64_t>(static_cast<double>(plane.rungs[r].data.size()) * times) +
+        plane.rungs[r].tables.size();
     if (codec_traits(plane.codec).incremental && r > 0) bytes += pairs.back().bytes;
     pairs.push_back({level, r, bytes, 0});
   }
@@ -300,14 +347,29 @@ std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, doub
   return keep;
 }
 
+std::vector<std::vector<std::uint8_t>> hull_sample(const Fragments& fragments) {
+  std::vector<std::vector<std::uint8_t>> out;
+  for (const TexturePlane& plane : fragments.planes) {
+    std::vector<std::uint8_t>& marks = out.emplace_back(plane.fragment_count(), plane.mip == 0);
+    if (plane.mip == 0) continue;
+    const TexturePlane& full = fragments.planes[plane.base];
+    mark_shown(full, plane, chain_windows(full), marks);
+    mark_shown(plane, plane, own_windows(plane), marks);
+    std::uint64_t covered = 0;
+    for (std::size_t f = 0; f < marks.size(); ++f) covered += marks[f] ? plane.covered_texels[f] : 0;
+    if (covered == 0) marks.assign(marks.size(), 1);
+  }
+  return out;
+}
+
 std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
                                     const Ladder& ladder, std::size_t base, const RunContext& context) {
   const TexturePlane& full = fragments.planes[base];
   const std::vector<std::size_t> chain = chain_of(fragments, base);
   std::vector<RungPair> pairs;
   for (std::size_t level = 0; level < chain.size(); ++level)
-    add_pairs(ladder.planes[chain[level]], level, pairs);
-  const std::vector<Window> windows = sample_windows(full, 4);
+    add_pairs(fragments.planes[chain[level]], ladder.planes[chain[level]], level, pairs);
+  const std::vector<Window> windows = chain_windows(full);
   std::vector<double> loss(windows.size() * pairs.size());
   parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
@@ -345,14 +407,14 @@ void keep_for_display(const std::vector<RungPair>& own, double shown_well, doubl
 
 std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
                                   const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
-  const std::vector<Window> windows = sample_windows(plane, 1);
+  const std::vector<Window> windows = own_windows(plane);
   if (windows.empty()) return {};
   const std::size_t measured = measured_channels(plane);
   const Pixels file = measured > 1 ? decode_jpeg(preview_file, kMostPreviewPixels)
                                    : decode_jpeg_luma(preview_file, kMostPreviewPixels);
   const Patch preview{0, 0, file.width_px, file.height_px, split_samples(file, measured)};
   std::vector<RungPair> pairs{{0, 0, 0, 0}};
-  add_pairs(ladder, 1, pairs);
+  add_pairs(plane, ladder, 1, pairs);
   std::vector<double> loss(windows.size() * pairs.size());
   parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
@@ -370,10 +432,16 @@ std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixel
   return pairs;
 }
 
-void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double gain,
-                         Ladder& ladder, const RunContext& context) {
+std::vector<std::vector<std::size_t>> drop_rungs_off_hull(const Fragments& fragments,
+                                                          const std::vector<Pixels>& pixels, double gain,
+                                                          Ladder& ladder, const RunContext& context) {
   RunContext inner = context;
   inner.progress = nullptr;
+  std::vector<std::vector<std::size_t>> kept(ladder.planes.size());
+  for (std::size_t p = 0; p < kept.size(); ++p) {
+    kept[p].resize(ladder.planes[p].rungs.size());
+    std::iota(kept[p].begin(), kept[p].end(), std::size_t{0});
+  }
   for (std::size_t base = 0; base < fragments.planes.size(); ++base) {
     if (fragments.planes[base].mip > 0) break;
     const std::vector<std::size_t> chain = chain_of(fragments, base);
@@ -391,9 +459,10 @@ void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& 
         keep_for_display(
             measure_own(fragments.planes[p], pixels[p], plane, ladder.planes[base].preview, inner),
             is_colour(fragments.planes[p].role) ? kShownWell : kDataShownWell, kOwnGain, of_rung);
-      keep_rungs(std::move(of_rung), plane);
+      kept[p] = keep_rungs(std::move(of_rung), plane);
     }
   }
+  return kept;
 }
 
 }  // namespace texmesh

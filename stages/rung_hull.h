@@ -23,7 +23,12 @@ struct RungPair {
 /// rung. Pure; ties by order.
 std::vector<std::uint8_t> worth_storing(const std::vector<RungPair>& pairs, double gain);
 
-/// The pairs of the plane `base` and its mips, by (level, rung). Loss is measured in up to 6 windows of up to
+/// The fragments of every plane that choosing its rungs takes: all of full-size planes, of mips those that
+/// measure_pairs() and measure_own() look at. [plane][fragment], 1 or 0.
+std::vector<std::vector<std::uint8_t>> hull_sample(const Fragments& fragments);
+
+/// The pairs of the plane `base` and its mips, by (level, rung). Where a ladder lacks fragments, bytes are
+/// what those it has let expect of the covered texels. Loss is measured in up to 6 windows of up to
 /// 128 px in covered fragments evenly spread in index order: the decoded texels, scaled up bilinearly as a
 /// client does, against `pixels` of the full size, luma, or
 /// every channel of data, over covered texels. Each window weighs as much as
@@ -46,8 +51,10 @@ void keep_for_display(const std::vector<RungPair>& own, double shown_well, doubl
 
 /// Removes the rungs of mips that neither worth_storing() nor keep_for_display() keeps: the one serves
 /// displays that could show more, the other those that show the mip itself. Rungs of incremental codecs lean
-/// on those below, so there only rungs above the highest kept are removed. A negative gain keeps all.
-void drop_rungs_off_hull(const Fragments& fragments, const std::vector<Pixels>& pixels, double gain,
-                         Ladder& ladder, const RunContext& context);
+/// on those below, so there only rungs above the highest kept are removed. A negative gain keeps all. The
+/// ladder needs only the fragments of hull_sample(). Returns the indices of the rungs that stay, by plane.
+std::vector<std::vector<std::size_t>> drop_rungs_off_hull(const Fragments& fragments,
+                                                          const std::vector<Pixels>& pixels, double gain,
+                                                          Ladder& ladder, const RunContext& context);
 
 }  // namespace texmesh

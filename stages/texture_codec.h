@@ -50,7 +50,7 @@ struct CodecRung {
 class FragmentEncoder {
  public:
   virtual ~FragmentEncoder() = default;
-  /// Appends the fragment's stream of rung r to streams[r].
+  /// Appends the fragment's stream of the encoder's rung r to streams[r].
   virtual void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) = 0;
 };
 
@@ -63,8 +63,9 @@ class TextureCodec {
   /// Chooses rungs and makes their shared tables from a sample of the plane; once, before encoder(). The
   /// sample may be empty. Same result for any thread count.
   virtual std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) = 0;
-  /// Encoders of several threads may run at once. The codec must outlive them.
-  virtual std::unique_ptr<FragmentEncoder> encoder() const = 0;
+  /// Encoders of several threads may run at once. The codec must outlive them. `rungs`: rising indices of
+  /// those that are wanted, of an incremental codec (format/codec.h) the first ones; none stands for all.
+  virtual std::unique_ptr<FragmentEncoder> encoder(std::span<const std::size_t> rungs = {}) const = 0;
 };
 
 /// StageError when the codec cannot code such planes.

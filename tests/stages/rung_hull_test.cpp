@@ -180,6 +180,58 @@ TEST(RungHull, KeptRungsAreTheirWholeSelves) {
   EXPECT_GT(dropped, 0u);
 }
 
+/// The ladder with nothing but the marked fragments.
+Ladder only(const Ladder& ladder, const std::vector<std::vector<std::uint8_t>>& marks) {
+  Ladder out = ladder;
+  for (std::size_t p = 0; p < out.planes.size(); ++p)
+    for (std::size_t r = 0; r < out.planes[p].rungs.size(); ++r) {
+      LadderRung& rung = out.planes[p].rungs[r];
+      rung.data.clear();
+      rung.offset = {0};
+      for (std::size_t f = 0; f < marks[p].size(); ++f) {
+        const auto stream = fragment_stream(ladder.planes[p].rungs[r], f);
+        if (marks[p][f]) rung.data.insert(rung.data.end(), stream.begin(), stream.end());
+        rung.offset.push_back(rung.data.size());
+      }
+    }
+  return out;
+}
+
+TEST(RungHull, TheSampleShowsAllThatIsMeasuredAndItsBytesStandForThePlanes) {
+  const Chain chain = make_chain(false);
+  const auto marks = hull_sample(chain.fragments);
+  ASSERT_EQ(marks.size(), 2u);
+  EXPECT_EQ(std::count(marks[0].begin(), marks[0].end(), 1), 48);
+  EXPECT_EQ(marks[1], (std::vector<std::uint8_t>{0, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1}));
+  const Ladder all = encode(chain, kKeepAll), some = only(all, marks);
+  const auto pairs_of = [&](const Ladder& ladder) {
+    return measure_pairs(chain.fragments, chain.pixels, ladder, 0, RunContext{});
+  };
+  const auto own_of = [&](const Ladder& ladder) {
+    return measure_own(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1], ladder.planes[0].preview,
+                       RunContext{});
+  };
+  for (const auto& [want, got] : {std::pair{pairs_of(all), pairs_of(some)}, {own_of(all), own_of(some)}}) {
+    ASSERT_EQ(want.size(), got.size());
+    for (std::size_t k = 0; k < want.size(); ++k) {
+      EXPECT_EQ(want[k].loss, got[k].loss) << k;
+      EXPECT_NEAR(static_cast<double>(got[k].bytes), static_cast<double>(want[k].bytes),
+                  0.3 * static_cast<double>(want[k].bytes))
+          << k;
+    }
+  }
+}
+
+TEST(RungHull, AMipWhoseSampleShowsNothingIsSampledWhole) {
+  Chain chain = make_chain(false);
+  std::fill(chain.fragments.planes[1].covered_texels.begin(), chain.fragments.planes[1].covered_texels.end(),
+            0u);
+  chain.fragments.planes[1].covered_texels[0] = 1;
+  std::fill(chain.fragments.planes[1].coverage.begin(), chain.fragments.planes[1].coverage.end(),
+            std::uint8_t{0});
+  EXPECT_EQ(hull_sample(chain.fragments)[1], std::vector<std::uint8_t>(12, 1));
+}
+
 TEST(RungHull, AMipHasARungThatShowsItWellAndNoneWorseThanThePreview) {
   const Chain chain = make_chain(false);
   const Ladder ladder = encode(chain, LadderOptions{}.hull_gain);
