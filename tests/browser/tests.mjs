@@ -11,6 +11,7 @@ import './application-tests.mjs';
 import './display-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
+import './size-tests.mjs';
 import './viewer-tests.mjs';
 
 /** Of the limit: figures.mjs measures what a quiet machine keeps, one that runs tests does other things, too. */
