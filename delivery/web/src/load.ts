@@ -47,7 +47,6 @@ export function loadModel(
   let coming: Promise<TextureLoad>;
   let textures: TextureLoad | undefined;
   let lastView = '';
-  let inTransit = -1; // scale
   let retryScale = -1;
   let retryTimer: ReturnType<typeof setTimeout> | undefined;
   let retryS = retryScaleS.first;
@@ -117,10 +116,10 @@ export function loadModel(
 
   /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
   function loadScale(scale: number): { near: Promise<void>; arrived: Promise<void>; shown: Promise<void> } {
-    inTransit = scale;
+    load.wantedScale = scale;
     const show = (k: number): void => {
       // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
-      if (inTransit === scale && (k === scale || k < load.shownScale)) showScale(k);
+      if (load.wantedScale === scale && (k === scale || k < load.shownScale)) showScale(k);
     };
     const { near, arrived, shape } = scales.load(scale, show);
     const shown = shape.then(async (its) => {
@@ -178,7 +177,6 @@ export function loadModel(
   /** Loads the scale that the view asks for, if it is another one. */
   async function followScale(scale = scaleForView()): Promise<void> {
     if (scale === load.wantedScale || scale === retryScale) return;
-    load.wantedScale = scale;
     try {
       await loadScale(scale).shown;
       retryS = retryScaleS.first;
@@ -207,7 +205,7 @@ export function loadModel(
   function scaleForView(): number {
     const { override, wantedScale, view: { display } } = load;
     const at = (factor: number): number => override.scale ?? textures!.scaleFor(display.heightPx * factor, display.part);
-    if (wantedScale < 0 || override.scale !== undefined || at(1 / hysteresis) < wantedScale) return at(1);
+    if (override.scale !== undefined || at(1 / hysteresis) < wantedScale) return at(1);
     return Math.max(at(hysteresis), wantedScale);
   }
   /** All that is wanted is there. */
@@ -216,24 +214,20 @@ export function loadModel(
       if (!resting()) await done;
       do {
         await restoring;
-        if (!signal.aborted) await refineRounds(textures!);
+        if (!signal.aborted) await refineOnce(textures!);
       } while (refineAgain && !signal.aborted);
     } finally {
       refining = undefined; // what is asked for from now on, by listeners too, is a turn of its own
     }
     if (!signal.aborted) finish();
   }
-  async function refineRounds({ forgetLosses, finerPlanes, refineSome, composed }: TextureLoad): Promise<void> {
+  async function refineOnce({ refine }: TextureLoad): Promise<void> {
     phase = 'refining';
     const scale = followScale(); // the time may have allowed a coarser one only
+    const asked = refineAgain;
+    refineAgain = false;
     try {
-      if (refineAgain) {
-        refineAgain = false;
-        forgetLosses();
-        await finerPlanes();
-        while (!refineAgain && (await refineSome()));
-      }
-      await composed();
+      if (asked) await refine(() => refineAgain);
       await scale; // the view may have changed meanwhile
     } catch (error) {
       fail(error, 'refining');

@@ -7,6 +7,7 @@ import { groupBytes, groupedList, throughputOf } from './groups';
 import { isAbort, isForGood, sleepS, throwIfAborted } from './http';
 import { mostPreviewPx } from './layout';
 import { LoadContext, hysteresis } from './load_context';
+import { clamp } from './numbers';
 import { choiceInTime, finerWhereSeen } from './scale_choice';
 import { textureSet } from './texture_set';
 import { TextureInfo, fullSizePlanes } from './textures';
@@ -257,7 +258,7 @@ export async function textureLoad(load: LoadContext) {
 
   const leftS = (): number => limitS - load.elapsedS();
   /** A share of the time left, for timers. */
-  const timeS = (share: number): Promise<void> => sleepS(Math.min(longestTimerS, Math.max(0, share * leftS())));
+  const timeS = (share: number): Promise<void> => sleepS(clamp(share * leftS(), 0, longestTimerS));
   function planOptions(timeLimitS: number): TimePlanOptions {
     const { policy, order = 'credit' } = options;
     return { policy: policy as Policy, order, timeLimitS, rttS: client.latencyS, initialBytesS: Math.max(1, load.beta0) };
@@ -280,8 +281,9 @@ export async function textureLoad(load: LoadContext) {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined, connections: client.options.connections,
       afterMesh: (scale) => ({ plan: planOptions(leftS() - composeS - meshS(scales.bytesOf(scale))), linkBytesS: load.beta0 }),
     });
-    for (let step = steps.next(); ; step = steps.next()) {
-      if (step.done) return step.value!;
+    for (;;) {
+      const { done, value } = steps.next();
+      if (done) return value!;
       await sleepS(0); // the page goes on meanwhile
       throwIfAborted(signal);
     }
@@ -290,7 +292,6 @@ export async function textureLoad(load: LoadContext) {
   async function timedPart(): Promise<void> {
     load.beta0 = options.beta0BytesS || throughputOf(reader.requests, client.latencyS);
     const { scale, planes: chosen } = await choice();
-    load.wantedScale = scale;
     if (scale !== load.shownScale) load.enter('mesh');
     const meshBytes = scales.bytesOf(scale);
     const mesh = load.showScale(scale);
@@ -362,12 +363,12 @@ export async function textureLoad(load: LoadContext) {
     readPlane: (base: number): Uint8Array | undefined => set.planes.get(base)?.read(),
     timedPart,
     scaleFor,
-    finerPlanes,
-    refineSome,
-    composed,
-    /** What could not be had for a while may be asked for again. */
-    forgetLosses(): void {
-      fates.forEach((fate, key) => fate === 'lost' && fates.delete(key));
+    /** Fetches what the camera sees and the display can show, until there is nothing left or somebody asks for another turn. */
+    async refine(again: () => boolean): Promise<void> {
+      fates.forEach((fate, key) => fate === 'lost' && fates.delete(key)); // what could not be had for a while
+      await finerPlanes();
+      while (!again() && (await refineSome()));
+      if (!again()) await composed();
     },
     /** The GPU has lost everything: previews, then the fragments that there were. */
     async restore(): Promise<void> {
@@ -375,7 +376,8 @@ export async function textureLoad(load: LoadContext) {
       set.dispose();
       set = newSet();
       await (await showPlanes(before, true)).shown;
-      await fetchWishes(before.flatMap(({ plane, rungs }) => [...rungs].flatMap((rung, fragment) => (rung >= 0 ? [{ plane, fragment, rung, offer: 0 }] : []))));
+      const had = before.flatMap(({ plane, rungs }) => [...rungs].map((rung, fragment) => ({ plane, fragment, rung, offer: 0 })));
+      await fetchWishes(had.filter((w) => w.rung >= 0));
       await composed();
     },
     dispose(): void {
