@@ -11,7 +11,6 @@ const withHeadBytes = 12 << 10;
 /** Scales that stand together within so many bytes are fetched by one request. */
 const leastRequestBytes = 32 << 10;
 
-const attributeNames = { uv0: 'uv', uv1: 'uv1', normal: 'normal', colour: 'color' } as const;
 let streamCount = 0;
 
 /** The scales of a model out of its vertex-split stream: one set of buffers that is appended to, an index per scale. */
@@ -72,23 +71,12 @@ export async function splitShapes(
     return mesh.material as Material;
   }
   async function add(scale: number, update: SplitUpdate, gltf: ParsedGltf): Promise<Mesh> {
-    append('position', 3, update.positions, update);
-    info.attributes.forEach((a, k) => append(attributeNames[a.kind], a.components, update.attributes[k], update));
+    for (const { name, components, values } of update.attributes) append(name, components, values, update);
     const geometry = new BufferGeometry();
     attributes.forEach((attribute, name) => geometry.setAttribute(name, attribute));
     geometry.setIndex(new BufferAttribute(update.index, 1));
     const chosen: Material[] = [];
-    let at = 0;
-    let last = -1;
-    for (const [g, { material }] of info.groups.entries()) {
-      const count = 3 * update.groupTriangles[g];
-      if (count === 0) continue;
-      // Neighbours of one material are drawn together.
-      if (material === last) geometry.groups.at(-1)!.count += count;
-      else geometry.addGroup(at, count, chosen.push(await materialOf(gltf, material, geometry)) - 1);
-      last = material;
-      at += count;
-    }
+    for (const { material, start, count } of update.draws) geometry.addGroup(start, count, chosen.push(await materialOf(gltf, material, geometry)) - 1);
     const mesh = new Mesh(geometry, chosen.length === 1 ? chosen[0] : chosen);
     mesh.name = `S_${scale}`;
     meshes.set(scale, mesh);

@@ -3,6 +3,7 @@ import type { SplitGrid, SplitStreamHead, SplitStreamReader } from './split_stre
 import type { SplitInfo, SplitUpdate } from './worker_protocol';
 
 const f = Math.fround;
+const names = { uv0: 'uv', uv1: 'uv1', normal: 'normal', colour: 'color' } as const;
 
 /** What the main thread needs to know of a head. */
 export function splitInfo(head: SplitStreamHead): SplitInfo {
@@ -10,12 +11,7 @@ export function splitInfo(head: SplitStreamHead): SplitInfo {
     const last = head.blocks[blocks - 1];
     return { scale, blocks, wedges, end: last.offset + last.bytes };
   });
-  // Normals leave the worker as vectors.
-  const attributes = head.attributes.map(({ kind, components }) => ({
-    kind,
-    components: kind === 'normal' ? 3 : components,
-  }));
-  return { headBytes: head.bytes, scales, attributes, groups: head.groups };
+  return { headBytes: head.bytes, scales };
 }
 
 function gridValues(
@@ -49,14 +45,16 @@ export function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdat
   const { mesh, head } = reader;
   const to = mesh.wedges;
   const points = mesh.wedgePoint.data;
-  const attributes = head.attributes.map((a, k) => {
+  const positions = gridValues(mesh.places.data, 3, head.position, to - from, (i) => points[from + i]);
+  const attributes = [{ name: 'position', components: 3, values: positions }];
+  head.attributes.forEach(({ kind, grid }, k) => {
     const data = mesh.values[k].data;
-    if (a.kind === 'normal') return normals(data, from, to, a.grid.bits);
-    if (a.kind === 'colour') {
-      const most = 2 ** a.grid.bits - 1;
-      return Float32Array.from(data.subarray(4 * from, 4 * to), (v) => v / most);
-    }
-    return gridValues(data, 2, a.grid, to - from, (i) => from + i);
+    const most = 2 ** grid.bits - 1;
+    const values =
+      kind === 'normal' ? normals(data, from, to, grid.bits)
+      : kind === 'colour' ? Float32Array.from(data.subarray(4 * from, 4 * to), (v) => v / most)
+      : gridValues(data, 2, grid, to - from, (i) => from + i);
+    attributes.push({ name: names[kind], components: kind === 'normal' ? 3 : kind === 'colour' ? 4 : 2, values });
   });
   const groupTriangles = new Uint32Array(head.groups.length);
   const visible = new Uint8Array(mesh.faceCount);
@@ -71,6 +69,15 @@ export function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdat
   for (let face = 0; face < visible.length; ++face)
     if (visible[face])
       index.set(mesh.faces.data.subarray(3 * face, 3 * face + 3), 3 * next[mesh.faceGroup.data[face]]++);
-  const positions = gridValues(mesh.places.data, 3, head.position, to - from, (i) => points[from + i]);
-  return { from, to, blocks: reader.nextBlock, positions, attributes, index, groupTriangles };
+  const draws: SplitUpdate['draws'] = [];
+  let start = 0;
+  for (const [g, { material }] of head.groups.entries()) {
+    const count = 3 * groupTriangles[g];
+    const last = draws[draws.length - 1];
+    // Neighbours of one material are drawn together.
+    if (last?.material === material) last.count += count;
+    else if (count > 0) draws.push({ material, start, count });
+    start += count;
+  }
+  return { from, to, blocks: reader.nextBlock, attributes, index, draws };
 }

@@ -97,7 +97,7 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
       await stream.reader.addBlocks(request.blocks);
       const update = splitUpdate(stream.reader, stream.wedges);
       stream.wedges = update.to;
-      const arrays = [update.positions, update.index, update.groupTriangles, ...update.attributes];
+      const arrays = [update.index, ...update.attributes.map((a) => a.values)];
       return [update, arrays.map((a) => a.buffer as ArrayBuffer)];
     }
     case 'split-close':

@@ -1,5 +1,4 @@
 import type { CodecId } from './codec';
-import type { SplitKind } from './split_stream';
 
 /** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
 export interface DecodeRequest {
@@ -77,8 +76,6 @@ export interface SplitInfo {
   headBytes: number;
   /** Coarsest first; complete with the byte before `end`. */
   scales: { scale: number; blocks: number; wedges: number; end: number }[];
-  attributes: { kind: SplitKind; components: number }[];
-  groups: { material: number; part: number }[];
 }
 
 /** What has been added to a split mesh, and its triangles now. */
@@ -88,13 +85,12 @@ export interface SplitUpdate {
   to: number;
   /** Blocks decoded so far. */
   blocks: number;
-  positions: Float32Array;
-  /** By attribute of the head: 2 floats (UV), 3 (normals), 4 (colours). */
-  attributes: Float32Array[];
+  /** Positions, UV, normals, colours, by three.js's names. */
+  attributes: { name: string; components: number; values: Float32Array }[];
   /** Wedges of all visible triangles, sorted by group. */
   index: Uint32Array;
-  /** Triangles of each group. */
-  groupTriangles: Uint32Array;
+  /** What of the index is drawn by which material. */
+  draws: { material: number; start: number; count: number }[];
 }
 
 /** What a worker answers. */
