@@ -60,13 +60,26 @@ std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers) {
 
 std::size_t highest(const FragmentOffer& f) { return std::min<std::size_t>(f.high_rung, f.bytes.size() - 1); }
 
-/// The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does.
-std::size_t lowest(const FragmentOffer& f, bool limits, bool hard) {
-  const std::size_t low = limits ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
-  if (hard) return low;
-  for (std::size_t r = low; r <= highest(f); ++r)
-    if (f.loss[r + 1] < f.loss[0]) return r;
-  return low;
+/// 0 where it is skipped.
+std::uint32_t bytes_at_rung(const FragmentOffer& f, std::int32_t rung) {
+  return rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)];
+}
+
+/// The rung from `low` on that costs least (ties: the first), of those that have so few bytes; -1: skipping
+/// does. `cost` of bytes and what is then lost.
+template <typename Cost>
+std::int32_t cheapest_rung(const FragmentOffer& f, std::size_t low, bool may_skip, double most_bytes,
+                           const Cost& cost) {
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
+  double least = may_skip ? cost(0.0, f.loss[0]) : cost(f.bytes[low], f.loss[low + 1]);
+  for (std::size_t r = low; r <= highest(f); ++r) {
+    if (f.bytes[r] > most_bytes) continue;
+    const double now = cost(f.bytes[r], f.loss[r + 1]);
+    if (now >= least) continue;
+    least = now;
+    best = static_cast<std::int32_t>(r);
+  }
+  return best;
 }
 
 }  // namespace
@@ -90,8 +103,8 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
   for (const FragmentOffer& f : offers_) {
     planned_.push_back(f.planned_bytes);
     planned_total_ += f.planned_bytes;
-    smallest_left_ += f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)];
-    low_left_ += f.bytes[lowest(f, true, options_.hard_limits)];
+    smallest_left_ += f.bytes[lowest(f, false)];
+    low_left_ += f.bytes[lowest(f, true)];
   }
   planned_left_ = planned_total_;
   // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
@@ -106,10 +119,7 @@ void HarmonicTimePlan::plan_prices() {
   const double budget = options_.time_limit_s * options_.throughput.initial_bytes_s;
   const auto bytes_at = [&](double price) {
     double sum = 0;
-    for (const FragmentOffer& f : offers_) {
-      const std::int32_t rung = cheapest_rung_of(f, price, true, budget);
-      sum += rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)];
-    }
+    for (const FragmentOffer& f : offers_) sum += bytes_at_rung(f, cheapest_rung_of(f, price, true, budget));
     return sum;
   };
   double low = -60, high = 60;  // of ln(price)
@@ -120,8 +130,7 @@ void HarmonicTimePlan::plan_prices() {
   price_0_ = portable::exp(high);
   price_bytes_.reserve(offers_.size());
   for (const FragmentOffer& f : offers_) {
-    const std::int32_t rung = cheapest_rung_of(f, price_0_, true, budget);
-    price_bytes_.push_back(rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)]);
+    price_bytes_.push_back(bytes_at_rung(f, cheapest_rung_of(f, price_0_, true, budget)));
     price_total_ += price_bytes_.back();
   }
 }
@@ -130,8 +139,7 @@ void HarmonicTimePlan::plan_for_least_loss() {
   planned_total_ = 0;
   for (std::size_t i = 0; i < offers_.size(); ++i) {
     const FragmentOffer& f = offers_[i];
-    planned_[i] =
-        std::max<double>(price_bytes_[i], f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)]);
+    planned_[i] = std::max<double>(price_bytes_[i], f.bytes[lowest(f, false)]);
     planned_total_ += planned_[i];
   }
   planned_left_ = planned_total_;
@@ -172,7 +180,7 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
     step.throughput_bytes_s = throughput_bytes_s();
     step.target_bytes = target_of(offer, step.theta_s, now_s);
     step.rung = rung_of(offer, step.target_bytes, now_s);
-    step.bytes = step.rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(step.rung)];
+    step.bytes = bytes_at_rung(f, step.rung);
     step.issued_s = now_s;
     take(offer);
     step_of_offer_[offer] = steps_.size();
@@ -213,8 +221,8 @@ void HarmonicTimePlan::take(std::uint32_t offer) {
   while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
   while (left_ < right_ && taken_[sorted_[right_ - 1]]) --right_;
   planned_left_ -= planned_[offer];
-  smallest_left_ -= f.bytes[lowest(f, options_.hard_limits, options_.hard_limits)];
-  low_left_ -= f.bytes[lowest(f, true, options_.hard_limits)];
+  smallest_left_ -= f.bytes[lowest(f, false)];
+  low_left_ -= f.bytes[lowest(f, true)];
   if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
 }
 
@@ -295,42 +303,31 @@ bool HarmonicTimePlan::may_skip(double now_s) const {
   return smallest_left_ > room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
 }
 
-std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
-  const FragmentOffer& f = offers_[offer];
-  const bool skip = may_skip(now_s);
-  if (options_.policy != Policy::kPrice) {
-    const bool limits = limits_can_hold(now_s);
-    return nearest_rung_of(f, target, limits, skip && !limits);
-  }
-  const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
-  return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
-}
-
-std::int32_t HarmonicTimePlan::nearest_rung_of(const FragmentOffer& f, double target, bool limits,
-                                               bool may_skip) const {
-  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(lowest(f, limits, options_.hard_limits));
-  double distance = std::abs(target - (best < 0 ? 0.0 : f.bytes[static_cast<std::size_t>(best)]));
-  for (std::size_t r = lowest(f, limits, options_.hard_limits); r <= highest(f); ++r)
-    if (const double d = std::abs(target - f.bytes[r]); d < distance) {
-      distance = d;
-      best = static_cast<std::int32_t>(r);
-    }
-  return best;
+/// The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does.
+std::size_t HarmonicTimePlan::lowest(const FragmentOffer& f, bool limits) const {
+  const bool hard = options_.hard_limits;
+  const std::size_t low = limits || hard ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
+  for (std::size_t r = low; r <= highest(f) && !hard; ++r)
+    if (f.loss[r + 1] < f.loss[0]) return r;
+  return low;
 }
 
 std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double price, bool may_skip,
                                                 double most_bytes) const {
-  const std::size_t low = lowest(f, options_.hard_limits, options_.hard_limits);
-  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
-  double cost = may_skip ? f.loss[0] : f.loss[low + 1] + price * f.bytes[low];
-  for (std::size_t r = low; r <= highest(f); ++r) {
-    if (f.bytes[r] > most_bytes) continue;
-    if (const double c = f.loss[r + 1] + price * f.bytes[r]; c < cost) {
-      cost = c;
-      best = static_cast<std::int32_t>(r);
-    }
+  return cheapest_rung(f, lowest(f, false), may_skip, most_bytes,
+                       [&](double bytes, double loss) { return loss + price * bytes; });
+}
+
+std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
+  const FragmentOffer& f = offers_[offer];
+  const bool skip = may_skip(now_s);
+  if (options_.policy == Policy::kPrice) {
+    const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+    return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
   }
-  return best;
+  const bool limits = limits_can_hold(now_s);
+  return cheapest_rung(f, lowest(f, limits), skip && !limits, 1e300,
+                       [&](double bytes, double) { return std::abs(target - bytes); });
 }
 
 // A lag alone asks for too much after a stall: no higher price than what is left can be sent at.

@@ -110,8 +110,8 @@ class HarmonicTimePlan {
   double proportional_share(double now_s, double beta) const;
   double lasting_bytes_s(double now_s) const;
   bool limits_can_hold(double now_s) const;
+  std::size_t lowest(const FragmentOffer& offer, bool limits) const;
   std::int32_t rung_of(std::uint32_t offer, double target, double now_s) const;
-  std::int32_t nearest_rung_of(const FragmentOffer& offer, double target, bool limits, bool may_skip) const;
   std::int32_t cheapest_rung_of(const FragmentOffer& offer, double price, bool may_skip,
                                 double most_bytes) const;
   double price_at(double now_s) const;
