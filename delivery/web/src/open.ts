@@ -4,7 +4,7 @@ import { InputError } from './errors';
 import { nowS } from './http';
 import { loadModel } from './load';
 import { OpenOptions, PackageReader } from './package_reader';
-import { PoolOptions, WorkerPool } from './worker_pool';
+import { PoolOptions, WorkerPool, workerPool } from './worker_pool';
 
 export { FormatError, InputError, TexmeshError } from './errors';
 export type * from './reader';
@@ -41,7 +41,7 @@ export class TexmeshPackage extends PackageReader {
     let { pool } = this;
     if (!pool || pool.none || options.workerUrl || options.decode) {
       pool?.dispose();
-      pool = new WorkerPool(options);
+      pool = workerPool(options);
     } else pool.grow(options.workers);
     this.pool = undefined;
     this.decodeDocument = pool.decodeDocument;
@@ -66,7 +66,7 @@ export class TexmeshPackage extends PackageReader {
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
 export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {
-  const pool = new WorkerPool({ ...options, workers: 1 }); // it comes while the manifest does
+  const pool = workerPool({ ...options, workers: 1 }); // it comes while the manifest does
   try {
     const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);
     opened.pool = pool;

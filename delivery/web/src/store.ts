@@ -66,7 +66,7 @@ class RangeStore implements PackageStore {
   readonly form = 'range';
   /** What a server said that knows no ranges. */
   noRanges?: InputError;
-  private parts_: { begin: number; bytes: Uint8Array }[] = [];
+  private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last one first
   private readonly mirrors_: Mirrors;
 
   constructor(urls: readonly string[], client: HttpClient) {
@@ -82,36 +82,23 @@ class RangeStore implements PackageStore {
 
   async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
     const end = begin + bytes;
-    const known = this.known_(begin, end);
-    const from = known.reduce((at, c) => at + c.length, begin);
+    const part = this.parts_.find((p) => p.begin <= begin && p.begin + p.bytes.length > begin);
     let got: Uint8Array | undefined;
-    if (from > begin)
+    if (part)
       try {
-        if (from < end) known.push(await this.fetch_(from, end - from, { ...how, verify: undefined }));
-        got = concat(known, bytes);
+        const known = part.bytes.subarray(begin - part.begin, end - part.begin);
+        const have = known.length;
+        got = have < bytes ? concat([known, await this.fetch_(begin + have, bytes - have, { ...how, verify: undefined })], bytes) : known;
         await how.verify?.(got);
-        if (from === end) return got;
+        if (have === bytes) return got;
       } catch (error) {
         if (!(error instanceof FormatError) || !how.verify) throw error;
         this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
         got = undefined;
       }
     got ??= await this.fetch_(begin, bytes, how);
-    if (!how.once) {
-      this.parts_ = this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end);
-      this.parts_.push({ begin, bytes: got });
-    }
+    if (!how.once) this.parts_ = [{ begin, bytes: got }, ...this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end)];
     return got;
-  }
-  /** What is known from a place on. */
-  private known_(begin: number, end: number): Uint8Array[] {
-    const chunks: Uint8Array[] = [];
-    for (let at = begin; at < end; at += chunks[chunks.length - 1].length) {
-      const part = this.parts_.find((p) => p.begin <= at && p.begin + p.bytes.length > at);
-      if (!part) break;
-      chunks.push(part.bytes.subarray(at - part.begin, end - part.begin));
-    }
-    return chunks;
   }
 
   private fetch_(offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {

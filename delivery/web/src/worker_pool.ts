@@ -9,12 +9,9 @@ const mostAtOnce = 8;
 
 interface Job {
   pool: WorkerPool;
-  id: number;
-  request: WorkerRequest;
-  /** Splits are decoded where their stream was opened: by the first worker. */
-  pinned: boolean;
-  /** Whose it is; -1: it waits for its turn. */
-  worker: number;
+  request: WorkerRequest & { id: number };
+  /** Whose it is; undefined: it waits for its turn. */
+  worker?: number;
   done: (result: unknown) => void;
   failed: (error: unknown) => void;
 }
@@ -51,87 +48,74 @@ export interface PoolOptions {
   decode?: DecodeHere;
 }
 
+/** See workerPool. */
+export type WorkerPool = ReturnType<typeof workerPool>;
+
 /** Workers that decode documents, images and vertex splits. */
-export class WorkerPool {
-  private readonly helpers_: Helper[] = [];
-  private readonly jobs_ = new Map<number, Job>();
-  private readonly broken_ = new Set<number>(); // whose workers broke once
-  private works_ = false; // a worker has answered
-  private lastId_ = 0;
-  private ended_ = false;
-  /** Nothing can be decoded: there are no workers, and no `decode`. `onNone` hears of it, once. */
-  none = false;
-  onNone?: (error: Error) => void;
+export function workerPool({ workerUrl, decode, workers }: PoolOptions = {}) {
+  const helpers: Helper[] = [];
+  const jobs = new Map<number, Job>();
+  const broken = new Set<number>(); // whose workers broke once
+  const here = decode !== undefined || typeof Worker === 'undefined';
+  let works = false; // a worker has answered
+  let lastId = 0;
+  let ended = false;
 
-  constructor(private readonly options_: PoolOptions = {}) {
-    this.grow(options_.workers);
-  }
-  /** To so many workers; left out: 2 to 4, by the number of cores. */
-  grow(workers = Math.min(4, Math.max(2, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1))): this {
-    const here = this.options_.decode !== undefined || typeof Worker === 'undefined';
-    for (let i = this.helpers_.length; i < 1 || (!here && i < workers); ++i) this.helpers_.push(here ? this.startHere_() : this.start_(i));
-    return this;
-  }
-
-  private start_(index: number): Helper {
-    const { workerUrl: url } = this.options_;
+  function start(index: number): Helper {
     try {
       // Written so that bundlers see it.
-      const worker = url ? new Worker(url, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
-      worker.onmessage = (event: MessageEvent<WorkerAnswer>) => this.answered_(event.data);
+      const worker = workerUrl ? new Worker(workerUrl, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+      worker.onmessage = (event: MessageEvent<WorkerAnswer>) => answered(event.data);
       worker.onerror = (event) => {
         event.preventDefault();
-        this.replace_(index);
+        replace(index);
       };
       return worker;
     } catch {
-      return this.startHere_(); // a page whose policy forbids workers
+      return startHere(); // a page whose policy forbids workers
     }
   }
-  private startHere_(): Helper {
-    const handle = this.options_.decode ?? (() => this.missing_());
-    const postMessage: Helper['postMessage'] = async ({ id, ...request }) => {
-      try {
-        await undefined; // as later as a worker would
-        this.answered_({ id, result: (await handle(request as WorkerRequest))[0] });
-      } catch (failed) {
-        this.answered_({ id, failed });
-      }
+  function startHere(): Helper {
+    return {
+      postMessage: async ({ id, ...request }) => {
+        try {
+          await null; // as later as a worker would
+          answered({ id, result: (await (decode ?? missing)(request as WorkerRequest))[0] });
+        } catch (failed) {
+          answered({ id, failed });
+        }
+      },
+      terminate: () => undefined,
     };
-    return { postMessage, terminate: () => undefined };
   }
-  private missing_(): never {
+  function missing(): never {
     const error = new Error('workers cannot be had here: give `workerUrl`, the address of dist/worker.js, or `decode`, the `handle` of texmesh/worker');
-    if (!this.none) this.onNone?.(error);
-    this.none = true;
+    if (!pool.none) pool.onNone?.(error);
+    pool.none = true;
     throw error;
   }
-  /** Finds out early whether there is anything that decodes. */
-  start(): void {
-    this.closeSplits(0);
-  }
   /** A worker that breaks gives its jobs to another one; where that breaks, too, they fail, or there are no workers here at all. */
-  private replace_(index: number): void {
-    if (this.ended_) return;
-    const again = this.broken_.has(index);
-    this.helpers_[index].terminate();
-    this.helpers_[index] = again && !this.works_ ? this.startHere_() : this.start_(index);
-    this.broken_.add(index);
-    for (const job of this.jobs_.values()) {
-      if (job.worker !== index) continue;
-      if (again && this.works_) this.answered_({ id: job.id, failed: new Error('a worker broke') });
-      else this.send_(job);
+  function replace(index: number): void {
+    if (ended) return;
+    const again = broken.has(index);
+    broken.add(index);
+    helpers[index].terminate();
+    helpers[index] = again && !works ? startHere() : start(index);
+    for (const { worker, request } of jobs.values()) {
+      if (worker !== index) continue;
+      if (again && works) answered({ id: request.id, failed: new Error('a worker broke') });
+      else helpers[index].postMessage(request);
     }
   }
 
-  private answered_({ id, result, failed, error }: WorkerAnswer): void {
-    const job = this.jobs_.get(id);
+  function answered({ id, result, failed, error }: WorkerAnswer): void {
+    const job = jobs.get(id);
     if (!job) {
       if (Array.isArray(result)) for (const b of result as Partial<ImageBitmap>[]) b.close?.(); // nobody waits for them any more
       return;
     }
-    this.works_ ||= !failed;
-    this.jobs_.delete(id);
+    works ||= !failed;
+    jobs.delete(id);
     --running;
     if (failed) job.failed(failed);
     else if (!error) job.done(result);
@@ -139,70 +123,65 @@ export class WorkerPool {
     pump();
   }
 
-  /** Gives a job whose turn it is to the worker that has least to do. */
-  post(job: Job): void {
-    const busy = this.helpers_.map(() => 0);
-    for (const { worker } of this.jobs_.values()) if (worker >= 0) ++busy[worker];
-    job.worker = job.pinned ? 0 : busy.indexOf(Math.min(...busy));
-    ++running;
-    try {
-      this.send_(job);
-    } catch (failed) {
-      this.answered_({ id: job.id, failed }); // what cannot be copied takes nobody's turn
-    }
-  }
-  /** Copied, not handed over: a worker that breaks gives its requests back. */
-  private send_({ worker, request, id }: Job): void {
-    this.helpers_[worker].postMessage({ ...request, id });
-  }
-
-  private ask_(asked: WorkerRequest): Promise<unknown> {
-    const request = Object.fromEntries(Object.entries(asked).map(([name, value]) => [name, alone(value)])) as unknown as WorkerRequest;
+  function ask<T>(asked: WorkerRequest): Promise<T> {
+    const own = Object.fromEntries(Object.entries(asked).map(([name, value]) => [name, alone(value)]));
     return new Promise((done, failed) => {
-      if (this.ended_) return failed(abortError());
-      const job = { pool: this, id: ++this.lastId_, request, pinned: request.op.startsWith('split'), worker: -1, done, failed };
-      this.jobs_.set(job.id, job);
-      if (request.op === 'document') return this.post(job); // everything waits for it
+      if (ended) return failed(abortError());
+      const request = { ...own, id: ++lastId } as Job['request'];
+      const job = { pool, request, done: done as Job['done'], failed };
+      jobs.set(lastId, job);
+      if (request.op === 'document') return pool.post(job); // everything waits for it
       queue.push(job);
       pump();
     });
   }
 
-  /** See PackageReader.decodeDocument. */
-  readonly decodeDocument: DocumentDecoder = (name, ...args) =>
-    this.ask_({ op: 'document', name, args }) as ReturnType<typeof this.decodeDocument<typeof name>>;
-  decode(request: Omit<DecodeRequest, 'op'>): Promise<Levels> {
-    return this.ask_({ op: 'decode', ...request }) as Promise<Levels>;
-  }
-  enlarge(request: Omit<EnlargeRequest, 'op'>): Promise<Levels> {
-    return this.ask_({ op: 'enlarge', ...request }) as Promise<Levels>;
-  }
-  openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
-    return this.ask_({ op: 'split-open', key, head }) as Promise<SplitInfo>;
-  }
-  /** FormatError where whole blocks from a place of the stream on are not those of its head. */
-  checkSplits(key: number, from: number, blocks: Uint8Array): Promise<void> {
-    return this.ask_({ op: 'split-check', key, from, blocks }) as Promise<void>;
-  }
-  addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
-    return this.ask_({ op: 'split-add', key, blocks }) as Promise<SplitUpdate>;
-  }
-  closeSplits(key: number): void {
-    this.ask_({ op: 'split-close', key }).catch(() => undefined);
-  }
-  /** Requests under way or waiting. */
-  get pending(): number {
-    return this.jobs_.size;
-  }
-  dispose(): void {
-    this.ended_ = true;
-    for (const h of this.helpers_) h.terminate();
-    queue = queue.filter(({ pool }) => pool !== this);
-    for (const { worker, failed } of this.jobs_.values()) {
-      if (worker >= 0) --running;
-      failed(abortError());
-    }
-    this.jobs_.clear();
-    pump();
-  }
+  const pool = {
+    /** Nothing can be decoded: there are no workers, and no `decode`. `onNone` hears of it, once. */
+    none: false,
+    onNone: undefined as ((error: Error) => void) | undefined,
+    /** To so many workers; left out: 2 to 4, by the number of cores. */
+    grow(count = Math.min(4, Math.max(2, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1))): void {
+      for (let i = helpers.length; i < 1 || (!here && i < count); ++i) helpers.push(here ? startHere() : start(i));
+    },
+    /** Finds out early whether there is anything that decodes. */
+    start: () => pool.closeSplits(0),
+    /** Gives a job whose turn it is to the worker that has least to do; splits are decoded where their stream was opened. */
+    post(job: Job): void {
+      const busy = helpers.map(() => 0);
+      for (const { worker = -1 } of jobs.values()) if (worker >= 0) ++busy[worker];
+      job.worker = job.request.op.startsWith('split') ? 0 : busy.indexOf(Math.min(...busy));
+      ++running;
+      try {
+        helpers[job.worker].postMessage(job.request); // copied, not handed over: a worker that breaks gives its requests back
+      } catch (failed) {
+        answered({ id: job.request.id, failed }); // what cannot be copied takes nobody's turn
+      }
+    },
+
+    /** See PackageReader.decodeDocument. */
+    decodeDocument: ((name, ...args) => ask({ op: 'document', name, args })) as DocumentDecoder,
+    decode: (request: Omit<DecodeRequest, 'op'>) => ask<Levels>({ op: 'decode', ...request }),
+    enlarge: (request: Omit<EnlargeRequest, 'op'>) => ask<Levels>({ op: 'enlarge', ...request }),
+    openSplits: (key: number, head: Uint8Array) => ask<SplitInfo>({ op: 'split-open', key, head }),
+    /** FormatError where whole blocks from a place of the stream on are not those of its head. */
+    checkSplits: (key: number, from: number, blocks: Uint8Array) => ask<void>({ op: 'split-check', key, from, blocks }),
+    addSplits: (key: number, blocks: Uint8Array) => ask<SplitUpdate>({ op: 'split-add', key, blocks }),
+    closeSplits: (key: number): void => void ask({ op: 'split-close', key }).catch(() => undefined),
+    /** Requests under way or waiting. */
+    pending: () => jobs.size,
+    dispose(): void {
+      ended = true;
+      helpers.forEach((h) => h.terminate());
+      queue = queue.filter((job) => job.pool !== pool);
+      for (const { worker, failed } of jobs.values()) {
+        if (worker !== undefined) --running;
+        failed(abortError());
+      }
+      jobs.clear();
+      pump();
+    },
+  };
+  pool.grow(workers);
+  return pool;
 }

@@ -9,7 +9,7 @@ import { FormatError, InputError, OpenOptions, PackageReader } from '../src/read
 import { openStore } from '../src/store';
 import { TreeStore } from '../src/store_files';
 import { handle } from '../src/worker';
-import { WorkerPool } from '../src/worker_pool';
+import { WorkerPool, workerPool } from '../src/worker_pool';
 import type { WorkerRequest } from '../src/worker_protocol';
 import { Fault, FakeServer, fakeServer } from './fake_server';
 import { golden } from './support';
@@ -314,7 +314,7 @@ it('a cap does not hold back who cancels', async () => {
 it('pictures that nobody waits for are closed, and streams are told of their end', async () => {
   let closed = 0;
   const heard: WorkerRequest['op'][] = [];
-  const pool = new WorkerPool({
+  const pool = workerPool({
     decode: async (request) => {
       heard.push(request.op);
       await new Promise((go) => setTimeout(go, 5));
@@ -387,7 +387,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
   const before = Object.getOwnPropertyDescriptor(globalThis, 'Worker');
   Object.defineProperty(globalThis, 'Worker', { value: Broken, configurable: true });
   try {
-    const pool = new WorkerPool({ workers: 1 });
+    const pool = workerPool({ workers: 1 });
     const job = rejection(pool.openSplits(1, new Uint8Array(4)));
     started[0].onerror!({ preventDefault: () => undefined });
     expect(started.map((w) => w.posted)).toEqual([1, 1]);
@@ -395,7 +395,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
     expect((await job).message).toContain('decode');
     expect(started.length).toBe(2);
     // One that has worked does not make all useless: what it broke on fails, and another takes its place.
-    const other = new WorkerPool({ workers: 1 });
+    const other = workerPool({ workers: 1 });
     const fine = other.openSplits(1, new Uint8Array(4));
     started[2].onmessage!({ data: { id: 1, result: 7 } });
     expect(await fine).toBe(7);
@@ -412,7 +412,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
 describe('documents', () => {
   /** As a worker would: what is asked and answered is copied. */
   const elsewhere = (heard: WorkerRequest['op'][]): WorkerPool =>
-    new WorkerPool({
+    workerPool({
       decode: async (request) => {
         heard.push(request.op);
         const [result, transfer] = await handle(structuredClone(request));
@@ -430,7 +430,7 @@ describe('documents', () => {
     expect(new Set(heard)).toEqual(new Set(['document']));
   });
   it('are decoded here where workers cannot, or have ended', async () => {
-    const pools = [new WorkerPool({ decode: () => Promise.reject(new Error('broken')) }), new WorkerPool({ decode: handle }), new WorkerPool()];
+    const pools = [workerPool({ decode: () => Promise.reject(new Error('broken')) }), workerPool({ decode: handle }), workerPool()];
     pools[1].dispose();
     for (const pool of pools) {
       const reader = await openAt(range());
@@ -464,17 +464,17 @@ describe('documents', () => {
       return [[], []];
     };
     const none = new Uint8Array(0);
-    const pools = [0, 1, 2].map(() => new WorkerPool({ decode }));
+    const pools = [0, 1, 2].map(() => workerPool({ decode }));
     const ended = [0, 0, 0];
     const jobs = pools.map((pool, p) => Array.from({ length: 10 }, () =>
       pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).then(() => ++ended[p], () => -1)));
     const settle = (): Promise<void> => new Promise((go) => setTimeout(go, 2));
     await settle();
-    expect([now, all, ...pools.map((p) => p.pending)]).toEqual([8, 8, 10, 10, 10]);
+    expect([now, all, ...pools.map((p) => p.pending())]).toEqual([8, 8, 10, 10, 10]);
     pools[0].dispose(); // what it had under way and what waits makes room
     expect(await Promise.all(jobs[0])).toEqual(Array(10).fill(-1));
     await settle();
-    expect([all, ...pools.map((p) => p.pending)]).toEqual([16, 0, 10, 10]);
+    expect([all, ...pools.map((p) => p.pending())]).toEqual([16, 0, 10, 10]);
     most = now = 8; // those of the first are nobody's any more
     letGo = letGo.slice(8);
     while (ended[1] + ended[2] < 20) {
@@ -486,7 +486,7 @@ describe('documents', () => {
   });
   it('do not wait behind pictures', async () => {
     const posted: WorkerRequest['op'][] = [];
-    const pool = new WorkerPool({
+    const pool = workerPool({
       decode: (request) => {
         posted.push(request.op);
         return new Promise(() => undefined);

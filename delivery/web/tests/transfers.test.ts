@@ -8,7 +8,7 @@ import { groupBytes, groupedList, throughputOf } from '../src/groups';
 import { timePlan } from '../src/time_plan';
 import { timedFetch } from '../src/timed_fetch';
 import { Transfers, Wish } from '../src/transfers';
-import { WorkerPool } from '../src/worker_pool';
+import { workerPool } from '../src/worker_pool';
 import { packError } from '../src/worker';
 import { samePrefix } from '../src/bytes';
 import { sha256 } from '../src/sha256';
@@ -33,7 +33,7 @@ async function setUp(fault?: Fault) {
   const data = await reader.data();
   const decoded: Wish[] = [];
   const lost: Wish[] = [];
-  const transfers = new Transfers(reader, data.textures, new WorkerPool({ decode }), {
+  const transfers = new Transfers(reader, data.textures, workerPool({ decode }), {
     decoded: (wish) => decoded.push(wish),
     lost: (wish) => lost.push(wish),
   });
@@ -112,7 +112,7 @@ describe('transfers', () => {
       return decode(request);
     };
     const textures = s.data.textures.map((t) => ({ ...t, fragmentWidthPx: 1 << 20, fragmentHeightPx: 1 << 20 }));
-    const transfers = new Transfers(s.reader, textures, new WorkerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
+    const transfers = new Transfers(s.reader, textures, workerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
     await transfers.prepare([0]);
     await transfers.fetch(wishesOf(s.list, 0).slice(0, 1), { gapBytes: 0, mostBytes: Infinity }, () => undefined, () => undefined);
     while (transfers.pending > 0) await new Promise((go) => setTimeout(go, 1));
@@ -224,7 +224,7 @@ it('a finer scale is taken while it was measured to be seen', () => {
 
 it('workers are sent the bytes that they need, not the package that they lie in', async () => {
   const sent: WorkerRequest[] = [];
-  const pool = new WorkerPool({ decode: async (request) => (sent.push(request), [[], []]) });
+  const pool = workerPool({ decode: async (request) => (sent.push(request), [[], []]) });
   const whole = Uint8Array.from({ length: 1000 }, (_, i) => i & 255);
   const [tables, stream] = [whole.subarray(0, 10), whole.subarray(500, 540)];
   await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1, most: [9, 9] });
