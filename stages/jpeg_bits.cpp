@@ -132,13 +132,13 @@ class Quantiser {
   std::uint64_t not_small(const Magnitudes& block) const {
     using Eight = std::int16_t __attribute__((vector_size(16)));
     using Bytes = std::uint8_t __attribute__((vector_size(8)));
-    Eight bits{};
+    Eight bits{}, bit{1, 1, 1, 1, 1, 1, 1, 1};
 #pragma GCC unroll 8
-    for (std::size_t k = 0; k < 8; ++k) {
+    for (std::size_t k = 0; k < 8; ++k, bit += bit) {
       Eight value, least;
       std::memcpy(&value, block.data() + 8 * k, sizeof value);
       std::memcpy(&least, least_.data() + 8 * k, sizeof least);
-      bits |= (value >= least) & static_cast<std::int16_t>(1 << k);
+      bits |= (value >= least) & bit;
     }
     const Bytes bytes = __builtin_convertvector(bits, Bytes);
     std::uint64_t mask;
