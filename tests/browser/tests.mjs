@@ -13,6 +13,7 @@ import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';
+import './worker-tests.mjs';
 
 /** Of the limit: figures.mjs measures what a quiet machine keeps, one that runs tests does other things, too. */
 const kLate = 1.06;
