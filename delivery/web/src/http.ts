@@ -39,7 +39,7 @@ export interface HttpOptions {
   retries: number;
   /** Before the first retry, doubled for each further one. */
   retryDelayS: number;
-  /** Without a byte. */
+  /** Without a byte, or without a worker's answer about a document. */
   stallTimeoutS: number;
   /**
    * The browser's cache, for ranges. Default no-store: Chromium answers ranges of one URL that may be cached one after

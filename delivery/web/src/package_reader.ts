@@ -42,18 +42,23 @@ type Decoded<K extends keyof Documents> = Awaited<ReturnType<Documents[K]>>;
 const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef => ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256 });
 /** Decodes documents on this thread. */
 export const decodeHere = (async (name, ...args: unknown[]) => ((await here())[name] as (...of: unknown[]) => unknown)(...args)) as DocumentDecoder;
-/** Elsewhere; on this thread where that fails: there are no workers, or those of a load that has ended. */
+/** Elsewhere; on this thread where that fails or does not answer: there are no workers, or those of a load that has ended. */
 async function decoded<K extends keyof Documents>(
   decoder: DocumentDecoder,
+  { options }: HttpClient,
   signal: AbortSignal | undefined,
   name: K,
   ...args: Parameters<Documents[K]>
 ): Promise<Decoded<K>> {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const late = new Promise<never>((_, fail) => (timer = setTimeout(fail, 1000 * options.stallTimeoutS)));
   try {
-    return await decoder(name, ...args);
+    return await Promise.race([decoder(name, ...args), late]);
   } catch (error) {
     if (error instanceof FormatError || signal?.aborted) throw error;
     return decodeHere(name, ...args);
+  } finally {
+    clearTimeout(timer);
   }
 }
 
@@ -90,7 +95,7 @@ export class PackageReader {
     const { signal, mode = 'auto', mirrors = [] } = options;
     const openedS = nowS();
     const { store, manifest } = await openStore(url, mirrors, mode, client, signal);
-    const { parsed, id } = await decoded(decoder, signal, 'manifest', manifest, store.form === 'range' ? store.name : '');
+    const { parsed, id } = await decoded(decoder, client, signal, 'manifest', manifest, store.form === 'range' ? store.name : '');
     return new this(store, client, url, parsed, id, openedS, decoder);
   }
 
@@ -178,7 +183,7 @@ export class PackageReader {
   }
   /** Decodes or checks by a function of documents.ts. */
   decoded<K extends keyof Documents>(signal: AbortSignal | undefined, name: K, ...args: Parameters<Documents[K]>): Promise<Decoded<K>> {
-    return decoded(this.decodeDocument, signal, name, ...args);
+    return decoded(this.decodeDocument, this.client, signal, name, ...args);
   }
 
   // ---- index

@@ -438,6 +438,12 @@ describe('documents', () => {
       expect((await reader.data()).tables.length).toBe(reader.manifest.planeCount);
     }
   });
+  it('are decoded here where workers do not answer, from the manifest on', async () => {
+    const silent = workerPool({ decode: () => new Promise(() => undefined) });
+    const reader = await PackageReader.openUrl(url, { fetch: range().fetch, ...quick }, silent.decodeDocument);
+    expect((await reader.data()).tables.length).toBe(reader.manifest.planeCount);
+    silent.dispose();
+  });
   it('that are damaged are told, and not decoded twice', async () => {
     const heard: WorkerRequest['op'][] = [];
     const { decodeDocument } = elsewhere(heard);
