@@ -107,6 +107,7 @@ export function loadModel(
   async function showInTime(): Promise<void> {
     enter('tables');
     textures = await coming;
+    throwIfAborted(signal);
     await textures.timedPart();
     phase = 'refining';
     if (autoRefine) void model.refine();

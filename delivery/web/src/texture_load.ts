@@ -160,6 +160,7 @@ export async function textureLoad(load: LoadContext) {
       try {
         const needed = !set.planes.has(base) && (anew || role === 'alpha' || !set.isUsed(base));
         const preview = needed ? await previewOf(base) : undefined;
+        throwIfAborted(signal); // what is shown from now on nobody would dispose of
         const tell = (): void => load.emit('plane', { base, plane, widthPx, heightPx });
         shown.push(set.show(choice, preview).then(tell, lostPlane).finally(() => preview?.close()));
       } catch (error) {
