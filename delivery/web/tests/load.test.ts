@@ -1,7 +1,8 @@
+import { PerspectiveCamera, SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
 import { InputError, PackageReader } from '../src/reader';
 import { fakeServer } from './fake_server';
-import { Loading, loading, until } from './loading';
+import { Loading, fakeGltf, loading, until } from './loading';
 import { golden } from './support';
 
 const container = golden('v1.1-scan');
@@ -53,6 +54,24 @@ describe('a load', () => {
       l.dispose();
     }
     expect(wanted).toEqual([1, 1, 0, 0, 0, 0, 1, 1]);
+  });
+  it('in the time given sees to what the camera looks at', async () => {
+    const { columns } = planes[0];
+    const mean = (values: number[]): number => values.reduce((sum, v) => sum + v, 0) / values.length;
+    for (const side of [1, -1]) {
+      const camera = new PerspectiveCamera(30, 1, 0.1, 100);
+      camera.position.set(0, 0, 5 * side);
+      camera.lookAt(0, 0, 0);
+      const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf(new SphereGeometry(1, 64, 32))) });
+      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 2, fullSize: true, autoRefine: false }, { capBytesS: 60000 });
+      await l.model.done;
+      // The half of a ball at +z has the texture's left half.
+      const middle = (f: number): number => ((f % columns) + 0.5) / columns - 0.5;
+      const rungs = rungsOf(l);
+      const [seen, unseen] = [side, -side].map((s) => mean(rungs.filter((_, f) => middle(f) * s < 0 && Math.abs(middle(f)) < 0.4)));
+      expect(seen).toBeGreaterThan(unseen);
+      l.dispose();
+    }
   });
   it('does not ask again and again for what cannot be had', async () => {
     const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });

@@ -1,4 +1,4 @@
-import { Group, Mesh, MeshStandardMaterial, BoxGeometry, Scene, Texture, WebGLRenderer } from 'three';
+import { BoxGeometry, BufferGeometry, Group, Mesh, MeshStandardMaterial, Scene, Texture, WebGLRenderer } from 'three';
 import { samePrefix } from '../src/bytes';
 import type { LoadEvents, LoadOptions, LoadedModel } from '../src/api';
 import { FormatError, TexmeshPackage } from '../src/open';
@@ -34,11 +34,11 @@ function fakeRenderer(uploads: Uploads): WebGLRenderer {
 }
 
 /** A scene with one mesh that shows all images, whatever the bytes are. */
-function fakeGltf(): unknown {
+export function fakeGltf(geometry: BufferGeometry = new BoxGeometry()): unknown {
   const picture = (image: number): Texture => Object.assign(new Texture(), { name: `texture/${image}` });
   const material = new MeshStandardMaterial({ map: picture(0), roughnessMap: picture(1), normalMap: picture(2) });
   return {
-    scene: new Group().add(new Mesh(new BoxGeometry(), material)),
+    scene: new Group().add(new Mesh(geometry, material)),
     parser: {
       json: { materials: [{}] },
       associations: new Map([[material, { materials: 0 }]]),
