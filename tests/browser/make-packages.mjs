@@ -19,6 +19,8 @@ const kPackages = {
   // Coverage, two sides, a texture of a material extension; the source stays beside them.
   blend: {sheet: {alphaMode: 'BLEND'}, options: ['--rungs', '20,60,90']},
   mask: {sheet: {alphaMode: 'MASK'}, options: ['--rungs', '20,60,90']},
+  // What shows little but its surroundings.
+  metal: {sheet: {alphaMode: 'OPAQUE', metal: true}, options: ['--rungs', '20,60,90']},
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };

@@ -23,8 +23,8 @@ function stripes(sidePx) {
   return PNG.sync.write(png, {colorType: 2});
 }
 
-/** The sheet as a GLB, in the plane of x and y, a metre wide and high. `alphaMode` as glTF has it. */
-export function sheetGlb({alphaMode, sidePx = 512}) {
+/** The sheet as a GLB, in the plane of x and y, a metre wide and high. `alphaMode` as glTF has it; of metal it has no sheen. */
+export function sheetGlb({alphaMode, metal = false, sidePx = 512}) {
   const n = kCells + 1;
   const [positions, uvs, indices] = [new Float32Array(3 * n * n), new Float32Array(2 * n * n), []];
   for (let j = 0; j < n; j++)
@@ -46,11 +46,11 @@ export function sheetGlb({alphaMode, sidePx = 512}) {
   }
   const clamp = {wrapS: 33071, wrapT: 33071};
   const json = {
-    asset: {version: '2.0'}, scene: 0, scenes: [{nodes: [0]}], nodes: [{mesh: 0}], extensionsUsed: ['KHR_materials_sheen'],
+    asset: {version: '2.0'}, scene: 0, scenes: [{nodes: [0]}], nodes: [{mesh: 0}], ...(!metal && {extensionsUsed: ['KHR_materials_sheen']}),
     meshes: [{primitives: [{attributes: {POSITION: 0, TEXCOORD_0: 1}, indices: 2, material: 0}]}],
     materials: [{
-      alphaMode, ...(alphaMode === 'MASK' && {alphaCutoff: 0.5}), doubleSided: true, pbrMetallicRoughness: {baseColorTexture: {index: 0}, metallicFactor: 0},
-      extensions: {KHR_materials_sheen: {sheenColorFactor: [1, 1, 1], sheenRoughnessFactor: 0.6, sheenColorTexture: {index: 1}}},
+      alphaMode, ...(alphaMode === 'MASK' && {alphaCutoff: 0.5}), doubleSided: true, pbrMetallicRoughness: {baseColorTexture: {index: 0}, metallicFactor: metal ? 1 : 0, ...(metal && {roughnessFactor: 0.3})},
+      ...(!metal && {extensions: {KHR_materials_sheen: {sheenColorFactor: [1, 1, 1], sheenRoughnessFactor: 0.6, sheenColorTexture: {index: 1}}}}),
     }],
     textures: [{source: 0, sampler: 0}, {source: 1, sampler: 0}], samplers: [clamp],
     images: [3, 4].map((bufferView) => ({bufferView, mimeType: 'image/png'})), bufferViews, buffers: [{byteLength: length}],

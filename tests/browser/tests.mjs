@@ -13,6 +13,8 @@ import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';
+import './viewer-use-tests.mjs';
+import './versions-tests.mjs';
 import './worker-tests.mjs';
 
 /** Of the limit: figures.mjs measures what a quiet machine keeps, one that runs tests does other things, too. */
@@ -84,12 +86,26 @@ for (const meshes of ['glb', 'stream'])
     await r.page.close();
   });
 
+/** Requests under way at once when a load's package is asked for many pieces. */
+async function mostAtOnce({page, id}) {
+  const before = (await lab(page, (i) => window.lab.report(i), id)).requests.length;
+  await lab(page, async (i) => {
+    const {client} = window.lab.loads[i].pkg;
+    const url = `${location.origin}/packages/maps.texmesh`;
+    await Promise.all(Array.from({length: 80}, (_, k) => client.get(url, {range: {offset: 64 * k, bytes: 64}, maxBytes: 64, kind: 'other'})));
+  }, id);
+  const asked = (await lab(page, (i) => window.lab.report(i), id)).requests.slice(before);
+  check(asked.length === 80 && asked.every((q) => q.ok), `${asked.filter((q) => q.ok).length} of ${asked.length} answers`);
+  return Math.max(...asked.map((q) => asked.filter((o) => o.started <= q.started && o.ended > q.started).length));
+}
+
 test('nginx with ranges, HTTP/1.1', async ({skip}) => {
   if (nginxMissing(false)) skip(nginxMissing(false));
   const [b, nginx] = [await common(), await startNginx()];
   try {
     const r = await rightFrom(b, nginx.url, 'maps.texmesh');
     check(/GET \/packages\/maps.texmesh HTTP\/1.1" 206/.test(nginx.log()), 'no range was asked for');
+    check(await mostAtOnce(r) === 6, 'another window than six connections');
     await r.page.close();
   } finally { nginx.close(); }
 });
@@ -100,6 +116,7 @@ test('nginx, HTTP/2', async ({skip}) => {
   try {
     const r = await rightFrom(b, nginx.url, 'maps.texmesh');
     check(/GET \/packages\/maps.texmesh HTTP\/2.0" 206/.test(nginx.log()), nginx.log().slice(0, 2000));
+    check(await mostAtOnce(r) === 32, 'another window than 32 streams');
     await r.page.close();
   } finally { nginx.close(); }
 });

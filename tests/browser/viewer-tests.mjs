@@ -7,10 +7,10 @@ import {startLink} from './link.mjs';
 /** Looks at a page's names, roles, labels and contrasts. */
 const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const kDesktop = {width: 1280, height: 800};
-const kPhone = {width: 390, height: 844};
+export const kPhone = {width: 390, height: 844};
 
 /** Opens the viewer on a package; `body` gets the page. Nothing may be said on the console, nothing asked of elsewhere. */
-async function withViewer(query, body, {viewport = kDesktop, dark = false, touch = false, quiet = true, fault, through} = {}) {
+export async function withViewer(query, body, {viewport = kDesktop, dark = false, touch = false, quiet = true, fault, through} = {}) {
   const {browser} = await common();
   const server = await serve(viewerRoots, {fault});
   const link = through ? await startLink({target: server.port, ...through}) : null;
@@ -31,10 +31,10 @@ async function withViewer(query, body, {viewport = kDesktop, dark = false, touch
   }
 }
 
-const shot = (page, name) => page.screenshot({path: path.join(pictures, `${name}.png`)});
-const phase = (page, name, timeout = 60000) => page.waitForFunction((p) => window.texmeshViewer?.session.live.phase === p, name, {timeout});
-const live = (page, f) => page.evaluate(`(${f})(window.texmeshViewer.session.live)`);
-const settled = (page) => page.waitForTimeout(400); // the panel draws a few times a second
+export const shot = (page, name) => page.screenshot({path: path.join(pictures, `${name}.png`)});
+export const phase = (page, name, timeout = 60000) => page.waitForFunction((p) => window.texmeshViewer?.session.live.phase === p, name, {timeout});
+export const live = (page, f) => page.evaluate(`(${f})(window.texmeshViewer.session.live)`);
+export const settled = (page) => page.waitForTimeout(400); // the panel draws a few times a second
 
 async function drawnShare(page) {
   const png = await page.locator('#view').screenshot();

@@ -212,17 +212,17 @@ export class HttpClient {
         const { done, value } = await reader.read();
         alive();
         if (done) break;
+        if (options.capBytesS > 0) {
+          clearTimeout(timer);
+          await this.holdBack_(value.length, signal); // nobody may know of it before
+          alive();
+        }
         chunks.push(value);
         record.received += value.length;
         this.received += value.length;
         answer.tooLong = record.received > maxBytes;
         if (answer.tooLong) answer.problem = 'more bytes than were asked for';
         else onBytes?.(record.received);
-        if (options.capBytesS > 0) {
-          clearTimeout(timer);
-          await this.holdBack_(value.length, signal);
-          alive();
-        }
       }
       const [first, last] = answer.range ?? [1, record.received];
       answer.complete = record.ok ? !answer.tooLong && last - first + 1 === record.received : status !== 206;

@@ -43,6 +43,7 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
   let mipsAt = 0;
   let pixels = 0; // since the last of the fences that the GPU may not have passed
   const behind: Promise<void>[] = [];
+  const software = isSoftware(renderer); // once, and soon: a GPU that has something to draw keeps the page waiting for its name
 
   /** Where materials that are there show this plane: coverage beside the colours that it belongs to, where they ask for it. */
   function slotsOf(base: number): Slot[] {
@@ -69,7 +70,7 @@ export function textureSet(renderer: WebGLRenderer, textures: readonly TextureIn
     else if (image?.width)
       try {
         // A preview of its own is that of coverage, beside which the colours are shown.
-        if (preview || (await isSoftware(renderer))) await (await import('./enlarge')).enlarge(next, image, { pool, enqueue, ended: () => disposed });
+        if (preview || (await software)) await (await import('./enlarge')).enlarge(next, image, { pool, enqueue, ended: () => disposed });
         else next.fill(old!);
       } catch (error) {
         // A browser whose workers cannot draw leaves it to the GPU.

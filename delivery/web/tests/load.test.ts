@@ -73,6 +73,27 @@ describe('a load', () => {
       l.dispose();
     }
   });
+  it('keeps its scale when the display changes by less than a tenth in the timed part', async () => {
+    const step = reader.manifest.steps[0];
+    const finer = reader.manifest.steps[1];
+    for (const [from, to, scale] of [[0.98, 1.05, step.scale], [0.98, 1.15, finer.scale], [1.02, 0.95, finer.scale], [1.02, 0.85, step.scale]]) {
+      let px = from * step.upToPx;
+      const l = await loading(url, fakeServer(files), { time: 3, rule: 'default', display: () => px });
+      const taken: number[] = [];
+      l.model.on('decision', () => {
+        if (taken.length > 0) return;
+        taken.push(l.model.state.wantedScale);
+        expect(l.count('deadline')).toBe(0);
+        px = to * step.upToPx;
+        l.model.update();
+      });
+      await l.model.done;
+      await l.model.refine();
+      expect(taken).toEqual([from < 1 ? step.scale : finer.scale]);
+      expect([from, to, l.model.state.wantedScale]).toEqual([from, to, scale]);
+      l.dispose();
+    }
+  });
   it('does not ask again and again for what cannot be had', async () => {
     const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
     const l = await loading(url, server, { time: 1 });

@@ -64,7 +64,7 @@ export function start(query: URLSearchParams): void {
     reload: () => {
       hideMessage();
       void session.start(choices);
-      if (!divider.hidden) void session.showOriginal(true).catch(session.onError);
+      if (!divider.hidden) void compare();
     },
     refine: () => { void session.refine(); },
   }, session.live);
@@ -84,7 +84,7 @@ export function start(query: URLSearchParams): void {
     if (session.live.scale === null) showError(error, packageUrl);
     else session.problem(error);
   };
-  wireTools(stage, session);
+  const compare = wireTools(stage, session);
   byId('toggle').setAttribute('aria-expanded', String(!document.body.classList.contains('wide')));
   Object.assign(window, { texmeshViewer: { stage, session, choices } });
   if (packageUrl === '') {
@@ -96,7 +96,8 @@ export function start(query: URLSearchParams): void {
   void session.start(choices);
 }
 
-function wireTools(stage: Stage, session: Session): void {
+/** Gives what shows the original; where that fails, the whole picture is the current one again. */
+function wireTools(stage: Stage, session: Session): () => Promise<void> {
   const divider = byId('divider');
   const stageBox = byId('stage');
   let share = 0.5;
@@ -110,7 +111,18 @@ function wireTools(stage: Stage, session: Session): void {
     divider.hidden = !divider.hidden;
     splitButton.setAttribute('aria-pressed', String(!divider.hidden));
     place();
-    void session.showOriginal(!divider.hidden).catch(session.onError);
+    if (!divider.hidden) void compare();
+  };
+  const side = byId('side-original');
+  const compare = async (): Promise<void> => {
+    const loading = (is: boolean): void => { side.textContent = is ? 'original, loading' : 'original'; };
+    try {
+      await session.showOriginal(loading);
+    } catch (error) {
+      loading(false);
+      if (!divider.hidden) toggleSplit();
+      session.onError(error);
+    }
   };
   const togglePanel = (): void => {
     const wide = document.body.classList.toggle('wide');
@@ -138,4 +150,5 @@ function wireTools(stage: Stage, session: Session): void {
     const action = { s: toggleSplit, t: toggleTheme, p: togglePanel, '0': () => stage.home() }[e.key];
     action?.();
   });
+  return compare;
 }

@@ -37,7 +37,9 @@ export class FragmentMap {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.canvas.addEventListener('pointermove', (e) => this.point(e));
     this.canvas.addEventListener('pointerdown', (e) => this.point(e));
-    this.canvas.addEventListener('pointerleave', () => (this.hint.textContent = ''));
+    this.canvas.addEventListener('pointerleave', (e) => {
+      if (e.pointerType === 'mouse') this.hint.textContent = ''; // a finger that is lifted has leave to read
+    });
     onTheme(() => this.draw());
   }
 

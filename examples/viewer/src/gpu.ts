@@ -37,11 +37,11 @@ export function graphics(canvas: HTMLCanvasElement): WebGL2RenderingContext {
 }
 
 /** Resolves when the GPU has done what it was asked for: a question holds the page up until then, this does not. */
-export async function idle(gl: WebGL2RenderingContext): Promise<void> {
+export async function idle(gl: WebGL2RenderingContext, mostMs = kMostIdleMs): Promise<void> {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   if (!fence) return; // a lost context
   gl.flush();
-  const end = performance.now() + kMostIdleMs;
-  do await turn(4); while (performance.now() < end && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
+  const end = performance.now() + mostMs;
+  do await turn(4); while (performance.now() < end && !gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
   gl.deleteSync(fence);
 }

@@ -98,7 +98,9 @@ export class Panel {
   }
 
   private followPlane(): void {
-    const plane = [...this.live.shownPlane.values()][0];
+    // What people call the texture, where there is one.
+    const shown = [...this.live.shownPlane].sort(([a], [b]) => a - b);
+    const [, plane] = shown.find(([base]) => this.live.textures[base]?.role === 'base-colour') ?? shown[0] ?? [];
     if (plane !== undefined && this.planeSelect.options.length > plane) this.planeSelect.value = String(plane);
   }
 
@@ -165,7 +167,7 @@ export class Panel {
       make('label', { for: 'time' }, 'Time limit'), make('div', { class: 'row' }, range, out),
       make('label', { for: 'cap' }, 'Bandwidth'), cap,
       make('label', { for: 'policy' }, 'Policy'), policy,
-      make('p', { class: 'note' }, 'Time, bandwidth and policy count from the next load on.'),
+      make('p', { class: 'note' }, 'These three count from the next load on.'),
       make('label', { for: 'scale' }, 'Mesh scale'), this.scaleSelect,
       make('label', { for: 'rung' }, 'Texture'), this.rungSelect,
       make('div', { class: 'buttons' },
@@ -187,18 +189,22 @@ export class Panel {
 
   private stepSection(): void {
     const holder = make('div');
-    const box = this.details('Scales', 'Triangles that are enough at a displayed height: what nobody can tell from the original, and an error within a pixel.', true, holder);
+    const box = this.details('Scales', 'Triangles that are enough at a displayed height: nobody can tell them from the original, and no error is beyond a pixel. The dot is what is shown.', true, holder);
     const triangles = (v: number): string => `${short(v)}`;
     this.addPlot(box, holder, {
       height: 170,
-      x: { label: 'displayed height, px', value: format.px, log: true, ticks: (v) => short(v) },
+      x: { label: 'displayed height, px', name: 'height', value: format.px, log: true, ticks: (v) => short(v) },
       y: [{ label: 'triangles', ticks: short, log: true }],
       curves: [
-        { label: 'taken', colour: 'k1', kind: 'steps', value: triangles, fill: false },
+        { label: 'enough', colour: 'k1', kind: 'band', value: triangles },
         { label: 'just noticeable', colour: 'k3', kind: 'dashes', value: triangles },
         { label: 'one pixel', colour: 'k4', kind: 'dashes', value: triangles },
       ],
-      mark: () => (this.live.displayedPx > 0 ? { x: this.live.displayedPx, label: this.live.scale === null ? 'now' : `S${this.live.scale}` } : null),
+      mark: () => {
+        const { displayedPx: x, scale, manifest } = this.live;
+        if (!(x > 0)) return null;
+        return { x, y: manifest?.scales.find((s) => s.scale === scale)?.triangles, label: scale === null ? 'now' : `S${scale}` };
+      },
     }, () => (this.live.manifest ? stepData(this.live.manifest) : null));
   }
 
@@ -243,7 +249,7 @@ export class Panel {
     const [first, second] = [make('div'), make('div')];
     const box = this.details('Time', 'Each fragment as it came: the time the plan gave it and the time it took, then credit and bandwidth.', false, first, second);
     const secondsTicks = (v: number): string => (Math.abs(v) < 1 ? `${(v * 1000).toFixed(0)} ms` : `${v.toFixed(1)} s`);
-    const x = { label: 'seconds since the start', value: (v: number) => `${v.toFixed(2)} s`, ticks: (v: number) => v.toFixed(2) };
+    const x = { label: 'seconds since the start', name: 'at', value: (v: number) => `${v.toFixed(2)} s`, ticks: (v: number) => v.toFixed(2) };
     this.addPlot(box, first, {
       x, y: [{ label: 'per fragment', ticks: secondsTicks, min: 0 }],
       curves: [
@@ -252,7 +258,7 @@ export class Panel {
       ],
     }, () => turnData(this.live, (t) => [t.plannedS, t.actualS]));
     this.addPlot(box, second, {
-      x, y: [{ label: 'credit', ticks: secondsTicks }, { label: 'Mbit/s', ticks: (v) => v.toFixed(1), min: 0 }],
+      x, y: [{ label: 'credit', ticks: secondsTicks }, { label: 'Mbit/s', ticks: (v) => v.toFixed(v < 10 ? 1 : 0), min: 0 }],
       curves: [
         { label: 'credit', colour: 'k4', value: secondsTicks, fill: true },
         { label: 'bandwidth', colour: 'k2', side: 1, value: (v) => `${v.toFixed(2)} Mbit/s` },
@@ -264,7 +270,7 @@ export class Panel {
     const holder = make('div');
     const box = this.details('Bytes', 'What has come over the line, by what it was for.', false, holder);
     this.addPlot(box, holder, {
-      x: { label: '', value: (v) => kKinds[v] ?? '', ticks: (v) => kKinds[v] ?? '', splits: kKinds.map((_, i) => i), range: [-0.6, kKinds.length - 0.4] },
+      x: { label: '', name: 'for', value: (v) => kKinds[v] ?? '', ticks: (v) => kKinds[v] ?? '', splits: kKinds.map((_, i) => i), range: [-0.6, kKinds.length - 0.4] },
       y: [{ label: 'bytes', ticks: format.bytes, min: 0 }],
       curves: [{ label: 'received', colour: 'k1', kind: 'bars', value: format.bytes }],
     }, () => (this.live.transfers.length ? [kKinds.map((_, i) => i), bytesByKind(this.live.transfers)] : null));

@@ -6,21 +6,29 @@ import { colour, onTheme } from './theme';
 export interface Curve {
   label: string;
   colour: string;
-  kind?: 'line' | 'steps' | 'points' | 'bars' | 'dashes';
+  /** `band`: steps so broad that others can be seen on them. */
+  kind?: 'line' | 'band' | 'points' | 'bars' | 'dashes';
   value: (v: number) => string;
   /** Index of the y axis: 0 left, 1 right. */
   side?: 0 | 1;
   fill?: boolean;
 }
 
+interface Mark {
+  x: number;
+  y?: number | undefined;
+  label: string;
+}
+
 export interface PlotOptions {
   height?: number;
-  x: { label: string; value: (v: number) => string; log?: boolean; ticks?: (v: number) => string; splits?: number[]; range?: [number, number] };
+  /** `name`: of its value under the pointer, where the label is too long. */
+  x: { label: string; name?: string; value: (v: number) => string; log?: boolean; ticks?: (v: number) => string; splits?: number[]; range?: [number, number] };
   /** `close`: the axis begins near the least value, not at 0. */
   y: { label: string; ticks: (v: number) => string; log?: boolean; min?: number; max?: number; close?: boolean }[];
   curves: Curve[];
-  /** A vertical mark: where things stand now. */
-  mark?: () => { x: number; label: string } | null;
+  /** Where things stand now: a vertical line, and a dot of the first axis. */
+  mark?: () => Mark | null;
   legend?: boolean;
 }
 
@@ -28,7 +36,7 @@ export interface PlotOptions {
 export class Plot {
   private plot: uPlot | null = null;
   private data: uPlot.AlignedData = [[]];
-  private mark: { x: number; label: string } | null | undefined;
+  private mark: Mark | null | undefined;
   private width = 0;
 
   constructor(
@@ -43,7 +51,7 @@ export class Plot {
   /** What is drawn already is not drawn again. */
   set(data: (number | null)[][]): void {
     const mark = this.options.mark?.();
-    const moved = mark?.x !== this.mark?.x || mark?.label !== this.mark?.label;
+    const moved = mark?.x !== this.mark?.x || mark?.y !== this.mark?.y || mark?.label !== this.mark?.label;
     const same = equal(data, this.data as (number | null)[][]);
     this.mark = mark;
     if (same && this.plot) {
@@ -101,7 +109,7 @@ function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
       },
     };
     axes.push({
-      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, size: 50, ...(y.log ? { splits: decades } : {}), label: y.label, labelSize: 16, space: 26, grid: { show: i === 0, stroke: line, width: 1 },
+      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, size: (_u, values) => Math.max(34, 12 + 6.5 * Math.max(0, ...(values ?? []).map((v) => v.length))), ...(y.log ? { splits: decades } : {}), label: y.label, labelSize: 16, space: 26, grid: { show: i === 0, stroke: line, width: 1 },
       values: (_u, splits) => splits.map((v) => (v == null ? '' : y.ticks(v))),
     });
   });
@@ -113,7 +121,7 @@ function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
     axes,
     legend: { show: o.legend ?? true, live: true },
     cursor: { y: false, points: { size: 6 }, drag: { x: false, y: false } },
-    series: [{ label: o.x.label, value: (_u, v) => (v == null ? '' : o.x.value(v)) }, ...o.curves.map(series)],
+    series: [{ label: o.x.name ?? o.x.label, value: (_u, v) => (v == null ? '' : o.x.value(v)) }, ...o.curves.map(series)],
     hooks: { draw: [(u) => drawMark(u, o)] },
   };
 }
@@ -131,11 +139,11 @@ function series(c: Curve): uPlot.Series {
   return {
     label: c.label,
     scale: `y${c.side ?? 0}`,
-    stroke,
-    width: c.kind === 'points' ? 0 : 1.75,
+    stroke: c.kind === 'band' ? `${stroke}55` : stroke,
+    width: c.kind === 'points' ? 0 : c.kind === 'band' ? 6 : 1.75,
     points: { show: c.kind === 'points', size: 5, fill: stroke, stroke },
     ...(c.kind === 'dashes' ? { dash: [4, 4] } : {}),
-    ...(c.kind === 'steps' && paths.stepped ? { paths: paths.stepped({ align: -1 }) } : {}),
+    ...(c.kind === 'band' && paths.stepped ? { paths: paths.stepped({ align: -1 }) } : {}),
     ...(c.kind === 'bars' && paths.bars ? { paths: paths.bars({ size: [0.7, 60] }), fill: stroke } : {}),
     ...(c.fill ? { fill: `${stroke}22` } : {}),
     value: (_u, v) => (v == null ? '' : c.value(v)),
@@ -155,6 +163,12 @@ function drawMark(u: uPlot, o: PlotOptions): void {
   ctx.moveTo(x, bbox.top);
   ctx.lineTo(x, bbox.top + bbox.height);
   ctx.stroke();
+  if (mark.y !== undefined) {
+    ctx.setLineDash([]);
+    ctx.beginPath();
+    ctx.arc(x, u.valToPos(mark.y, 'y0', true), 4 * devicePixelRatio, 0, 2 * Math.PI);
+    ctx.fill();
+  }
   ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
   const right = x > bbox.left + bbox.width * 0.6;
   ctx.textAlign = right ? 'right' : 'left';

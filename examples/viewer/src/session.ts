@@ -1,6 +1,8 @@
 import { equivalentQuality, open, predictedSsim, surfaceWeights } from 'texmesh';
+import type { Object3D } from 'three';
 import type { DecisionEvent, LoadedModel, LoadOptions, TexmeshPackage } from 'texmesh';
 import { gltfLoader } from './decoders';
+import { isMetallic } from './light';
 import { emptyLive } from './live';
 import type { Live } from './live';
 import type { Choices } from './choices';
@@ -38,6 +40,8 @@ export class Session {
     const turn = ++this.turn;
     const first = this.live.manifest === null;
     this.live = { ...emptyLive(), startedAt: performance.now(), limitS: choices.timeS };
+    this.stage.dueAt = this.live.startedAt + 1000 * choices.timeS;
+    this.stage.draw(); // what was shown is gone
     this.changed('opening');
     try {
       const cap = Number.isFinite(choices.capBytesPerSecond) ? choices.capBytesPerSecond : 0;
@@ -46,7 +50,7 @@ export class Session {
       const pkg = await opening;
       if (turn !== this.turn) return pkg.dispose();
       this.pkg = pkg;
-      this.opened(pkg, first);
+      this.opened(pkg, first, turn);
       const model = pkg.load(this.stage.current, this.options(choices));
       this.model = model;
       this.listen(model, turn);
@@ -75,11 +79,12 @@ export class Session {
     }
   }
 
-  /** S_0 with the highest rungs of full-size textures, into the second scene. */
-  async showOriginal(on: boolean): Promise<void> {
+  /** S_0 with the highest rungs of full-size textures, into the second scene, once for each load. Rejects where it cannot be opened. */
+  async showOriginal(loading: (is: boolean) => void): Promise<void> {
     const { turn } = this;
-    if (!on || this.original || this.openingOriginal === turn) return;
+    if (this.original || this.openingOriginal === turn) return;
     this.openingOriginal = turn;
+    loading(true);
     const { signal } = this.abort;
     let pkg: TexmeshPackage;
     try {
@@ -96,13 +101,14 @@ export class Session {
       ...this.common(), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,
     });
     this.original = { pkg, model };
-    const draw = (): void => this.stage.draw();
-    for (const name of ['first-picture', 'scale', 'fragment', 'done'] as const) model.on(name, draw);
+    const show = (): void => this.stage.show();
+    for (const name of ['first-picture', 'scale', 'fragment', 'done'] as const) model.on(name, show);
     try {
       await model.done;
     } catch (error) {
       if (turn === this.turn && !signal.aborted) this.onError(error);
     }
+    if (turn === this.turn) loading(false);
   }
 
   stop(): void {
@@ -121,7 +127,9 @@ export class Session {
   }
 
   private common(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'camera' | 'signal'> {
-    return { renderer: this.stage.renderer, gltfLoader, camera: this.stage.camera, signal: this.abort.signal };
+    // Seen before its programs are made, which depend on it.
+    const read = ({ scene }: { scene: Object3D }): void => { if (isMetallic(scene)) this.stage.reflect(); };
+    return { renderer: this.stage.renderer, gltfLoader: () => gltfLoader(read), camera: this.stage.camera, signal: this.abort.signal };
   }
 
   private options(c: Choices): LoadOptions {
@@ -138,7 +146,7 @@ export class Session {
     return scales.reduce((best, s) => (Math.abs(s - wanted) < Math.abs(best - wanted) ? s : best));
   }
 
-  private opened(pkg: TexmeshPackage, first: boolean): void {
+  private opened(pkg: TexmeshPackage, first: boolean, turn: number): void {
     const m = pkg.manifest;
     this.live.manifest = m;
     this.live.title = m.title;
@@ -146,6 +154,7 @@ export class Session {
     if (first) this.stage.frame(m.boundsMin, m.boundsMax);
     for (const record of pkg.requests) this.transfer(record);
     pkg.onRequest((record) => {
+      if (turn !== this.turn) return; // what was cancelled for this load is not of it
       this.transfer(record);
       this.changed();
     });
@@ -190,16 +199,16 @@ export class Session {
     });
     on('scale', (e) => {
       l.scale = e.scale;
-      this.stage.draw();
+      this.stage.show();
     });
     on('plane', (e) => {
       l.shownPlane.set(e.base, e.plane);
       if (this.pkg) void this.readTables(this.pkg, turn, [e.plane]);
-      this.stage.draw();
+      this.stage.show();
     });
     on('fragment', (e) => {
       this.rungsOf(model, e.plane);
-      this.stage.draw();
+      this.stage.show();
     });
     on('decision', (e) => {
       if (Number.isNaN(origin)) origin = since(e.at) - e.issued;
@@ -212,6 +221,8 @@ export class Session {
     on('deadline', (e) => {
       l.doneS = e.actual;
       l.limitS = e.limit;
+      this.stage.dueAt = Infinity;
+      this.stage.draw();
     });
     on('done', () => {
       l.phase = 'done';
@@ -292,6 +303,7 @@ export class Session {
   }
 
   private failed(error: unknown): void {
+    this.stage.dueAt = Infinity;
     this.live.phase = 'failed';
     this.changed();
     this.onError(error);

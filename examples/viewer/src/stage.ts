@@ -1,12 +1,16 @@
 import {
-  Box3, DirectionalLight, HemisphereLight, MathUtils, NeutralToneMapping, PerspectiveCamera, Scene, Spherical, SRGBColorSpace,
-  Vector2, Vector3, WebGLRenderer,
+  Box3, DirectionalLight, MathUtils, NeutralToneMapping, PerspectiveCamera, Scene, Spherical, SRGBColorSpace, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { graphics, idle, pixelRatio, turn } from './gpu';
+import { light, reflectSky } from './light';
 
 const kFieldOfViewDegrees = 32;
 const kTurnDegrees = 6; // per press of an arrow key
+/** Longer than this no frame is waited for, and none is kept back. */
+const kMostFrameMs = 1500;
+/** A load that ends later than this shows what it has. */
+const kMostLateMs = 1000;
 
 /**
  * The picture: a camera that goes round the object by mouse, touch and keyboard, and two scenes of which the left one is shown
@@ -28,6 +32,7 @@ export class Stage {
   private readonly bounds = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
   private split = 0; // share of the width that shows the original
   private asked = false;
+  private readonly pace = new Pace();
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     this.lamps = [this.current, this.original].map(light);
@@ -107,6 +112,24 @@ export class Stage {
     });
   }
 
+  /**
+   * Something has come that a frame may show: one is drawn when the GPU has had as much time for other things, the next things to come
+   * among them, as the last frame took. Where the processor draws, half a second each, frames would else keep back what is to be shown.
+   */
+  show(): void {
+    this.pace.next(() => this.draw());
+  }
+
+  /** All is to have come at this time of performance.now(): no frame of `show` is begun that would last until then. */
+  set dueAt(ms: number) {
+    this.pace.dueAt = ms;
+  }
+
+  /** Metals mirror a sky, of whose light the rest gets as much as before. For what is loaded from now on. */
+  reflect(): void {
+    for (const scene of [this.current, this.original]) reflectSky(scene);
+  }
+
   /** Draws now. */
   render(): void {
     this.controls.update(); // while it is gliding, this asks for the next frame
@@ -114,6 +137,11 @@ export class Stage {
     this.carryLamps();
     const [r, width, height] = [this.made, this.widthPx, this.heightPx];
     if (!r) return;
+    this.draws(r, width, height);
+    this.pace.drawn(r.getContext() as WebGL2RenderingContext);
+  }
+
+  private draws(r: WebGLRenderer, width: number, height: number): void {
     if (this.split > 0) {
       const border = Math.round(width * this.split);
       r.setScissorTest(true);
@@ -195,9 +223,40 @@ export class Stage {
   }
 }
 
-/** Daylight from above and a lamp that the camera carries. Scans have their own shadows in the texture. */
-function light(scene: Scene): DirectionalLight {
-  const lamp = new DirectionalLight(0xffffff, 2.2);
-  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
-  return lamp;
+/** When frames of what comes are drawn. */
+class Pace {
+  dueAt = Infinity;
+  private frameMs = 0; // on the GPU, the last one
+  private drawing = 0; // frames that are not on the screen yet
+  private freeAt = 0; // since when the GPU has had none
+  private timer = 0;
+
+  /** Calls `draw` once, when it is time. */
+  next(draw: () => void): void {
+    if (this.timer) return;
+    const wait = this.waitMs(performance.now());
+    if (wait <= 0) return draw();
+    this.timer = window.setTimeout(() => {
+      this.timer = 0;
+      this.next(draw);
+    }, wait);
+  }
+
+  private waitMs(now: number): number {
+    if (this.drawing > 0) return 8;
+    // What is late has no time for frames, either.
+    if (now + this.frameMs > this.dueAt && now < this.dueAt + kMostLateMs) return Math.max(8, this.dueAt - now);
+    return this.freeAt + this.frameMs - now;
+  }
+
+  /** A frame has been asked for. */
+  drawn(gl: WebGL2RenderingContext): void {
+    const begun = performance.now();
+    this.drawing++;
+    void idle(gl, kMostFrameMs).then(() => {
+      this.drawing--;
+      this.freeAt = performance.now();
+      this.frameMs = Math.min(this.freeAt - begun, kMostFrameMs);
+    });
+  }
 }

@@ -1,0 +1,47 @@
+import { CubeUVReflectionMapping, DataTexture, DirectionalLight, HemisphereLight, ShaderChunk } from 'three';
+import type { Object3D, Scene } from 'three';
+
+/**
+ * Radiance of the sky by height of the direction and roughness. To paper it is what the hemisphere light is, whose intensity over pi
+ * this is in linear light; a mirror sees more contrast, or it would look like paper.
+ */
+const kSky = `
+vec3 skyRadiance( const in float up, const in float roughness ) {
+  vec3 paper = mix( vec3( 0.653, 0.627, 0.577 ), vec3( 0.955 ), 0.5 + 0.5 * up );
+  return mix( vec3( mix( 0.3, 1.7, smoothstep( -0.6, 0.9, up ) ) ), paper, roughness );
+}
+`;
+const kLookUp = /textureCubeUV\( envMap, envMapRotation \* (\w+), ([\w.]+) \)/g;
+
+/** Daylight from above and a lamp that the camera carries. Scans have their own shadows in the texture. */
+export function light(scene: Scene): DirectionalLight {
+  const lamp = new DirectionalLight(0xffffff, 2.2);
+  scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
+  return lamp;
+}
+
+/** Whether something beneath an object shows little but what it mirrors. */
+export function isMetallic(root: Object3D): boolean {
+  let metallic = false;
+  root.traverse((o) => {
+    const { material } = o as { material?: unknown };
+    for (const m of [material].flat()) metallic ||= ((m as { metalness?: number } | undefined)?.metalness ?? 0) > 0.5;
+  });
+  return metallic;
+}
+
+/**
+ * In place of the hemisphere light its like as surroundings; a metal under that light alone is black. Computed where three.js would look it
+ * up in a texture: a processor that draws takes twice as long for a frame with that.
+ */
+export function reflectSky(scene: Scene): void {
+  if (scene.environment) return;
+  const { envmap_physical_pars_fragment: code } = ShaderChunk;
+  if (kLookUp.test(code))
+    ShaderChunk.envmap_physical_pars_fragment = kSky + code.replace(kLookUp, 'vec4( skyRadiance( $1.y, $2 ), 1.0 )');
+  const none = new DataTexture(new Uint8Array(4 * 64), 1, 64); // of the least size that three.js takes for surroundings
+  none.mapping = CubeUVReflectionMapping;
+  none.needsUpdate = true;
+  scene.environment = none;
+  for (const o of [...scene.children]) if (o instanceof HemisphereLight) scene.remove(o);
+}
