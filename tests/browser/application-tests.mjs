@@ -54,6 +54,21 @@ test("an application of Vite, built, at a server without ranges: README's exampl
   } finally { await server.close(); }
 }, {seconds: 90});
 
+test('an application of Vite that awaits at its top level, with the chunk that README names', async () => {
+  const {root, vite} = application();
+  const main = path.join(root, 'main.ts');
+  const inside = fs.readFileSync(main, 'utf8').replace('async function show() {\n', '').replace('}\nvoid show();\n', 'await model.done;\n');
+  check(!/show\(\)/.test(inside), 'the example is another');
+  fs.writeFileSync(main, inside);
+  const [, chunks] = /`build: ({.*manualChunks.*})`/.exec(fs.readFileSync(path.join(env.source, 'delivery/web/README.md'), 'utf8'));
+  const build = new Function(`return ${chunks}`)();
+  await (await vite()).build({root, configFile: false, logLevel: 'error', build: {...build, target: 'es2022'}});
+  const [b, server] = [await common(), await serve({'/': path.join(root, 'dist')})];
+  try {
+    await isShown(b, `${server.url}/index.html`);
+  } finally { await server.close(); }
+}, {seconds: 90});
+
 test("an application of Vite's dev server: README's example", async () => {
   const {root, vite} = application();
   const server = await (await vite()).createServer({root, configFile: false, logLevel: 'error', server: {port: 0, host: '127.0.0.1'}, optimizeDeps: {exclude: ['texmesh']}});
