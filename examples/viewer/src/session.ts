@@ -226,6 +226,7 @@ export class Session {
     });
     on('done', () => {
       l.phase = 'done';
+      this.stage.draw();
       if (this.pkg) void this.predict(this.pkg, model, turn).catch(() => {}); // refining has made it better
     });
     // The library makes anew what the GPU has lost; until then there is nothing to be seen.
