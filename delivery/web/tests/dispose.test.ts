@@ -31,9 +31,9 @@ it('a load that is disposed of frees textures, materials and geometries, and hea
   expect([l.model.object.children, l.model.state.planes]).toEqual([[], []]);
   const before = l.count('request');
   const asked = server.log.length;
-  await l.pkg.store.read({ path: 'x', offset: 20000, bytes: 5000 }, { offset: 20000, bytes: 5000 }, { kind: 'other', once: true });
+  await l.pkg.scaleGlb(0);
   expect(l.count('request')).toBe(before);
   expect(l.pkg.client.listeners.size).toBe(0);
-  expect(server.log.length).toBe(asked + 1);
+  expect(server.log.length).toBeGreaterThan(asked);
   l.dispose();
 });
