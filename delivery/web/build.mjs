@@ -45,12 +45,14 @@ const typescript = (joined) => ({
  * `texmesh` and `texmesh/reader` offer some of them.
  */
 const internal = [
-  'adopt', 'afterMesh', 'areaPerTexel', 'bytesLeft', 'bytesOf', 'coarsest', 'completed', 'creditS', 'decided', 'doneS', 'elapsedS', 'endS',
-  'estimator', 'expectedBytes', 'extraFile', 'fillFrom', 'fillFromTexture', 'filesOf', 'filled', 'finerPlanes', 'finished', 'gainPerByte', 'gapBytes', 'hardLimits',
-  'highRung', 'initialBytesS', 'isUsed', 'issuedS', 'limitS', 'linkBytesS', 'lostScale', 'lowRung', 'makeOpaque', 'maxInFlight', 'meanBytesS',
-  'mipsAreStale', 'mostBytes', 'ofImage', 'openSplits', 'openStream', 'owedBytes', 'plannedBytes', 'prepare', 'priceKappa', 'qualityHigh', 'qualityLow',
-  'recentBytesS', 'refineSome', 'residualS', 'scaleFor', 'settled', 'setTexture', 'showScale', 'shownScale', 'slots', 'smallBytes', 'spacingS', 'startsS',
-  'targetBytes', 'textureAt', 'textureDssim', 'thetaS', 'timeLimitS', 'timedPart', 'tooLong', 'tooShortForRtt', 'totalWeight', 'updateMips', 'uploadFragment', 'wish',
+  'adopt', 'advance', 'afterMesh', 'alive', 'allBytes', 'allSeconds', 'bytesLeft', 'bytesOf', 'coarsest', 'creditS',
+  'decided', 'doneS', 'elapsedS', 'elsewhere', 'endS', 'estimate', 'estimator', 'expectedBytes', 'extraFile', 'filesOf', 'filled',
+  'finerPlanes', 'finished', 'gainPerByte', 'gapBytes', 'hardLimits', 'highRung', 'initialBytesS', 'isUsed', 'issuedS',
+  'lastS', 'leastInFlight', 'limitS', 'linkBytesS', 'loss', 'lostScale', 'lowRung', 'lowestRung', 'meanBytesS', 'mostBytes',
+  'mostInFlight', 'noRanges', 'offers', 'openSplits', 'openStream', 'owedBytes', 'plannedBytes', 'prepare', 'previewLoss', 'priceKappa',
+  'qualityHigh', 'qualityLow', 'recentBytesS', 'refineSome', 'residualS', 'scaleFor', 'showScale', 'shownScale', 'skips', 'slope', 'slots',
+  'smallBytes', 'spacingS', 'startsS', 'targetBytes', 'textureAt', 'textureDssim', 'thetaS', 'timeLimitS', 'timedPart', 'tooLong',
+  'totalWeight', 'updateMips', 'uploadFragment', 'waitS', 'ways', 'wish',
 ];
 
 /** Private members end in _; nobody else names them. One chunk after the other, so that all give them the same names. */
