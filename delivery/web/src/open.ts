@@ -43,10 +43,11 @@ export class TexmeshPackage extends PackageReader {
       pool?.dispose();
       pool = workerPool(options);
     } else pool.grow(options.workers);
-    this.pool = undefined;
+    this.pool = pool; // until a load has it: options may be refused
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
     const load = loadModel(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
+    this.pool = undefined;
     this.loaded_ = true;
     this.loads_.add(load);
     return load;

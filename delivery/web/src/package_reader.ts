@@ -2,7 +2,7 @@ import { requireDigest } from './digests';
 import { FormatError, InputError } from './errors';
 import type { PackageData } from './fragment_list';
 import type { FragmentFiles } from './fragment_files';
-import { HttpClient, HttpOptions, RequestKind, RequestRecord, isAbort, nowS } from './http';
+import { HttpClient, HttpOptions, RequestKind, RequestRecord, abortError, isAbort, nowS, throwIfAborted } from './http';
 import * as layout from './layout';
 import type { PlaneDocument } from './documents';
 import type { ByteRange, EntryRef, Manifest, PagedRef, StreamRef } from './manifest';
@@ -50,15 +50,26 @@ async function decoded<K extends keyof Documents>(
   name: K,
   ...args: Parameters<Documents[K]>
 ): Promise<Decoded<K>> {
-  let timer: ReturnType<typeof setTimeout> | undefined;
-  const late = new Promise<never>((_, fail) => (timer = setTimeout(fail, 1000 * options.stallTimeoutS)));
+  throwIfAborted(signal);
+  let over = (): void => undefined;
+  const late = new Promise<never>((_, fail) => {
+    const cancel = (): void => fail(abortError());
+    const timer = setTimeout(cancel, 1000 * options.stallTimeoutS);
+    signal?.addEventListener('abort', cancel);
+    over = () => {
+      clearTimeout(timer);
+      signal?.removeEventListener('abort', cancel);
+    };
+  });
   try {
-    return await Promise.race([decoder(name, ...args), late]);
+    const result = await Promise.race([decoder(name, ...args), late]);
+    throwIfAborted(signal);
+    return result;
   } catch (error) {
     if (error instanceof FormatError || signal?.aborted) throw error;
     return decodeHere(name, ...args);
   } finally {
-    clearTimeout(timer);
+    over();
   }
 }
 

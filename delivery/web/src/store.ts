@@ -81,6 +81,7 @@ class RangeStore implements PackageStore {
   }
 
   async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
+    if (bytes === 0) return new Uint8Array(0); // as WebP's tables are; no range says that
     const end = begin + bytes;
     const part = this.parts_.find((p) => p.begin <= begin && p.begin + p.bytes.length > begin);
     let got: Uint8Array | undefined;

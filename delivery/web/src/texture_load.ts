@@ -308,7 +308,8 @@ export async function textureLoad(load: LoadContext) {
     const list = await listOf(scale, unseen);
     for (const o of list.offers) load.expectedBytes += o.plannedBytes;
     const fragmentsS = leftS() - composeS;
-    if (load.override.rung !== undefined || !Number.isFinite(fragmentsS)) while (await refineSome(true));
+    const given = load.override.rung !== undefined;
+    if (given || !Number.isFinite(fragmentsS)) while (given === (load.override.rung !== undefined) && (await refineSome(true)));
     else if (fragmentsS > 0 && !pool.none && list.offers.length > 0) await fetchInTime(list, fragmentsS);
     await shown;
     await composed();

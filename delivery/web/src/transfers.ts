@@ -141,7 +141,7 @@ export class Transfers {
           });
       for (const p of parts) p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);
       say(Infinity);
-      for (const p of parts) if (p.job.missing === 0 && p.job.streams.every((s) => s)) void this.decode_(p.job, signal);
+      for (const p of parts) if (p.job.missing === 0 && !p.job.streams.includes(undefined as never)) void this.decode_(p.job, signal);
     } catch (error) {
       parts.forEach((p, i) => {
         if (p.job.failed) return;

@@ -101,8 +101,8 @@ export function workerPool({ workerUrl, decode, workers }: PoolOptions = {}) {
     broken.add(index);
     helpers[index].terminate();
     helpers[index] = again && !works ? startHere() : start(index);
-    for (const { worker, request } of jobs.values()) {
-      if (worker !== index) continue;
+    // Those of now: each that fails gives another one its turn.
+    for (const { request } of [...jobs.values()].filter((job) => job.worker === index)) {
       if (again && works) answered({ id: request.id, failed: new Error('a worker broke') });
       else helpers[index].postMessage(request);
     }

@@ -1,16 +1,20 @@
 import { describe, expect, it } from 'vitest';
 import { FormatError } from '../src/errors';
+import { open } from '../src/open';
 import { PackageReader } from '../src/package_reader';
 import type { TextureInfo } from '../src/textures';
 import { Transfers, Wish } from '../src/transfers';
 import { workerPool } from '../src/worker_pool';
+import { handle } from '../src/worker';
 import type { WorkerRequest } from '../src/worker_protocol';
 import { fakeServer } from './fake_server';
+import { loading, until } from './loading';
 import { golden } from './support';
 
 const container = golden('v1.1-scan');
 const url = 'http://host/a/scan.texmesh';
 const files = { '/a/scan.texmesh': container };
+const turns = (ms = 5): Promise<void> => new Promise((go) => setTimeout(go, ms));
 
 describe('streams of several rungs', () => {
   /** One fragment of two rungs that follow each other; reads end when the test says so. */
@@ -42,6 +46,39 @@ describe('streams of several rungs', () => {
     const run = transfers.fetch([wish], { gapBytes: 0, mostBytes: Infinity }, () => heard.push('arrived'), () => heard.push('failed'));
     return { reads, asked, heard, run, transfers };
   }
+  it('are decoded once, when the last request has ended', async () => {
+    const t = await twoRungs();
+    expect(t.reads.length).toBe(2);
+    t.reads[1].onBytes(50); // all its bytes are there, but the answer has not ended
+    t.reads[0].done(new Uint8Array(100));
+    await turns();
+    expect([t.heard, t.asked]).toEqual([['arrived'], []]);
+    t.reads[1].done(new Uint8Array(50));
+    await t.run;
+    await turns();
+    expect([t.heard, t.asked]).toEqual([['arrived', 'decoded'], [[100, 50]]]);
+    expect(t.transfers.pending).toBe(0);
+  });
+  it('are lost once, where what had arrived does not end well', async () => {
+    const t = await twoRungs();
+    t.reads[1].onBytes(50);
+    t.reads[0].done(new Uint8Array(100));
+    await turns();
+    t.reads[1].failed(new Error('cut'));
+    await t.run;
+    await turns();
+    expect([t.heard, t.asked]).toEqual([['arrived', 'lost'], []]);
+  });
+  it('that have failed do not arrive later', async () => {
+    const t = await twoRungs();
+    t.reads[0].onBytes(100);
+    t.reads[0].failed(new Error('cut'));
+    await turns();
+    t.reads[1].done(new Uint8Array(50));
+    await t.run;
+    await turns();
+    expect([t.heard, t.asked]).toEqual([['failed'], []]);
+  });
   it('fail once, where both requests do', async () => {
     const t = await twoRungs();
     t.reads[0].failed(new Error('cut'));
@@ -49,6 +86,42 @@ describe('streams of several rungs', () => {
     await t.run;
     expect([t.heard, t.asked]).toEqual([['failed'], []]);
   });
+});
+
+describe('open() that is cancelled while the manifest is decoded', () => {
+  it('ends though the worker does not answer', async () => {
+    const abort = new AbortController();
+    const asked: string[] = [];
+    const decode = (request: WorkerRequest): Promise<never> => {
+      asked.push(request.op);
+      return new Promise(() => undefined);
+    };
+    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode }).then(() => 'opened', (error: Error) => error.name);
+    expect(await until(() => asked.length > 0)).toBe(true);
+    abort.abort();
+    expect(await Promise.race([opening, turns(500).then(() => 'still waits')])).toBe('AbortError');
+  });
+  it('gives no package, though the worker answers', async () => {
+    const abort = new AbortController();
+    const decode = (request: WorkerRequest): ReturnType<typeof handle> => {
+      abort.abort();
+      return handle(request);
+    };
+    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode }).then(() => 'opened', (error: Error) => error.name);
+    expect(await opening).toBe('AbortError');
+  });
+});
+
+it('who gives up an override in the timed part does not ask for everything', async () => {
+  const server = fakeServer(files);
+  const l = await loading(url, server, { rung: 0, time: 5, autoRefine: false });
+  expect(await until(() => l.pkg.requests.some((q) => q.kind === 'texture'))).toBe(true);
+  l.model.setOverride({});
+  let inTime = -1;
+  l.model.on('deadline', () => (inTime = Math.max(...l.model.state.planes.flatMap((p) => [...p.rungs]))));
+  await l.model.done;
+  expect(inTime).toBe(0);
+  l.dispose();
 });
 
 it('who cancels while a document is decoded has no other thread decode it', async () => {
