@@ -153,6 +153,12 @@ describe('hostile answers', () => {
     }
     expect(server.log.length).toBe(1);
   });
+  it('nothing is asked for where an entry is empty', async () => {
+    const server = range();
+    const { store } = await openStore(url, [], 'range', new HttpClient({ fetch: server.fetch, ...quick }));
+    expect((await store.read({ path: 'texture/0/tables.pack', offset: 20000, bytes: 0 }, { offset: 20000, bytes: 0 }, { kind: 'texture' })).length).toBe(0);
+    expect(server.log.length).toBe(1);
+  });
   it('a server that gives its front page for everything has the whole container, too', async () => {
     const page = new TextEncoder().encode('<!doctype html><title>front page</title>'.repeat(20));
     const files = { '/a/scan.texmesh': container, '/a/scan/manifest.json': page, '/a/scan/fragments.json': page };
