@@ -114,7 +114,6 @@ class RangeStore implements PackageStore {
     const { client } = this.mirrors_;
     const again = retriesOf(client, signal);
     const chunks: Uint8Array[] = [];
-    if (bytes === 0) return new Uint8Array(0); // tables of a codec that has none
     for (let have = 0; ; ) {
       this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before room is made
       const before = have;
