@@ -318,6 +318,7 @@ export class PackageReader {
     const { tableBytes } = await this.planeTables(plane, signal);
     const { tableStreams } = this.planes_.get(plane)!;
     const streams = await this.shared_(`streams/${plane}`, () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
+    if (!(rung in tableBytes)) throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${tableBytes.length}`, `${rung}`);
     const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
     return streams.subarray(begin, begin + tableBytes[rung]);
   }
@@ -373,9 +374,10 @@ export class PackageReader {
     const { stream: s } = this.manifest;
     return s && this.read_(s, { offset: s.offset, bytes: Math.min(s.bytes, s.headBytes + more) }, { kind: 'stream', signal }, headOf(s));
   }
-  /** Bytes of the vertex-split stream, which there must be; whoever takes blocks of it checks them by its head. */
+  /** Bytes of the vertex-split stream; InputError where there is none. Whoever takes blocks of it checks them by its head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
-    const stream = this.manifest.stream!;
+    const { stream } = this.manifest;
+    if (!stream) throw new InputError(this.store.name, '', 'a stream of vertex splits', 'none');
     return this.store.read(stream, { offset: stream.offset + offset, bytes }, { kind: 'stream', once: true, ...how });
   }
 }

@@ -141,11 +141,14 @@ class RangeStore implements PackageStore {
   }
 
   /** Whether it is of the file that reading began with, and what was asked for. */
-  private checkRange_(m: Mirror, { range, etag, url }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
+  private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
     this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');
     m.etag ||= etag;
     // Another origin may keep the header to itself; then only the length tells.
-    if (!range) return this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
+    if (!range) {
+      this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
+      return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`, body.length);
+    }
     const [first, last, total] = range;
     this.require_(m, m.total < 0 || total === m.total, offset, `a file of ${m.total} bytes`, total);
     this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset, 'the range that was asked for', `${first}-${last}`);

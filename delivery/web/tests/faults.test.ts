@@ -169,27 +169,38 @@ describe('hostile answers', () => {
     const opening = PackageReader.openUrl('http://host/a/scan.zip', { fetch: range().fetch, mode: 'files' });
     expect(await rejection(opening)).toBeInstanceOf(InputError);
   });
-  it('a redirection to another origin may keep Content-Range to itself', async () => {
-    const server = range();
-    const redirected: typeof fetch = async (input, init) => {
-      const answer = await server.fetch(input, init);
-      const headers = new Headers(answer.headers);
-      headers.delete('content-range');
-      const other = new Response(answer.body, { status: answer.status, headers });
-      Object.defineProperty(other, 'url', { value: 'https://cdn.example/scan.texmesh' });
-      return other;
-    };
+  /** Answers of another origin, which keeps Content-Range to itself, read by a page. */
+  async function fromElsewhere(server: FakeServer, body: (read: typeof fetch) => Promise<void>): Promise<void> {
     const before = Object.getOwnPropertyDescriptor(globalThis, 'location');
     Object.defineProperty(globalThis, 'location', { value: new URL('http://host/page'), configurable: true });
     try {
-      const reader = await PackageReader.openUrl(url, { fetch: redirected, ...quick });
-      expect((await reader.textures()).length).toBe(reader.manifest.planeCount);
-      expect(absolute('a.texmesh')).toBe('http://host/a.texmesh');
+      await body(async (input, init) => {
+        const answer = await server.fetch(input, init);
+        const headers = new Headers(answer.headers);
+        headers.delete('content-range');
+        const other = new Response(answer.body, { status: answer.status, headers });
+        Object.defineProperty(other, 'url', { value: 'https://cdn.example/scan.texmesh' });
+        return other;
+      });
     } finally {
       if (before) Object.defineProperty(globalThis, 'location', before);
       else Reflect.deleteProperty(globalThis, 'location');
     }
-  });
+  }
+  it('a redirection to another origin may keep Content-Range to itself', () =>
+    fromElsewhere(range(), async (read) => {
+      const reader = await PackageReader.openUrl(url, { fetch: read, ...quick });
+      expect((await reader.textures()).length).toBe(reader.manifest.planeCount);
+      expect(absolute('a.texmesh')).toBe('http://host/a.texmesh');
+    }));
+  it('then the length tells what is not whole', () =>
+    fromElsewhere(range(({ number }) => number > 0 && 'short'), async (read) => {
+      const { store } = await openStore(url, [], 'range', new HttpClient({ fetch: read, ...quick }));
+      const place = { path: 'mesh/S02.glb', offset: 20000, bytes: 500 };
+      const error = await rejection(store.read(place, place, { kind: 'mesh' }));
+      expect(error).toBeInstanceOf(FormatError);
+      expect(error.message).toContain('expected 500 bytes, found 499');
+    }));
   const [jsonChunk, binChunk] = [0x4e4f534a, 0x004e4942];
   /** A GLB of these chunks. */
   function glb(...chunks: (string | [number, string])[]): Uint8Array {

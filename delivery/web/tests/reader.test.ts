@@ -114,6 +114,7 @@ describe('places that do not exist', async () => {
   ])('%s', async (_, read) => {
     expect(await problem(read)).toBeInstanceOf(InputError);
   });
+  it('a rung', async () => expect(await problem(() => reader.tableStream(0, 99))).toBeInstanceOf(InputError));
   it('an entry', async () => expect(await problem(() => reader.entry('nothing.bin'))).toBeInstanceOf(FormatError));
   it('errors have names that survive bundling', () => {
     expect(new InputError('f', 'p', 'e', 'x').name).toBe('InputError');

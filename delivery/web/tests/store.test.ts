@@ -63,13 +63,6 @@ describe('a server with ranges', () => {
     await reader.preview(0);
     expect(bytesAskedTwice(server.log, url)).toBe(0);
   });
-  it('is not asked for what has no bytes, like the tables of WebP', async () => {
-    const server = range();
-    const reader = await openAt(server);
-    const place = { path: 'texture/0/tables.pack', offset: container.length - 100, bytes: 0 };
-    expect(await reader.store.read(place, place, { kind: 'texture' })).toHaveLength(0);
-    expect(server.log).toHaveLength(1);
-  });
   it('two askers of one document share a request', async () => {
     const server = range();
     const reader = await openAt(server);
