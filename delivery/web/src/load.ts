@@ -96,9 +96,10 @@ export function loadModel(
     const { scale, glb } = manifest.scales.at(-1)!;
     load.expectedBytes = client.received + glb.bytes;
     enter('first-picture');
-    // On a slow link nothing shares it with the first picture; what comes next is asked for just before its end.
-    const { near, shown } = loadScale(scale);
-    coming = Promise.all([import('./texture_load'), near]).then(([part]) => part.textureLoad(load));
+    // On a slow link nothing shares it with the first picture. What comes next is asked for while the GPU
+    // prepares for it.
+    const { shape, shown } = loadScale(scale);
+    coming = Promise.all([import('./texture_load'), shape]).then(([part]) => part.textureLoad(load));
     coming.catch(() => undefined);
     await shown;
     model.update(load.view.camera); // by what is there, not by its bounds alone
@@ -116,18 +117,18 @@ export function loadModel(
   // ---- scales
 
   /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
-  function loadScale(scale: number): { near: Promise<void>; arrived: Promise<void>; shown: Promise<void> } {
+  function loadScale(scale: number): { arrived: Promise<void>; shape: Promise<Object3D>; shown: Promise<void> } {
     load.wantedScale = scale;
     const show = (k: number): void => {
       // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
       if (load.wantedScale === scale && (k === scale || k < load.shownScale)) showScale(k);
     };
-    const { near, arrived, shape } = scales.load(scale, show);
+    const { arrived, shape } = scales.load(scale, show);
     const shown = shape.then(async (its) => {
       if (load.shownScale < 0) await compiled(its);
       show(scale);
     });
-    return { near, arrived, shown };
+    return { arrived, shape, shown };
   }
   /** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
   async function compiled(shape: Object3D): Promise<void> {

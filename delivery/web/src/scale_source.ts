@@ -1,6 +1,6 @@
 import type { Mesh, Object3D } from 'three';
 import type { LoadOptions } from './api';
-import { isAbort, nowS } from './http';
+import { isAbort } from './http';
 import type { PackageReader } from './package_reader';
 import { MaterialSet, ParsedGltf, Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
 import type { SplitShapes } from './split_shape';
@@ -8,8 +8,6 @@ import type { WorkerPool } from './worker_pool';
 
 /** A scale on its way. */
 export interface ScaleLoad {
-  /** So little of its file is missing that the next request may be made: its answer follows without a pause. */
-  near: Promise<void>;
   /** All bytes are there. */
   arrived: Promise<void>;
   shape: Promise<Object3D>;
@@ -27,7 +25,7 @@ export function scaleSource(
   added: (slot: Slot) => void,
   problem: (error: unknown, what: string) => void,
 ) {
-  const { manifest, client, form } = reader;
+  const { manifest, form } = reader;
   const shapes = new Map<number, Object3D>();
   const underWay = new Map<number, ScaleLoad>();
   let splits: SplitShapes | undefined;
@@ -39,7 +37,7 @@ export function scaleSource(
   const streamBytes = (scale: number): number => (usable ? splits!.bytesOf(scale) : Infinity);
   const usesStream = (scale: number): boolean => streamBytes(scale) <= (options.meshes === 'stream' ? Number.MAX_VALUE : glbBytes(scale));
 
-  async function read(scale: number, near: () => void, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
+  async function read(scale: number, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
     const known = shapes.get(scale);
     if (known) return known;
     if (first && usesStream(scale))
@@ -54,14 +52,7 @@ export function scaleSource(
         usable = false;
         problem(error, 'vertex splits');
       }
-    let began = 0;
-    const onBytes = (received: number): void => {
-      const now = nowS();
-      began ||= now;
-      const flying = now > began ? (received / (now - began)) * client.rttS : 0;
-      if (glbBytes(scale) - received <= Math.max(4096, flying)) near();
-    };
-    const glb = await reader.scaleGlb(scale, { signal, onBytes });
+    const glb = await reader.scaleGlb(scale, { signal });
     arrived();
     await reader.decoded(signal, 'requireOwnBytes', glb);
     const gltf = await parseScale(options.gltfLoader(), glb, first !== undefined);
@@ -93,14 +84,12 @@ export function scaleSource(
     load(scale: number, passed: (scale: number) => void): ScaleLoad {
       const asked = underWay.get(scale);
       if (asked) return asked;
-      let [tellNear, tellArrived] = [(): void => undefined, (): void => undefined];
-      const near = new Promise<void>((done) => (tellNear = done));
+      let tellArrived = (): void => undefined;
       const arrived = new Promise<void>((done) => (tellArrived = done));
-      const load = { near, arrived, shape: read(scale, tellNear, tellArrived, passed) };
+      const load = { arrived, shape: read(scale, tellArrived, passed) };
       underWay.set(scale, load);
       const end = (): void => {
         underWay.delete(scale);
-        tellNear();
         tellArrived();
       };
       load.shape.then(end, end);
