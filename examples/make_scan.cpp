@@ -7,7 +7,7 @@
 
 #include "examples/scan_noise.h"
 #include "examples/scan_writers.h"
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace {
 

@@ -5,8 +5,8 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/base/errors.h"
+#include "format/base/portable_math.h"
 
 namespace texmesh::examples {
 namespace {

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/model.h"
-#include "stages/decode_image.h"
-#include "stages/run_context.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh::examples {
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "format/vec.h"
+#include "format/base/vec.h"
 
 namespace texmesh::examples {
 

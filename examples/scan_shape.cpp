@@ -2,7 +2,7 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/portable_math.h"
+#include "format/base/portable_math.h"
 
 namespace texmesh::examples {
 namespace {

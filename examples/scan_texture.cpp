@@ -6,8 +6,8 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/portable_math.h"
-#include "stages/parallel.h"
+#include "format/base/portable_math.h"
+#include "stages/base/parallel.h"
 
 namespace texmesh::examples {
 namespace {

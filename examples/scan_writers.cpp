@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace texmesh::examples {
 namespace {

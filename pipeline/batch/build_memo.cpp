@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "format/archive.h"
-#include "format/errors.h"
-#include "pipeline/atomic_file.h"
+#include "format/base/archive.h"
+#include "format/base/errors.h"
 #include "pipeline/cache/cache_files.h"
+#include "pipeline/io/atomic_file.h"
 
 namespace texmesh {
 namespace {

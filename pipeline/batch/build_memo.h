@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/worker.h"
+#include "pipeline/compile/worker.h"
 
 namespace texmesh {
 

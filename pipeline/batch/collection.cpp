@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "format/errors.h"
-#include "pipeline/inspect/bounded_json.h"
+#include "format/base/bounded_json.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/options.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 

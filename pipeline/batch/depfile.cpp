@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <unordered_map>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;

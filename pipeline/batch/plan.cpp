@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <map>
 
-#include "format/errors.h"
-#include "format/sha256.h"
+#include "format/base/errors.h"
+#include "format/base/sha256.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/batch/find_models.h"
-#include "pipeline/file_resolver.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
 namespace {

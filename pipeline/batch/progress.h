@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/worker.h"
+#include "pipeline/compile/worker.h"
 
 namespace texmesh {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "pipeline/batch/plan.h"
-#include "pipeline/worker.h"
+#include "pipeline/compile/worker.h"
 
 namespace texmesh {
 

@@ -12,14 +12,14 @@
 #include <ostream>
 #include <set>
 
-#include "format/errors.h"
-#include "pipeline/atomic_file.h"
+#include "format/base/errors.h"
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/depfile.h"
 #include "pipeline/batch/reports.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/core_path.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/core_path.h"
 
 namespace texmesh {
 namespace {

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "format/errors.h"
-#include "pipeline/atomic_file.h"
+#include "format/base/errors.h"
+#include "pipeline/io/atomic_file.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/store.h"
+#include "pipeline/graph/store.h"
 
 // The cache folder's own files: what stands where, how a file is published, what a record looks like.
 //

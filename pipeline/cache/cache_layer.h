@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/store.h"
+#include "pipeline/graph/store.h"
 
 namespace texmesh {
 

@@ -10,11 +10,11 @@
 #include <filesystem>
 #include <thread>
 
-#include "format/errors.h"
-#include "pipeline/atomic_file.h"
+#include "format/base/errors.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/prune.h"
-#include "pipeline/file_stamp.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace {

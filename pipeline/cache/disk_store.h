@@ -2,7 +2,7 @@
 #include <memory>
 #include <string>
 
-#include "pipeline/store.h"
+#include "pipeline/graph/store.h"
 
 namespace texmesh {
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <mutex>
 
-#include "delivery/cpp/http_client.h"
+#include "delivery/cpp/http/http_client.h"
 #include "pipeline/cache/cache_layer.h"
 
 namespace texmesh {

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/cache/cache_layer.h"
 
 namespace texmesh {

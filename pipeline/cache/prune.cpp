@@ -11,9 +11,9 @@
 #include <map>
 #include <set>
 
-#include "pipeline/atomic_file.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/file_stamp.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"

@@ -4,16 +4,16 @@
 #include <iostream>
 #include <thread>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
-#include "pipeline/file_resolver.h"
-#include "pipeline/jnd_profile.h"
-#include "pipeline/options.h"
+#include "pipeline/compile/jnd_profile.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
 namespace {

@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "format/errors.h"
-#include "pipeline/atomic_file.h"
+#include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/file_resolver.h"
-#include "pipeline/inspect/debug_input.h"
-#include "pipeline/inspect/text_table.h"
+#include "pipeline/inspect/debug/debug_input.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/inspect/diff.h"
+#include "pipeline/inspect/diff/diff.h"
 
 namespace texmesh {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/inspect/dump.h"
+#include "pipeline/inspect/dump/dump.h"
 
 namespace texmesh {
 namespace {

@@ -4,10 +4,10 @@
 #include <memory>
 #include <thread>
 
-#include "pipeline/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
 #include "pipeline/extract/extract.h"
+#include "pipeline/io/atomic_file.h"
 
 namespace texmesh {
 namespace {

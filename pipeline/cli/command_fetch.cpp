@@ -8,14 +8,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/http_store.h"
-#include "delivery/cpp/package_transport.h"
-#include "delivery/cpp/texture_loader.h"
-#include "pipeline/atomic_file.h"
+#include "delivery/cpp/client/texture_loader.h"
+#include "delivery/cpp/package/http_store.h"
+#include "delivery/cpp/transfer/package_transport.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/cli/units.h"
-#include "pipeline/inspect/text_table.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -9,7 +9,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/cli/units.h"
-#include "pipeline/inspect/text_table.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -4,11 +4,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/inspect/simulation_plot.h"
-#include "pipeline/inspect/text_table.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/library_versions.h"
-#include "pipeline/options.h"
-#include "pipeline/stage_table.h"
+#include "pipeline/compile/library_versions.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/compile/stage_table.h"
 
 namespace texmesh {
 namespace {

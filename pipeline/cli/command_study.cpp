@@ -7,17 +7,17 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/atomic_file.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/compile_model.h"
-#include "pipeline/file_resolver.h"
-#include "pipeline/inspect/text_table.h"
-#include "pipeline/stage_table.h"
-#include "stages/allocation_study.h"
-#include "stages/decode_image.h"
-#include "stages/fragment_study.h"
-#include "stages/png_writer.h"
+#include "pipeline/compile/compile_model.h"
+#include "pipeline/compile/stage_table.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/text_table.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
+#include "stages/study/allocation_study.h"
+#include "stages/study/fragment_study.h"
 
 namespace texmesh {
 namespace {

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/inspect/text_table.h"
-#include "pipeline/inspect/verify.h"
+#include "pipeline/inspect/verify/verify.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "delivery/cpp/delivery_plan.h"
+#include "delivery/cpp/client/delivery_plan.h"
 
 namespace CLI {
 class App;

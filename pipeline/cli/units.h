@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <map>
 
-#include "delivery/cpp/fragment_list.h"
-#include "format/viewing.h"
-#include "pipeline/extract/budget_search.h"
-#include "pipeline/extract/standalone_glb.h"
-#include "pipeline/extract/texture_source.h"
+#include "delivery/cpp/decide/fragment_list.h"
+#include "format/documents/viewing.h"
+#include "pipeline/extract/budget/budget_search.h"
+#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
 namespace {

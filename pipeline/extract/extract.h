@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "delivery/cpp/package_reader.h"
-#include "pipeline/extract/image_codecs.h"
-#include "pipeline/extract/plane_pixels.h"
-#include "stages/run_context.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "pipeline/extract/glb/image_codecs.h"
+#include "pipeline/extract/glb/plane_pixels.h"
+#include "stages/base/run_context.h"
 
 namespace texmesh {
 

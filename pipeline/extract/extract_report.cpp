@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/extract/extract.h"
-#include "pipeline/inspect/text_table.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "stages/decode_image.h"
-#include "stages/png_writer.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
 
 namespace texmesh {
 namespace {

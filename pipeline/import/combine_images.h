@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "format/model.h"
+#include "format/model/model.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "format/fields.h"
-#include "format/model.h"
-#include "stages/decode_image.h"
-#include "stages/run_context.h"
+#include "format/base/fields.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <limits>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/near_uvs.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/uri.h"
-#include "stages/image_metadata.h"
+#include "pipeline/io/uri.h"
+#include "stages/image/image_metadata.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/text_scan.h"
 

@@ -4,12 +4,12 @@
 #include <map>
 #include <optional>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/obj_material.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/uri.h"
+#include "pipeline/io/uri.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
 // words into 0 without a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300

@@ -1,7 +1,7 @@
 #include <array>
 #include <cmath>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/ply_reader.h"

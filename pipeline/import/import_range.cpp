@@ -3,13 +3,13 @@
 #include <cmath>
 #include <cstring>
 
-#include "format/errors.h"
-#include "format/portable_math.h"
+#include "format/base/errors.h"
+#include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/range_scan.h"
+#include "pipeline/import/range_scan_document.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/uri.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"

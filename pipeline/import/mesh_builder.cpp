@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "format/srgb.h"
+#include "format/base/srgb.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {

@@ -1,5 +1,5 @@
 #pragma once
-#include "format/model.h"
+#include "format/model/model.h"
 
 namespace texmesh {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/combine_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/import/uri.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

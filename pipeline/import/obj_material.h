@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "format/model.h"
+#include "format/model/model.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh {

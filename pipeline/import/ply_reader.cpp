@@ -5,7 +5,7 @@
 #include <cstring>
 #include <optional>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {

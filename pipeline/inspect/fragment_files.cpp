@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <map>
 
-#include "format/sha256.h"
-#include "pipeline/inspect/bounded_json.h"
-#include "pipeline/inspect/plane_streams.h"
+#include "delivery/cpp/package/plane_streams.h"
+#include "format/base/bounded_json.h"
+#include "format/base/sha256.h"
 
 namespace texmesh {
 namespace {

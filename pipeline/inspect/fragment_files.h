@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "delivery/cpp/package_reader.h"
-#include "pipeline/inspect/finding.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/finding.h"
 
 namespace texmesh {
 

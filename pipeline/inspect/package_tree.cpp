@@ -12,10 +12,10 @@
 #include <map>
 #include <set>
 
-#include "delivery/cpp/package_reader.h"
-#include "format/sha256.h"
-#include "pipeline/atomic_file.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/sha256.h"
 #include "pipeline/inspect/fragment_files.h"
+#include "pipeline/io/atomic_file.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;

@@ -1,8 +1,8 @@
 #include "pipeline/inspect/provenance.h"
 
-#include "format/errors.h"
-#include "format/sha256.h"
-#include "pipeline/inspect/bounded_json.h"
+#include "format/base/bounded_json.h"
+#include "format/base/errors.h"
+#include "format/base/sha256.h"
 
 namespace texmesh {
 namespace {

@@ -13,9 +13,9 @@
 #include <string_view>
 #include <utility>
 
-#include "format/container.h"
-#include "format/errors.h"
-#include "format/layout.h"
+#include "format/base/errors.h"
+#include "format/container/container.h"
+#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

@@ -13,10 +13,10 @@
 #include <cmath>
 #include <iostream>
 
-#include "delivery/cpp/package_reader.h"
-#include "stages/ladder.h"
-#include "stages/lut.h"
-#include "stages/zim.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "stages/ladder/ladder.h"
+#include "stages/lut/lut.h"
+#include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
 #include "tests/support/allocation_curves.h"
 

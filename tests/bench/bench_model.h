@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/file_resolver.h"
 #include "pipeline/import/import.h"
-#include "stages/condition.h"
-#include "stages/fragmentation.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/condition/condition.h"
+#include "stages/fragmentation/fragmentation.h"
 
 namespace texmesh {
 

@@ -13,8 +13,8 @@
 
 #include <jpeglib.h>
 
-#include "stages/fragmentation.h"
-#include "stages/run_context.h"
+#include "stages/base/run_context.h"
+#include "stages/fragmentation/fragmentation.h"
 
 namespace texmesh {
 

@@ -17,10 +17,10 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/package_reader.h"
-#include "format/errors.h"
-#include "stages/jpeg.h"
-#include "stages/jpeg_coder.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
+#include "stages/jpeg/jpeg.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 extern char** environ;
 

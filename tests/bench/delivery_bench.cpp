@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "delivery/cpp/delivery_plan.h"
-#include "delivery/cpp/simulation.h"
+#include "delivery/cpp/client/delivery_plan.h"
+#include "delivery/cpp/simulate/simulation.h"
 
 namespace {
 

@@ -19,10 +19,10 @@
 #include <iostream>
 #include <iterator>
 
+#include "pipeline/extract/budget/picture_meter.h"
 #include "pipeline/extract/extract.h"
-#include "pipeline/extract/picture_meter.h"
-#include "pipeline/file_resolver.h"
 #include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
 namespace {

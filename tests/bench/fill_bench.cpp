@@ -8,9 +8,9 @@
 #include <iostream>
 #include <utility>
 
-#include "stages/ladder.h"
-#include "stages/lut.h"
-#include "stages/zim.h"
+#include "stages/ladder/ladder.h"
+#include "stages/lut/lut.h"
+#include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
 #include "tests/support/fill_curves.h"
 

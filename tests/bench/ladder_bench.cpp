@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/lut.h"
+#include "stages/lut/lut.h"
 #include "tests/bench/bench_texture.h"
 
 namespace texmesh {

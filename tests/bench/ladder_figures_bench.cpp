@@ -15,8 +15,8 @@
 #include <iterator>
 #include <string>
 
-#include "stages/ladder.h"
-#include "stages/lossless_top.h"
+#include "stages/ladder/ladder.h"
+#include "stages/ladder/lossless_top.h"
 #include "tests/bench/bench_texture.h"
 
 namespace texmesh {

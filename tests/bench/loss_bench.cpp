@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "delivery/cpp/package_reader.h"
-#include "delivery/cpp/simulation.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "delivery/cpp/simulate/simulation.h"
 
 namespace {
 

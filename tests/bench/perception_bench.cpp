@@ -10,12 +10,12 @@
 #include <filesystem>
 #include <iostream>
 
-#include "format/portable_math.h"
-#include "pipeline/file_resolver.h"
+#include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
-#include "stages/perceptual_values.h"
-#include "stages/simplification.h"
-#include "stages/ssf.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/perceptual_values/perceptual_values.h"
+#include "stages/simplification/simplification.h"
+#include "stages/ssf/ssf.h"
 #include "tests/bench/growth.h"
 
 namespace {

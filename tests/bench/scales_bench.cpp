@@ -6,7 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/package_reader.h"
+#include "delivery/cpp/package/package_reader.h"
 
 namespace texmesh {
 namespace {

@@ -13,8 +13,8 @@
 #include <iostream>
 
 #include "examples/scan_model.h"
-#include "stages/collapse_engine.h"
-#include "stages/scale_error.h"
+#include "stages/simplification/collapse_engine.h"
+#include "stages/simplification/scale_error.h"
 
 namespace {
 

@@ -16,12 +16,12 @@
 #include <iostream>
 #include <limits>
 
-#include "format/errors.h"
-#include "pipeline/file_resolver.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
-#include "stages/collapse_engine.h"
-#include "stages/distance.h"
-#include "stages/parallel.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/base/parallel.h"
+#include "stages/geometry/distance.h"
+#include "stages/simplification/collapse_engine.h"
 
 namespace {
 

@@ -10,11 +10,11 @@
 #include <filesystem>
 #include <iostream>
 
-#include "format/portable_math.h"
-#include "pipeline/file_resolver.h"
+#include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
-#include "stages/condition.h"
-#include "stages/skeletonization.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/condition/condition.h"
+#include "stages/skeletonization/skeletonization.h"
 #include "tests/bench/growth.h"
 
 namespace {

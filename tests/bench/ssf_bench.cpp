@@ -21,13 +21,13 @@
 #include <vector>
 
 #include "examples/scan_model.h"
-#include "pipeline/file_resolver.h"
 #include "pipeline/import/import.h"
-#include "stages/condition.h"
-#include "stages/heat_levels.h"
-#include "stages/parallel.h"
-#include "stages/ssf.h"
-#include "stages/ssf_component.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/base/parallel.h"
+#include "stages/condition/condition.h"
+#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/ssf.h"
+#include "stages/ssf/ssf_component.h"
 #include "tests/bench/growth.h"
 #include "tests/support/pyramid_accuracy.h"
 

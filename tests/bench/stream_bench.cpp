@@ -11,11 +11,11 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "pipeline/file_resolver.h"
 #include "pipeline/import/import.h"
-#include "stages/scale_grid.h"
-#include "stages/ssf.h"
-#include "stages/vertex_split.h"
+#include "pipeline/io/file_resolver.h"
+#include "stages/scales/scale_grid.h"
+#include "stages/scales/vertex_split.h"
+#include "stages/ssf/ssf.h"
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <fstream>
 #include <iostream>
 
-#include "delivery/cpp/package_reader.h"
-#include "format/errors.h"
-#include "stages/decode_image.h"
-#include "stages/png_writer.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
 
 namespace texmesh {
 namespace {

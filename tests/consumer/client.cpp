@@ -2,10 +2,10 @@
 // (house_delivery_size).
 #include <iostream>
 
-#include "delivery/cpp/delivery_plan.h"
-#include "delivery/cpp/package_transport.h"
-#include "delivery/cpp/texture_loader.h"
-#include "format/split_stream.h"
+#include "delivery/cpp/client/delivery_plan.h"
+#include "delivery/cpp/client/texture_loader.h"
+#include "delivery/cpp/transfer/package_transport.h"
+#include "format/split/split_stream.h"
 
 int main(int argc, char** argv) {
   using namespace texmesh;  // NOLINT: a program's main file

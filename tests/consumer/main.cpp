@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "delivery/cpp/package_reader.h"
+#include "delivery/cpp/package/package_reader.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;

@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "delivery/cpp/delivery_plan.h"
-#include "format/portable_math.h"
-#include "format/split_stream.h"
+#include "delivery/cpp/client/delivery_plan.h"
+#include "format/base/portable_math.h"
+#include "format/split/split_stream.h"
 
 namespace texmesh {
 namespace {

@@ -1,7 +1,7 @@
 // libFuzzer's entry (see tests/CMakeLists.txt for how to configure); then for instance
 //   build/fuzz/tests/format_fuzz --write-corpus corpus && build/fuzz/tests/format_fuzz -max_total_time=60
 //   corpus
-// The same target runs over the corpus and mutations of it as a normal test, delivery_format_fuzz_test.
+// The same target runs over the corpus and mutations of it as a normal test, system_format_fuzz_test.
 #include "tests/fuzz/format_fuzz.h"
 
 #include <cstdlib>

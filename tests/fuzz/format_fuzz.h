@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "delivery/cpp/package_reader.h"
-#include "tests/format/manifest_fixture.h"
-#include "tests/format/package_fixture.h"
-#include "tests/format/split_fixture.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "tests/format/container/package_fixture.h"
+#include "tests/format/documents/manifest_fixture.h"
+#include "tests/format/split/split_fixture.h"
 
 namespace texmesh::fuzz {
 namespace detail {

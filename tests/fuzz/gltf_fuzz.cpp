@@ -1,6 +1,6 @@
 // libFuzzer entry of the glTF reader: any bytes give a model or an InputError. Replayed over generated inputs
-// by tests/pipeline/import_gltf_fuzz_test.cpp; for a real run build this file, pipeline/import and what it
-// needs with clang++ -fsanitize=fuzzer,address,undefined.
+// by tests/pipeline/import/gltf/import_gltf_fuzz_test.cpp; for a real run build this file, pipeline/import
+// and what it needs with clang++ -fsanitize=fuzzer,address,undefined.
 #include <cstddef>
 #include <cstdint>
 #include <optional>

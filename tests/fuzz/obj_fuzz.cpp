@@ -1,7 +1,7 @@
 // libFuzzer entry of the OBJ and MTL readers: any bytes give a model or an InputError. The bytes up to the
 // first NUL are the OBJ, the rest is every MTL it asks for. Replayed over generated inputs by
-// tests/pipeline/import_text_fuzz_test.cpp; for a real run build this file, pipeline/import and what it needs
-// with clang++ -fsanitize=fuzzer,address,undefined.
+// tests/pipeline/import/import_text_fuzz_test.cpp; for a real run build this file, pipeline/import and what
+// it needs with clang++ -fsanitize=fuzzer,address,undefined.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 
 namespace {

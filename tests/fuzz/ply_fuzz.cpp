@@ -1,13 +1,13 @@
 // libFuzzer entry of the PLY reader: any bytes give a model or an InputError. Replayed over generated inputs
-// by tests/pipeline/import_text_fuzz_test.cpp; for a real run build this file, pipeline/import and what it
-// needs with clang++ -fsanitize=fuzzer,address,undefined.
+// by tests/pipeline/import/import_text_fuzz_test.cpp; for a real run build this file, pipeline/import and
+// what it needs with clang++ -fsanitize=fuzzer,address,undefined.
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 
 namespace {

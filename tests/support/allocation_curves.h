@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/tables.h"
+#include "format/documents/tables.h"
 
 namespace texmesh::testing {
 

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "format/model.h"
-#include "format/portable_math.h"
+#include "format/base/portable_math.h"
+#include "format/model/model.h"
 
 namespace texmesh::testing {
 

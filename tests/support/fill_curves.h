@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/tables.h"
+#include "format/documents/tables.h"
 
 namespace texmesh::testing {
 

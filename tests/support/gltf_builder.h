@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pipeline/import/import.h"
-#include "pipeline/import/uri.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh::testing {
 

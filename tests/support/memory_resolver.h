@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "format/errors.h"
+#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh::testing {

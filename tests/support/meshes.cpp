@@ -1,6 +1,6 @@
 #include "tests/support/meshes.h"
 
-#include "format/portable_math.h"
+#include "format/base/portable_math.h"
 
 namespace texmesh::testing {
 namespace {

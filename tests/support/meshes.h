@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-#include "format/model.h"
+#include "format/model/model.h"
 
 namespace texmesh::testing {
 

@@ -6,10 +6,10 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "format/container.h"
-#include "format/layout.h"
-#include "format/package_writer.h"
-#include "stages/jpeg.h"
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "format/documents/package_writer.h"
+#include "stages/jpeg/jpeg.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

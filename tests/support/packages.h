@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "format/manifest.h"
-#include "format/tables.h"
-#include "stages/ladder.h"
+#include "format/documents/manifest.h"
+#include "format/documents/tables.h"
+#include "stages/ladder/ladder.h"
 
 namespace texmesh::testing {
 

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/heat_levels.h"
-#include "stages/ssf_component.h"
+#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/ssf_component.h"
 
 namespace texmesh::testing {
 

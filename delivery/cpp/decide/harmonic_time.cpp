@@ -1,0 +1,409 @@
+#include "delivery/cpp/decide/harmonic_time.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "format/base/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kWindowFactor = 1.5;     // of throughput x round trip
+constexpr std::size_t kTripSamples = 64;  // a window that follows every swing makes them worse
+constexpr std::size_t kWindowSamples = 10, kGuardSamples = 20;
+constexpr double kBreak = 4;             // a link this many times faster or slower is another link
+constexpr double kLargestExponent = 12;  // of kPrice's factor: 1.6e5 either way
+// A stall that is over looks like a slow link until something has been transferred: what is skipped on such
+// evidence is lost for good.
+constexpr int kMostSkipsInARow = 1;
+constexpr double kElasticity = 2.5;  // of the price by bytes, on ladders of photographs
+constexpr double kSpareExponent = 1;
+constexpr double kLateFactor = 1.2;  // what is asked for may take this much longer than is left
+
+void require(bool good, const char* what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+void check(const std::vector<FragmentOffer>& offers, const HtcOptions& o) {
+  require(offers.size() < 1u << 24, "HarmonicTimePlan: fewer than 2^24 fragments");
+  require(o.time_limit_s > 0 && o.time_limit_s <= 1e6, "HarmonicTimePlan: time limit in (0, 1e6] s");
+  require(o.throughput.initial_bytes_s > 0, "HarmonicTimePlan: initial throughput > 0");
+  require(o.rtt_s >= 0 && o.rtt_s < 1e4, "HarmonicTimePlan: round trip in [0, 1e4) s");
+  require(o.window >= 0 && o.max_in_flight >= 1 && o.guard > 1, "HarmonicTimePlan: window, guard");
+  for (const FragmentOffer& f : offers) {
+    require(!f.bytes.empty() && f.loss.size() == f.bytes.size() + 1,
+            "FragmentOffer: a loss per rung and one more");
+    require(f.planned_bytes > 0 && f.planned_bytes < 1e12, "FragmentOffer: planned bytes > 0");
+    for (const std::uint32_t b : f.bytes) require(b > 0, "FragmentOffer: bytes > 0");
+    for (const double l : f.loss) require(l >= 0 && l < 1e300, "FragmentOffer: loss >= 0");
+    require(std::isfinite(f.eta), "FragmentOffer: eta");
+  }
+}
+
+std::vector<double> harmonic_numbers(std::size_t n) {
+  std::vector<double> h(n + 2, 0.0);
+  for (std::size_t i = 1; i < h.size(); ++i) h[i] = h[i - 1] + 1.0 / static_cast<double>(i);
+  return h;
+}
+
+/// The fragment with eta nearest the mean (ties: the first).
+std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers) {
+  double sum = 0;
+  for (const FragmentOffer& f : offers) sum += f.eta;
+  const double mean = sum / static_cast<double>(std::max<std::size_t>(offers.size(), 1));
+  std::uint32_t best = 0;
+  for (std::uint32_t i = 1; i < offers.size(); ++i)
+    if (std::abs(offers[i].eta - mean) < std::abs(offers[best].eta - mean)) best = i;
+  return best;
+}
+
+std::size_t highest(const FragmentOffer& f) { return std::min<std::size_t>(f.high_rung, f.bytes.size() - 1); }
+
+/// 0 where it is skipped.
+std::uint32_t bytes_at_rung(const FragmentOffer& f, std::int32_t rung) {
+  return rung < 0 ? 0 : f.bytes[static_cast<std::size_t>(rung)];
+}
+
+/// The rung from `low` on that costs least (ties: the first), of those that have so few bytes; -1: skipping
+/// does. `cost` of bytes and what is then lost.
+template <typename Cost>
+std::int32_t cheapest_rung(const FragmentOffer& f, std::size_t low, bool may_skip, double most_bytes,
+                           const Cost& cost) {
+  std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
+  double least = may_skip ? cost(0.0, f.loss[0]) : cost(f.bytes[low], f.loss[low + 1]);
+  for (std::size_t r = low; r <= highest(f); ++r) {
+    if (f.bytes[r] > most_bytes) continue;
+    const double now = cost(f.bytes[r], f.loss[r + 1]);
+    if (now >= least) continue;
+    least = now;
+    best = static_cast<std::int32_t>(r);
+  }
+  return best;
+}
+
+}  // namespace
+
+HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcOptions& options)
+    : offers_(std::move(offers)), options_(options), throughput_(options.throughput) {
+  check(offers_, options_);
+  const std::size_t n = offers_.size();
+  std::vector<std::size_t> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return offers_[a].eta > offers_[b].eta; });
+  harmonic_ = harmonic_numbers(n);
+  sorted_.assign(order.begin(), order.end());
+  steps_.reserve(n);
+  step_of_offer_.assign(n, n);
+  taken_.assign(n, false);
+  right_ = static_cast<std::uint32_t>(n);
+  mean_ = mean_fragment(offers_);
+  planned_.reserve(n);
+  for (const FragmentOffer& f : offers_) {
+    planned_.push_back(f.planned_bytes);
+    planned_total_ += f.planned_bytes;
+    smallest_left_ += f.bytes[lowest(f, false)];
+    low_left_ += f.bytes[lowest(f, true)];
+  }
+  planned_left_ = planned_total_;
+  // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
+  // next; with one request at a time every fragment has a round trip of its own.
+  if (options_.window != 1) latency_s_ = std::min(options_.rtt_s, options_.time_limit_s / 2);
+  if (options_.policy == Policy::kPrice || options_.policy == Policy::kGuard) plan_prices();
+  if (options_.policy == Policy::kGuard) plan_for_least_loss();
+}
+
+// The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
+void HarmonicTimePlan::plan_prices() {
+  const double budget = options_.time_limit_s * options_.throughput.initial_bytes_s;
+  const auto bytes_at = [&](double price) {
+    double sum = 0;
+    for (const FragmentOffer& f : offers_) sum += bytes_at_rung(f, cheapest_rung_of(f, price, true, budget));
+    return sum;
+  };
+  double low = -60, high = 60;  // of ln(price)
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (bytes_at(portable::exp(middle)) > budget ? low : high) = middle;
+  }
+  price_0_ = portable::exp(high);
+  price_bytes_.reserve(offers_.size());
+  for (const FragmentOffer& f : offers_) {
+    price_bytes_.push_back(bytes_at_rung(f, cheapest_rung_of(f, price_0_, true, budget)));
+    price_total_ += price_bytes_.back();
+  }
+}
+
+void HarmonicTimePlan::plan_for_least_loss() {
+  planned_total_ = 0;
+  for (std::size_t i = 0; i < offers_.size(); ++i) {
+    const FragmentOffer& f = offers_[i];
+    planned_[i] = std::max<double>(price_bytes_[i], f.bytes[lowest(f, false)]);
+    planned_total_ += planned_[i];
+  }
+  planned_left_ = planned_total_;
+}
+
+double HarmonicTimePlan::throughput_bytes_s() const {
+  // With several requests in flight completions come in bunches: only sums over some of them say anything.
+  if (options_.window != 1 && options_.throughput.estimator == Estimator::kLast)
+    return throughput_.recent_bytes_s(kWindowSamples);
+  return throughput_.bytes_s();
+}
+
+bool HarmonicTimePlan::window_open(double now_s) const {
+  if (options_.window > 0) return in_flight_ < static_cast<std::uint32_t>(options_.window);
+  if (in_flight_ < 2) return true;
+  if (in_flight_ >= static_cast<std::uint32_t>(options_.max_in_flight)) return false;
+  // What is in flight takes all the time that is left: what is asked for now could only be late.
+  const double left_s = options_.time_limit_s - now_s;
+  if (left_s > latency_s_ && room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s) <= 0) return false;
+  // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there
+  // is little time, and those are received side by side and late.
+  const double fragment_bytes = planned_total_ / static_cast<double>(offers_.size());
+  const double trip_bytes = throughput_.recent_bytes_s(kTripSamples) * options_.rtt_s;
+  return in_flight_ < 2 + kWindowFactor * trip_bytes / fragment_bytes;
+}
+
+const HtcStep* HarmonicTimePlan::next(double now_s) {
+  while (!all_issued() && window_open(now_s)) {
+    const std::size_t position = steps_.size() + 1;
+    const double credit = credit_at(position);
+    const std::uint32_t offer = choose_offer(credit);
+    const FragmentOffer& f = offers_[offer];
+    HtcStep step;
+    step.position = static_cast<std::uint32_t>(position);
+    step.offer = offer;
+    step.credit_s = credit;
+    step.theta_s = theta_of(offer) + credit;
+    step.throughput_bytes_s = throughput_bytes_s();
+    step.target_bytes = target_of(offer, step.theta_s, now_s);
+    step.rung = rung_of(offer, step.target_bytes, now_s);
+    step.bytes = bytes_at_rung(f, step.rung);
+    step.issued_s = now_s;
+    take(offer);
+    step_of_offer_[offer] = steps_.size();
+    steps_.push_back(step);
+    if (step.rung < 0) {  // no transfer: it takes no time and says nothing of the link
+      HtcStep& skipped = steps_.back();
+      skipped.done_s = now_s;
+      skipped.residual_s = skipped.theta_s;
+      ++skips_in_a_row_;
+      spread(skipped.residual_s);
+      continue;
+    }
+    skips_in_a_row_ = 0;
+    waiting_.push_back(steps_.size() - 1);
+    ++in_flight_;
+    in_flight_bytes_ += step.bytes;
+    return &steps_.back();
+  }
+  return nullptr;
+}
+
+std::uint32_t HarmonicTimePlan::choose_offer(double credit) const {
+  const bool in_order = options_.policy == Policy::kPrice;
+  if (steps_.empty() && !in_order) return mean_;
+  bool finest = true;
+  if (!in_order && options_.order == HtcOrder::kCredit) finest = credit <= 0;
+  if (!in_order && options_.order == HtcOrder::kBeta0)
+    finest = throughput_bytes_s() <= options_.throughput.initial_bytes_s;
+  std::uint32_t left = left_, right = right_;
+  while (left < right && taken_[sorted_[left]]) ++left;
+  while (left < right && taken_[sorted_[right - 1]]) --right;
+  return sorted_[finest ? left : right - 1];
+}
+
+void HarmonicTimePlan::take(std::uint32_t offer) {
+  const FragmentOffer& f = offers_[offer];
+  taken_[offer] = true;
+  while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
+  while (left_ < right_ && taken_[sorted_[right_ - 1]]) --right_;
+  planned_left_ -= planned_[offer];
+  smallest_left_ -= f.bytes[lowest(f, false)];
+  low_left_ -= f.bytes[lowest(f, true)];
+  if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
+}
+
+double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
+  return (options_.time_limit_s - latency_s_) * (planned_[offer] / planned_total_);
+}
+
+// credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
+double HarmonicTimePlan::credit_at(std::size_t position) const {
+  double credit = 0;
+  for (const Credit& c : credits_) credit += c.value / static_cast<double>(position - c.issued + 1);
+  return credit;
+}
+
+void HarmonicTimePlan::spread(double residual_s) {
+  const std::size_t issued = steps_.size(), left = offers_.size() - issued;
+  if (left == 0) {
+    unspent_s_ += residual_s;
+    return;
+  }
+  const double zeta = harmonic_[left + 1] - 1.0;  // 1/2 + ... + 1/(left + 1)
+  credits_.push_back({residual_s / zeta, issued});
+}
+
+/// Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip
+/// later, whether or not enough is in flight until then.
+double HarmonicTimePlan::room_bytes(double beta, double now_s) const {
+  const double left_s = options_.time_limit_s - now_s;
+  return std::max(0.0, std::min(beta * left_s - in_flight_bytes_, beta * (left_s - latency_s_)));
+}
+
+/// What a plan in proportion to the planned sizes gives, as a factor of them.
+double HarmonicTimePlan::proportional_share(double now_s, double beta) const {
+  return room_bytes(beta, now_s) / std::max(planned_left_, 1.0);
+}
+
+/// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
+/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return to
+/// its mean.
+double HarmonicTimePlan::lasting_bytes_s(double now_s) const {
+  const double recent = throughput_.recent_bytes_s(kGuardSamples);
+  const double left_s = options_.time_limit_s - now_s;
+  if (left_s <= 0) return recent;
+  const double mean = throughput_.mean_bytes_s(left_s);
+  return recent * kBreak > mean && recent < kBreak * mean ? mean : recent;
+}
+
+double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double now_s) const {
+  const double planned = planned_[offer];
+  switch (options_.policy) {
+    case Policy::kStatic:
+    case Policy::kPrice:
+      return planned;
+    case Policy::kProportional:
+      return planned * proportional_share(now_s, throughput_bytes_s());
+    case Policy::kHtc:
+    case Policy::kGuard:
+      break;
+  }
+  if (steps_.empty()) return planned;  // F-bar has the quality Q_i
+  // Alone in flight it has to wait for a round trip first.
+  const double wait = options_.window == 1 ? options_.rtt_s : 0;
+  const double target = throughput_bytes_s() * (theta_s - wait);
+  if (options_.policy == Policy::kHtc) return target;
+  const double even = planned * proportional_share(now_s, lasting_bytes_s(now_s));
+  return std::clamp(target, even / options_.guard, even * options_.guard);
+}
+
+bool HarmonicTimePlan::limits_can_hold(double now_s) const {
+  return options_.hard_limits || low_left_ <= room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+}
+
+bool HarmonicTimePlan::may_skip(double now_s) const {
+  if (options_.hard_limits) return false;
+  if (options_.time_limit_s - now_s <= latency_s_) return true;  // it could not arrive in time
+  if (skips_in_a_row_ >= kMostSkipsInARow) return false;
+  if (options_.policy == Policy::kHtc || options_.policy == Policy::kStatic) return true;
+  return smallest_left_ > room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+}
+
+/// The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does.
+std::size_t HarmonicTimePlan::lowest(const FragmentOffer& f, bool limits) const {
+  const bool hard = options_.hard_limits;
+  const std::size_t low = limits || hard ? std::min<std::size_t>(f.low_rung, f.bytes.size() - 1) : 0;
+  for (std::size_t r = low; r <= highest(f) && !hard; ++r)
+    if (f.loss[r + 1] < f.loss[0]) return r;
+  return low;
+}
+
+std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double price, bool may_skip,
+                                                double most_bytes) const {
+  return cheapest_rung(f, lowest(f, false), may_skip, most_bytes,
+                       [&](double bytes, double loss) { return loss + price * bytes; });
+}
+
+std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
+  const FragmentOffer& f = offers_[offer];
+  const bool skip = may_skip(now_s);
+  if (options_.policy == Policy::kPrice) {
+    const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+    return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
+  }
+  const bool limits = limits_can_hold(now_s);
+  return cheapest_rung(f, lowest(f, limits), skip && !limits, 1e300,
+                       [&](double bytes, double) { return std::abs(target - bytes); });
+}
+
+// A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
+double HarmonicTimePlan::most_exponent(double left_s) const {
+  const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), options_.time_limit_s - left_s);
+  const double ratio = (price_total_ - price_done_) / std::max(room, 1.0);
+  const double enough = kSpareExponent + kElasticity * portable::log(std::max(ratio, 1.0));
+  return std::min(enough, kLargestExponent);
+}
+
+double HarmonicTimePlan::price_at(double now_s) const {
+  const double planned_s = price_total_ > 0 ? options_.time_limit_s * (price_done_ / price_total_) : 0;
+  // What is in flight has been issued but not paid for yet.
+  const double lag = now_s - (planned_s - in_flight_bytes_ / throughput_bytes_s());
+  const double left = std::max(options_.time_limit_s - now_s, 1e-3 * options_.time_limit_s);
+  const double exponent =
+      std::clamp(options_.price_kappa * lag / left, -kLargestExponent, most_exponent(left));
+  return price_0_ * portable::exp(exponent);
+}
+
+void HarmonicTimePlan::completed(std::uint32_t offer, double now_s) {
+  require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
+  finish(steps_[step_of_offer_[offer]], now_s, true);
+}
+
+void HarmonicTimePlan::failed(std::uint32_t offer, double now_s) {
+  require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
+  HtcStep& step = steps_[step_of_offer_[offer]];
+  finish(step, now_s, false);
+  step.rung = -1;
+}
+
+void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
+  require(step.done_s < 0 && now_s >= last_done_s_, "HarmonicTimePlan: completed twice, or time runs back");
+  step.done_s = now_s;
+  step.spacing_s = std::max(0.0, now_s - std::max(last_done_s_, latency_s_));
+  step.residual_s = step.theta_s - step.spacing_s;
+  // The link was idle only while nothing that was asked for could have been on its way.
+  double first_issued_s = step.issued_s;
+  for (const std::size_t i : waiting_) first_issued_s = std::min(first_issued_s, steps_[i].issued_s);
+  std::erase(waiting_, step_of_offer_[step.offer]);
+  if (sample) throughput_.add(step.bytes, now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s));
+  last_done_s_ = now_s;
+  --in_flight_;
+  in_flight_bytes_ -= step.bytes;
+  spread(step.residual_s);
+}
+
+std::vector<std::int32_t> HarmonicTimePlan::rungs() const {
+  std::vector<std::int32_t> rungs(offers_.size(), -1);
+  for (const HtcStep& s : steps_) rungs[s.offer] = s.rung;
+  return rungs;
+}
+
+HtcTheorem theorem_of(const HarmonicTimePlan& plan) {
+  HtcTheorem t;
+  const std::vector<HtcStep>& steps = plan.steps();
+  if (steps.empty()) return t;
+  const std::size_t n = steps.size();
+  const HtcStep& last = steps.back();
+  t.surplus_s = plan.surplus_s();
+  t.last_residual_s = last.residual_s;
+  if (last.bytes > 0) {
+    const double beta_n = last.bytes / last.spacing_s;
+    t.corrected_bound_s = std::abs(last.theta_s) * std::abs(last.throughput_bytes_s / beta_n - 1) +
+                          std::abs(last.target_bytes - last.bytes) / beta_n;
+  } else {
+    t.corrected_bound_s = std::abs(last.theta_s);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k + 1 < n; ++k) sum += steps[k].residual_s;
+  const double mean = n > 1 ? sum / static_cast<double>(n - 1) : 0;
+  const double log_n = portable::log(static_cast<double>(std::max<std::size_t>(n, 3)));
+  t.published_bound_s =
+      last.residual_s + (n > 1 ? steps[n - 2].residual_s / 2 : 0) + (1.088 + portable::log(log_n)) * mean;
+  return t;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,169 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "delivery/cpp/decide/throughput.h"
+
+namespace texmesh {
+
+// Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred
+// so that the whole ends at the time limit T_0, though throughput moves. Each fragment has a share theta_g of
+// the time; what a transfer takes less or more, dT, is spread over the fragments to come with weights 1/2,
+// 1/3, ..., the nearest most, and the size that fits a fragment's time decides its rung.
+//
+// The plan does no I/O and knows no clock: its user tells it what the time is. Plain double arithmetic and
+// format/base/portable_math.h: the same decisions bit for bit in C++ and TypeScript (delivery/vectors).
+
+/// One fragment as the plan sees it.
+struct FragmentOffer {
+  std::vector<std::uint32_t> bytes;  // by rung, lowest first; at least one, all > 0
+  std::vector<double> loss;  // [rungs + 1]: what is lost when it is skipped, then by rung; any unit, >= 0
+  double eta = 0;            // feature density times weights; orders the list
+  double planned_bytes = 0;  // d_g > 0: what it gets by Eq. 3.2
+  std::uint16_t low_rung = 0, high_rung = 0xffff;  // limits of quality, see HtcOptions::hard_limits
+};
+
+/// How rungs are chosen. kHtc: the method. kGuard: the method over the plan of least loss instead of
+/// Eq. 3.2's, with sizes kept within a factor of that plan's share of what the link gives in the time left,
+/// which takes the swings out of noisy links. kPrice: one price of bytes in units of
+/// loss that rises when the plan is late. kProportional: sizes scaled by what is left of time over what is
+/// left to send. kStatic: the planned sizes, whatever happens.
+enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic };
+/// Which end of the list is next: kCredit by the sign of the next credit (negative: the finest fragment,
+/// positive: the coarsest), kBeta0 by the last throughput against beta_0, kFinest always the finest.
+enum class HtcOrder : std::uint8_t { kCredit, kBeta0, kFinest };
+
+struct HtcOptions {
+  Policy policy = Policy::kHtc;
+  HtcOrder order = HtcOrder::kCredit;
+  double time_limit_s = 5;  // T_0, of the fragments alone: mesh and preview have their own time before
+  ThroughputOptions throughput{Estimator::kLast, 10, 0.2, 4000, 1e5};  // initial_bytes_s is beta_0
+  double rtt_s = 0;                                                    // round trip, measured or told
+  int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2
+  int max_in_flight = 64;
+  // true: never below low_rung, nothing skipped, as in the thesis. false: so while the time is enough for it,
+  // then the bottom of the ladder, then skipping; and never a rung that loses no less than skipping does.
+  bool hard_limits = false;
+  double guard = 1.5;       // factor of kGuard, > 1
+  double price_kappa = 10;  // how fast kPrice's price rises with delay
+};
+
+/// A decision and what became of it.
+struct HtcStep {
+  std::uint32_t position = 0;  // k = 1 .. n in the order of decisions
+  std::uint32_t offer = 0;     // index into the list
+  std::int32_t rung = -1;      // -1 = skipped
+  std::uint32_t bytes = 0;
+  double credit_s = 0, theta_s = 0;  // credit_k and theta_k = theta_g + credit_k
+  double target_bytes = 0;           // d_k asked for
+  double throughput_bytes_s = 0;     // beta_{k-1} it was asked with
+  double issued_s = 0;
+  double done_s = -1;     // -1: in flight
+  double spacing_s = 0;   // gamma_k: since the completion before (since the start for the first)
+  double residual_s = 0;  // dT_k = theta_k - gamma_k
+};
+
+class HarmonicTimePlan {
+ public:
+  /// The list is taken by falling eta (ties: index), whatever order the offers have. Throws
+  /// std::invalid_argument for values out of range.
+  HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcOptions& options);
+
+  /// The next request, while the window has room. Fragments that are skipped are decided on the way and stand
+  /// in steps(). nullptr: nothing more to issue now (wait for a completion) or at all. The pointer holds
+  /// until the next call. `now_s` >= 0 counts from the first request.
+  const HtcStep* next(double now_s);
+  /// The request for this offer has ended. Completions may come in any order; times must not fall.
+  void completed(std::uint32_t offer, double now_s);
+  /// The request failed and was given up: its time is spent, its fragment counts as skipped.
+  void failed(std::uint32_t offer, double now_s);
+
+  bool all_issued() const { return steps_.size() == offers_.size(); }
+  bool finished() const { return all_issued() && in_flight_ == 0; }
+  const std::vector<FragmentOffer>& offers() const { return offers_; }
+  const std::vector<HtcStep>& steps() const { return steps_; }
+  double throughput_bytes_s() const;
+  /// Pi: T_0 less the time taken = the residuals that no fragment was left to take. Once finished().
+  double surplus_s() const { return options_.time_limit_s - last_done_s_; }
+  double unspent_s() const { return unspent_s_; }
+  /// Chosen rung by offer; -1 skipped or not decided.
+  std::vector<std::int32_t> rungs() const;
+  /// A limit under 30 round trips cannot be met well (p95 beyond 2.5 %).
+  bool too_short_for_rtt() const { return options_.time_limit_s < 30 * options_.rtt_s; }
+
+ private:
+  struct Credit {
+    double value = 0;        // dT / zeta
+    std::size_t issued = 0;  // positions that were issued when it arose
+  };
+  void plan_prices();
+  void plan_for_least_loss();
+  bool window_open(double now_s) const;
+  double credit_at(std::size_t position) const;
+  std::uint32_t choose_offer(double credit) const;
+  void take(std::uint32_t offer);
+  double theta_of(std::uint32_t offer) const;
+  double target_of(std::uint32_t offer, double theta_s, double now_s) const;
+  double room_bytes(double beta, double now_s) const;
+  double proportional_share(double now_s, double beta) const;
+  double lasting_bytes_s(double now_s) const;
+  bool limits_can_hold(double now_s) const;
+  std::size_t lowest(const FragmentOffer& offer, bool limits) const;
+  std::int32_t rung_of(std::uint32_t offer, double target, double now_s) const;
+  std::int32_t cheapest_rung_of(const FragmentOffer& offer, double price, bool may_skip,
+                                double most_bytes) const;
+  double price_at(double now_s) const;
+  double most_exponent(double left_s) const;
+  bool may_skip(double now_s) const;
+  void finish(HtcStep& step, double now_s, bool sample);
+  void spread(double residual_s);
+
+  std::vector<FragmentOffer> offers_;
+  HtcOptions options_;
+  Throughput throughput_;
+  std::vector<double> harmonic_;  // H_0 .. H_{n+1}
+  std::vector<Credit> credits_;
+  std::vector<HtcStep> steps_;
+  std::vector<std::uint32_t> sorted_;  // offers by falling eta
+  std::vector<std::size_t> step_of_offer_;
+  std::vector<bool> taken_;
+  std::uint32_t left_ = 0, right_ = 0, mean_ = 0;          // remaining: [left_, right_) less what is taken
+  std::vector<double> planned_;                            // d_g in bytes by offer, by the policy's plan
+  double planned_total_ = 0, planned_left_ = 0;            // bytes
+  double smallest_left_ = 0;                               // bytes of the lowest rungs of what is not issued
+  double low_left_ = 0;                                    // and of their low_rung
+  double price_0_ = 0, price_total_ = 0, price_done_ = 0;  // kPrice: lambda_0; its plan's bytes, issued ones
+  std::vector<double> price_bytes_;
+  std::uint32_t in_flight_ = 0;
+  std::vector<std::size_t> waiting_;  // steps in flight
+  int skips_in_a_row_ = 0;
+  double in_flight_bytes_ = 0;
+  double latency_s_ = 0;  // at the start, in which nothing can arrive
+  double last_done_s_ = 0, unspent_s_ = 0;
+};
+
+/// What may be fetched after the deadline: upgrades of fragments in order of loss saved per byte, each from
+/// the rung before. `rungs` by offer, -1 = skipped. With `incremental` rungs (each continues the one below)
+/// only the missing bytes count.
+struct Upgrade {
+  std::uint32_t offer = 0;
+  std::int32_t rung = 0;
+  std::uint64_t bytes = 0;
+  double gain_per_byte = 0;
+};
+std::vector<Upgrade> upgrades_in_order(const std::vector<FragmentOffer>& offers,
+                                       const std::vector<std::int32_t>& rungs, bool incremental = false);
+
+/// The bounds of the thesis for a finished serial run, and what really holds (Appendix A).
+struct HtcTheorem {
+  double surplus_s = 0;          // Pi
+  double last_residual_s = 0;    // dT_n: equal to Pi
+  double corrected_bound_s = 0;  // theta_n |beta_{n-1} / beta_n - 1| + rounding to a rung at beta_n
+  double published_bound_s = 0;  // Theorem 4.1 as printed, a diagnostic: its proof drops a term
+};
+/// For plans with one request at a time in which nothing failed; beta_n is the last transfer's throughput.
+HtcTheorem theorem_of(const HarmonicTimePlan& plan);
+
+}  // namespace texmesh

@@ -1,0 +1,270 @@
+#include "delivery/cpp/package/package_reader.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+std::string plane_place(std::size_t plane) { return "texture plane " + std::to_string(plane); }
+
+// Far above what packages have: 10,000 planes with all their rungs, 65,535 fragments each in several.
+constexpr std::uint64_t kMostIndexBytes = 64ull << 20, kMostTablesBytes = 512ull << 20;
+constexpr std::uint64_t kMostDocumentBytes = 64ull << 20, kMostImageBytes = 1ull << 30;
+
+}  // namespace
+
+std::uint64_t most_entry_bytes(const std::string& path) {
+  if (path == kManifestPath) return kBootstrapBytes;
+  if (path == kIndexPath) return kMostIndexBytes;
+  if (path == kTablesPath) return kMostTablesBytes;
+  if (path.ends_with(".json") || path.ends_with("/tables.pack")) return kMostDocumentBytes;
+  if (path.starts_with("preview/")) return kMostDocumentBytes;
+  return path.starts_with("source/") ? kMostImageBytes : ~0ull;
+}
+
+PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::move(store)) {
+  const Bytes bytes = store_->read_manifest();
+  manifest_ = read_manifest(bytes);
+  id_ = sha256(bytes);
+}
+
+Bytes PackageReader::read_all(const EntryRef& ref) {
+  if (ref.bytes > most_entry_bytes(ref.path))
+    throw FormatError(store_->name(), "entry " + ref.path,
+                      "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
+                      std::to_string(ref.bytes));
+  Bytes bytes = store_->read(ref, 0, ref.bytes);
+  const Sha256 digest = sha256(bytes);
+  if (digest != ref.digest)
+    throw FormatError(store_->name(), "entry " + ref.path, "SHA-256 " + to_hex(ref.digest), to_hex(digest));
+  return bytes;
+}
+
+Bytes PackageReader::read_paged(const PagedRef& ref) {
+  Bytes bytes = read_all(ref);
+  const Sha256 digest = sha256(std::span(bytes).first(static_cast<std::size_t>(ref.head_bytes)));
+  if (digest != ref.head_digest)
+    throw FormatError(store_->name(), "head of " + ref.path, "SHA-256 " + to_hex(ref.head_digest),
+                      to_hex(digest));
+  return bytes;
+}
+
+void PackageReader::require_head(const PagedRef& ref, std::uint64_t head_bytes) const {
+  if (ref.head_bytes != head_bytes)
+    throw FormatError(store_->name(), "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
+                      std::to_string(head_bytes));
+}
+
+const std::vector<EntryRef>& PackageReader::index() {
+  if (index_) return *index_;
+  const Bytes bytes = read_paged(manifest_.index);
+  require_head(manifest_.index, read_index_head(bytes).bytes);
+  std::vector<EntryRef> entries = read_index(bytes);
+  const auto require_entry = [&](const EntryRef& ref) {
+    const auto it = std::ranges::find(entries, ref.path, &EntryRef::path);
+    if (it == entries.end() || !(*it == ref))
+      throw FormatError(store_->name(), "index entry " + ref.path, "what the manifest says of it",
+                        it == entries.end() ? "none" : "another offset, size or digest");
+  };
+  for (const EntryRef& ref :
+       {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality, manifest_.provenance})
+    require_entry(ref);
+  for (const ManifestScale& scale : manifest_.scales) require_entry(scale.glb);
+  index_ = std::move(entries);
+  return *index_;
+}
+
+const EntryRef& PackageReader::find(const std::string& path) {
+  const auto it = std::ranges::find(index(), path, &EntryRef::path);
+  if (it == index_->end())
+    throw FormatError(store_->name(), "entry " + path, "an entry of the index", "none");
+  return *it;
+}
+
+const std::vector<TextureInfo>& PackageReader::textures() {
+  if (textures_) return *textures_;
+  std::vector<TextureInfo> textures = read_textures(read_all(manifest_.textures));
+  if (textures.size() != manifest_.plane_count)
+    throw FormatError(store_->name(), kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
+                      std::to_string(textures.size()));
+  for (const TextureInfo& t : textures)
+    if (const auto feature = codec_traits(t.codec).required_feature;
+        !feature.empty() &&
+        std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
+      throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
+  const std::size_t full = full_size_planes(textures);
+  const bool mips =
+      std::ranges::find(manifest_.required_features, kMipsFeature) != manifest_.required_features.end();
+  if (mips != (full < textures.size()))
+    throw FormatError(store_->name(), kTexturesPath, mips ? "mips, as the manifest requires" : "no mips",
+                      std::to_string(textures.size() - full));
+  if (manifest_.previews.size() != std::min(full, kMaxManifestPreviews))
+    throw FormatError(store_->name(), kManifestPath, "previews of the full-size planes",
+                      std::to_string(manifest_.previews.size()));
+  resolve_textures(textures, index());
+  for (std::size_t p = 0; p < manifest_.previews.size(); ++p)
+    if (manifest_.previews[p] != ByteRange{textures[p].preview.offset, textures[p].preview.bytes})
+      throw FormatError(store_->name(), textures[p].preview.path, "the range that the manifest says",
+                        "another");
+  textures_ = std::move(textures);
+  return *textures_;
+}
+
+void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
+  const TextureInfo& texture = textures()[plane];
+  const bool same_rungs = std::ranges::equal(tables.rung_quality, texture.rung_quality, {},
+                                             [](std::uint8_t q) { return int{q}; });
+  if (tables.columns != texture.columns || tables.rows != texture.rows || !same_rungs)
+    throw FormatError(store_->name(), plane_place(plane), "the grid and rungs of textures.json in tables.bin",
+                      "others");
+  if (tables.incremental != codec_traits(texture.codec).incremental)
+    throw FormatError(store_->name(), plane_place(plane), "tables of the codec in textures.json", "others");
+  const auto require_sum = [&](const EntryRef& ref, std::uint64_t sum) {
+    if (ref.bytes != sum)
+      throw FormatError(store_->name(), "entry " + ref.path,
+                        std::to_string(sum) + " bytes, as tables.bin adds up", std::to_string(ref.bytes));
+  };
+  require_sum(texture.tables,
+              std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}));
+  const std::size_t fragments = tables.fragment_count();
+  for (std::size_t r = 0; r < tables.rung_count(); ++r) {
+    const auto begin = tables.size_bytes.begin() + static_cast<std::ptrdiff_t>(r * fragments);
+    require_sum(texture.rungs[r],
+                std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(fragments), std::uint64_t{0}));
+  }
+}
+
+const PackageTables& PackageReader::tables() {
+  if (tables_) return *tables_;
+  std::vector<EntryRef> needed{manifest_.tables};
+  if (!index_) needed.push_back(manifest_.index);
+  if (!textures_) needed.push_back(manifest_.textures);
+  store_->prefetch(needed);
+  const Bytes bytes = read_paged(manifest_.tables);
+  require_head(manifest_.tables, read_tables_head(bytes).bytes);
+  PackageTables tables = read_tables(bytes);
+  if (tables.planes.size() != manifest_.plane_count)
+    throw FormatError(store_->name(), kTablesPath, std::to_string(manifest_.plane_count) + " planes",
+                      std::to_string(tables.planes.size()));
+  fragment_offsets_.clear();
+  for (std::size_t p = 0; p < tables.planes.size(); ++p) {
+    const PlaneTables& t = tables.planes[p];
+    check_plane(p, t);
+    auto& offsets =
+        fragment_offsets_.emplace_back(t.rung_count(), std::vector<std::uint64_t>(t.fragment_count(), 0));
+    for (std::size_t r = 0; r < t.rung_count(); ++r) {
+      std::uint64_t at = 0;
+      for (const std::uint16_t f : t.order) {
+        offsets[r][f] = at;
+        at += t.size_bytes[r * t.fragment_count() + f];
+      }
+    }
+  }
+  tables_ = std::move(tables);
+  return *tables_;
+}
+
+const QualityTable& PackageReader::quality() {
+  if (!quality_) quality_ = read_quality(read_all(manifest_.quality));
+  return *quality_;
+}
+
+Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
+
+Bytes PackageReader::scale_glb(int scale) { return read_all(scale_entry(scale)); }
+
+std::size_t PackageReader::scale_index(int scale) const {
+  std::string known;
+  for (std::size_t k = 0; k < manifest_.scales.size(); ++k) {
+    if (manifest_.scales[k].scale == scale) return k;
+    known += (k == 0 ? "" : ", ") + std::to_string(manifest_.scales[k].scale);
+  }
+  throw InputError(store_->name(), "", "one of its scales " + known, "scale " + std::to_string(scale));
+}
+
+SplitStreamHead PackageReader::split_stream_head() {
+  if (!manifest_.stream)
+    throw FormatError(store_->name(), kSplitStreamPath, "a stream of vertex splits", "none");
+  const StreamRef& ref = *manifest_.stream;
+  const Bytes head = store_->read({kSplitStreamPath, ref.offset, ref.bytes, {}}, 0, ref.head_bytes);
+  if (sha256(head) != ref.head_digest)
+    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath, to_hex(ref.head_digest),
+                      to_hex(sha256(head)));
+  SplitStreamHead parsed = read_split_head(head);
+  if (parsed.bytes != ref.head_bytes)
+    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath,
+                      std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+  return parsed;
+}
+
+const TextureInfo& PackageReader::texture(std::uint32_t plane) {
+  if (plane >= textures().size())
+    throw FormatError(store_->name(), plane_place(plane), "one of " + std::to_string(textures_->size()),
+                      "none");
+  return (*textures_)[plane];
+}
+
+Bytes PackageReader::preview(std::uint32_t plane) { return read_all(texture(plane).preview); }
+
+Bytes PackageReader::source(std::uint32_t plane) {
+  const TextureInfo& info = texture(plane);
+  if (info.source_extension.empty())
+    throw FormatError(store_->name(), plane_place(plane), "a source image in the package", "none");
+  return read_all(info.source);
+}
+
+Bytes PackageReader::table_stream(std::uint32_t plane, std::uint32_t rung) {
+  const TextureInfo& info = texture(plane);
+  const PlaneTables& t = tables().planes[plane];
+  if (rung >= t.rung_count())
+    throw FormatError(store_->name(), plane_place(plane), "a rung under " + std::to_string(t.rung_count()),
+                      std::to_string(rung));
+  auto it = table_streams_.find(plane);
+  if (it == table_streams_.end()) it = table_streams_.emplace(plane, read_all(info.tables)).first;
+  const auto begin = std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
+  const auto stream = std::span(it->second).subspan(static_cast<std::size_t>(begin), t.table_bytes[rung]);
+  return {stream.begin(), stream.end()};
+}
+
+ByteRange PackageReader::fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment) {
+  texture(plane);
+  const PlaneTables& t = tables().planes[plane];
+  if (rung >= t.rung_count() || fragment >= t.fragment_count())
+    throw FormatError(store_->name(), plane_place(plane),
+                      "a rung under " + std::to_string(t.rung_count()) + " and a fragment under " +
+                          std::to_string(t.fragment_count()),
+                      std::to_string(rung) + ", " + std::to_string(fragment));
+  return {fragment_offsets_[plane][rung][fragment], t.size_bytes[rung * t.fragment_count() + fragment]};
+}
+
+Bytes PackageReader::fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment) {
+  const ByteRange range = fragment_range(plane, rung, fragment);
+  const EntryRef& pack = textures()[plane].rungs[rung];
+  const std::string place = "fragment " + std::to_string(fragment) + " of " + pack.path;
+  if (range.bytes == 0) throw FormatError(store_->name(), place, "a stored fragment", "none");
+  Bytes bytes = store_->read(pack, range.offset, range.bytes);
+  const PlaneTables& t = tables().planes[plane];
+  if (truncated(sha256(bytes)) != t.digest[rung * t.fragment_count() + fragment])
+    throw FormatError(store_->name(), place, "bytes of the digest in tables.bin", "others");
+  return bytes;
+}
+
+Bytes PackageReader::complete_fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment) {
+  const Codec codec = texture(plane).codec;
+  const std::uint32_t first = codec_traits(codec).incremental ? 0 : rung;
+  std::vector<Bytes> streams;
+  for (std::uint32_t r = first; r <= rung; ++r) streams.push_back(this->fragment(plane, r, fragment));
+  return join_fragment(codec, table_stream(plane, first),
+                       std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
+}
+
+int select_scale(const Manifest& manifest, double displayed_px) {
+  for (const ManifestStep& step : manifest.steps)
+    if (displayed_px <= step.up_to_px) return step.scale;
+  return 0;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,107 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "format/documents/manifest.h"
+#include "format/documents/tables.h"
+#include "format/split/split_stream.h"
+
+namespace texmesh {
+
+/// Where a package's entries come from: a .texmesh file (or anything that serves ranges of one), or the same
+/// tree unpacked into a folder.
+class PackageStore {
+ public:
+  virtual ~PackageStore() = default;
+  virtual std::string name() const = 0;  // for errors
+  virtual bool is_folder() const = 0;
+  /// The bytes of manifest.json. From a container this is one read of kBootstrapBytes at offset 0.
+  virtual std::vector<std::uint8_t> read_manifest() = 0;
+  /// Exactly `bytes` bytes from `offset` within an entry. A container goes by entry.offset, a folder by
+  /// entry.path. FormatError when they are not there.
+  virtual std::vector<std::uint8_t> read(const EntryRef& entry, std::uint64_t offset,
+                                         std::uint64_t bytes) = 0;
+  /// These will be read soon, in whole: a server is asked for all of them at once. Errors as of read().
+  virtual void prefetch(const std::vector<EntryRef>&) {}
+  /// What is really there, manifest.json and index.bin included: a container's entries in file order (every
+  /// rule of the profile checked), a folder's regular files by path (offsets and CRCs are 0). FormatError on
+  /// anything else in it.
+  virtual std::vector<ContainerEntry> list() = 0;
+};
+/// The most bytes that an entry of this path may have; what says that it has more is not to be believed.
+/// Meshes and packs are bounded by what the reader's store allows.
+std::uint64_t most_entry_bytes(const std::string& path);
+std::unique_ptr<PackageStore> open_container(std::unique_ptr<ByteSource> source);
+std::unique_ptr<PackageStore> open_folder(
+    const std::string& path);  // InputError; no symlinks are followed beneath it
+/// An http or https URL (http_store.h), a folder or a file, by what `path` is.
+std::unique_ptr<PackageStore> open_store(const std::string& path);
+
+/// Reads a package on demand. The constructor reads the manifest only; index, textures and tables are read
+/// when they are first asked for. Everything handed out has been checked: entries against their SHA-256,
+/// fragments against the truncated digest in the tables, documents against each other. FormatError says what
+/// does not fit. Not thread-safe.
+class PackageReader {
+ public:
+  explicit PackageReader(std::unique_ptr<PackageStore> store);
+  PackageStore& store() { return *store_; }
+  const Manifest& manifest() const { return manifest_; }
+  /// Package id: SHA-256 of the bytes of manifest.json.
+  const Sha256& id() const { return id_; }
+
+  /// Every entry but manifest.json and index.bin, in container order.
+  const std::vector<EntryRef>& index();
+  const EntryRef& find(const std::string& path);  // FormatError when the index has no such entry
+  const std::vector<TextureInfo>& textures();     // refs resolved
+  const PackageTables& tables();                  // one element per texture plane, consistent with textures()
+  const QualityTable& quality();
+
+  std::vector<std::uint8_t> entry(const EntryRef& ref);
+  std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
+  std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
+  /// Index into manifest().scales; InputError that names the scales there are when it is none of them.
+  std::size_t scale_index(int scale) const;
+  const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }
+  /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read
+  /// with store() or entry(kSplitStreamPath).
+  SplitStreamHead split_stream_head();
+  std::vector<std::uint8_t> preview(std::uint32_t plane);
+  /// The plane's source image as it was; FormatError when the package does not keep it as a file.
+  std::vector<std::uint8_t> source(std::uint32_t plane);
+  std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);
+  /// Where a fragment's stream stands within its rung's entry; bytes 0 = not stored.
+  ByteRange fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
+  std::vector<std::uint8_t> fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
+  /// The image file, of the plane's codec, that any decoder takes: table stream and fragment joined; for
+  /// incremental codecs with the streams of the lower rungs between them.
+  std::vector<std::uint8_t> complete_fragment(std::uint32_t plane, std::uint32_t rung,
+                                              std::uint32_t fragment);
+
+ private:
+  std::vector<std::uint8_t> read_all(const EntryRef& ref);
+  std::vector<std::uint8_t> read_paged(const PagedRef& ref);
+  void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
+  void check_plane(std::size_t plane, const PlaneTables& tables);
+  const TextureInfo& texture(std::uint32_t plane);
+  std::unique_ptr<PackageStore> store_;
+  Manifest manifest_;
+  Sha256 id_{};
+  std::optional<std::vector<EntryRef>> index_;
+  std::optional<std::vector<TextureInfo>> textures_;
+  std::optional<PackageTables> tables_;
+  std::optional<QualityTable> quality_;
+  // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
+  std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
+  std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane
+};
+
+/// The step function: the scale to show an object at that is `displayed_px` pixels high on screen.
+int select_scale(const Manifest& manifest, double displayed_px);
+
+}  // namespace texmesh

@@ -1,0 +1,204 @@
+#include "delivery/cpp/simulate/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "delivery/cpp/transfer/transfer.h"
+#include "format/base/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+double loss_of(const FragmentOffer& f, std::int32_t rung) {
+  return f.loss[static_cast<std::size_t>(rung + 1)];
+}
+
+std::int32_t nearest_rung_to(const FragmentOffer& f, double bytes) {
+  std::int32_t best = 0;
+  for (std::size_t r = 1; r < f.bytes.size(); ++r)
+    if (std::abs(f.bytes[r] - bytes) < std::abs(f.bytes[static_cast<std::size_t>(best)] - bytes))
+      best = static_cast<std::int32_t>(r);
+  return best;
+}
+
+}  // namespace
+
+SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double end_s) {
+  SimulationResult r;
+  r.time_limit_s = limit_s;
+  r.end_s = end_s;
+  r.deviation_percent = 100 * (limit_s - end_s) / limit_s;
+  r.late_s = std::max(0.0, end_s - limit_s);
+  r.steps = plan.steps();
+  r.rungs = plan.rungs();
+  for (const HtcStep& s : r.steps) {
+    r.bytes += s.rung < 0 ? 0 : s.bytes;
+    r.skipped += s.rung < 0;
+    r.given_up += s.rung < 0 && s.bytes > 0;
+  }
+  r.skipped += static_cast<std::uint32_t>(plan.offers().size() - r.steps.size());
+  for (std::size_t i = 0; i < r.rungs.size(); ++i) {
+    const FragmentOffer& f = plan.offers()[i];
+    r.loss += loss_of(f, r.rungs[i]);
+    r.planned_loss += loss_of(f, nearest_rung_to(f, f.planned_bytes));
+  }
+  return r;
+}
+
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at least
+
+/// A model of a network as a transport.
+class ModelTransport final : public Transport {
+ public:
+  explicit ModelTransport(const NetworkOptions& network)
+      : model_(network), mirrors_(network.mirrors.size()) {}
+  std::size_t mirrors() const override { return mirrors_; }
+  double now_s() override { return model_.now_s(); }
+  void start(const TransferRequest& request, std::uint32_t mirror) override {
+    Part& part = parts_[request.number];
+    if (part.left <= 0) part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes)};
+    model_.request(request.number, mirror, part.left);
+  }
+  void cancel(std::uint32_t number) override {
+    if (const auto left = model_.bytes_left(number)) parts_[number].left = *left;
+    model_.cancel(number);
+  }
+  double received(std::uint32_t number) override {
+    const auto left = model_.bytes_left(number);
+    return left ? parts_[number].bytes - *left : 0;
+  }
+  std::optional<Outcome> wait(double until_s) override {
+    const auto arrival = model_.advance(until_s);
+    if (!arrival) return std::nullopt;
+    parts_.erase(arrival->request);
+    return Outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
+  }
+  void move_to(double time_s) {
+    while (model_.now_s() < time_s) model_.advance(time_s);
+  }
+
+ private:
+  struct Part {
+    double bytes = 0, left = 0;
+  };
+  NetworkModel model_;
+  std::size_t mirrors_;
+  std::map<std::uint32_t, Part> parts_;  // by request, of what is still to come
+};
+
+/// One request and nothing more.
+class OneRequest final : public RequestSource {
+ public:
+  explicit OneRequest(std::uint64_t bytes) : bytes_(bytes) {}
+  std::optional<TransferRequest> next(double) override {
+    if (std::exchange(asked_, true)) return std::nullopt;
+    return TransferRequest{0, bytes_, {}};
+  }
+  bool arrived(const Transport::Outcome&) override { return ended_ = true; }
+  void failed(std::uint32_t, double) override { ended_ = true; }
+  bool finished() const override { return ended_; }
+
+ private:
+  std::uint64_t bytes_;
+  bool asked_ = false, ended_ = false;
+};
+
+}  // namespace
+
+SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
+                          const NetworkOptions& network) {
+  HarmonicTimePlan plan(std::move(offers), options);
+  ModelTransport transport(network);
+  PlanSource source(plan);
+  TransferOptions how;
+  how.rtt_s = network.rtt_s;
+  how.initial_bytes_s = options.throughput.initial_bytes_s;
+  const TransferEnd end = transfer(source, transport, how);
+  SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNever : end.last_s);
+  result.never = end.given_up > 0;
+  return result;
+}
+
+NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
+  const auto dead = [now_s](const MirrorModel& m) { return m.dead_from_s + kFoundDead_s <= now_s; };
+  if (!std::ranges::all_of(network.mirrors, dead)) std::erase_if(network.mirrors, dead);
+  return network;
+}
+
+double fetched_s(const NetworkOptions& all, double from_s, std::uint64_t bytes) {
+  if (!std::isfinite(from_s)) return kNever;
+  const NetworkOptions network = without_dead_mirrors(all, from_s);
+  ModelTransport transport(network);
+  transport.move_to(from_s);
+  OneRequest source(bytes);
+  TransferOptions how;
+  how.rtt_s = network.rtt_s;
+  // A client knows by then about how fast its link and its best server are.
+  double best = 0;
+  for (const MirrorModel& m : network.mirrors) best = std::max(best, m.rate.at(from_s));
+  how.initial_bytes_s = std::max(1.0, std::min(best, network.link.at(from_s)));
+  const TransferEnd end = transfer(source, transport, how);
+  return end.given_up > 0 ? kNever : end.last_s;
+}
+
+SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,
+                                  const std::function<double(std::size_t, double)>& rate) {
+  HtcOptions serial = options;
+  serial.window = 1;
+  serial.rtt_s = 0;
+  HarmonicTimePlan plan(std::move(offers), serial);
+  double now_s = 0;
+  while (const HtcStep* step = plan.next(now_s)) {
+    now_s += step->bytes / rate(step->position, now_s);
+    plan.completed(step->offer, now_s);
+  }
+  return result_of(plan, options.time_limit_s, now_s);
+}
+
+SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
+                                       const BandwidthTrace& trace) {
+  HtcOptions serial = options;
+  serial.window = 1;
+  serial.rtt_s = 0;
+  NetworkOptions network;
+  network.link = trace;
+  network.connections = 1;
+  return simulate(std::move(offers), serial, network);
+}
+
+double TraceRandom::uniform() {
+  state_ += 0x9e3779b97f4a7c15ull;
+  std::uint64_t z = state_;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  z ^= z >> 31;
+  return (static_cast<double>(z >> 11) + 1.0) / 9007199254740992.0;
+}
+
+double TraceRandom::normal() {
+  const double u = uniform(), v = uniform();
+  return std::sqrt(-2 * portable::log(u)) * portable::cos(2 * portable::kPi * v);
+}
+
+BandwidthTrace random_trace(double mean_bytes_s, double cv, double rho, double step_s, double length_s,
+                            std::uint64_t seed) {
+  const double variance = portable::log(1 + cv * cv), sigma = std::sqrt(variance);
+  TraceRandom random(seed);
+  BandwidthTrace trace{{}, {}};
+  double x = random.normal();
+  const auto steps = static_cast<std::size_t>(std::ceil(length_s / step_s));
+  for (std::size_t i = 0; i <= steps; ++i) {
+    trace.time_s.push_back(static_cast<double>(i) * step_s);
+    trace.bytes_s.push_back(mean_bytes_s * portable::exp(sigma * x - variance / 2));
+    x = rho * x + std::sqrt(1 - rho * rho) * random.normal();
+  }
+  return trace;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,89 @@
+#include <algorithm>
+#include <cmath>
+
+#include "delivery/cpp/simulate/simulation.h"
+#include "format/base/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kFragments = 256;
+constexpr double kListBytes = 418e3, kLinkBytes_s = 41.68e3;
+constexpr double kQuality = 80, kWidth = 60;  // Q_i and dQ of Eq. 3.2
+// Steps of 5 as in the thesis's tables, finer where bytes grow fastest: between 95 and 100 they double.
+constexpr int kRungs[] = {5,  10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65,
+                          70, 75, 80, 85, 90, 92, 94, 95, 96, 97, 98, 99, 100};
+
+/// IJG's scale of the quantisers, 1 at quality 50.
+double quantiser_scale(double quality) {
+  return quality < 50 ? 50 / quality : std::max(2 - quality / 50, 0.015);
+}
+/// Bytes of a photograph grow about like this, 1 at quality 50.
+double relative_bytes(double quality) { return portable::pow(quantiser_scale(quality), -0.75); }
+double relative_loss(double quality) { return 0.03 * portable::pow(quantiser_scale(quality), 0.8); }
+
+}  // namespace
+
+std::vector<FragmentOffer> table_4_2_offers() {
+  TraceRandom random(42);
+  std::vector<FragmentOffer> offers(kFragments);
+  std::vector<double> base(kFragments);
+  double mean_eta = 0;
+  for (std::size_t i = 0; i < kFragments; ++i) {
+    offers[i].eta = (random.uniform() + random.uniform() + random.uniform()) / 3;
+    base[i] = portable::exp(0.5 * random.normal());
+    mean_eta += offers[i].eta / kFragments;
+  }
+  double total = 0;
+  for (std::size_t i = 0; i < kFragments; ++i) {
+    const double q = std::clamp(kQuality + kWidth * (offers[i].eta - mean_eta), 40.0, 100.0);
+    offers[i].planned_bytes = base[i] * relative_bytes(q);
+    total += offers[i].planned_bytes;
+  }
+  for (std::size_t i = 0; i < kFragments; ++i) {
+    FragmentOffer& f = offers[i];
+    const double unit = kListBytes / total;
+    f.planned_bytes *= unit;
+    f.loss.push_back(0.4 / kFragments);
+    for (const int q : kRungs) {
+      f.bytes.push_back(
+          static_cast<std::uint32_t>(std::max(1.0, std::floor(base[i] * unit * relative_bytes(q) + 0.5))));
+      f.loss.push_back(relative_loss(q) / kFragments);
+    }
+    f.low_rung = 7;  // the thesis's limits are 40 and 100
+  }
+  return offers;
+}
+
+std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds) {
+  const std::vector<FragmentOffer> offers = table_4_2_offers();
+  std::vector<Table42Row> rows;
+  for (int beta0 = 20; beta0 <= 53; beta0 += 3) {
+    Table42Row row;
+    row.beta0_kb_s = beta0;
+    row.t0_s = kListBytes / (beta0 * 1e3);
+    row.static_percent = 100 * (1 - beta0 * 1e3 / kLinkBytes_s);
+    HtcOptions options = base;
+    options.time_limit_s = row.t0_s;
+    options.throughput.initial_bytes_s = beta0 * 1e3;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      const BandwidthTrace samples =
+          random_trace(kLinkBytes_s, 0.2, 0, 1, kFragments, static_cast<std::uint64_t>(seed));
+      const SimulationResult by_sample = simulate_samples(
+          offers, options, [&](std::size_t k, double) { return samples.bytes_s[std::min(k, kFragments)]; });
+      const SimulationResult by_time = simulate_serial_trace(
+          offers, options,
+          random_trace(kLinkBytes_s, 0.3, 0.9, 0.1, 3 * row.t0_s, static_cast<std::uint64_t>(seed)));
+      const double d = std::abs(by_sample.deviation_percent), t = std::abs(by_time.deviation_percent);
+      row.deviation_percent += d / seeds;
+      row.trace_deviation_percent += t / seeds;
+      row.worst_percent = std::max(row.worst_percent, d);
+      row.trace_worst_percent = std::max(row.trace_worst_percent, t);
+      row.mean_loss += by_sample.loss / seeds;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace texmesh

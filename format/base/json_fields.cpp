@@ -1,0 +1,183 @@
+#include "format/base/json_fields.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <set>
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::json;
+
+void check_depth(std::span<const std::uint8_t> bytes, const std::string& file) {
+  int depth = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const std::uint8_t c = bytes[i];
+    if (in_text) {
+      if (c == '\\') ++i;
+      if (c == '"') in_text = false;
+    } else if (c == '"') {
+      in_text = true;
+    } else if (c == '[' || c == '{') {
+      if (++depth > kMaxJsonDepth)
+        throw FormatError(file, "byte " + std::to_string(i),
+                          "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+}
+
+/// At most 40 printable ASCII characters of a value, for an error message.
+std::string excerpt(const Json& value) {
+  std::string s = value.dump(-1, ' ', true, Json::error_handler_t::replace).substr(0, 40);
+  std::ranges::replace_if(
+      s, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return s;
+}
+
+/// Builds the document and notices names that an object has twice. (A parser callback would see them too, but
+/// with one nlohmann's parser goes over an array's elements again after each: hours for a hostile 16 MB.)
+class NameWatcher : public nlohmann::detail::json_sax_dom_parser<Json> {
+ public:
+  using Base = nlohmann::detail::json_sax_dom_parser<Json>;
+  explicit NameWatcher(Json& document) : Base(document, true) {}
+
+  bool start_object(std::size_t size) {
+    names_.emplace_back();
+    return Base::start_object(size);
+  }
+  bool key(std::string& name) {
+    if (!names_.back().insert(name).second && !repeated) repeated = name;
+    return Base::key(name);
+  }
+  bool end_object() {
+    names_.pop_back();
+    return Base::end_object();
+  }
+
+  std::optional<std::string> repeated;  // the first one
+
+ private:
+  std::vector<std::set<std::string>> names_;
+};
+
+std::string print(double v) {
+  char text[32];
+  const auto result = std::to_chars(text, text + sizeof text, v);
+  return {text, result.ptr};
+}
+
+}  // namespace
+
+Json parse_json(std::span<const std::uint8_t> bytes, const std::string& file, std::uint64_t max_bytes) {
+  if (bytes.size() > max_bytes)
+    throw FormatError(file, "", "at most " + std::to_string(max_bytes) + " bytes",
+                      std::to_string(bytes.size()));
+  check_depth(bytes, file);
+  Json json;
+  NameWatcher watcher(json);
+  try {
+    Json::sax_parse(bytes.begin(), bytes.end(), &watcher);
+  } catch (const Json::parse_error& e) {
+    throw FormatError(file, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
+  } catch (const Json::exception&) {
+    throw FormatError(file, "", "JSON with numbers in range", "another number");
+  }
+  if (watcher.repeated) throw FormatError(file, "", "every name once", excerpt(*watcher.repeated) + " twice");
+  return json;
+}
+
+std::string dump_json(const nlohmann::ordered_json& json, const std::string& file) {
+  try {
+    return json.dump();
+  } catch (const nlohmann::ordered_json::exception&) {
+    throw FormatError(file, "", "texts in UTF-8", "other bytes");
+  }
+}
+
+double shortest_double(float value) {
+  if (!std::isfinite(value)) return value;
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  double d = 0;
+  std::from_chars(text, end, d);
+  return d;
+}
+
+double six_digits(double value) {
+  if (!std::isfinite(value)) return value;
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::scientific, 5).ptr;
+  double d = 0;
+  std::from_chars(text, end, d);
+  return d;
+}
+
+void JsonAt::fail(const std::string& expected, const std::string& found) const {
+  throw FormatError(file_, pointer_.empty() ? "/" : pointer_, expected, found);
+}
+void JsonAt::fail_type(const char* expected) const { fail(expected, excerpt(value_)); }
+
+bool JsonAt::has(std::string_view name) const { return value_.is_object() && value_.contains(name); }
+
+JsonAt JsonAt::operator[](std::string_view name) const {
+  if (!value_.is_object()) fail_type("an object");
+  const auto it = value_.find(name);
+  if (it == value_.end())
+    JsonAt(value_, file_, pointer_ + "/" + std::string(name)).fail("a value", "nothing");
+  return {*it, file_, pointer_ + "/" + std::string(name)};
+}
+
+JsonAt JsonAt::operator[](std::size_t index) const {
+  return {value_.at(index), file_, pointer_ + "/" + std::to_string(index)};
+}
+
+std::size_t JsonAt::array(std::size_t min_size, std::size_t max_size) const {
+  if (!value_.is_array()) fail_type("an array");
+  if (value_.size() < min_size || value_.size() > max_size)
+    fail(min_size == max_size ? std::to_string(min_size) + " elements"
+                              : std::to_string(min_size) + " to " + std::to_string(max_size) + " elements",
+         std::to_string(value_.size()));
+  return value_.size();
+}
+
+std::uint64_t JsonAt::integer(std::uint64_t lo, std::uint64_t hi) const {
+  if (!value_.is_number_unsigned()) fail_type("a whole number >= 0");
+  const auto v = value_.get<std::uint64_t>();
+  if (v < lo || v > hi) fail(std::to_string(lo) + " to " + std::to_string(hi), std::to_string(v));
+  return v;
+}
+
+double JsonAt::number(double lo, double hi) const {
+  if (!value_.is_number()) fail_type("a number");
+  const auto v = value_.get<double>();
+  if (!(v >= lo && v <= hi)) fail(print(lo) + " to " + print(hi), print(v));
+  return v;
+}
+
+bool JsonAt::boolean() const {
+  if (!value_.is_boolean()) fail_type("true or false");
+  return value_.get<bool>();
+}
+
+std::string JsonAt::text(std::size_t max_bytes) const {
+  if (!value_.is_string()) fail_type("a text");
+  const auto& v = value_.get_ref<const std::string&>();
+  if (v.size() > max_bytes) fail("at most " + std::to_string(max_bytes) + " bytes", std::to_string(v.size()));
+  if (std::ranges::any_of(v, [](char c) { return (c >= 0 && c < ' ') || c == 0x7f; }))
+    fail("no control characters", excerpt(value_));
+  return v;
+}
+
+Sha256 JsonAt::digest() const {
+  if (!value_.is_string()) fail_type("a SHA-256");
+  Sha256 digest{};
+  if (!from_hex(value_.get_ref<const std::string&>(), digest)) fail_type("64 lower-case hexadecimal digits");
+  return digest;
+}
+
+}  // namespace texmesh

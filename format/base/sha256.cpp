@@ -1,0 +1,48 @@
+#include "format/base/sha256.h"
+
+#include <openssl/evp.h>
+
+#include <stdexcept>
+
+namespace texmesh {
+
+Sha256 sha256(std::span<const std::uint8_t> bytes) {
+  Sha256 digest{};
+  unsigned size = 0;
+  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1 ||
+      size != digest.size())
+    throw std::runtime_error("SHA-256 is not available from OpenSSL");
+  return digest;
+}
+
+std::string to_hex(const Sha256& digest) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string s;
+  s.reserve(64);
+  for (std::uint8_t b : digest) {
+    s += kDigits[b >> 4];
+    s += kDigits[b & 15];
+  }
+  return s;
+}
+
+bool from_hex(std::string_view hex, Sha256& digest) {
+  if (hex.size() != 64) return false;
+  auto value = [](char c) {
+    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+  };
+  for (std::size_t i = 0; i < 32; ++i) {
+    const int hi = value(hex[2 * i]), lo = value(hex[2 * i + 1]);
+    if (hi < 0 || lo < 0) return false;
+    digest[i] = static_cast<std::uint8_t>(hi * 16 + lo);
+  }
+  return true;
+}
+
+std::uint64_t truncated(const Sha256& digest) {
+  std::uint64_t v = 0;
+  for (int i = 0; i < 8; ++i) v = v << 8 | digest[static_cast<std::size_t>(i)];
+  return v;
+}
+
+}  // namespace texmesh

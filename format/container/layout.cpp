@@ -1,0 +1,197 @@
+#include "format/container/layout.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <tuple>
+
+namespace texmesh {
+namespace {
+
+template <class... T>
+std::string print(const char* format, T... values) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+/// Takes the digits at the front of `text`; false when there are none or the number does not fit.
+bool take_number(std::string_view& text, std::uint32_t& number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end == text.data()) return false;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return true;
+}
+
+bool take(std::string_view& text, std::string_view prefix) {
+  if (!text.starts_with(prefix)) return false;
+  text.remove_prefix(prefix.size());
+  return true;
+}
+
+EntryName parse_texture_path(std::string_view text) {
+  EntryName name;
+  if (!take_number(text, name.number) || !take(text, "/")) return {};
+  if (text == "tables.pack") {
+    name.kind = EntryKind::kTableStreams;
+  } else if (take(text, "r") && take_number(text, name.rung)) {
+    if (text == ".pack") name.kind = EntryKind::kRung;
+    if (take(text, "/") && take_number(text, name.fragment) && take(text, "."))
+      for (const std::string_view extension : {"jpg", "webp"})
+        if (text == extension) name.kind = EntryKind::kFragmentFile, name.extension = extension;
+  }
+  return name;
+}
+
+EntryName parse_any_spelling(std::string_view path) {
+  constexpr std::pair<const char*, EntryKind> kSingle[] = {
+      {kManifestPath, EntryKind::kManifest},      {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},          {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},        {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream}};
+  for (const auto& [single, kind] : kSingle)
+    if (path == single) return {kind};
+  std::string_view text = path;
+  EntryName name;
+  if (take(text, "mesh/s")) {
+    if (take_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
+  } else if (take(text, "preview/")) {
+    if (take_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
+  } else if (take(text, "source/")) {
+    if (take_number(text, name.number) && take(text, "."))
+      for (const std::string_view extension : kSourceExtensions)
+        if (text == extension) name.kind = EntryKind::kSource, name.extension = extension;
+  } else if (take(text, "texture/")) {
+    return parse_texture_path(text);
+  }
+  return name;
+}
+
+std::string spell(const EntryName& name) {
+  switch (name.kind) {
+    case EntryKind::kMesh:
+      return name.number > 9999 ? "" : mesh_path(static_cast<int>(name.number));
+    case EntryKind::kPreview:
+      return preview_path(name.number);
+    case EntryKind::kTableStreams:
+      return table_streams_path(name.number);
+    case EntryKind::kRung:
+      return rung_path(name.number, name.rung);
+    case EntryKind::kFragmentFile:
+      return fragment_file_path(name.number, name.rung, name.fragment, name.extension);
+    case EntryKind::kSource:
+      return source_path(name.number, name.extension);
+    default:
+      return "";
+  }
+}
+
+/// Which of the coarse places of the order an entry has.
+enum Place : int {
+  kManifestPlace,
+  kIndexPlace,
+  kTablesPlace,
+  kTexturesPlace,
+  kQualityPlace,
+  kFirstMesh,
+  kPreviews,
+  kTableStreamsPlace,
+  kInterleaved,
+  kOthers,
+  kLast
+};
+
+Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
+  switch (name.kind) {
+    case EntryKind::kManifest:
+      return kManifestPlace;
+    case EntryKind::kIndex:
+      return kIndexPlace;
+    case EntryKind::kTables:
+      return kTablesPlace;
+    case EntryKind::kTextures:
+      return kTexturesPlace;
+    case EntryKind::kQuality:
+      return kQualityPlace;
+    case EntryKind::kMesh:
+      return name.number == coarsest_scale ? kFirstMesh : kInterleaved;
+    case EntryKind::kPreview:
+      return kPreviews;
+    case EntryKind::kTableStreams:
+      return kTableStreamsPlace;
+    case EntryKind::kRung:
+      return kInterleaved;
+    case EntryKind::kProvenance:
+      return kLast;
+    case EntryKind::kFragmentFile:
+    case EntryKind::kSource:  // readers of 1.0 know neither this nor the next and expect them there
+    case EntryKind::kSplitStream:
+    case EntryKind::kOther:
+      return kOthers;
+  }
+  return kOthers;
+}
+
+}  // namespace
+
+std::string mesh_path(int scale) { return print("mesh/s%02d.glb", scale); }
+std::string preview_path(std::uint32_t plane) { return print("preview/%03u.jpg", plane); }
+std::string table_streams_path(std::uint32_t plane) { return print("texture/%u/tables.pack", plane); }
+std::string rung_path(std::uint32_t plane, std::uint32_t rung) {
+  return print("texture/%u/r%02u.pack", plane, rung);
+}
+std::string source_path(std::uint32_t plane, std::string_view extension) {
+  return print("source/%03u.", plane).append(extension);
+}
+std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
+                               std::string_view extension) {
+  return print("texture/%u/r%02u/%04u.", plane, rung, fragment).append(extension);
+}
+
+EntryName parse_entry_path(const std::string& path) {
+  const EntryName name = parse_any_spelling(path);
+  const std::string canonical = spell(name);
+  if (!canonical.empty()) return canonical == path ? name : EntryName{};
+  const bool numbered = name.kind >= EntryKind::kMesh && name.kind <= EntryKind::kSource;
+  return numbered ? EntryName{} : name;
+}
+
+std::vector<std::string> streaming_order(std::vector<std::string> paths) {
+  std::uint32_t coarsest = 0, rungs = 0;
+  std::vector<std::uint32_t> meshes;  // coarse to fine
+  for (const std::string& path : paths) {
+    const EntryName name = parse_entry_path(path);
+    if (name.kind == EntryKind::kMesh) meshes.push_back(name.number);
+    if (name.kind == EntryKind::kRung) rungs = std::max(rungs, name.rung + 1);
+  }
+  std::ranges::sort(meshes, std::greater<>());
+  if (!meshes.empty()) {
+    coarsest = meshes.front();
+    meshes.erase(meshes.begin());
+  }
+  // Mesh k of M (coarse to fine, without the coarsest) follows the first rung r of R with (r + 1) M >= (k +
+  // 1) R: both ladders rise together and end together.
+  const auto step_of = [&](const EntryName& name) -> std::uint64_t {
+    if (name.kind == EntryKind::kRung) return 2ull * name.rung;
+    const auto k = static_cast<std::uint64_t>(std::ranges::find(meshes, name.number) - meshes.begin());
+    const std::uint64_t after = ((k + 1) * rungs + meshes.size() - 1) / meshes.size();
+    return 2 * after - (after > 0 ? 1 : 0);
+  };
+  using Key = std::tuple<int, std::uint64_t, std::uint64_t, std::string>;
+  std::vector<Key> keys;
+  for (std::string& path : paths) {
+    const EntryName name = parse_entry_path(path);
+    const Place place = place_of(name, coarsest);
+    const std::uint64_t step = place == kInterleaved ? step_of(name) : 0;
+    // Scales count down from coarse to fine; planes count up.
+    const std::uint64_t rank = name.kind == EntryKind::kMesh ? 0xffffffffu - name.number
+                               : place == kOthers            ? 0
+                                                             : name.number;
+    keys.emplace_back(place, step, rank, std::move(path));
+  }
+  std::ranges::sort(keys);
+  for (std::size_t i = 0; i < keys.size(); ++i) paths[i] = std::move(std::get<3>(keys[i]));
+  return paths;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "format/base/bytes.h"
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "format/documents/manifest.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+const std::string kFile = kIndexPath;
+constexpr std::string_view kMagic = "TXMX";
+constexpr std::size_t kHeadFixed = 16, kPageFixed = 44, kRecordFixed = 49;
+
+std::uint32_t plane_of(const EntryRef& entry) {
+  const EntryName name = parse_entry_path(entry.path);
+  const bool textured = name.kind == EntryKind::kTableStreams || name.kind == EntryKind::kRung ||
+                        name.kind == EntryKind::kFragmentFile;
+  return textured ? name.number : kNoPlane;
+}
+
+/// What holds for any list of entries, whoever made it.
+void check_entry(const EntryRef& e) {
+  if (!is_valid_entry_path(e.path)) throw FormatError(kFile, "entry " + e.path, "a valid path", "another");
+  if (e.path == kManifestPath || e.path == kIndexPath)
+    throw FormatError(kFile, "entry " + e.path, "an entry other than manifest and index", e.path);
+  if (e.offset % 64 != 0 || e.offset == 0)
+    throw FormatError(kFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
+  if (e.offset > std::uint64_t{1} << 53 || e.bytes > std::uint64_t{1} << 53)
+    throw FormatError(kFile, "entry " + e.path, "offset and size up to 2^53", "more");
+}
+
+void check_order(const std::vector<EntryRef>& entries) {
+  std::set<std::string> paths;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const EntryRef& e = entries[i];
+    if (!paths.insert(e.path).second) throw FormatError(kFile, "entry " + e.path, "each path once", "twice");
+    if (i > 0 && e.offset <= entries[i - 1].offset + entries[i - 1].bytes)
+      throw FormatError(kFile, "offset of " + e.path, "more than where " + entries[i - 1].path + " ends",
+                        std::to_string(e.offset));
+  }
+}
+
+Bytes write_page(const std::vector<EntryRef>& entries) {
+  BytesOut out;
+  for (const EntryRef& e : entries) {
+    out.u64(e.offset);
+    out.u64(e.bytes);
+    out.raw(e.digest);
+    out.u8(e.path.size());
+    out.text(e.path);
+  }
+  return out.take();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
+  for (const EntryRef& e : entries) check_entry(e);
+  check_order(entries);
+  // Page 0 is always there; planes follow by number.
+  std::vector<EntryRef> general;
+  std::map<std::uint32_t, std::vector<EntryRef>> planes;
+  for (const EntryRef& e : entries) (plane_of(e) == kNoPlane ? general : planes[plane_of(e)]).push_back(e);
+
+  BytesOut head, pages;
+  head.text(kMagic);
+  head.u16(kFormatMajor);
+  head.u16(kFormatMinor);
+  head.u32(planes.size() + 1);
+  head.u32(entries.size());
+  const auto add_page = [&](std::uint32_t plane, const std::vector<EntryRef>& page_entries) {
+    const Bytes page = write_page(page_entries);
+    head.u32(plane);
+    head.u32(page_entries.size());
+    head.u32(page.size());
+    head.raw(sha256(page));
+    pages.raw(page);
+  };
+  add_page(kNoPlane, general);
+  for (const auto& [plane, page_entries] : planes) add_page(plane, page_entries);
+  head.raw(pages.take());
+  return head.take();
+}
+
+IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
+  BytesIn in(bytes, kFile);
+  in.expect("the magic TXMX", kMagic);
+  if (const auto major = in.u16(); major != kFormatMajor)
+    in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
+  IndexHead head;
+  head.minor = in.u16();
+  const std::uint64_t page_count = in.u32(), entry_count = in.u32();
+  if (page_count == 0 || page_count > in.left() / kPageFixed)
+    in.fail("a page count that fits the file", std::to_string(page_count));
+  head.bytes = kHeadFixed + page_count * kPageFixed;
+  std::uint64_t offset = head.bytes, entries = 0;
+  for (std::uint64_t i = 0; i < page_count; ++i) {
+    IndexPage page;
+    page.plane = in.u32();
+    if (i == 0 ? page.plane != kNoPlane
+               : page.plane == kNoPlane || (i > 1 && page.plane <= head.pages.back().plane))
+      in.fail("page 0 without a plane, then rising planes", std::to_string(page.plane));
+    page.entries = in.u32();
+    page.offset = offset;
+    page.bytes = in.u32();
+    if (page.entries > page.bytes / kRecordFixed)
+      in.fail("an entry count that fits the page", std::to_string(page.entries));
+    const auto digest = in.raw(32);
+    std::copy(digest.begin(), digest.end(), page.digest.begin());
+    offset += page.bytes;
+    entries += page.entries;
+    head.pages.push_back(page);
+  }
+  if (entries != entry_count)
+    in.fail(std::to_string(entry_count) + " entries on all pages", std::to_string(entries));
+  return head;
+}
+
+std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
+                                      std::span<const std::uint8_t> bytes) {
+  const IndexPage& p = head.pages.at(page);
+  const std::string place = "page " + std::to_string(page);
+  if (bytes.size() != p.bytes)
+    throw FormatError(kFile, place, std::to_string(p.bytes) + " bytes", std::to_string(bytes.size()));
+  if (sha256(bytes) != p.digest)
+    throw FormatError(kFile, place, "SHA-256 " + to_hex(p.digest), to_hex(sha256(bytes)));
+  BytesIn in(bytes, kFile + ": " + place);
+  std::vector<EntryRef> entries;
+  for (std::uint32_t i = 0; i < p.entries; ++i) {
+    EntryRef e;
+    e.offset = in.u64();
+    e.bytes = in.u64();
+    const auto digest = in.raw(32);
+    std::copy(digest.begin(), digest.end(), e.digest.begin());
+    e.path = in.text(in.u8());
+    check_entry(e);
+    if (plane_of(e) != p.plane) in.fail("entries of this page's plane", e.path);
+    entries.push_back(std::move(e));
+  }
+  if (head.minor <= kFormatMinor) in.finish();  // later minor versions may add to a page's end
+  check_order(entries);
+  return entries;
+}
+
+std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes) {
+  const IndexHead head = read_index_head(bytes);
+  const IndexPage& last = head.pages.back();
+  if (last.offset + last.bytes != bytes.size())
+    throw FormatError(kFile, "", std::to_string(last.offset + last.bytes) + " bytes",
+                      std::to_string(bytes.size()));
+  std::vector<EntryRef> entries;
+  for (std::size_t i = 0; i < head.pages.size(); ++i) {
+    const IndexPage& p = head.pages[i];
+    for (EntryRef& e : read_index_page(head, i, bytes.subspan(p.offset, p.bytes)))
+      entries.push_back(std::move(e));
+  }
+  std::ranges::sort(entries, {}, &EntryRef::offset);
+  check_order(entries);
+  return entries;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,280 @@
+#include "format/documents/manifest.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "format/base/json_fields.h"
+#include "format/container/container.h"
+#include "format/container/layout.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const std::string kFile = kManifestPath;
+constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
+constexpr std::size_t kMaxScales = 100;  // two digits in the path
+constexpr std::uint64_t kMaxPlanes = 10000;
+
+/// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
+constexpr std::array<std::string_view, 3> kKnownFeatures{
+    "codec-jpeg-progressive",
+    "codec-webp",
+    kMipsFeature,
+};
+bool is_known_feature(const std::string& name) {
+  return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
+}
+
+Json vector_json(Vec3d v) { return Json::array({v.x, v.y, v.z}); }
+
+Json ref_json(const EntryRef& ref) {
+  Json j;
+  j["offset"] = ref.offset;
+  j["bytes"] = ref.bytes;
+  j["sha256"] = to_hex(ref.digest);
+  return j;
+}
+
+Json ref_json(const PagedRef& ref) {
+  Json j = ref_json(static_cast<const EntryRef&>(ref));
+  j["headBytes"] = ref.head_bytes;
+  j["headSha256"] = to_hex(ref.head_digest);
+  return j;
+}
+
+Json stream_json(const StreamRef& ref) {
+  Json j;
+  j["offset"] = ref.offset;
+  j["bytes"] = ref.bytes;
+  j["headBytes"] = ref.head_bytes;
+  j["headSha256"] = to_hex(ref.head_digest);
+  return j;
+}
+
+/// One array per property: as objects, forty scales would spend half of the 16 KiB on names.
+Json scales_json(const std::vector<ManifestScale>& scales) {
+  Json j;
+  for (const char* name : {"scale", "triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
+                           "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge"})
+    j[name] = Json::array();
+  for (const ManifestScale& s : scales) {
+    j["scale"].push_back(s.scale);
+    j["triangles"].push_back(s.triangles);
+    j["vertices"].push_back(s.vertices);
+    j["offset"].push_back(s.glb.offset);
+    j["bytes"].push_back(s.glb.bytes);
+    j["sha256"].push_back(to_hex(s.glb.digest));
+    j["major"].push_back(s.major);
+    j["errorMax"].push_back(six_digits(s.error_max));
+    j["errorRms"].push_back(six_digits(s.error_rms));
+    j["p95"].push_back(six_digits(s.p95));
+    j["p99"].push_back(six_digits(s.p99));
+    j["displayPxJnd"].push_back(six_digits(s.display_px_jnd));
+    j["displayPxError"].push_back(six_digits(s.display_px_error));
+    j["displayPxEdge"].push_back(six_digits(s.display_px_edge));
+  }
+  if (std::ranges::any_of(scales, [](const ManifestScale& s) { return !s.floor.empty(); }))
+    for (const ManifestScale& s : scales) j["floor"].push_back(s.floor);
+  return j;
+}
+
+Json manifest_json(const Manifest& m) {
+  Json j;
+  j["format"] = "texmesh";
+  j["version"]["major"] = m.major;
+  j["version"]["minor"] = m.minor;
+  j["requiredFeatures"] = m.required_features;
+  j["title"] = m.title;
+  j["origin"] = vector_json(m.origin);
+  j["bounds"]["min"] = vector_json(m.bounds_min);
+  j["bounds"]["max"] = vector_json(m.bounds_max);
+  j["objectHeight"] = m.object_height;
+  if (m.surface_area > 0) j["surfaceArea"] = six_digits(m.surface_area);
+  j["jnd"] = m.jnd;
+  j["scales"] = scales_json(m.scales);
+  j["steps"] = Json::array();
+  for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
+  j["planeCount"] = m.plane_count;
+  j["firstPicture"]["offset"] = m.first_picture_offset;
+  j["firstPicture"]["bytes"] = m.first_picture_bytes;
+  j["firstPicture"]["sha256"] = to_hex(m.first_picture_digest);
+  j["previews"] = Json::array();
+  for (const ByteRange& r : m.previews) j["previews"].push_back(Json::array({r.offset, r.bytes}));
+  j["index"] = ref_json(m.index);
+  j["tables"] = ref_json(m.tables);
+  j["textures"] = ref_json(m.textures);
+  j["quality"] = ref_json(m.quality);
+  j["provenance"] = ref_json(m.provenance);
+  if (m.stream) j["stream"] = stream_json(*m.stream);
+  return j;
+}
+
+void read_version(const JsonAt& at, Manifest& m) {
+  const std::string format = at["format"].text(100);
+  if (format != "texmesh") at["format"].fail("texmesh", format);
+  m.major = static_cast<int>(at["version"]["major"].integer(0, 1'000'000));
+  m.minor = static_cast<int>(at["version"]["minor"].integer(0, 1'000'000));
+  if (m.major != kFormatMajor)
+    at["version"]["major"].fail(std::to_string(kFormatMajor),
+                                std::to_string(m.major) + ", which another reader is for");
+  const JsonAt features = at["requiredFeatures"];
+  for (std::size_t i = 0, n = features.array(0, 100); i < n; ++i) {
+    m.required_features.push_back(features[i].text(100));
+    if (!is_known_feature(m.required_features.back()))
+      features[i].fail("a feature that this reader knows", m.required_features.back());
+  }
+}
+
+Vec3d read_vector(const JsonAt& at) {
+  at.array(3, 3);
+  return {at[0].number(-kLargest, kLargest), at[1].number(-kLargest, kLargest),
+          at[2].number(-kLargest, kLargest)};
+}
+
+std::uint64_t read_offset(const JsonAt& at) {
+  const std::uint64_t offset = at.integer(64);
+  if (offset % 64 != 0) at.fail("a multiple of 64", std::to_string(offset));
+  return offset;
+}
+
+void read_ref(const JsonAt& at, const char* path, EntryRef& ref) {
+  ref.path = path;
+  ref.offset = read_offset(at["offset"]);
+  ref.bytes = at["bytes"].integer(1);
+  ref.digest = at["sha256"].digest();
+}
+
+void read_paged_ref(const JsonAt& at, const char* path, PagedRef& ref) {
+  read_ref(at, path, ref);
+  ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
+  ref.head_digest = at["headSha256"].digest();
+}
+
+StreamRef read_stream(const JsonAt& at) {
+  StreamRef ref;
+  ref.offset = read_offset(at["offset"]);
+  ref.bytes = at["bytes"].integer(1);
+  ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
+  ref.head_digest = at["headSha256"].digest();
+  return ref;
+}
+
+void read_shape(const JsonAt& at, Manifest& m) {
+  m.title = at["title"].text(kMaxTitleBytes);
+  m.origin = read_vector(at["origin"]);
+  const JsonAt bounds = at["bounds"];
+  m.bounds_min = read_vector(bounds["min"]);
+  m.bounds_max = read_vector(bounds["max"]);
+  for (int i = 0; i < 3; ++i)
+    if (m.bounds_min[i] > m.bounds_max[i])
+      bounds["max"][static_cast<std::size_t>(i)].fail("at least the minimum", "less");
+  m.object_height = at["objectHeight"].number(0, kLargest);
+  m.jnd = at["jnd"].number(0, 1);
+}
+
+void read_scales(const JsonAt& at, bool floors, Manifest& m) {
+  const std::size_t n = at["scale"].array(1, kMaxScales);
+  for (const char* column : {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
+                             "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge"})
+    at[column].array(n, n);
+  if (floors) at["floor"].array(n, n);
+  for (std::size_t i = 0; i < n; ++i) {
+    ManifestScale s;
+    s.scale = static_cast<int>(at["scale"][i].integer(0, kMaxScales - 1));
+    if (i == 0 && s.scale != 0) at["scale"][i].fail("0", std::to_string(s.scale));
+    if (i > 0 && s.scale <= m.scales.back().scale)
+      at["scale"][i].fail("a rising number", std::to_string(s.scale));
+    s.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
+    s.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
+    s.glb = {mesh_path(s.scale), read_offset(at["offset"][i]), at["bytes"][i].integer(1),
+             at["sha256"][i].digest()};
+    s.major = at["major"][i].boolean();
+    s.error_max = at["errorMax"][i].number(0, kLargest);
+    s.error_rms = at["errorRms"][i].number(0, kLargest);
+    s.p95 = at["p95"][i].number(0, kLargest);
+    s.p99 = at["p99"][i].number(0, kLargest);
+    s.display_px_jnd = at["displayPxJnd"][i].number(0, kAnyDisplayPx);
+    s.display_px_error = at["displayPxError"][i].number(0, kAnyDisplayPx);
+    s.display_px_edge = at["displayPxEdge"][i].number(0, kAnyDisplayPx);
+    if (floors) s.floor = at["floor"][i].text(kMaxFloorBytes);
+    m.scales.push_back(std::move(s));
+  }
+}
+
+void read_steps(const JsonAt& at, Manifest& m) {
+  const std::size_t n = at.array(1, kMaxScales);
+  for (std::size_t i = 0; i < n; ++i) {
+    at[i].array(2, 2);
+    const ManifestStep s{at[i][0].number(0, kAnyDisplayPx),
+                         static_cast<int>(at[i][1].integer(0, kMaxScales))};
+    if (std::ranges::none_of(m.scales, [&](const ManifestScale& k) { return k.scale == s.scale; }))
+      at[i][1].fail("a scale of the package", std::to_string(s.scale));
+    if (i > 0 && s.up_to_px <= m.steps.back().up_to_px) at[i][0].fail("a rising number", "another");
+    if (i > 0 && s.scale >= m.steps.back().scale) at[i][1].fail("a finer scale", std::to_string(s.scale));
+    m.steps.push_back(s);
+  }
+  if (m.steps.back().up_to_px != kAnyDisplayPx) at[n - 1][0].fail("1e9", "less");
+  if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
+}
+
+void read_first_picture(const JsonAt& at, Manifest& m) {
+  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPlanes));
+  const JsonAt first = at["firstPicture"];
+  const EntryRef& coarsest = m.scales.back().glb;
+  m.first_picture_offset = read_offset(first["offset"]);
+  if (m.first_picture_offset != coarsest.offset)
+    first["offset"].fail("the offset of the coarsest mesh, " + std::to_string(coarsest.offset),
+                         std::to_string(m.first_picture_offset));
+  m.first_picture_bytes = first["bytes"].integer(coarsest.bytes);
+  m.first_picture_digest = first["sha256"].digest();
+  const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
+  const JsonAt previews = at["previews"];
+  const std::size_t most = std::min<std::size_t>(m.plane_count, kMaxManifestPreviews);
+  // Only textures.json tells how many of the planes are mips, which have none.
+  const bool mips = std::ranges::find(m.required_features, kMipsFeature) != m.required_features.end();
+  const std::size_t n = previews.array(mips ? std::min<std::size_t>(most, 1) : most, most);
+  for (std::size_t i = 0; i < n; ++i) {
+    previews[i].array(2, 2);
+    const ByteRange r{read_offset(previews[i][0]), previews[i][1].integer(1)};
+    if (r.offset < m.first_picture_offset + coarsest.bytes || r.offset + r.bytes > end)
+      previews[i].fail("a range within the first picture, after the mesh", std::to_string(r.offset));
+    m.previews.push_back(r);
+  }
+}
+
+}  // namespace
+
+std::string write_manifest(const Manifest& manifest) {
+  const std::string json = dump_json(manifest_json(manifest), kFile);
+  const std::uint64_t room = kBootstrapBytes - ContainerWriter::data_offset(0, kManifestPath, json.size());
+  if (json.size() > room)
+    throw FormatError(kFile, "", "at most " + std::to_string(room) + " bytes",
+                      std::to_string(json.size()) + " bytes");
+  read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  return json;
+}
+
+Manifest read_manifest(std::span<const std::uint8_t> json) {
+  const nlohmann::json document = parse_json(json, kFile, kBootstrapBytes);
+  const JsonAt at(document, kFile);
+  Manifest m;
+  read_version(at, m);
+  read_shape(at, m);
+  if (document.contains("surfaceArea")) m.surface_area = at["surfaceArea"].number(0, kLargest);
+  const JsonAt scales = at["scales"];
+  read_scales(scales, document["scales"].is_object() && document["scales"].contains("floor"), m);
+  read_steps(at["steps"], m);
+  read_first_picture(at, m);
+  read_paged_ref(at["index"], kIndexPath, m.index);
+  read_paged_ref(at["tables"], kTablesPath, m.tables);
+  read_ref(at["textures"], kTexturesPath, m.textures);
+  read_ref(at["quality"], kQualityPath, m.quality);
+  read_ref(at["provenance"], kProvenancePath, m.provenance);
+  if (document.contains("stream")) m.stream = read_stream(at["stream"]);
+  return m;
+}
+
+}  // namespace texmesh

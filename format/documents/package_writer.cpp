@@ -1,0 +1,196 @@
+#include "format/documents/package_writer.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "format/documents/tables.h"
+#include "format/split/split_stream.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
+  throw FormatError("package", place, expected, found);
+}
+
+Bytes to_bytes(const std::string& s) { return {s.begin(), s.end()}; }
+
+/// Places of all entries for a manifest of `manifest_bytes` bytes; `refs` are in streaming order without the
+/// manifest and have their sizes.
+void place_entries(std::vector<EntryRef>& refs, std::uint64_t manifest_bytes) {
+  std::uint64_t at = ContainerWriter::data_offset(0, kManifestPath, manifest_bytes) + manifest_bytes;
+  for (EntryRef& ref : refs) {
+    ref.offset = ContainerWriter::data_offset(at, ref.path, ref.bytes);
+    at = ref.offset + ref.bytes;
+  }
+}
+
+/// Everything of the manifest that is known once the entries have places.
+class ManifestFiller {
+ public:
+  ManifestFiller(Manifest& manifest, std::size_t full_size_planes,
+                 const std::map<std::string, const Bytes*>& data)
+      : manifest_(manifest), full_size_planes_(full_size_planes), data_(data) {}
+
+  void fill(const std::vector<EntryRef>& refs) {
+    by_path_.clear();
+    for (const EntryRef& ref : refs) by_path_[ref.path] = &ref;
+    set(manifest_.textures, kTexturesPath);
+    set(manifest_.quality, kQualityPath);
+    set(manifest_.provenance, kProvenancePath);
+    set(manifest_.index, kIndexPath);
+    set_head(manifest_.index, read_index_head(*data_.at(kIndexPath)).bytes);
+    set(manifest_.tables, kTablesPath);
+    set_head(manifest_.tables, read_tables_head(*data_.at(kTablesPath)).bytes);
+    for (ManifestScale& s : manifest_.scales) set(s.glb, mesh_path(s.scale));
+    fill_first_picture();
+    fill_stream();
+  }
+
+ private:
+  void set(EntryRef& ref, const std::string& path) { ref = *by_path_.at(path); }
+  void set_head(PagedRef& ref, std::uint64_t head_bytes) {
+    ref.head_bytes = head_bytes;
+    ref.head_digest = sha256(std::span(*data_.at(ref.path)).first(static_cast<std::size_t>(head_bytes)));
+  }
+  void fill_stream() {
+    manifest_.stream.reset();
+    const auto it = by_path_.find(kSplitStreamPath);
+    if (it == by_path_.end()) return;
+    const Bytes& bytes = *data_.at(kSplitStreamPath);
+    const std::uint64_t head_bytes = read_split_head(bytes).bytes;
+    manifest_.stream = StreamRef{it->second->offset, it->second->bytes, head_bytes,
+                                 sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))};
+  }
+  void fill_first_picture() {
+    const EntryRef& coarsest = manifest_.scales.back().glb;
+    std::uint64_t end = coarsest.offset + coarsest.bytes;
+    manifest_.previews.clear();
+    for (std::uint32_t p = 0; p < full_size_planes_; ++p) {
+      const EntryRef& preview = *by_path_.at(preview_path(p));
+      if (p < kMaxManifestPreviews) manifest_.previews.push_back({preview.offset, preview.bytes});
+      end = std::max(end, preview.offset + preview.bytes);
+    }
+    for (std::uint32_t p = 0; p < manifest_.plane_count; ++p) {
+      const EntryRef& tables = *by_path_.at(table_streams_path(p));
+      end = std::max(end, tables.offset + tables.bytes);
+    }
+    manifest_.first_picture_offset = coarsest.offset;
+    manifest_.first_picture_bytes = end - coarsest.offset;
+  }
+
+  Manifest& manifest_;
+  std::size_t full_size_planes_;
+  const std::map<std::string, const Bytes*>& data_;
+  std::map<std::string, const EntryRef*> by_path_;
+};
+
+/// The bytes of the first picture's range: entries and the headers between them. Every header there follows
+/// from path, size, CRC and place, so a container of the same entries up to the range's end has the same
+/// bytes.
+Sha256 first_picture_digest(const Manifest& m, const std::vector<EntryRef>& refs,
+                            const std::map<std::string, const Bytes*>& data, std::uint64_t manifest_bytes) {
+  Bytes head;
+  const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
+  ContainerWriter writer(
+      [&](std::span<const std::uint8_t> part) { head.insert(head.end(), part.begin(), part.end()); });
+  writer.add(kManifestPath, Bytes(static_cast<std::size_t>(manifest_bytes), ' '));
+  for (const EntryRef& ref : refs) {
+    if (head.size() >= end) break;  // by bytes, not by ref.offset: an empty entry may stand last
+    writer.add(ref.path, *data.at(ref.path));
+  }
+  return sha256(std::span(head).subspan(static_cast<std::size_t>(m.first_picture_offset),
+                                        static_cast<std::size_t>(m.first_picture_bytes)));
+}
+
+void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                   const std::vector<PackageEntry>& entries) {
+  std::set<std::string> paths;
+  for (const PackageEntry& e : entries) {
+    const EntryKind kind = parse_entry_path(e.path).kind;
+    if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures)
+      fail("entry " + e.path, "an entry that write_package does not make itself", e.path);
+    if (!paths.insert(e.path).second) fail("entry " + e.path, "one entry of that path", "two");
+  }
+  std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
+  for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
+  for (std::uint32_t p = 0; p < textures.size(); ++p) {
+    if (textures[p].mip == 0) needed.push_back(preview_path(p));
+    if (!textures[p].source_extension.empty()) needed.push_back(source_path(p, textures[p].source_extension));
+    needed.push_back(table_streams_path(p));
+    for (std::uint32_t r = 0; r < textures[p].rung_quality.size(); ++r) needed.push_back(rung_path(p, r));
+  }
+  for (const std::string& path : needed)
+    if (!paths.contains(path)) fail("entry " + path, "an entry", "none");
+  if (manifest.scales.empty() || manifest.plane_count != textures.size())
+    fail("manifest", "scales, and as many planes as textures", std::to_string(manifest.plane_count));
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
+                                        const std::vector<PackageEntry>& entries) {
+  check_entries(manifest, textures, entries);
+  const std::size_t full = full_size_planes(textures);
+  if (full < textures.size() &&
+      std::ranges::find(manifest.required_features, kMipsFeature) == manifest.required_features.end())
+    manifest.required_features.emplace_back(kMipsFeature);
+  const Bytes textures_json = to_bytes(write_textures(textures));
+  Bytes index;
+  std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};
+  for (const PackageEntry& e : entries) data[e.path] = &e.bytes;
+  std::vector<std::string> paths;
+  for (const auto& [path, unused] : data) paths.push_back(path);
+
+  std::vector<EntryRef> refs;
+  for (const std::string& path : streaming_order(paths))
+    refs.push_back({path, 64, data.at(path)->size(), {}});
+  for (EntryRef& ref : refs)
+    if (ref.path != kIndexPath) ref.digest = sha256(*data.at(ref.path));
+  const auto index_ref = std::ranges::find(refs, std::string(kIndexPath), &EntryRef::path);
+  const auto without_index = [&] {
+    std::vector<EntryRef> others;
+    for (const EntryRef& ref : refs)
+      if (ref.path != kIndexPath) others.push_back(ref);
+    return others;
+  };
+
+  // The manifest holds offsets that depend on its own length. Its slot grows until the text that its size
+  // leads to fits, and blanks fill the rest; it only ever grows, and offsets have few digits, so this ends
+  // after a handful of rounds.
+  std::uint64_t slot = 1024;
+  std::string text;
+  for (;;) {
+    place_entries(refs, slot);
+    if (index.empty()) {  // its size does not depend on the offsets in it
+      index = write_index(without_index());
+      index_ref->bytes = index.size();
+      place_entries(refs, slot);
+    }
+    index = write_index(without_index());
+    index_ref->digest = sha256(index);
+    ManifestFiller(manifest, full, data).fill(refs);
+    text = write_manifest(manifest);
+    if (text.size() <= slot) break;
+    slot = text.size();
+  }
+  manifest.first_picture_digest = first_picture_digest(manifest, refs, data, slot);
+  text = write_manifest(manifest);  // digests have one length: the text still fits its slot
+  text.resize(static_cast<std::size_t>(slot), ' ');
+
+  Bytes package;
+  package.reserve(static_cast<std::size_t>(refs.back().offset + refs.back().bytes + 300 * (refs.size() + 2)));
+  ContainerWriter writer(
+      [&](std::span<const std::uint8_t> part) { package.insert(package.end(), part.begin(), part.end()); });
+  writer.add(kManifestPath, to_bytes(text));
+  for (const EntryRef& ref : refs) writer.add(ref.path, *data.at(ref.path));
+  writer.finish();
+  return package;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <map>
+
+#include "format/base/json_fields.h"
+#include "format/container/layout.h"
+#include "format/documents/manifest.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const std::string kFile = kTexturesPath;
+constexpr std::uint64_t kMaxFileBytes = 32u << 20;
+constexpr std::size_t kMaxPlanes = 10000, kMaxRungs = 100, kMaxTextBytes = 1000;
+constexpr std::uint64_t kMaxSide = 1u << 20, kMaxMip = 20;
+
+Json texture_json(const TextureInfo& t) {
+  Json j;
+  j["image"] = t.image;
+  if (t.mip > 0) {
+    j["mip"] = t.mip;
+    j["base"] = t.base;
+  }
+  j["role"] = t.role;
+  j["name"] = t.name;
+  j["colourSpace"] = t.colour_space;
+  j["codec"] = codec_traits(t.codec).id;
+  j["widthPx"] = t.width_px;
+  j["heightPx"] = t.height_px;
+  j["channels"] = t.channels;
+  j["fragmentWidthPx"] = t.fragment_width_px;
+  j["fragmentHeightPx"] = t.fragment_height_px;
+  j["columns"] = t.columns;
+  j["rows"] = t.rows;
+  j["gridReason"] = t.grid_reason;
+  j["previewWidthPx"] = t.preview_width_px;
+  j["previewHeightPx"] = t.preview_height_px;
+  j["rungQuality"] = t.rung_quality;
+  if (t.lossless) j["lossless"] = true;
+  if (!t.source_extension.empty()) {
+    j["source"] = t.source_extension;
+    j["sourceColours"] = t.source_colours;
+  }
+  return j;
+}
+
+std::uint32_t u32(const JsonAt& at, std::uint64_t lo, std::uint64_t hi) {
+  return static_cast<std::uint32_t>(at.integer(lo, hi));
+}
+
+/// Fragments tile the plane: the last row and column may be partly outside, none wholly.
+void read_grid(const JsonAt& at, TextureInfo& t) {
+  t.width_px = u32(at["widthPx"], 1, kMaxSide);
+  t.height_px = u32(at["heightPx"], 1, kMaxSide);
+  t.channels = u32(at["channels"], 1, 3);
+  if (t.channels == 2) at["channels"].fail("1 or 3", "2");
+  t.fragment_width_px = u32(at["fragmentWidthPx"], 1, kMaxSide);
+  t.fragment_height_px = u32(at["fragmentHeightPx"], 1, kMaxSide);
+  for (const char* side : {"fragmentWidthPx", "fragmentHeightPx"})  // whole MCUs even with 4:2:0
+    if (at[side].integer(1) % 16 != 0) at[side].fail("a multiple of 16", std::to_string(at[side].integer(1)));
+  t.columns = u32(at["columns"], 1, 65535);
+  t.rows = u32(at["rows"], 1, 65535 / t.columns);
+  const auto tiles = [](std::uint64_t count, std::uint64_t side, std::uint64_t whole) {
+    return count * side >= whole && (count - 1) * side < whole;
+  };
+  if (!tiles(t.columns, t.fragment_width_px, t.width_px))
+    at["columns"].fail("as many as cover the width", std::to_string(t.columns));
+  if (!tiles(t.rows, t.fragment_height_px, t.height_px))
+    at["rows"].fail("as many as cover the height", std::to_string(t.rows));
+  t.grid_reason = at["gridReason"].text(kMaxTextBytes);
+}
+
+void read_mip(const JsonAt& at, TextureInfo& t) {
+  if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
+  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPlanes);
+}
+
+void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
+  if (at.has("lossless")) t.lossless = at["lossless"].boolean();
+  if (t.lossless && (t.codec != Codec::kJpeg || t.mip > 0))
+    at["lossless"].fail("a full-size plane of codec jpeg", "another");
+  if (!at.has("source")) return;
+  t.source_extension = at["source"].text(100);
+  if (std::ranges::find(kSourceExtensions, t.source_extension) == std::end(kSourceExtensions))
+    at["source"].fail("jpg, png, tif, webp or exr", t.source_extension);
+  if (t.mip > 0) at["source"].fail("none, for a mip", t.source_extension);
+  t.source_colours = at["sourceColours"].boolean();
+  t.source.path = source_path(plane, t.source_extension);
+}
+
+/// Full-size planes first, then mips by (base, mip), each of its base's image and size.
+void check_mips(const JsonAt& list, const std::vector<TextureInfo>& textures) {
+  const std::size_t full = full_size_planes(textures);
+  for (std::size_t p = full; p < textures.size(); ++p) {
+    const TextureInfo& t = textures[p];
+    if (t.mip == 0) list[p].fail("a mip, as the plane before is one", "a full-size plane");
+    if (t.base >= full) list[p]["base"].fail("a full-size plane", std::to_string(t.base));
+    const TextureInfo& base = textures[t.base];
+    const std::uint32_t before = p > full && textures[p - 1].base == t.base ? textures[p - 1].mip : 0;
+    if (t.mip <= before || (p > full && textures[p - 1].base > t.base))
+      list[p]["mip"].fail("mips by base and mip", std::to_string(t.mip));
+    const auto side = [&](std::uint64_t px) { return (px + (std::uint64_t{1} << t.mip) - 1) >> t.mip; };
+    if (t.width_px != side(base.width_px) || t.height_px != side(base.height_px))
+      list[p]["widthPx"].fail("sides of 1 / 2^mip of the full size, rounded up", std::to_string(t.width_px));
+    if (t.image != base.image || t.role != base.role || t.channels != base.channels ||
+        t.colour_space != base.colour_space || t.preview_width_px != base.preview_width_px ||
+        t.preview_height_px != base.preview_height_px)
+      list[p].fail("image, role, channels, colour space and preview of plane " + std::to_string(t.base),
+                   "others");
+  }
+}
+
+TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
+  TextureInfo t;
+  t.image = u32(at["image"], 0, 0xffffffffu);
+  t.role = at["role"].text(100);
+  t.name = at["name"].text(kMaxTextBytes);
+  t.colour_space = at["colourSpace"].text(100);
+  if (t.colour_space != "srgb" && t.colour_space != "linear")
+    at["colourSpace"].fail("srgb or linear", t.colour_space);
+  const std::string codec = at["codec"].text(100);
+  if (!find_codec(codec)) at["codec"].fail("jpeg, jpeg-progressive or webp", codec);
+  t.codec = *find_codec(codec);
+  read_grid(at, t);
+  t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
+  t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);
+  const JsonAt qualities = at["rungQuality"];
+  for (std::size_t i = 0, n = qualities.array(1, kMaxRungs); i < n; ++i) {
+    const int quality = static_cast<int>(qualities[i].integer(1, 100));
+    if (i > 0 && quality <= t.rung_quality.back())
+      qualities[i].fail("a rising number", std::to_string(quality));
+    t.rung_quality.push_back(quality);
+    t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(i));
+  }
+  read_mip(at, t);
+  read_source(at, plane, t);
+  t.preview.path = preview_path(t.mip > 0 ? t.base : plane);
+  t.tables.path = table_streams_path(plane);
+  return t;
+}
+
+}  // namespace
+
+std::size_t full_size_planes(const std::vector<TextureInfo>& textures) {
+  return static_cast<std::size_t>(
+      std::ranges::find_if(textures, [](const TextureInfo& t) { return t.mip > 0; }) - textures.begin());
+}
+
+std::string write_textures(const std::vector<TextureInfo>& textures) {
+  Json j;
+  j["textures"] = Json::array();
+  for (const TextureInfo& t : textures) j["textures"].push_back(texture_json(t));
+  std::string json = dump_json(j, kFile);
+  read_textures(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  return json;
+}
+
+std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
+  const nlohmann::json document = parse_json(json, kFile, kMaxFileBytes);
+  const JsonAt list = JsonAt(document, kFile)["textures"];
+  std::vector<TextureInfo> textures;
+  for (std::size_t i = 0, n = list.array(0, kMaxPlanes); i < n; ++i)
+    textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
+  check_mips(list, textures);
+  return textures;
+}
+
+void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<EntryRef>& index) {
+  std::map<std::string, const EntryRef*> by_path;
+  for (const EntryRef& e : index) by_path[e.path] = &e;
+  const auto resolve = [&](EntryRef& ref) {
+    const auto it = by_path.find(ref.path);
+    if (it == by_path.end())
+      throw FormatError(kIndexPath, ref.path, "an entry, for " + kFile + " speaks of it", "none");
+    ref = *it->second;
+  };
+  for (TextureInfo& t : textures) {
+    resolve(t.preview);
+    resolve(t.tables);
+    for (EntryRef& rung : t.rungs) resolve(rung);
+    if (!t.source_extension.empty()) resolve(t.source);
+  }
+}
+
+}  // namespace texmesh

@@ -1,0 +1,144 @@
+#include "format/documents/viewing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "format/base/errors.h"
+#include "format/base/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+/// A coarser scale that is enough at any size stops just below, because the last step is always S_0's.
+constexpr double kBelowAny = 0.999 * kAnyDisplayPx;
+/// Keeps steps apart in the manifest's six digits.
+constexpr double kApart = 1.0001;
+
+double half_tangent(double degrees) {
+  const double half = degrees * (portable::kPi / 360);
+  return portable::sin(half) / portable::cos(half);
+}
+
+void require(bool good, const char* place, const char* expected, double found) {
+  if (!good) throw FormatError("viewing", place, expected, std::to_string(found));
+}
+
+/// Between the O_V / E_S of two scales the better match is the one whose ratio is nearer: their geometric
+/// mean parts them.
+double edge_limit(std::span<const ManifestScale> scales, std::size_t k) {
+  return std::sqrt(scales[k].display_px_edge * scales[k - 1].display_px_edge);
+}
+
+/// S_0's O_V / E_S is not in the manifest: it has no step to a finer scale. What it would be is estimated
+/// from the number of triangles, which grows with the square of edges per length.
+double edge_limit_of_first(std::span<const ManifestScale> scales) {
+  const double ratio = std::sqrt(static_cast<double>(scales[0].triangles) /
+                                 static_cast<double>(std::max(scales[1].triangles, 1u)));
+  return scales[1].display_px_edge * std::sqrt(std::max(ratio, 1.0));
+}
+
+double limit_of(std::span<const ManifestScale> scales, std::size_t k, StepRule rule) {
+  switch (rule) {
+    case StepRule::kJnd:
+      return scales[k].display_px_jnd;
+    case StepRule::kError:
+      return scales[k].display_px_error;
+    case StepRule::kEdge:
+      return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
+    case StepRule::kDefault:
+      break;
+  }
+  return std::min(scales[k].display_px_jnd, scales[k].display_px_error);
+}
+
+/// By how much a relative distance grows when R can be no more than half the part's shorter side.
+double growth_of_value(const ManifestScale& s, double displayed_px, const VisiblePart& part) {
+  if (!(s.p95 > 0) || s.display_px_error >= kAnyDisplayPx) return 1;
+  const double half_width_px = std::min(part.width_px, part.height_px) / 2;
+  const double value = displayed_px / s.display_px_error / half_width_px;
+  return std::max(1.0, value / s.p95);
+}
+
+bool accepts(std::span<const ManifestScale> scales, std::size_t k, double displayed_px,
+             const VisiblePart& part, StepRule rule) {
+  const ManifestScale& s = scales[k];
+  const bool jnd =
+      std::max(part.width_px, part.height_px) * growth_of_value(s, displayed_px, part) <= s.display_px_jnd;
+  const bool error = displayed_px <= s.display_px_error;
+  if (rule == StepRule::kJnd) return jnd;
+  if (rule == StepRule::kError) return error;
+  if (rule == StepRule::kEdge) return displayed_px <= limit_of(scales, k, rule);
+  return jnd && error;
+}
+
+}  // namespace
+
+double displayed_height_px(double object_height, double distance, const Camera& camera) {
+  require(distance > 0, "distance", "> 0", distance);
+  require(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
+          camera.fov_degrees);
+  return object_height / (2 * distance * half_tangent(camera.fov_degrees)) * camera.viewport_px;
+}
+
+double viewing_distance(double object_height, double height_px, const Camera& camera) {
+  require(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
+          camera.fov_degrees);
+  if (height_px >= kAnyDisplayPx) return 0;
+  if (!(height_px > 0)) return std::numeric_limits<double>::infinity();
+  return object_height / (2 * height_px * half_tangent(camera.fov_degrees)) * camera.viewport_px;
+}
+
+std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, StepRule rule) {
+  std::vector<ManifestStep> steps;
+  double reached = 0;
+  for (std::size_t k = scales.size(); k-- > 0;) {
+    const double limit = k == 0 ? kAnyDisplayPx : std::min(limit_of(scales, k, rule), kBelowAny);
+    if (limit <= reached * kApart) continue;
+    steps.push_back({limit, scales[k].scale});
+    reached = limit;
+  }
+  return steps;
+}
+
+int scale_at(std::span<const ManifestStep> steps, double displayed_px) {
+  for (const ManifestStep& step : steps)
+    if (displayed_px <= step.up_to_px) return step.scale;
+  return steps.empty() ? 0 : steps.back().scale;
+}
+
+PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, double displayed_px) {
+  if (scale.scale == 0 || !(manifest.object_height > 0)) return {};
+  const double px_per_unit = displayed_px / manifest.object_height;
+  const double p95 = scale.display_px_error >= kAnyDisplayPx ? 0 : displayed_px / scale.display_px_error;
+  return {p95, scale.error_rms * px_per_unit, std::max(p95, scale.error_max * px_per_unit)};
+}
+
+VisiblePart clip_to(const ScreenRect& object, const ScreenRect& view) {
+  const double x0 = std::max(object.x0, view.x0), x1 = std::min(object.x1, view.x1);
+  const double y0 = std::max(object.y0, view.y0), y1 = std::min(object.y1, view.y1);
+  if (!(x1 > x0) || !(y1 > y0)) return {0, 0, true};
+  const bool whole = x0 <= object.x0 && x1 >= object.x1 && y0 <= object.y0 && y1 >= object.y1;
+  return {x1 - x0, y1 - y0, !whole};
+}
+
+VisiblePart clip_to(const ScreenRect& object, const ScreenCircle& fovea) {
+  return clip_to(object, ScreenRect{fovea.x - fovea.radius, fovea.y - fovea.radius, fovea.x + fovea.radius,
+                                    fovea.y + fovea.radius});
+}
+
+double fovea_radius_px(double eye_distance_px, double degrees) {
+  require(degrees > 0 && degrees < 180, "angle of the fovea", "0 .. 180 degrees", degrees);
+  return eye_distance_px * half_tangent(degrees);
+}
+
+int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part, StepRule rule) {
+  const std::span<const ManifestScale> scales = manifest.scales;
+  if (!part.clipped) return scale_at(step_function(scales, rule), displayed_px);
+  if (!(part.width_px > 0 && part.height_px > 0)) return scales.back().scale;
+  for (std::size_t k = scales.size(); k-- > 1;)
+    if (accepts(scales, k, displayed_px, part, rule)) return scales[k].scale;
+  return scales.front().scale;
+}
+
+}  // namespace texmesh

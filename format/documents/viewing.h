@@ -1,0 +1,75 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "format/documents/manifest.h"
+
+namespace texmesh {
+
+// From how an object is looked at to the scale that is enough: what a client works out at run time from the
+// numbers of the manifest. Lengths on screen are px, in the world object units; "displayed height" is the
+// length on screen of the object's largest extent, Manifest::object_height (the thesis's D and O_V, 7.6).
+// Pure functions, the same bits everywhere.
+
+/// A perspective camera: what its picture is high, in px and in degrees.
+struct Camera {
+  double fov_degrees = 45;    // vertical, above 0 and below 180
+  double viewport_px = 1080;  // height of the picture, > 0
+};
+/// Displayed height of the object at a viewing distance (camera to object, > 0).
+double displayed_height_px(double object_height, double distance, const Camera& camera);
+/// The distance at which the object is displayed that high; infinite for 0 px, 0 for kAnyDisplayPx and more.
+double viewing_distance(double object_height, double height_px, const Camera& camera);
+
+/// What decides about the scale: kJnd = the just-noticeable difference; kError = an error of one pixel (95th
+/// percentile); kEdge = the O_V / E_S that matches the displayed height best (thesis 7.6); kDefault = the
+/// finer of kJnd and kError, which is what Manifest::steps holds.
+enum class StepRule { kDefault, kJnd, kError, kEdge };
+/// The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's, up to
+/// kAnyDisplayPx. A scale that accepts no more than a coarser one gives no step. `scales` as in a manifest,
+/// S_0 first.
+std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, StepRule rule);
+/// The scale of the first step that reaches this height.
+int scale_at(std::span<const ManifestStep> steps, double displayed_px);
+
+/// How far a scale's surface is from S_0's on screen, in px at most (a distance seen from the side). `max` is
+/// the largest of some thousand sampled distances, never less than p95, which comes from samples of its own.
+/// What has vanished counts with its distance to what is left.
+struct PixelError {
+  double p95 = 0, rms = 0, max = 0;
+};
+PixelError pixel_error(const Manifest& manifest, const ManifestScale& scale, double displayed_px);
+
+/// Rectangles and circles on the screen, in px.
+struct ScreenRect {
+  double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+struct ScreenCircle {
+  double x = 0, y = 0, radius = 0;
+};
+/// The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5).
+struct VisiblePart {
+  double width_px = 0, height_px = 0;  // both 0: nothing of the object is to be seen
+  bool clipped = false;                // false: all of it
+};
+/// `object` bounds the object on the screen. Fig. 7.5, left: the border of the display (or window) cuts it.
+VisiblePart clip_to(const ScreenRect& object, const ScreenRect& view);
+/// Fig. 7.5, right: only what the fovea covers counts. The part is the object's bounds cut by the square
+/// around the circle.
+VisiblePart clip_to(const ScreenRect& object, const ScreenCircle& fovea);
+
+/// Angle of the region that the thesis takes for what the fovea covers, though the fovea proper is about 1
+/// degree wide: all of an object on its 12 inch high monitors at 30 inches.
+inline constexpr double kFoveaDegrees = 23;
+/// Radius on screen of a cone of that angle, for an eye `eye_distance_px` in front of the screen.
+double fovea_radius_px(double eye_distance_px, double degrees = kFoveaDegrees);
+
+/// The scale for an object displayed `displayed_px` high (the whole of it, seen or not) of which only a part
+/// is visible. The part is a shape of its own: no point of it is farther from its skeleton than half its
+/// shorter side, so a distance between surfaces weighs more, relative to that, than on the whole object; and
+/// the height that the JND goes by is the part's. The rule of one pixel and O_V / E_S know nothing of shapes
+/// and stay as they are. Nothing visible: the coarsest scale. Not clipped: scale_at(step_function(...)).
+int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part,
+                 StepRule rule = StepRule::kDefault);
+
+}  // namespace texmesh

@@ -1,0 +1,234 @@
+#include <limits>
+
+#include "format/base/errors.h"
+#include "format/split/split_codec.h"
+#include "format/split/split_coder.h"
+#include "format/split/split_fill.h"
+#include "format/split/split_head.h"
+#include "format/split/split_stream.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+/// Decodes the values of one part. Where the part was left out every residual is 0.
+class PartDecoder {
+ public:
+  void start(Bytes bytes, const std::vector<std::uint8_t>& models) {
+    present_ = !bytes.empty();
+    if (!present_) return;
+    for (std::size_t i = 0; i < models.size(); ++i)
+      walk_.models.all[i] = {static_cast<std::uint16_t>(models[i] << 8), ValueModels::kPrior};
+    walk_.start(bytes[0] * 2);
+    bits_ = BitDecoder(bytes.subspan(1));
+  }
+  void values(std::int32_t* out, const std::int32_t* guess, int components, int bits) {
+    const std::int32_t largest = (1 << bits) - 1;
+    for (int i = 0; i < components; ++i) {
+      const std::int32_t residual = present_ ? walk_.residual(*this, i, 0) : 0;
+      out[i] = (std::clamp(guess[i], 0, largest) + residual) & largest;
+    }
+  }
+  bool present() const { return present_; }
+  bool same() { return present_ && walk_.same(*this, false); }
+
+  // What ValueWalk asks of its bits:
+  bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kLimit); }
+  std::uint32_t raw(std::uint32_t, int count) { return bits_.decode_raw(count); }
+
+ private:
+  bool present_ = false;
+  BitDecoder bits_;
+  ValueWalk walk_;
+};
+
+/// The reader's side of SplitCodec. Blocks of patches have no splits: what their points lack stays predicted.
+class DecodingChannel {
+ public:
+  DecodingChannel(const SplitStreamHead& head, SplitFill fill)
+      : head_(head), fill_(fill), parts_(head.attributes.size() + 1) {}
+  void start(std::span<const Bytes> parts) {
+    connectivity_ = BitDecoder(parts[0]);
+    for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
+  }
+  template <class Truth>
+  bool bit(BitModel& model, Truth&&) {
+    return connectivity_.decode(model, SplitModels::kLimit);
+  }
+  template <class Truth>
+  std::uint32_t raw(int count, Truth&&) {
+    return connectivity_.decode_raw(count);
+  }
+  template <class Note>
+  void know(Note&&) {}
+  template <class Truth>
+  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&&) {
+    parts_[0].values(point.data(), guess.data(), 3, head_.position.bits);
+  }
+  void made(SplitMesh& mesh, std::uint32_t point) {
+    if (parts_[0].present()) return;
+    lost_.push_back(point);
+    if (fill_ == SplitFill::kTexture) fill_lost_point(head_, mesh, point);
+  }
+  const std::vector<std::uint32_t>& lost() const { return lost_; }
+  template <class Truth>
+  bool same(std::size_t k, Truth&&) {
+    return parts_[k + 1].same();
+  }
+  template <class Truth>
+  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, Truth&&) {
+    const SplitAttribute& a = head_.attributes[k];
+    parts_[k + 1].values(value, guess.data(), split_components(a.kind), a.grid.bits);
+  }
+  std::array<std::int32_t, 4> mean(std::size_t k, SplitMesh& mesh, const std::vector<std::uint32_t>& wedges) {
+    return split_mean(head_.attributes[k], k, mesh, wedges);
+  }
+
+ private:
+  const SplitStreamHead& head_;
+  SplitFill fill_;
+  std::vector<std::uint32_t> lost_;
+  BitDecoder connectivity_;
+  std::vector<PartDecoder> parts_;
+};
+
+[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
+  throw FormatError(kSplitStreamName, place, expected, found);
+}
+
+std::vector<int> components_of(const SplitStreamHead& head) {
+  std::vector<int> components;
+  for (const SplitAttribute& a : head.attributes) components.push_back(split_components(a.kind));
+  return components;
+}
+
+/// A mesh never grows beyond what the head announces, and that not beyond the reader's limits.
+SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limits) {
+  const SplitScale& last = head.scales.at(head.scales.size() - 1);
+  if (last.points > limits.points)
+    fail("points", "at most " + std::to_string(limits.points), std::to_string(last.points));
+  if (last.faces > limits.faces || last.wedges > 3ull * limits.faces)
+    fail("faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
+  return {last.points, last.faces};
+}
+
+}  // namespace
+
+std::array<std::int32_t, 4> split_mean(const SplitAttribute& attribute, std::size_t k, SplitMesh& mesh,
+                                       const std::vector<std::uint32_t>& wedges) {
+  std::array<std::int64_t, 4> sum{};
+  const int components = split_components(attribute.kind);
+  if (attribute.kind == SplitKind::kNormal) {
+    std::array<std::int64_t, 3> direction{};
+    for (std::uint32_t w : wedges) {
+      const std::int32_t* v = mesh.value(k, w);
+      const OctahedralVector o = octahedral_vector(v[0], v[1], attribute.grid.bits);
+      for (std::size_t i = 0; i < 3; ++i) direction[i] += o[i];
+    }
+    const auto place = octahedral_place(direction, attribute.grid.bits);
+    return {place[0], place[1], 0, 0};
+  }
+  for (std::uint32_t w : wedges)
+    for (int i = 0; i < components; ++i) sum[static_cast<std::size_t>(i)] += mesh.value(k, w)[i];
+  const auto count = static_cast<std::int64_t>(wedges.size());
+  std::array<std::int32_t, 4> mean{};
+  for (std::size_t i = 0; i < 4; ++i) mean[i] = static_cast<std::int32_t>((2 * sum[i] + count) / (2 * count));
+  return mean;
+}
+
+struct SplitStreamReader::State {
+  State(SplitStreamHead h, SplitLimits limits, SplitFill fill)
+      : head(std::move(h)),
+        mesh(components_of(head)),
+        channel(head, fill),
+        codec(mesh, channel, head.groups.size(), checked_limits(head, limits)) {}
+  SplitStreamHead head;
+  SplitMesh mesh;
+  DecodingChannel channel;
+  SplitCodec<DecodingChannel> codec;
+  std::size_t block = 0, scale = 0;
+  bool complete = true;  // no part of positions was left out
+};
+
+SplitStreamReader::SplitStreamReader(SplitStreamHead head, SplitLimits limits, SplitFill fill)
+    : state_(std::make_unique<State>(std::move(head), limits, fill)) {}
+SplitStreamReader::~SplitStreamReader() = default;
+SplitStreamReader::SplitStreamReader(SplitStreamReader&&) noexcept = default;
+SplitStreamReader& SplitStreamReader::operator=(SplitStreamReader&&) noexcept = default;
+
+const SplitStreamHead& SplitStreamReader::head() const { return state_->head; }
+const SplitMesh& SplitStreamReader::mesh() const { return state_->mesh; }
+std::size_t SplitStreamReader::next_block() const { return state_->block; }
+
+void SplitStreamReader::add_block(Bytes block) {
+  State& s = *state_;
+  const std::string place = "block " + std::to_string(s.block);
+  if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
+  const SplitBlock& b = s.head.blocks[s.block];
+  if (block.size() != b.bytes())
+    fail(place, std::to_string(b.bytes()) + " bytes", std::to_string(block.size()));
+  const Sha256 digest = sha256(block);
+  if (!std::equal(b.digest.begin(), b.digest.end(), digest.begin()))
+    fail(place, "bytes of the digest in the head", "others");
+  std::vector<Bytes> parts;
+  std::size_t at = 0;
+  for (std::uint32_t size : b.parts) {
+    parts.push_back(block.subspan(at, size));
+    at += size;
+  }
+  add_parts(parts);
+}
+
+void SplitStreamReader::add_parts(std::span<const Bytes> parts) {
+  State& s = *state_;
+  const std::string place = "block " + std::to_string(s.block);
+  if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
+  const SplitBlock& b = s.head.blocks[s.block];
+  if (parts.size() != b.parts.size())
+    fail(place, std::to_string(b.parts.size()) + " parts", std::to_string(parts.size()));
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (parts[i].size() != b.parts[i] && (i == 0 || !parts[i].empty()))
+      fail(place, std::to_string(b.parts[i]) + " bytes", std::to_string(parts[i].size()));
+  if (parts[1].size() != b.parts[1]) s.complete = false;
+  if (s.block == 0 || s.block == s.head.scales[s.scale].blocks) {
+    if (s.block > 0) ++s.scale;
+    s.codec.begin_chapter();
+  }
+  s.channel.start(parts);
+  if (b.is_patch)
+    s.codec.patch(b.count);
+  else
+    s.codec.splits(b.count);
+  ++s.block;
+  const SplitScale& scale = s.head.scales[s.scale];
+  if (s.block != scale.blocks) return;
+  const auto require = [&](const char* what, std::size_t expected, std::size_t found) {
+    if (expected != found)
+      fail("scale " + std::to_string(scale.scale), std::to_string(expected) + " " + what,
+           std::to_string(found));
+  };
+  require("points", scale.points, s.mesh.points().size());
+  require("wedges", scale.wedges, s.mesh.wedge_point().size());
+  require("faces", scale.faces, s.mesh.faces().size());
+  if (s.complete) require("triangles", scale.triangles, s.mesh.visible_faces().size());
+}
+
+const std::vector<std::uint32_t>& SplitStreamReader::lost_points() const { return state_->channel.lost(); }
+
+void SplitStreamReader::fill_again() {
+  for (const std::uint32_t point : state_->channel.lost()) fill_lost_point(state_->head, state_->mesh, point);
+}
+
+void SplitStreamReader::read_to_scale(std::size_t index, Bytes stream) {
+  const std::size_t end = state_->head.scales.at(index).blocks;
+  while (state_->block < end) {
+    const SplitBlock& b = state_->head.blocks[state_->block];
+    if (b.offset > stream.size() || b.bytes() > stream.size() - b.offset)
+      fail("block " + std::to_string(state_->block), "bytes up to " + std::to_string(b.offset + b.bytes()),
+           std::to_string(stream.size()));
+    add_block(stream.subspan(static_cast<std::size_t>(b.offset), static_cast<std::size_t>(b.bytes())));
+  }
+}
+
+}  // namespace texmesh

@@ -1,0 +1,54 @@
+#pragma once
+#include <atomic>
+#include <string>
+
+#include "pipeline/compile/options.h"
+#include "pipeline/graph/graph_run.h"
+#include "pipeline/graph/store.h"
+#include "pipeline/io/file_resolver.h"
+
+namespace texmesh {
+
+struct CompileRequest {
+  std::string input;      // path of the model file
+  std::string output;     // path of the package; "" = compile, check, write nothing
+  std::string temporary;  // sibling of output that is renamed to it; "" = a name of its own
+  CompileOptions options;
+  bool strict = false;  // warnings are errors
+  std::vector<FileRequest>
+      known;                 // digests of an earlier run, by stamp: such files are not read to learn them
+  StageKeys earlier_keys;    // of an earlier run, to explain against
+  StageExplainer explainer;  // may be empty
+  // Told, when compiling fails, which files had been looked at: what would have to change for another result.
+  std::function<void(const std::vector<FileRequest>&)> files_of_failure;
+};
+
+struct CompileOutcome {
+  std::uint64_t package_bytes = 0;
+  Sha256 package_digest{};
+  bool unchanged = false;  // the output already held these bytes and was left alone
+  Notes notes;
+  std::vector<FileRequest>
+      files;  // what the result depends on: the model (uri ""), then what it refers to, found or not
+  StageKeys keys;
+};
+
+/// Compiles one model in this process: reads the input and what it refers to beneath its folder, runs the
+/// graph over the store, writes the package atomically. Throws InputError, FormatError, StageError or
+/// Cancelled; then nothing is left under the output's name that was not there before.
+CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
+                             const StageObserver& observer);
+
+/// Runs any graph over the model `request.input`, which it is given as "source" (and what made it as
+/// "provenance"), through the same store and keys as compile_model; returns the object of artefact `wanted`.
+/// `stages` must outlive the call. Errors as compile_model.
+Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
+                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes);
+
+/// What compile_model would do, by stage, without running a stage or writing anything. The input is read, and
+/// parsed where the store does not remember what it refers to.
+std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request,
+                                                                      Store& store,
+                                                                      const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,99 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/graph/graph_run.h"
+#include "pipeline/io/file_resolver.h"
+
+namespace texmesh {
+
+/// Bounds of the child process that compiles one model. 0 = none.
+struct WorkerLimits {
+  std::uint64_t memory_bytes = 8ull << 30;  // address space
+  std::uint64_t cpu_s = 0;
+  std::uint64_t wall_s = 3600;
+};
+
+/// Where results are kept.
+struct CacheSettings {
+  std::string folder;               // "" = keep nothing
+  std::vector<std::string> layers;  // asked behind it: folders and URLs
+  bool upload = false;              // put what was computed into the layers that are URLs
+};
+
+/// One model for a child process.
+struct WorkerJob {
+  std::string input, output;
+  std::shared_ptr<const std::string> profile;  // JSON of every option; jobs may share it
+  CacheSettings cache;
+  bool strict = false;
+  bool explain = false;            // say of every stage why it runs or not
+  bool forecast = false;           // say it, and do nothing
+  std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
+  StageKeys earlier_keys;
+  std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
+  double predicted_s = 0;
+};
+
+enum class ModelResult : std::uint8_t { kOk, kUnchanged, kFailed, kInternal, kCancelled };
+const char* result_name(ModelResult result);  // "ok", "unchanged", "failed", "internal-error", "cancelled"
+
+/// One stage in the course of a model, in seconds since the pool began.
+struct StageSpan {
+  std::string stage;
+  double start_s = 0, end_s = 0;
+  bool hit = false;
+  bool running = false;  // the model ended, by a limit or a crash, before the stage did
+};
+
+/// What became of a model.
+struct WorkerReport {
+  ModelResult result = ModelResult::kInternal;
+  bool ran = false;  // false: known from an earlier run (up to date, or a known failure), or never started
+  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
+  Sha256 package_digest{};
+  double seconds = 0;
+  std::string error_kind, error_file, error_place, error_expected, error_found, error_message;
+  int stages_ran = 0, stages_hit = 0;
+  std::vector<FileRequest> files;  // as CompileOutcome; empty after a failure
+  StageKeys keys;
+  std::vector<int> layers_left_out;  // numbers in CacheSettings::layers of those that did not work
+  int lane = 0;                      // which of the side-by-side places it ran in, from 0
+  double start_s = 0;
+  std::vector<StageSpan> spans;
+  bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
+};
+
+/// Told of every event line of a job's child (SPEC of the lines: schemas/event.v1.schema.json), in order.
+using EventSink = std::function<void(std::size_t job, const std::string& json_line)>;
+using FinishSink = std::function<void(std::size_t job, const WorkerReport& report)>;
+
+struct PoolSettings {
+  int processors = 1;
+  std::uint64_t memory_bytes = 0;  // bound of the sum of the predicted peaks that run side by side; 0 = none
+  WorkerLimits limits;
+  bool stop_on_failure = false;  // no further child starts after a failure
+};
+
+/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a
+/// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest
+/// start first; at most `processors` run side by side, fewer when their predicted peaks do not fit the memory
+/// (one always runs), and the last ones get the processors that are free as threads. A cache layer that did
+/// not work for one child is not asked by those that start later. A child that dies, hangs or outgrows its
+/// limits costs its own model only. SIGINT and SIGTERM end all children within two seconds and leave no
+/// temporary file; what had not finished is kCancelled.
+std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
+                                      const EventSink& sink, const FinishSink& finished);
+
+/// The child's side: reads a job from standard input, writes event lines to standard output, returns the exit
+/// code.
+int worker_main();
+
+/// How files and keys travel between the two.
+std::string files_to_json(const std::vector<FileRequest>& files);
+std::vector<FileRequest> files_from_json(const std::string& json);  // what is malformed is left out
+
+}  // namespace texmesh

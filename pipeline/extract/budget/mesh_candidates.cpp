@@ -1,0 +1,64 @@
+#include "pipeline/extract/budget/mesh_candidates.h"
+
+#include <algorithm>
+
+#include "pipeline/extract/budget/budget_search.h"
+
+namespace texmesh {
+namespace {
+
+/// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
+/// normals and vertex colours; for pictures 512 px high.
+struct Coding {
+  int position, uv, normal, colour;
+};
+constexpr Coding kCodings[kMeshCodings] = {
+    {10, 10, 7, 5}, {11, 11, 7, 6}, {12, 12, 8, 7}, {13, 13, 8, 8}, {14, 14, 9, 8}};
+
+}  // namespace
+
+std::vector<std::uint8_t> MeshCandidate::with(const std::map<std::uint32_t, FileImageData>& images) const {
+  StandaloneGlb out = *file;
+  std::map<std::uint32_t, FileImageData> all;
+  for (const std::uint32_t i : out.source_images()) all[i] = {FileImage::kWebp, {}};
+  for (const auto& [i, data] : images) all[i] = data;
+  out.set_images(all);
+  return out.finish();
+}
+
+DracoSteps MeshCandidates::steps_of(int coding) const {
+  const Coding& c = kCodings[coding];
+  int finer = 0;  // a picture twice as high shows one bit more
+  for (double px = 512 * 1.5; px < source_.display_px && finer < 4; px *= 2) ++finer;
+  const auto places = [finer](int bits) { return static_cast<double>(1u << (bits + finer)); };
+  return {source_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour};
+}
+
+std::unique_ptr<StandaloneGlb> MeshCandidates::coded(int scale, int coding) const {
+  auto file = std::make_unique<StandaloneGlb>(source_.package.scale_glb(scale), mesh_path(scale));
+  const bool lit_anew = scale > 0 && !source_.light.places.empty();
+  if (file->has_draco() && (lit_anew || coding + 1 < kMeshCodings))
+    file->recode(steps_of(coding), lit_anew ? &source_.light : nullptr, source_.context);
+  return file;
+}
+
+const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
+  const auto [it, fresh] = made_.try_emplace(key);
+  MeshCandidate& c = it->second;
+  if (!fresh) return c;
+  const Manifest& m = source_.package.manifest();
+  c.scale = m.scales[key.scale].scale;
+  c.triangles = m.scales[key.scale].triangles;
+  c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
+  c.file = coded(c.scale, key.coding);
+  c.model = read_model(*c.file, mesh_path(c.scale), source_.context);
+  if (source_.request.lods) c.file->begin_levels(screen_coverage_of(m, c.scale));
+  for (std::size_t l = 1; l < c.levels.size(); ++l)
+    c.file->add_level(*coded(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+  c.fixed_bytes = c.with({}).size();
+  c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);
+  c.geometry = source_.difference(*c.views, source_.best_textures);
+  return c;
+}
+
+}  // namespace texmesh

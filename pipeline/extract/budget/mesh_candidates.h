@@ -1,0 +1,52 @@
+#pragma once
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "pipeline/extract/budget/budget_source.h"
+
+namespace texmesh {
+
+/// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is
+/// stored).
+inline constexpr int kMeshCodings = 5;
+
+/// Which mesh: an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1.
+struct MeshKey {
+  std::size_t scale = 0;
+  int coding = 0;
+  friend auto operator<=>(const MeshKey&, const MeshKey&) = default;
+};
+
+/// A scale (with its coarser levels, where they are asked for) that could be the mesh of the file.
+struct MeshCandidate {
+  int scale = 0;
+  std::vector<int> levels;
+  std::uint64_t triangles = 0;
+  std::unique_ptr<StandaloneGlb> file;
+  Model model;
+  std::unique_ptr<ModelViews> views;
+  std::uint64_t fixed_bytes = 0;  // the file without its images' bytes
+  double geometry = 0;            // difference with the best textures
+
+  /// The file with these images; those that are missing have no bytes.
+  std::vector<std::uint8_t> with(const std::map<std::uint32_t, FileImageData>& images) const;
+};
+
+/// Makes candidates when they are first asked for, and keeps them until forget().
+class MeshCandidates {
+ public:
+  explicit MeshCandidates(const BudgetSource& source) : source_(source) {}
+  const MeshCandidate& at(const MeshKey& key);
+  void forget(const MeshKey& key) { made_.erase(key); }  // its pictures take tens of megabytes
+
+ private:
+  DracoSteps steps_of(int coding) const;
+  std::unique_ptr<StandaloneGlb> coded(int scale, int coding) const;
+  const BudgetSource& source_;
+  std::map<MeshKey, MeshCandidate> made_;
+};
+
+}  // namespace texmesh

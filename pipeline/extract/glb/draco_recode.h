@@ -1,0 +1,36 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/base/vec.h"
+#include "pipeline/extract/glb/fit_normals.h"
+
+namespace texmesh {
+
+/// How fine a mesh is coded anew. Steps are the largest distance between neighbouring places of a grid.
+struct DracoSteps {
+  double position = 0;  // object units, > 0
+  double uv = 0;        // texture coordinates, > 0
+  int normal_bits = 8;
+  int colour_bits = 8;  // of the 8 that vertex colours have
+};
+
+/// One primitive of a file: its Draco stream and which attribute of it is which glTF attribute.
+struct DracoStream {
+  std::vector<std::uint8_t> bytes;
+  std::map<std::string, int> attributes;  // "POSITION" -> unique id
+  std::uint32_t vertices = 0, triangles = 0;
+  Vec3f low, high;  // of the positions
+};
+
+/// Codes the primitives of one file anew on coarser grids that all of them share, so that borders between
+/// primitives stay closed. A stream that does not get smaller is kept, and with it all the others of the file
+/// (one grid for all). With `lit_as`, normals are fitted to it and nothing is kept, however many bytes come
+/// out. FormatError when a stream does not decode; StageError when Draco refuses.
+void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
+                  const std::string& entry, const RunContext& context);
+
+}  // namespace texmesh

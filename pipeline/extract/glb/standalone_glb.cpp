@@ -1,0 +1,318 @@
+#include "pipeline/extract/glb/standalone_glb.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "format/base/bounded_json.h"
+#include "format/base/errors.h"
+#include "stages/gltf/check_glb.h"
+#include "stages/gltf/glb_writer.h"
+
+namespace texmesh {
+namespace {
+
+using Json = StandaloneGlb::Json;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr const char* kMeshopt = "EXT_meshopt_compression";
+constexpr const char* kWebp = "EXT_texture_webp";
+constexpr const char* kLod = "MSFT_lod";
+constexpr int kMaxJsonDepth = 64;
+
+std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
+  return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16) |
+         static_cast<std::uint32_t>(bytes[at + 3]) << 24;
+}
+
+void put_u32(Bytes& out, std::size_t x) {
+  for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(x >> shift));
+}
+
+void pad(Bytes& out, std::uint8_t with) {
+  while (out.size() % 4 != 0) out.push_back(with);
+}
+
+std::size_t number(const Json& object, const char* key) {
+  return object.contains(key) ? object[key].get<std::size_t>() : 0;
+}
+
+/// Calls f(reference) for every number under `key` anywhere in the document.
+template <class F>
+void for_each_key(Json& json, const char* key, const F& f) {
+  if (json.is_object() || json.is_array())
+    for (auto it = json.begin(); it != json.end(); ++it) {
+      if (json.is_object() && it.key() == key && it->is_number_unsigned())
+        f(*it);
+      else
+        for_each_key(*it, key, f);
+    }
+}
+
+/// "texture/<number>", nothing else.
+bool source_image_of(const Json& image, std::uint32_t& number) {
+  constexpr std::string_view kPrefix = "texture/";
+  if (!image.contains("name") || !image["name"].is_string()) return false;
+  const std::string& name = image["name"].get_ref<const std::string&>();
+  if (!name.starts_with(kPrefix)) return false;
+  const auto end = std::from_chars(name.data() + kPrefix.size(), name.data() + name.size(), number);
+  return end.ec == std::errc() && end.ptr == name.data() + name.size();
+}
+
+template <class F>
+void for_each_primitive(Json& root, const F& f) {
+  if (!root.contains("meshes")) return;
+  for (Json& mesh : root["meshes"])
+    for (Json& primitive : mesh["primitives"]) f(primitive);
+}
+
+Json* draco_of(Json& primitive) {
+  if (!primitive.contains("extensions") || !primitive["extensions"].contains(kDraco)) return nullptr;
+  return &primitive["extensions"][kDraco];
+}
+
+Json vector_json(Vec3f v) {
+  return Json::array({GlbWriter::shortest(v.x), GlbWriter::shortest(v.y), GlbWriter::shortest(v.z)});
+}
+
+void require_valid(std::span<const std::uint8_t> glb, const std::string& entry) {
+  Findings findings;
+  check_glb(glb, entry, findings);
+  if (findings.empty()) return;
+  const Finding& f = findings.list().front();
+  throw FormatError(f.entry, f.field, f.expected, f.found);
+}
+
+}  // namespace
+
+StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry)
+    : entry_(std::move(entry)) {
+  require_valid(glb, entry_);
+  constexpr std::size_t kHeader = 12, kChunk = 8;
+  const std::size_t json_bytes = read_u32(glb, kHeader);
+  root_ = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);
+  const std::size_t binary_at = kHeader + kChunk + json_bytes;
+  const std::span<const std::uint8_t> binary = glb.size() > binary_at + kChunk
+                                                   ? glb.subspan(binary_at + kChunk, read_u32(glb, binary_at))
+                                                   : std::span<const std::uint8_t>();
+  if (root_.contains("buffers") && root_["buffers"].size() > 1)
+    fallback_bytes_ = root_["buffers"][1].value("byteLength", std::uint64_t{0});
+  if (!root_.contains("bufferViews")) return;
+  for (const Json& json : root_["bufferViews"]) {
+    View view{json, {}, json.contains("extensions") && json["extensions"].contains(kMeshopt)};
+    const Json& place = view.meshopt ? json["extensions"][kMeshopt] : json;
+    const std::size_t offset = number(place, "byteOffset"), bytes = number(place, "byteLength");
+    if (offset > binary.size() || bytes > binary.size() - offset)
+      throw FormatError(entry_, "/bufferViews", "views within the binary chunk", "one beyond it");
+    view.bytes.assign(binary.begin() + static_cast<std::ptrdiff_t>(offset),
+                      binary.begin() + static_cast<std::ptrdiff_t>(offset + bytes));
+    views_.push_back(std::move(view));
+  }
+}
+
+std::size_t StandaloneGlb::add_view(Bytes bytes) {
+  views_.push_back({Json::object(), std::move(bytes), false});
+  return views_.size() - 1;
+}
+
+void StandaloneGlb::use_extension(const std::string& name, bool required) {
+  for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
+    if (list == std::string("extensionsRequired") && !required) continue;
+    Json names = root_.value(list, Json::array());
+    if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
+    root_[list] = names;
+  }
+}
+
+void StandaloneGlb::forget_extension(const std::string& name) {
+  for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
+    if (!root_.contains(list)) continue;
+    Json kept = Json::array();
+    for (const Json& n : root_[list])
+      if (n != name) kept.push_back(n);
+    if (kept.empty())
+      root_.erase(list);
+    else
+      root_[list] = kept;
+  }
+}
+
+std::vector<std::uint32_t> StandaloneGlb::source_images() const {
+  std::vector<std::uint32_t> out;
+  if (!root_.contains("images")) return out;
+  for (const Json& image : root_["images"]) {
+    std::uint32_t number = 0;
+    if (source_image_of(image, number)) out.push_back(number);
+  }
+  return out;
+}
+
+void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
+  if (!root_.contains("images")) return;
+  std::vector<bool> webp(root_["images"].size());
+  for (std::size_t k = 0; k < webp.size(); ++k) {
+    Json& image = root_["images"][k];
+    std::uint32_t source = 0;
+    const auto found = source_image_of(image, source) ? images.find(source) : images.end();
+    if (found != images.end()) {
+      image["mimeType"] = mime_type_of(found->second.format);
+      image["bufferView"] = add_view(found->second.bytes);
+    }
+    webp[k] = image.value("mimeType", "") == "image/webp";
+  }
+  if (root_.contains("textures"))
+    for (Json& texture : root_["textures"]) {
+      std::size_t image = number(texture, "source");
+      if (texture.contains("extensions") && texture["extensions"].contains(kWebp))
+        image = number(texture["extensions"][kWebp], "source");
+      if (image >= webp.size()) continue;
+      texture.erase("source");
+      if (texture.contains("extensions")) texture["extensions"].erase(kWebp);
+      if (webp[image])
+        texture["extensions"][kWebp]["source"] = image;
+      else
+        texture["source"] = image;
+      if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
+    }
+  forget_extension(kWebp);
+  if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
+}
+
+bool StandaloneGlb::has_draco() const {
+  return root_.contains("extensionsUsed") &&
+         std::find(root_["extensionsUsed"].begin(), root_["extensionsUsed"].end(), Json(kDraco)) !=
+             root_["extensionsUsed"].end();
+}
+
+void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
+  std::vector<DracoStream> streams;
+  for_each_primitive(root_, [&](Json& primitive) {
+    const Json* draco = draco_of(primitive);
+    if (!draco) return;
+    DracoStream s;
+    s.bytes = views_.at(number(*draco, "bufferView")).bytes;
+    for (const auto& [name, id] : (*draco)["attributes"].items()) s.attributes[name] = id.get<int>();
+    streams.push_back(std::move(s));
+  });
+  if (streams.empty()) return;
+  recode_draco(streams, steps, lit_as, entry_, context);
+  std::size_t next = 0;
+  for_each_primitive(root_, [&](Json& primitive) {
+    Json* draco = draco_of(primitive);
+    if (!draco) return;
+    DracoStream& s = streams[next++];
+    if (s.vertices == 0) return;  // kept as it was
+    (*draco)["bufferView"] = add_view(std::move(s.bytes));
+    for (const auto& [name, id] : s.attributes) (*draco)["attributes"][name] = id;
+    for (const auto& [name, accessor] : primitive["attributes"].items()) {
+      Json& a = root_["accessors"].at(accessor.get<std::size_t>());
+      a["count"] = s.vertices;
+      if (name == "POSITION") a["min"] = vector_json(s.low), a["max"] = vector_json(s.high);
+    }
+    Json& indices = root_["accessors"].at(number(primitive, "indices"));
+    indices["count"] = std::size_t{s.triangles} * 3;
+    indices["componentType"] = s.vertices > 65535 ? 5125 : 5123;
+  });
+}
+
+void StandaloneGlb::begin_levels(double screen_coverage) {
+  const std::size_t scene = number(root_, "scene");
+  Json& nodes = root_["scenes"].at(scene)["nodes"];
+  Json parent{{"name", "level 0"}, {"children", nodes}};
+  parent["extensions"][kLod]["ids"] = Json::array();
+  parent["extras"]["MSFT_screencoverage"] = Json::array({screen_coverage});
+  level_node_ = root_["nodes"].size();
+  root_["nodes"].push_back(parent);
+  nodes = Json::array({level_node_});
+  use_extension(kLod, false);
+}
+
+void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
+  for (const char* shared : {"materials", "textures", "samplers"})
+    if (root_.value(shared, Json::array()) != coarser.root_.value(shared, Json::array()))
+      throw FormatError(coarser.entry_, std::string("/") + shared, "those of " + entry_, "others");
+  const std::size_t view = views_.size(), accessor = root_["accessors"].size(), mesh = root_["meshes"].size(),
+                    node = root_["nodes"].size();
+  for (View& v : coarser.views_) {
+    if (v.meshopt) v.json["byteOffset"] = number(v.json, "byteOffset") + fallback_bytes_;
+    views_.push_back(std::move(v));
+  }
+  fallback_bytes_ += (coarser.fallback_bytes_ + 3) / 4 * 4;
+  const auto moved = [](std::size_t by) {
+    return [by](Json& index) { index = index.get<std::size_t>() + by; };
+  };
+  for (const char* list : {"accessors", "meshes"})
+    for_each_key(coarser.root_[list], "bufferView", moved(view));
+  for (Json& a : coarser.root_["accessors"]) root_["accessors"].push_back(std::move(a));
+  for_each_primitive(coarser.root_, [&](Json& primitive) {
+    for (Json& a : primitive["attributes"]) a = a.get<std::size_t>() + accessor;
+    if (primitive.contains("indices")) primitive["indices"] = number(primitive, "indices") + accessor;
+  });
+  for (Json& m : coarser.root_["meshes"]) root_["meshes"].push_back(std::move(m));
+  for (Json& n : coarser.root_["nodes"]) {
+    if (n.contains("mesh")) n["mesh"] = number(n, "mesh") + mesh;
+    if (n.contains("children"))
+      for (Json& child : n["children"]) child = child.get<std::size_t>() + node;
+    root_["nodes"].push_back(std::move(n));
+  }
+  Json children = Json::array();
+  for (const Json& child : coarser.root_["scenes"].at(number(coarser.root_, "scene"))["nodes"])
+    children.push_back(child.get<std::size_t>() + node);
+  Json& ids = root_["nodes"][level_node_]["extensions"][kLod]["ids"];
+  Json level{{"name", "level " + std::to_string(ids.size() + 1)}, {"children", children}};
+  ids.push_back(root_["nodes"].size());
+  root_["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
+  root_["nodes"].push_back(level);
+  for (const char* list : {"extensionsUsed", "extensionsRequired"})
+    for (const Json& name : coarser.root_.value(list, Json::array()))
+      use_extension(name.get<std::string>(), list == std::string("extensionsRequired"));
+}
+
+Bytes StandaloneGlb::finish() const {
+  Json root = root_;
+  root.erase("bufferViews");
+  root.erase("buffers");
+  std::vector<std::int64_t> place(views_.size(), -1);
+  for_each_key(root, "bufferView", [&](Json& view) { place.at(view.get<std::size_t>()) = 0; });
+  Bytes binary;
+  Json views = Json::array();
+  for (std::size_t k = 0; k < views_.size(); ++k) {
+    if (place[k] < 0) continue;
+    place[k] = static_cast<std::int64_t>(views.size());
+    pad(binary, 0);
+    Json json = views_[k].json;
+    Json& at = views_[k].meshopt ? json["extensions"][kMeshopt] : json;
+    at["buffer"] = 0;
+    at["byteOffset"] = binary.size();
+    at["byteLength"] = views_[k].bytes.size();
+    binary.insert(binary.end(), views_[k].bytes.begin(), views_[k].bytes.end());
+    views.push_back(std::move(json));
+  }
+  for_each_key(root, "bufferView",
+               [&](Json& view) { view = static_cast<std::size_t>(place[view.get<std::size_t>()]); });
+  pad(binary, 0);
+  if (!views.empty()) root["bufferViews"] = views;
+  root["buffers"] = Json::array({{{"byteLength", binary.size()}}});
+  if (fallback_bytes_ > 0)
+    root["buffers"].push_back(
+        {{"byteLength", fallback_bytes_}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
+
+  const std::string text = root.dump(-1, ' ', false, Json::error_handler_t::replace);
+  Bytes json(text.begin(), text.end());
+  pad(json, ' ');
+  Bytes out;
+  out.reserve(28 + json.size() + binary.size());
+  put_u32(out, 0x46546c67);  // "glTF"
+  put_u32(out, 2);
+  put_u32(out, 28 + json.size() + binary.size());
+  put_u32(out, json.size());
+  put_u32(out, 0x4e4f534a);  // "JSON"
+  out.insert(out.end(), json.begin(), json.end());
+  put_u32(out, binary.size());
+  put_u32(out, 0x004e4942);  // "BIN"
+  out.insert(out.end(), binary.begin(), binary.end());
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,66 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/extract/glb/draco_recode.h"
+#include "pipeline/extract/glb/image_codecs.h"
+
+namespace texmesh {
+
+/// An image as a file holds it.
+struct FileImageData {
+  FileImage format = FileImage::kJpeg;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// A scale's GLB taken apart, changed and written again: other images, a coarser mesh, further levels of
+/// detail. Materials, nodes, names, extras and extensions stay as they are. Brings the JSON library along;
+/// for .cpp files of this folder.
+class StandaloneGlb {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  /// Checks the whole file first (inspect/check_glb.h). `entry` is for messages. FormatError.
+  StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry);
+
+  /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
+  std::vector<std::uint32_t> source_images() const;
+  /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
+  /// makes EXT_texture_webp a required extension.
+  void set_images(const std::map<std::uint32_t, FileImageData>& images);
+  /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
+  void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
+  bool has_draco() const;
+
+  /// Makes the nodes of the scene the children of one node, the first level of detail. Once, before
+  /// add_level().
+  void begin_levels(double screen_coverage);
+  /// Adds a coarser file of the same package as a further level (MSFT_lod), whose materials and images are
+  /// those already here. Levels by falling `screen_coverage`: the share of the screen's area above which the
+  /// level is shown (extras.MSFT_screencoverage).
+  void add_level(StandaloneGlb coarser, double screen_coverage);
+
+  /// The file; views in their first order, those that nothing uses left out. Same input, same bytes.
+  std::vector<std::uint8_t> finish() const;
+
+ private:
+  struct View {
+    Json json;  // without buffer, byteOffset, byteLength, except those of a fallback buffer
+    std::vector<std::uint8_t> bytes;
+    bool meshopt = false;
+  };
+  std::size_t add_view(std::vector<std::uint8_t> bytes);
+  void use_extension(const std::string& name, bool required);
+  void forget_extension(const std::string& name);
+  std::string entry_;
+  Json root_;
+  std::vector<View> views_;
+  std::uint64_t fallback_bytes_ = 0;
+  std::size_t level_node_ = 0;
+};
+
+}  // namespace texmesh

@@ -1,0 +1,156 @@
+#include "pipeline/extract/glb/texture_source.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/extract/glb/plane_pixels.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/image/texel_coverage.h"
+
+namespace texmesh {
+namespace {
+
+std::uint32_t half_of(std::uint32_t side, std::uint32_t times) {
+  for (; times > 0; --times) side = (side + 1) / 2;
+  return side;
+}
+
+bool finite(const std::array<Vec2d, 3>& corners) {
+  return std::all_of(corners.begin(), corners.end(),
+                     [](Vec2d c) { return std::isfinite(c.x) && std::isfinite(c.y); });
+}
+
+void add_triangles(const Mesh& mesh, std::size_t material, const TextureRef& ref, const TexelMap& map,
+                   TexelCoverage& coverage) {
+  const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
+  if (uv.empty()) return;
+  coverage.set_wrap(ref.wrap_s, ref.wrap_t);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.triangle_material[t] != material) continue;
+    std::array<Vec2d, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = map(uv[mesh.triangles[t][k]]);
+    if (finite(corners)) coverage.add(corners);
+  }
+}
+
+}  // namespace
+
+Averaging PackageImage::averaging() const {
+  if (colours) return Averaging::kLight;
+  return role == "normal" ? Averaging::kNormals : Averaging::kNumbers;
+}
+
+std::vector<PackageImage> package_images(PackageReader& package) {
+  const std::vector<TextureInfo>& textures = package.textures();
+  std::vector<PackageImage> out;
+  for (std::uint32_t p = 0; p < full_size_planes(textures); ++p) {
+    const TextureInfo& t = textures[p];
+    if (t.role == "alpha" && !out.empty() && out.back().image == t.image) {
+      out.back().alpha_plane = p;
+      continue;
+    }
+    PackageImage image;
+    image.image = t.image;
+    image.plane = p;
+    image.role = t.role;
+    image.width_px = t.width_px;
+    image.height_px = t.height_px;
+    image.colours = t.colour_space == "srgb";
+    out.push_back(std::move(image));
+  }
+  return out;
+}
+
+TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context)
+    : package_(package), context_(context), images_(package_images(package)) {
+  context_.progress = nullptr;
+  double texels = 0;
+  for (const PackageImage& i : images_)
+    if (i.colours) texels += static_cast<double>(i.width_px) * i.height_px;
+  for (; texels > most_texels && first_level_ < 20; texels /= 4) ++first_level_;
+}
+
+double TextureSource::largest(std::size_t index) {
+  return images_[index].colours ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
+}
+
+const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colours, Averaging kind) {
+  std::vector<Pixels>& levels = planes_[plane];
+  if (!levels.empty()) return levels;
+  Pixels full = read_plane(package_, plane, kBestRung, context_);
+  const std::uint32_t skip = colours ? first_level_ : 0;
+  if (skip > 0)
+    full = reduced(full, full.width_px, full.height_px, half_of(full.width_px, skip),
+                   half_of(full.height_px, skip), kind);
+  levels.push_back(std::move(full));
+  while (levels.back().width_px > 8 && levels.back().height_px > 8) {
+    const Pixels& last = levels.back();
+    levels.push_back(reduced(last, last.width_px, last.height_px, half_of(last.width_px, 1),
+                             half_of(last.height_px, 1), kind));
+  }
+  return levels;
+}
+
+/// Colours come from the full-size plane: its best rung is better than any mip's. For data a mip that is
+/// large enough will do and saves most of the reading.
+std::uint32_t TextureSource::plane_for(std::size_t index, std::uint32_t base, std::uint32_t width_px) const {
+  if (images_[index].colours) return base;
+  const std::vector<TextureInfo>& textures = package_.textures();
+  std::uint32_t best = base;
+  for (std::uint32_t p = 0; p < textures.size(); ++p)
+    if (textures[p].mip > 0 && textures[p].base == base && textures[p].width_px >= width_px &&
+        textures[p].width_px < textures[best].width_px)
+      best = p;
+  return best;
+}
+
+Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px,
+                                   std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
+                                   float sharpening) {
+  const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
+  const std::vector<Pixels>& from = levels(plane_for(index, base, width_px), images_[index].colours, kind);
+  std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
+  while (level + 1 < from.size() && from[level + 1].width_px >= 2 * width_px &&
+         from[level + 1].height_px >= 2 * height_px)
+    ++level;
+  const Pixels& p = from[level];
+  Pixels out = reduced(p, p.width_px, p.height_px, std::min(width_px, p.width_px),
+                       std::min(height_px, p.height_px), kind, images_[index].colours ? sharpening : 0.f);
+  if (coverage.size() == (std::size_t{out.width_px} + 7) / 8 * out.height_px)
+    fill_uncovered(out, coverage, context_);
+  return out;
+}
+
+Pixels TextureSource::texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
+                             const std::vector<std::uint8_t>& coverage, float sharpening) {
+  const PackageImage& image = images_.at(index);
+  Pixels colours = plane_texels(index, image.plane, width_px, height_px, coverage, sharpening);
+  if (!image.alpha_plane) return colours;
+  return with_alpha(colours, plane_texels(index, *image.alpha_plane, width_px, height_px, coverage, 0));
+}
+
+Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {
+  if (colours.width_px != alpha.width_px || colours.height_px != alpha.height_px || alpha.channels != 1)
+    throw FormatError(kTexturesPath, "alpha", "a plane as large as its colours", "another");
+  Pixels out{colours.width_px, colours.height_px, 4, {}};
+  out.data.reserve(std::size_t{4} * colours.width_px * colours.height_px);
+  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
+    const std::uint8_t* c = colours.data.data() + i * colours.channels;
+    for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
+    out.data.push_back(alpha.data[i]);
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Material>& materials,
+                                      std::int32_t image, std::uint32_t width_px, std::uint32_t height_px) {
+  TexelCoverage coverage(width_px, height_px, Wrap::kRepeat, Wrap::kRepeat);
+  for (std::size_t m = 0; m < materials.size(); ++m)
+    for_each_texture(materials[m], [&](const TextureRef& ref) {
+      if (ref.image != image || ref.texcoord > 1) return;
+      add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
+    });
+  return coverage.take();
+}
+
+}  // namespace texmesh

@@ -1,0 +1,67 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/model/model.h"
+#include "pipeline/extract/glb/image_codecs.h"
+#include "pipeline/extract/glb/resize.h"
+#include "stages/base/run_context.h"
+#include "stages/image/decode_image.h"
+
+namespace texmesh {
+
+/// Of colours that are made smaller (reduced()): what averaging blurs, and a little of what viewers do.
+inline constexpr float kSharpening = 0.06f;
+
+/// A source image of a package: one image of every file that is extracted.
+struct PackageImage {
+  std::uint32_t image = 0;  // "texture/<image>"
+  std::uint32_t plane = 0;  // full-size plane of its colours or data
+  std::optional<std::uint32_t> alpha_plane;
+  std::string role;
+  std::uint32_t width_px = 0, height_px = 0;
+  bool colours = true;  // sRGB encoded
+  Averaging averaging() const;
+};
+std::vector<PackageImage> package_images(PackageReader& package);
+
+/// Texels of a package's images at any size, from its best rungs. What was read stays in memory at the size
+/// that `most_texels` (over all colour images) allows.
+class TextureSource {
+ public:
+  TextureSource(PackageReader& package, double most_texels, const RunContext& context);
+  const std::vector<PackageImage>& images() const { return images_; }
+  /// 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and at most those of the image;
+  /// where memory was bounded, larger ones are cut down, see largest(). `coverage` (bits as
+  /// TexturePlane::coverage, empty = all): what shows; the other texels are made cheap to code. `sharpening`
+  /// (see reduced()) is for colours alone.
+  Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
+                const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
+  /// Largest share of an image's sides, 0 .. 1, that texels() gives.
+  double largest(std::size_t index);
+
+ private:
+  const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
+  std::uint32_t plane_for(std::size_t index, std::uint32_t base, std::uint32_t width_px) const;
+  Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
+                      const std::vector<std::uint8_t>& coverage, float sharpening);
+  PackageReader& package_;
+  RunContext context_;
+  std::vector<PackageImage> images_;
+  std::uint32_t first_level_ = 0;                        // of colour planes: how often sides are halved
+  std::map<std::uint32_t, std::vector<Pixels>> planes_;  // by plane: halves, halves of them ..
+};
+
+/// Colours and alpha as one image of 4 channels; both of one size.
+Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
+
+/// Which texels of an image of `width_px` x `height_px` a mesh shows with these materials, as
+/// TexturePlane::coverage. `image` is the materials' index of it.
+std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Material>& materials,
+                                      std::int32_t image, std::uint32_t width_px, std::uint32_t height_px);
+
+}  // namespace texmesh

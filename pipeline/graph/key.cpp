@@ -1,0 +1,54 @@
+#include "pipeline/graph/key.h"
+
+#include <nlohmann/json.hpp>
+
+namespace texmesh {
+
+Key::Key(std::string_view stage, int stage_version) {
+  add("key schema", std::to_string(kKeySchema));
+  add("stage", std::string(stage));
+  add("stage version", std::to_string(stage_version));
+}
+
+Key& Key::add(std::string label, std::string value) {
+  parts_.emplace_back(std::move(label), std::move(value));
+  return *this;
+}
+
+Key& Key::add_input(std::string_view role, const Sha256& digest, std::uint64_t bytes) {
+  return add("input " + std::string(role), to_hex(digest) + " " + std::to_string(bytes));
+}
+
+Sha256 Key::digest() const { return digest_of_parts(parts_); }
+
+Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts) {
+  std::vector<std::uint8_t> record;
+  auto put = [&record](const std::string& s) {
+    for (int i = 0; i < 8; ++i) record.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
+    record.insert(record.end(), s.begin(), s.end());
+  };
+  for (const auto& [label, value] : parts) {
+    put(label);
+    put(value);
+  }
+  return sha256(record);
+}
+
+std::optional<Key> key_from_preimage(const std::string& preimage) {
+  const auto j = nlohmann::ordered_json::parse(preimage, nullptr, false);
+  if (!j.is_object()) return std::nullopt;
+  Key key;
+  for (const auto& [label, value] : j.items()) {
+    if (!value.is_string()) return std::nullopt;
+    key.add(label, value.get<std::string>());
+  }
+  return key;
+}
+
+std::string Key::preimage() const {
+  nlohmann::ordered_json j = nlohmann::ordered_json::object();
+  for (const auto& [label, value] : parts_) j[label] = value;
+  return j.dump(1);
+}
+
+}  // namespace texmesh

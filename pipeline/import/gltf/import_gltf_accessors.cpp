@@ -1,0 +1,150 @@
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "pipeline/import/gltf/import_gltf_parts.h"
+
+namespace texmesh::gltf {
+namespace {
+
+template <class T>
+T load(const std::uint8_t* at) {
+  T v;
+  std::memcpy(&v, at, sizeof v);
+  return v;
+}
+
+std::uint32_t load_index(const std::uint8_t* at, int type) {
+  switch (type) {
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return load<std::uint8_t>(at);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return load<std::uint16_t>(at);
+    default:
+      return load<std::uint32_t>(at);
+  }
+}
+
+float load_float(const std::uint8_t* at, int type, bool normalized) {
+  switch (type) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE: {
+      const float v = load<std::int8_t>(at);
+      return normalized ? std::max(v / 127.0f, -1.0f) : v;
+    }
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: {
+      const float v = load<std::uint8_t>(at);
+      return normalized ? v / 255.0f : v;
+    }
+    case TINYGLTF_COMPONENT_TYPE_SHORT: {
+      const float v = load<std::int16_t>(at);
+      return normalized ? std::max(v / 32767.0f, -1.0f) : v;
+    }
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: {
+      const float v = load<std::uint16_t>(at);
+      return normalized ? v / 65535.0f : v;
+    }
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: {
+      const auto v = load<std::uint32_t>(at);
+      return normalized ? static_cast<float>(v / 4294967295.0) : static_cast<float>(v);
+    }
+    default:
+      return load<float>(at);
+  }
+}
+
+/// Checks that `count` elements of `element_bytes`, `stride` apart, lie within a view.
+void check_extent(const Source& source, const std::string& place, Bytes view, std::uint64_t offset,
+                  std::uint64_t count, std::uint64_t stride, std::uint64_t element_bytes) {
+  if (count == 0) return;
+  const std::uint64_t room = view.size() < offset ? 0 : view.size() - offset;
+  if (room < element_bytes || (count - 1) > (room - element_bytes) / stride) {
+    source.fail(place,
+                std::to_string(count) + " elements of " + std::to_string(element_bytes) +
+                    " bytes from byte " + std::to_string(offset),
+                "a bufferView of " + std::to_string(view.size()) + " bytes");
+  }
+}
+
+}  // namespace
+
+AccessorReader::AccessorReader(const Source& source, const tinygltf::Model& model, Buffers& buffers,
+                               std::size_t index) {
+  const std::string place = "/accessors/" + std::to_string(index);
+  const tinygltf::Accessor& a = model.accessors[index];
+  count_ = a.count;
+  component_type_ = a.componentType;
+  normalized_ = a.normalized;
+  components_ = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(a.type));
+  component_bytes_ = static_cast<std::size_t>(
+      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)));
+  if (a.type == TINYGLTF_TYPE_MAT2 || a.type == TINYGLTF_TYPE_MAT3 || a.type == TINYGLTF_TYPE_MAT4) {
+    source.fail(place + "/type", "a scalar or a vector", "a matrix");
+  }
+  const std::size_t element_bytes = component_bytes_ * static_cast<std::size_t>(components_);
+  stride_ = element_bytes;
+  if (a.bufferView >= 0) {
+    const auto view_index = static_cast<std::size_t>(a.bufferView);
+    const Bytes view = buffers.view(view_index, place);
+    const std::size_t declared = model.bufferViews[view_index].byteStride;
+    if (declared != 0 && declared < element_bytes) {
+      source.fail("/bufferViews/" + std::to_string(view_index) + "/byteStride",
+                  "at least the " + std::to_string(element_bytes) + " bytes of an element",
+                  std::to_string(declared));
+    }
+    if (declared != 0) stride_ = declared;
+    check_extent(source, place, view, a.byteOffset, count_, stride_, element_bytes);
+    base_ = view.data() + (count_ ? a.byteOffset : 0);
+  }
+  if (!a.sparse.isSparse) return;
+  const std::string sparse_place = place + "/sparse";
+  const auto n = static_cast<std::size_t>(a.sparse.count);
+  if (n > count_)
+    source.fail(sparse_place + "/count", "at most " + std::to_string(count_), std::to_string(n));
+  const Bytes indices = buffers.view(static_cast<std::size_t>(a.sparse.indices.bufferView), sparse_place);
+  const Bytes values = buffers.view(static_cast<std::size_t>(a.sparse.values.bufferView), sparse_place);
+  const int type = a.sparse.indices.componentType;
+  const auto index_bytes =
+      static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type)));
+  const auto index_offset = static_cast<std::size_t>(a.sparse.indices.byteOffset);
+  const auto value_offset = static_cast<std::size_t>(a.sparse.values.byteOffset);
+  check_extent(source, sparse_place + "/indices", indices, index_offset, n, index_bytes, index_bytes);
+  check_extent(source, sparse_place + "/values", values, value_offset, n, element_bytes, element_bytes);
+  sparse_indices_.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t at = load_index(indices.data() + index_offset + i * index_bytes, type);
+    if (at >= count_ || (i > 0 && at <= sparse_indices_.back())) {
+      source.fail(sparse_place + "/indices", "increasing indices below " + std::to_string(count_),
+                  std::to_string(at) + " at " + std::to_string(i));
+    }
+    sparse_indices_.push_back(at);
+  }
+  if (n > 0) sparse_values_ = values.data() + value_offset;
+}
+
+const std::uint8_t* AccessorReader::element_at(std::size_t element) const {
+  if (sparse_values_) {
+    const auto it = std::lower_bound(sparse_indices_.begin(), sparse_indices_.end(), element);
+    if (it != sparse_indices_.end() && *it == element) {
+      const auto i = static_cast<std::size_t>(it - sparse_indices_.begin());
+      return sparse_values_ + i * component_bytes_ * static_cast<std::size_t>(components_);
+    }
+  }
+  return base_ ? base_ + element * stride_ : nullptr;
+}
+
+void AccessorReader::read(std::size_t element, float* out) const {
+  const std::uint8_t* at = element_at(element);
+  for (int i = 0; i < components_; ++i) {
+    out[i] =
+        at ? load_float(at + static_cast<std::size_t>(i) * component_bytes_, component_type_, normalized_)
+           : 0;
+  }
+}
+
+std::uint32_t AccessorReader::read_index(std::size_t element) const {
+  const std::uint8_t* at = element_at(element);
+  return at ? load_index(at, component_type_) : 0;
+}
+
+}  // namespace texmesh::gltf

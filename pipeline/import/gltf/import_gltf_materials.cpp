@@ -1,0 +1,268 @@
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "format/model/material_extensions.h"
+#include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/io/uri.h"
+
+namespace texmesh::gltf {
+namespace {
+
+constexpr std::int32_t kNotRead = -2;
+
+const Json* member(const Json& object, const char* key) {
+  const auto it = object.find(key);
+  return it == object.end() || it->is_null() ? nullptr : &*it;
+}
+
+const Json* extension(const Json& object, const char* name) {
+  const Json* e = member(object, "extensions");
+  return e && e->is_object() ? member(*e, name) : nullptr;
+}
+
+float to_unit(double v) { return static_cast<float>(std::clamp(v, 0.0, 1.0)); }
+
+/// Numbers beyond a float would become infinities, which no JSON can hold later.
+float to_float(double v) { return static_cast<float>(std::clamp(v, -1e30, 1e30)); }
+
+Wrap wrap_of(int mode) {
+  if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::kClamp;
+  return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror : Wrap::kRepeat;
+}
+
+class MaterialReader {
+ public:
+  MaterialReader(const Source& source, const Json& document, const tinygltf::Model& structure,
+                 Buffers& buffers, Model& model)
+      : source_(source), document_(document), structure_(structure), buffers_(buffers), model_(model) {
+    if (const Json* images = member(document_, "images")) image_of_.assign(images->size(), kNotRead);
+  }
+  Material read(std::size_t index);
+
+ private:
+  std::int32_t image(std::size_t index);
+  std::int32_t read_image(std::size_t index);
+  std::int32_t image_of_texture(std::size_t index);
+  TextureRef texture(const Json* info, const std::string& place);
+  void read_specular_glossiness(const Json& e, const std::string& place, Material& out);
+  MaterialExtension read_extension(const Json& e, const MaterialExtensionKind& kind,
+                                   const std::string& place);
+  void read_extensions(const Json& material, const std::string& place, Material& out);
+
+  const Source& source_;
+  const Json& document_;
+  const tinygltf::Model& structure_;
+  Buffers& buffers_;
+  Model& model_;
+  std::vector<std::int32_t> image_of_;  // per glTF image: index in model_.images, -1 missing, kNotRead
+};
+
+std::int32_t MaterialReader::read_image(std::size_t index) {
+  const Json& declared = document_["images"][index];
+  const std::string place = "/images/" + std::to_string(index);
+  if (model_.images.size() >= static_cast<std::size_t>(source_.options.max_images)) {
+    source_.fail(place, "at most " + std::to_string(source_.options.max_images) + " images", "more");
+  }
+  const Json* name_value = member(declared, "name");
+  std::string name = name_value && name_value->is_string() ? name_value->get<std::string>() : "";
+  if (name.empty()) name = "image " + std::to_string(index);
+  if (const Json* view = member(declared, "bufferView")) {
+    const Bytes bytes = buffers_.view(view->get<std::size_t>(), place);
+    return add_image_bytes(model_, name, {bytes.begin(), bytes.end()}, source_.file, place, source_.options);
+  }
+  const std::string uri = declared["uri"].get<std::string>();
+  if (is_data_uri(uri)) {
+    return add_image_bytes(model_, name,
+                           decode_data_uri(uri, static_cast<std::uint64_t>(source_.options.max_file_bytes),
+                                           source_.file, place + "/uri"),
+                           source_.file, place, source_.options);
+  }
+  const std::string file = decode_uri(uri, source_.file, place + "/uri");
+  try {
+    return add_image(model_, file, source_.resolver, source_.file, place + "/uri", source_.options);
+  } catch (const InputError& e) {
+    if (e.file() == source_.file) throw;
+    source_.fail(place + "/uri", e.expected(),
+                 e.found() + " (" + file + ")");  // the resolver knows the name alone
+  }
+}
+
+std::int32_t MaterialReader::image(std::size_t index) {
+  if (image_of_[index] == kNotRead) image_of_[index] = read_image(index);
+  return image_of_[index];
+}
+
+/// The WebP image where there is one, else (or when its file is missing) the plain one.
+std::int32_t MaterialReader::image_of_texture(std::size_t index) {
+  const Json& texture = document_["textures"][index];
+  std::int32_t found = -1;
+  const Json* webp = extension(texture, "EXT_texture_webp");
+  if (webp && member(*webp, "source")) {
+    found = image((*webp)["source"].get<std::size_t>());
+  }
+  const int source = structure_.textures[index].source;
+  if (found < 0 && source >= 0) found = image(static_cast<std::size_t>(source));
+  if (found < 0 && source < 0 && !webp) {
+    source_.note_once(Severity::kWarning, "missing-texture", "/textures/" + std::to_string(index),
+                      "a texture without an image of a kind that texmesh reads is left out");
+  }
+  return found;
+}
+
+TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
+  TextureRef ref;
+  if (!info) return ref;
+  const auto index = (*info)["index"].get<std::size_t>();
+  std::uint64_t texcoord = info->value("texCoord", std::uint64_t{0});
+  if (const Json* t = extension(*info, "KHR_texture_transform")) {
+    const auto pair = [&](const char* key, Vec2f otherwise) {
+      const Json* v = member(*t, key);
+      return v ? Vec2f{to_float((*v)[0].get<double>()), to_float((*v)[1].get<double>())} : otherwise;
+    };
+    ref.transform.offset = pair("offset", {0, 0});
+    ref.transform.scale = pair("scale", {1, 1});
+    ref.transform.rotation = to_float(t->value("rotation", 0.0));
+    texcoord = t->value("texCoord", texcoord);
+  }
+  if (texcoord > 1) {
+    source_.note_once(
+        Severity::kWarning, "unsupported-texcoord", place,
+        "a texture on TEXCOORD_" + std::to_string(texcoord) + " is left out; only 0 and 1 are read");
+    return {};
+  }
+  ref.texcoord = static_cast<std::uint8_t>(texcoord);
+  if (const int s = structure_.textures[index].sampler; s >= 0) {
+    const tinygltf::Sampler& sampler = structure_.samplers[static_cast<std::size_t>(s)];
+    ref.wrap_s = wrap_of(sampler.wrapS);
+    ref.wrap_t = wrap_of(sampler.wrapT);
+    ref.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+  }
+  ref.image = image_of_texture(index);
+  if (ref.image < 0) return {};
+  return ref;
+}
+
+/// The older PBR model: it is kept, and for the many viewers that have dropped it its diffuse part becomes a
+/// dielectric's base colour.
+void MaterialReader::read_specular_glossiness(const Json& e, const std::string& place, Material& out) {
+  source_.note_once(
+      Severity::kInfo, "specular-glossiness", place,
+      "KHR_materials_pbrSpecularGlossiness is kept; viewers without it are shown the diffuse part as the "
+      "base colour of a dielectric");
+  if (const Json* d = member(e, "diffuseFactor")) {
+    const auto at = [&](std::size_t i) { return to_unit((*d)[i].get<double>()); };
+    out.base_colour = {at(0), at(1), at(2), at(3)};
+  } else {
+    out.base_colour = {1, 1, 1, 1};
+  }
+  out.metallic = 0;
+  out.roughness = to_unit(1 - e.value("glossinessFactor", 1.0));
+  out.base_colour_texture = texture(member(e, "diffuseTexture"), place + "/diffuseTexture");
+  out.metallic_roughness_texture = {};
+}
+
+MaterialExtension MaterialReader::read_extension(const Json& e, const MaterialExtensionKind& kind,
+                                                 const std::string& place) {
+  MaterialExtension out;
+  out.name = kind.name;
+  for (const ExtensionFactorKind& f : kind.factors) {
+    const Json* value = member(e, std::string(f.key).c_str());
+    if (!value) continue;
+    ExtensionFactor factor{std::string(f.key), {}};
+    for (int i = 0; i < f.components; ++i) {
+      const Json& number = f.components == 1 ? *value : (*value)[static_cast<std::size_t>(i)];
+      factor.values.push_back(to_float(std::clamp(number.get<double>(), f.lowest, f.highest)));
+    }
+    out.factors.push_back(std::move(factor));
+  }
+  for (const ExtensionTextureKind& t : kind.textures) {
+    const std::string key(t.key);
+    const Json* info = member(e, key.c_str());
+    const TextureRef ref = texture(info, place + "/" + key);
+    if (ref.used()) out.textures.push_back({key, ref, to_float(info->value("scale", 1.0))});
+  }
+  return out;
+}
+
+/// Keys of the textures that `value` names: "brightnessTexture, maskTexture".
+std::string texture_names(const Json& value) {
+  std::string names;
+  for (const auto& [key, v] : value.items())
+    if (v.is_object() && v.contains("index")) names += (names.empty() ? "" : ", ") + key;
+  return names;
+}
+
+/// Extensions that texmesh knows become part of the material; of others a note says what is lost.
+void MaterialReader::read_extensions(const Json& material, const std::string& place, Material& out) {
+  const Json* extensions = member(material, "extensions");
+  if (!extensions) return;
+  for (const auto& [name, value] : extensions->items()) {
+    if (name == "KHR_materials_unlit") continue;
+    if (const MaterialExtensionKind* kind = find_material_extension(name)) {
+      out.extensions.push_back(read_extension(value, *kind, place + "/extensions/" + name));
+      continue;
+    }
+    const std::string textures = texture_names(value);
+    const std::string text =
+        name + " is left out" + (textures.empty() ? "" : ", and with it the textures " + textures);
+    const bool told = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
+      return n.code == "unknown-extension" && n.text == text;
+    });
+    if (!told)
+      source_.notes.push_back(
+          {textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension", place, text});
+  }
+}
+
+Material MaterialReader::read(std::size_t index) {
+  const Json& declared = document_["materials"][index];
+  const tinygltf::Material& m = structure_.materials[index];
+  const std::string place = "/materials/" + std::to_string(index);
+  const auto texture_of = [&](const Json* holder, const char* key) {
+    return texture(holder ? member(*holder, key) : nullptr, place + "/" + key);
+  };
+  Material out;
+  out.name = m.name;
+  const auto& base = m.pbrMetallicRoughness.baseColorFactor;
+  out.base_colour = {to_unit(base[0]), to_unit(base[1]), to_unit(base[2]), to_unit(base[3])};
+  out.metallic = to_unit(m.pbrMetallicRoughness.metallicFactor);
+  out.roughness = to_unit(m.pbrMetallicRoughness.roughnessFactor);
+  out.emissive = {to_unit(m.emissiveFactor[0]), to_unit(m.emissiveFactor[1]), to_unit(m.emissiveFactor[2])};
+  out.normal_scale = to_float(m.normalTexture.scale);
+  out.occlusion_strength = to_unit(m.occlusionTexture.strength);
+  if (m.alphaMode == "MASK") out.alpha_mode = AlphaMode::kMask;
+  if (m.alphaMode == "BLEND") out.alpha_mode = AlphaMode::kBlend;
+  out.alpha_cutoff = to_float(m.alphaCutoff);
+  out.double_sided = m.doubleSided;
+  out.unlit = extension(declared, "KHR_materials_unlit") != nullptr;
+  const Json* specular = extension(declared, "KHR_materials_pbrSpecularGlossiness");
+  if (const Json* pbr = member(declared, "pbrMetallicRoughness"); pbr && !specular) {
+    out.base_colour_texture = texture_of(pbr, "baseColorTexture");
+    out.metallic_roughness_texture = texture_of(pbr, "metallicRoughnessTexture");
+  }
+  if (specular) read_specular_glossiness(*specular, place, out);
+  out.normal_texture = texture_of(&declared, "normalTexture");
+  out.occlusion_texture = texture_of(&declared, "occlusionTexture");
+  out.emissive_texture = texture_of(&declared, "emissiveTexture");
+  read_extensions(declared, place, out);
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::uint16_t> read_materials(const Source& source, const Json& document,
+                                          const tinygltf::Model& structure, Buffers& buffers,
+                                          const std::vector<int>& used, Model& model) {
+  MaterialReader reader(source, document, structure, buffers, model);
+  std::vector<std::uint16_t> indices;
+  for (const int m : used) {
+    source.context.check_cancelled();
+    indices.push_back(static_cast<std::uint16_t>(model.materials.size()));
+    model.materials.push_back(m < 0 ? Material{} : reader.read(static_cast<std::size_t>(m)));
+  }
+  return indices;
+}
+
+}  // namespace texmesh::gltf

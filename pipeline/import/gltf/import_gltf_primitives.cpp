@@ -1,0 +1,275 @@
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/import/gltf/import_gltf_parts.h"
+
+namespace texmesh::gltf {
+namespace {
+
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr std::uint32_t kUnused = 0xffffffffu;
+
+struct Place {
+  std::size_t mesh, primitive;
+  std::string text() const {
+    return "/meshes/" + std::to_string(mesh) + "/primitives/" + std::to_string(primitive);
+  }
+};
+
+const Json* draco_extension(const Json& document, const Place& place) {
+  const Json& primitive = document["meshes"][place.mesh]["primitives"][place.primitive];
+  const auto e = primitive.find("extensions");
+  if (e == primitive.end() || !e->is_object()) return nullptr;
+  const auto d = e->find(kDraco);
+  return d == e->end() || d->is_null() ? nullptr : &*d;
+}
+
+class PrimitiveReader {
+ public:
+  PrimitiveReader(const Source& source, const Json& document, const tinygltf::Model& model, Buffers& buffers,
+                  const Place& place)
+      : source_(source),
+        document_(document),
+        model_(model),
+        buffers_(buffers),
+        place_(place),
+        primitive_(model.meshes[place.mesh].primitives[place.primitive]) {}
+
+  Primitive read();
+
+ private:
+  std::string at(const std::string& what) const { return place_.text() + "/" + what; }
+  bool is_drawn() const;
+  ReadFloats attribute(const std::string& name, VertexData& data, int min_components, int max_components,
+                       int* components = nullptr) const;
+  VertexData vertices() const;
+  void read_indices(VertexData& data) const;
+  std::vector<Triangle> triangles(const VertexData& data, int mode) const;
+
+  const Source& source_;
+  const Json& document_;
+  const tinygltf::Model& model_;
+  Buffers& buffers_;
+  const Place place_;
+  const tinygltf::Primitive& primitive_;
+};
+
+bool PrimitiveReader::is_drawn() const {
+  if (primitive_.mode < TINYGLTF_MODE_TRIANGLES) {
+    source_.note_once(Severity::kInfo, "skipped-primitive", place_.text(), "points and lines are left out");
+    return false;
+  }
+  if (primitive_.attributes.count("POSITION") == 0) {
+    source_.note_once(Severity::kWarning, "no-positions", place_.text(),
+                      "a primitive without POSITION is left out");
+    return false;
+  }
+  return true;
+}
+
+/// Through an accessor. The first attribute that is read (POSITION) sets data.count.
+ReadFloats PrimitiveReader::attribute(const std::string& name, VertexData& data, int min_components,
+                                      int max_components, int* components) const {
+  const auto it = primitive_.attributes.find(name);
+  if (it == primitive_.attributes.end()) return {};
+  const auto index = static_cast<std::size_t>(it->second);
+  const std::string place = "/accessors/" + std::to_string(index);
+  const std::size_t count = model_.accessors[index].count;
+  const auto max_vertices = static_cast<std::size_t>(source_.options.max_vertices);
+  if (count > max_vertices) {
+    source_.fail(place + "/count", "at most " + std::to_string(max_vertices), std::to_string(count));
+  }
+  const auto reader = std::make_shared<AccessorReader>(source_, model_, buffers_, index);
+  const int n = reader->components();
+  if (n < min_components || n > max_components) {
+    source_.fail(place + "/type", std::to_string(min_components) + " components for " + name,
+                 std::to_string(n));
+  }
+  if (reader->component_type() == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
+    source_.fail(place + "/componentType", "8 or 16 bits or floats for " + name, "32-bit integers");
+  }
+  if (name == "POSITION") {
+    data.count = count;
+    if (model_.accessors[index].minValues.size() != 3 || model_.accessors[index].maxValues.size() != 3) {
+      source_.note_once(Severity::kWarning, "accessor-without-bounds", place, "POSITION has no min and max");
+    }
+  } else if (count != data.count) {
+    source_.fail(place + "/count", std::to_string(data.count) + ", as POSITION has", std::to_string(count));
+  }
+  // glTF asks for normalised colours; exporters forget the flag, and 255 would be far from white otherwise.
+  if (name == "COLOR_0") reader->normalize();
+  if (components) *components = n;
+  return [reader](std::size_t vertex, float* out) { reader->read(vertex, out); };
+}
+
+VertexData PrimitiveReader::vertices() const {
+  VertexData data;
+  const Json* draco = draco_extension(document_, place_);
+  if (draco) {
+    const std::string place = at(std::string("extensions/") + kDraco);
+    const auto normalized = [&](const std::string& name) {
+      const auto it = primitive_.attributes.find(name);
+      return name == "COLOR_0" || (it != primitive_.attributes.end() &&
+                                   model_.accessors[static_cast<std::size_t>(it->second)].normalized);
+    };
+    data = decode_draco(source_, place, buffers_.view((*draco)["bufferView"].get<std::size_t>(), place),
+                        (*draco)["attributes"], normalized);
+    if (!data.position) source_.fail(place + "/attributes", "\"POSITION\"", "an object without it");
+  } else {
+    data.position = attribute("POSITION", data, 3, 3);
+    read_indices(data);
+  }
+  // What a Draco stream does not hold may stand in plain accessors.
+  if (!data.normal) data.normal = attribute("NORMAL", data, 3, 3);
+  if (!data.uv0) data.uv0 = attribute("TEXCOORD_0", data, 2, 2);
+  if (!data.uv1) data.uv1 = attribute("TEXCOORD_1", data, 2, 2);
+  if (!data.colour) data.colour = attribute("COLOR_0", data, 3, 4, &data.colour_components);
+  if (!data.tangent) data.tangent = attribute("TANGENT", data, 4, 4);
+  return data;
+}
+
+void PrimitiveReader::read_indices(VertexData& data) const {
+  const auto max_indices = static_cast<std::size_t>(source_.options.max_triangles) * 3;
+  if (primitive_.indices < 0) {
+    if (data.count > max_indices) {
+      source_.fail(at("attributes/POSITION"), "at most " + std::to_string(max_indices) + " corners",
+                   std::to_string(data.count));
+    }
+    return;
+  }
+  const auto index = static_cast<std::size_t>(primitive_.indices);
+  const std::string place = "/accessors/" + std::to_string(index);
+  if (model_.accessors[index].count > max_indices) {
+    source_.fail(place + "/count", "at most " + std::to_string(max_indices),
+                 std::to_string(model_.accessors[index].count));
+  }
+  const AccessorReader reader(source_, model_, buffers_, index);
+  const int type = reader.component_type();
+  if (reader.components() != 1 ||
+      (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+       type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)) {
+    source_.fail(place, "unsigned integer scalars for indices", "another type");
+  }
+  data.indexed = true;
+  data.indices.resize(reader.count());
+  for (std::size_t i = 0; i < data.indices.size(); ++i) data.indices[i] = reader.read_index(i);
+}
+
+std::vector<Triangle> PrimitiveReader::triangles(const VertexData& data, int mode) const {
+  const std::size_t n = data.indexed ? data.indices.size() : data.count;
+  const auto vertex = [&](std::size_t i) {
+    return data.indexed ? data.indices[i] : static_cast<std::uint32_t>(i);
+  };
+  for (std::size_t i = 0; i < data.indices.size(); ++i) {
+    if (data.indices[i] >= data.count) {
+      source_.fail(at("indices"), "indices below " + std::to_string(data.count),
+                   std::to_string(data.indices[i]) + " at " + std::to_string(i));
+    }
+  }
+  std::vector<Triangle> out;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    if (n % 3 != 0) {
+      source_.note_once(Severity::kWarning, "incomplete-triangle", place_.text(),
+                        "the last one or two indices make no triangle");
+    }
+    out.reserve(n / 3);
+    for (std::size_t i = 0; i + 2 < n; i += 3) out.push_back({vertex(i), vertex(i + 1), vertex(i + 2)});
+  } else {
+    // Strips turn round at every other triangle; the specification keeps the first corner
+    // (glTF 2.0, 3.7.2.1).
+    for (std::size_t i = 0; i + 2 < n; ++i) {
+      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
+        out.push_back({vertex(i + 1), vertex(i + 2), vertex(0)});
+      } else {
+        out.push_back({vertex(i), vertex(i + 1 + i % 2), vertex(i + 2 - i % 2)});
+      }
+    }
+  }
+  return out;
+}
+
+/// Renumbers triangles to the vertices that they use, which are returned in rising order. Several primitives
+/// may share one large vertex buffer: the work must follow the triangles, not the buffer.
+std::vector<std::uint32_t> keep_used(std::vector<Triangle>& triangles, std::size_t count) {
+  std::vector<std::uint32_t> used;
+  if (count <= 12 * triangles.size() + 1024) {
+    std::vector<std::uint32_t> to(count, kUnused);
+    for (const Triangle& t : triangles) {
+      for (const std::uint32_t v : t) to[v] = 0;
+    }
+    for (std::uint32_t v = 0; v < count; ++v) {
+      if (to[v] == kUnused) continue;
+      to[v] = static_cast<std::uint32_t>(used.size());
+      used.push_back(v);
+    }
+    for (Triangle& t : triangles) {
+      for (std::uint32_t& v : t) v = to[v];
+    }
+    return used;
+  }
+  used.reserve(triangles.size() * 3);
+  for (const Triangle& t : triangles) used.insert(used.end(), t.begin(), t.end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  for (Triangle& t : triangles) {
+    for (std::uint32_t& v : t) {
+      v = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), v) - used.begin());
+    }
+  }
+  return used;
+}
+
+/// make(values) for every used vertex.
+template <class T, class F>
+std::vector<T> gather(const std::vector<std::uint32_t>& used, const ReadFloats& read, F&& make) {
+  std::vector<T> out;
+  if (!read) return out;
+  out.reserve(used.size());
+  for (const std::uint32_t v : used) {
+    float values[4] = {};
+    read(v, values);
+    out.push_back(make(values));
+  }
+  return out;
+}
+
+Primitive PrimitiveReader::read() {
+  Primitive out;
+  if (!is_drawn()) return out;
+  const VertexData data = vertices();
+  const int mode = draco_extension(document_, place_) ? TINYGLTF_MODE_TRIANGLES : primitive_.mode;
+  out.triangles = triangles(data, mode);
+  const std::vector<std::uint32_t> used = keep_used(out.triangles, data.count);
+  const auto vec2 = [](const float* v) { return Vec2f{v[0], v[1]}; };
+  const auto vec3 = [](const float* v) { return Vec3f{v[0], v[1], v[2]}; };
+  const bool alpha = data.colour_components == 4;
+  const auto colour = [alpha](const float* v) { return Vec4f{v[0], v[1], v[2], alpha ? v[3] : 1.0f}; };
+  out.positions = gather<Vec3f>(used, data.position, vec3);
+  out.normals = gather<Vec3f>(used, data.normal, vec3);
+  out.uv0 = gather<Vec2f>(used, data.uv0, vec2);
+  out.uv1 = gather<Vec2f>(used, data.uv1, vec2);
+  out.colours = gather<Vec4f>(used, data.colour, colour);
+  // glTF: tangents without normals are to be ignored.
+  if (data.normal)
+    out.tangents = gather<Vec4f>(used, data.tangent, [](const float* v) {
+      return Vec4f{v[0], v[1], v[2], v[3]};
+    });
+  return out;
+}
+
+}  // namespace
+
+bool primitive_has(const tinygltf::Model& model, std::size_t mesh, std::size_t primitive,
+                   const char* attribute) {
+  return model.meshes[mesh].primitives[primitive].attributes.count(attribute) != 0;
+}
+
+Primitive read_primitive(const Source& source, const Json& document, const tinygltf::Model& model,
+                         Buffers& buffers, std::size_t mesh, std::size_t primitive) {
+  return PrimitiveReader(source, document, model, buffers, {mesh, primitive}).read();
+}
+
+}  // namespace texmesh::gltf

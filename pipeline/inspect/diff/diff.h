@@ -1,0 +1,56 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/package/package_reader.h"
+
+namespace texmesh {
+
+/// One thing that two packages do not share. Texts and sizes are those of A and B, empty or 0 where that
+/// package has no such thing.
+struct Difference {
+  enum class Kind : std::uint8_t { kInput, kOption, kStageVersion, kLibrary, kTool, kFormat };
+  Kind kind;
+  std::string name;                      // uri ("" = the model itself), "ladder.rungs", stage, library
+  std::array<std::string, 2> values;     // digest, JSON text, version
+  std::array<std::uint64_t, 2> bytes{};  // inputs only
+};
+
+struct EntryDifference {
+  std::string path;
+  std::string stage;  // that made it; "" for the record of provenance itself
+  std::array<bool, 2> present{};
+  std::array<std::uint64_t, 2> bytes{};
+};
+
+/// A stage whose entries differ, and every recorded difference that can reach it through the graph.
+struct StageDifference {
+  std::string stage;
+  std::uint64_t entries = 0;
+  std::array<std::uint64_t, 2> bytes{};
+  std::vector<std::size_t> causes;  // indices into PackageDiff::differences; empty = none is recorded
+};
+
+struct PackageDiff {
+  std::array<std::string, 2> ids;        // package ids, hexadecimal
+  std::array<std::uint64_t, 2> bytes{};  // of all entries
+  std::vector<Difference> differences;   // inputs, options, stage versions, libraries, tool, format
+  std::vector<EntryDifference> entries;  // in A's order, then those that only B has
+  std::vector<StageDifference> stages;   // in the order of the graph
+  std::uint64_t equal_entries = 0;
+  bool equal() const { return ids[0] == ids[1]; }
+};
+
+/// What differs between two packages and why, from their indices and provenance; reads no meshes or textures.
+/// Causes follow the graph of this build's stages: what an entry can depend on, not what it must have
+/// depended on. FormatError for packages that cannot be read.
+PackageDiff diff_packages(PackageReader& a, PackageReader& b);
+
+std::string diff_text(const PackageDiff& diff, const std::array<std::string, 2>& names);
+/// schemas/diff.v1.schema.json.
+nlohmann::ordered_json diff_json(const PackageDiff& diff, const std::array<std::string, 2>& names);
+
+}  // namespace texmesh

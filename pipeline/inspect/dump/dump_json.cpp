@@ -1,0 +1,277 @@
+#include "format/documents/viewing.h"
+#include "pipeline/inspect/dump/dump.h"
+#include "pipeline/inspect/dump/package_figures.h"
+#include "pipeline/inspect/provenance.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kGammas = 21;
+
+Json vector_json(const Vec3d& v) { return Json{v.x, v.y, v.z}; }
+
+std::uint64_t package_bytes(PackageReader& p) {
+  std::uint64_t bytes = 0;
+  for (const KindBytes& k : bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.index()))
+    bytes += k.bytes;
+  return bytes;
+}
+
+/// Every step function, with the viewing distance in object heights at which a step begins (null = 0, at any
+/// distance).
+Json steps_json(const std::vector<ManifestStep>& steps) {
+  Json list = Json::array();
+  for (const ManifestStep& s : steps) {
+    const bool any = s.up_to_px >= kAnyDisplayPx;
+    list.push_back({{"up_to_px", s.up_to_px},
+                    {"scale", s.scale},
+                    {"from_distance", any ? Json() : Json(viewing_distance(1, s.up_to_px, {}))}});
+  }
+  return list;
+}
+
+Json summary_json(PackageReader& p) {
+  const Manifest& m = p.manifest();
+  Json kinds = Json::array(), textures = Json::array();
+  for (const KindBytes& k : bytes_by_kind(m, p.store().read_manifest().size(), p.index()))
+    kinds.push_back({{"kind", k.kind}, {"entries", k.entries}, {"bytes", k.bytes}});
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& t = p.textures()[k];
+    textures.push_back({{"plane", k},
+                        {"image", t.image},
+                        {"mip", t.mip},
+                        {"base", t.mip > 0 ? t.base : k},
+                        {"name", t.name},
+                        {"role", t.role},
+                        {"width_px", t.width_px},
+                        {"height_px", t.height_px},
+                        {"channels", t.channels},
+                        {"fragments", stored_fragments(p.tables().planes[k])},
+                        {"rungs", t.rungs.size()}});
+    if (t.lossless) textures.back()["lossless"] = true;
+    if (!t.source_extension.empty()) textures.back()["source"] = t.source.path;
+  }
+  Json stream = Json::array();
+  if (m.stream)
+    for (const StreamFigures& f : stream_figures(p.split_stream_head()))
+      stream.push_back({{"scale", f.scale},
+                        {"triangles", f.triangles},
+                        {"points", f.points},
+                        {"blocks", f.blocks},
+                        {"bytes", f.bytes},
+                        {"connectivity", f.connectivity},
+                        {"positions", f.positions},
+                        {"uv", f.uv},
+                        {"others", f.others}});
+  const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
+  return {{"package",
+           {{"id", to_hex(p.id())},
+            {"version", {{"major", m.major}, {"minor", m.minor}}},
+            {"title", m.title},
+            {"tool", provenance.tool},
+            {"entries", p.index().size() + 2},
+            {"entry_bytes", package_bytes(p)}}},
+          {"object",
+           {{"origin", vector_json(m.origin)},
+            {"bounds_min", vector_json(m.bounds_min)},
+            {"bounds_max", vector_json(m.bounds_max)},
+            {"height", m.object_height},
+            {"surface_area", m.surface_area},
+            {"jnd", m.jnd}}},
+          {"steps", steps_json(m.steps)},
+          {"step_rules",
+           {{"jnd", steps_json(step_function(m.scales, StepRule::kJnd))},
+            {"error", steps_json(step_function(m.scales, StepRule::kError))},
+            {"edge", steps_json(step_function(m.scales, StepRule::kEdge))}}},
+          {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
+          {"stream", stream},
+          {"textures", textures},
+          {"bytes", kinds},
+          {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};
+}
+
+Json scales_json(PackageReader& p) {
+  Json list = Json::array();
+  for (const ManifestScale& s : p.manifest().scales)
+    list.push_back({{"scale", s.scale},
+                    {"triangles", s.triangles},
+                    {"vertices", s.vertices},
+                    {"bytes", s.glb.bytes},
+                    {"major", s.major},
+                    {"error_max", s.error_max},
+                    {"error_rms", s.error_rms},
+                    {"p95", s.p95},
+                    {"p99", s.p99},
+                    {"display_px_jnd", s.display_px_jnd},
+                    {"display_px_error", s.display_px_error},
+                    {"display_px_edge", s.display_px_edge},
+                    {"floor", s.floor},
+                    {"path", s.glb.path}});
+  return {{"scales", list}};
+}
+
+Json fragment_json(const PlaneTables& t, std::size_t i, const std::vector<float>& eta) {
+  Json bytes = Json::array(), features = Json::array();
+  for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
+  for (std::size_t s = 0; s <= t.scales; ++s) features.push_back(t.features[s * t.fragment_count() + i]);
+  return {{"fragment", i},
+          {"column", i % t.columns},
+          {"row", i / t.columns},
+          {"covered_texels", t.covered_texels[i]},
+          {"surface_fraction", t.surface_fraction[i]},
+          {"eta", eta[i]},
+          {"vqp", t.vqp[i]},
+          {"z", t.z[i]},
+          {"i", t.i[i]},
+          {"zeta", t.zeta[i]},
+          {"m", t.m[i]},
+          {"features", features},
+          {"bytes", bytes}};
+}
+
+Json fragments_json(PackageReader& p) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& info = p.textures()[k];
+    const PlaneTables& t = p.tables().planes[k];
+    const std::vector<float> eta = eta_of(t, 0);
+    Json fragments = Json::array();
+    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, i, eta));
+    planes.push_back({{"plane", k},
+                      {"columns", info.columns},
+                      {"rows", info.rows},
+                      {"fragment_width_px", info.fragment_width_px},
+                      {"fragment_height_px", info.fragment_height_px},
+                      {"grid_reason", info.grid_reason},
+                      {"rung_quality", info.rung_quality},
+                      {"fragments", fragments}});
+  }
+  return {{"fragments", planes}};
+}
+
+Json ladder_json(PackageReader& p) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& info = p.textures()[k];
+    const auto figures = rung_figures(p.tables().planes[k]);
+    Json rungs = Json::array();
+    for (std::size_t r = 0; r < figures.size(); ++r)
+      rungs.push_back({{"rung", r},
+                       {"quality", figures[r].quality},
+                       {"bytes", figures[r].bytes},
+                       {"table_bytes", figures[r].table_bytes},
+                       {"mse", figures[r].mse},
+                       {"ssim", figures[r].ssim},
+                       {"surface_ssim", figures[r].surface_ssim},
+                       {"path", info.rungs[r].path}});
+    planes.push_back({{"plane", k},
+                      {"codec", codec_traits(info.codec).id},
+                      {"preview_width_px", info.preview_width_px},
+                      {"preview_height_px", info.preview_height_px},
+                      {"preview_bytes", info.preview.bytes},
+                      {"rungs", rungs}});
+  }
+  return {{"ladder", planes}};
+}
+
+Json allocation_json(const PlaneTables& t, std::uint32_t scale, std::optional<double> gamma) {
+  const AllocationFigures f = allocation_figures(t, scale, gamma);
+  Json q = Json::array(), rungs = Json::array(), bytes = Json::array(), total = Json::array();
+  for (std::size_t i = 0; i < t.fragment_count(); ++i) {
+    const bool stored = f.fragment_rung[i] != kSkipped;
+    q.push_back(stored ? Json(f.fragment_quality[i]) : Json());
+    rungs.push_back(stored ? Json(f.fragment_rung[i]) : Json());
+    bytes.push_back(stored ? Json(f.fragment_bytes[i]) : Json());
+  }
+  for (std::size_t g = 0; g < kGammas; ++g) total.push_back(t.total_bytes[scale * kGammas + g]);
+  return {{"scale", scale},         {"quality", t.quality[scale]},
+          {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
+          {"total_bytes", total},   {"fragment_quality", q},
+          {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
+}
+
+Json tables_json(PackageReader& p, std::optional<double> gamma) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const PlaneTables& t = p.tables().planes[k];
+    Json scales = Json::array();
+    for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s, gamma));
+    planes.push_back({{"plane", k},
+                      {"allocation", allocation_name(t)},
+                      {"quality_width", t.quality_width},
+                      {"log_width", t.log_width},
+                      {"quality_min", t.quality_min},
+                      {"quality_max", t.quality_max},
+                      {"size_model",
+                       {{"a", t.model_a},
+                        {"b", t.model_b},
+                        {"r", t.model_r},
+                        {"correlation", t.model_correlation},
+                        {"error", t.model_error}}},
+                      {"scales", scales}});
+  }
+  const QualityTable& q = p.quality();
+  Json samples = Json::array();
+  for (std::size_t s = 0; s < q.scales.size(); ++s)
+    for (std::size_t r = 0; r < q.rungs.size(); ++r)
+      samples.push_back({{"scale", q.scales[s]},
+                         {"quality", q.rungs[r]},
+                         {"ssim", q.ssim[s * q.rungs.size() + r]},
+                         {"difference", q.difference[s * q.rungs.size() + r]}});
+  return {{"tables", planes},
+          {"measured_quality", {{"views", q.views}, {"size_px", q.size_px}, {"samples", samples}}}};
+}
+
+Json entry_json(const std::string& path, std::uint64_t offset, std::uint64_t bytes,
+                const std::string& digest) {
+  return {{"path", path}, {"offset", offset}, {"bytes", bytes}, {"sha256", digest}};
+}
+
+Json entries_json(PackageReader& p) {
+  Json list = Json::array();
+  for (const ContainerEntry& e : p.store().list())
+    if (e.path == kManifestPath) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(p.id())));
+  const EntryRef& index = p.manifest().index;
+  list.push_back(entry_json(index.path, index.offset, index.bytes, to_hex(index.digest)));
+  for (const EntryRef& e : p.index()) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
+  return {{"entries", list}};
+}
+
+Json provenance_json(PackageReader& p) {
+  const auto bytes = p.entry(p.manifest().provenance);
+  read_provenance(bytes);  // refuse what verify would refuse
+  return {{"provenance", Json::parse(bytes.begin(), bytes.end())}};
+}
+
+Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
+  switch (part) {
+    case DumpPart::kSummary:
+      return summary_json(p);
+    case DumpPart::kScales:
+      return scales_json(p);
+    case DumpPart::kFragments:
+      return fragments_json(p);
+    case DumpPart::kLadder:
+      return ladder_json(p);
+    case DumpPart::kTables:
+      return tables_json(p, gamma);
+    case DumpPart::kEntries:
+      return entries_json(p);
+    default:
+      return provenance_json(p);
+  }
+}
+
+}  // namespace
+
+Json dump_json(PackageReader& package, DumpPart part, std::optional<double> gamma) {
+  if (part != DumpPart::kAll) return part_json(package, part, gamma);
+  Json all = Json::object();
+  for (std::size_t k = 0; k + 1 < kDumpParts.size(); ++k)
+    all.update(part_json(package, static_cast<DumpPart>(k), gamma));
+  return all;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,69 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "delivery/cpp/package/plane_streams.h"
+#include "format/base/finding.h"
+#include "format/base/vec.h"
+#include "format/documents/manifest.h"
+#include "format/documents/tables.h"
+#include "pipeline/inspect/provenance.h"
+#include "stages/base/run_context.h"
+
+namespace texmesh {
+
+// The rules of verify.h, each over documents that have been read or bytes whose place is known. All add
+// findings and go on.
+
+/// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse, the step
+/// function.
+void check_manifest(const Manifest& manifest, Findings& findings);
+
+/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews and first
+/// picture.
+void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
+
+/// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
+void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                    const PackageTables& tables, Findings& findings);
+
+/// One plane's tables in themselves: stored fragments, order, surface, D_i(Gamma) against a recomputation.
+void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
+                        Findings& findings);
+
+void check_quality(const Manifest& manifest, const PackageTables& tables, const QualityTable& quality,
+                   Findings& findings);
+void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                      const Provenance& provenance, Findings& findings);
+
+/// A GLB and what the manifest says about it. Returns its positions, sorted; none when the GLB is broken.
+std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
+                              const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
+                              Findings& findings);
+
+/// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty list says
+/// nothing.
+void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,
+                  const ManifestScale& coarser, const std::vector<Vec3d>& coarser_positions,
+                  Findings& findings);
+
+/// The stream of vertex splits: its head against the manifest, every block, and the triangles of every scale
+/// it passes. FormatError where it cannot be decoded.
+void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes,
+                        const RunContext& context, Findings& findings);
+
+void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
+
+/// The source image that a plane keeps: of that format and the plane's size, and it decodes.
+void check_source(const TextureInfo& texture, std::vector<std::uint8_t> bytes, Findings& findings);
+
+/// The table streams of all rungs: each as the codec has it, of the size the tables say.
+void check_table_streams(const TextureInfo& texture, const PlaneTables& tables,
+                         std::span<const std::uint8_t> pack, Findings& findings);
+
+/// All fragments of the rung that was added to `streams` last: digest, and the decoded image's size and
+/// channels. Returns the number of fragments looked at.
+std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& tables, std::uint32_t rung,
+                         const PlaneStreams& streams, const RunContext& context, Findings& findings);
+
+}  // namespace texmesh

@@ -1,0 +1,46 @@
+#include <algorithm>
+
+#include "format/container/layout.h"
+#include "format/split/split_stream.h"
+#include "pipeline/inspect/verify/verify_checks.h"
+
+namespace texmesh {
+namespace {
+
+void check_head(const Manifest& m, std::span<const std::uint8_t> bytes, const SplitStreamHead& head,
+                Findings& findings) {
+  if (!findings.require(m.stream.has_value(), "reference", kManifestPath, "/stream",
+                        std::string("where ") + kSplitStreamPath + " stands", "nothing"))
+    return;
+  if (findings.require_equal(head.bytes, m.stream->head_bytes, "reference", kManifestPath,
+                             "/stream/headBytes"))
+    findings.require_equal(to_hex(sha256(bytes.first(static_cast<std::size_t>(head.bytes)))),
+                           to_hex(m.stream->head_digest), "reference", kManifestPath, "/stream/headSha256");
+  const SplitBlock& last = head.blocks.back();
+  findings.require_equal<std::uint64_t>(last.offset + last.bytes(), bytes.size(), "split-stream",
+                                        kSplitStreamPath, "end of the last block");
+}
+
+}  // namespace
+
+void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, const RunContext& context,
+                        Findings& findings) {
+  const SplitStreamHead head = read_split_head(bytes);
+  check_head(m, bytes, head, findings);
+  // The manifest's counts bound nothing here: on a coarse grid most faces of a stream may show nothing, and
+  // the files have none of them. What the reader makes is bounded by the bytes of the blocks.
+  SplitStreamReader reader(head);
+  for (std::size_t k = 0; k < head.scales.size(); ++k) {
+    context.check_cancelled();
+    reader.read_to_scale(k, bytes);
+    const SplitScale& s = head.scales[k];
+    const std::string place = "scale " + std::to_string(s.scale);
+    const auto scale = std::ranges::find(m.scales, s.scale, &ManifestScale::scale);
+    if (findings.require(scale != m.scales.end(), "split-stream", kSplitStreamPath, place,
+                         "a scale of the manifest", "none"))
+      findings.require_equal(scale->triangles, s.triangles, "split-stream", kSplitStreamPath,
+                             place + ", triangles");
+  }
+}
+
+}  // namespace texmesh

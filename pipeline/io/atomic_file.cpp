@@ -1,0 +1,206 @@
+#include "pipeline/io/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include "format/base/errors.h"
+#include "pipeline/io/resource_error.h"
+
+namespace texmesh {
+namespace {
+
+struct Descriptor {
+  int fd = -1;
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+};
+
+[[noreturn]] void fail(const std::string& path, const char* step) {
+  throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
+}
+
+void write_all(int fd, std::span<const std::uint8_t> bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), 1 << 24));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail(path, "write");
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+}
+
+void sync_folder(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  Descriptor d{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (d.fd < 0 || ::fsync(d.fd) != 0) {
+    // Some file systems cannot sync folders; the rename itself stands.
+    if (errno != EINVAL && errno != ENOTSUP) fail(path, "fsync of the folder");
+  }
+}
+
+std::string own_temporary(const std::string& path) {
+  static std::atomic<std::size_t> counter{0};
+  return temporary_name(path, counter++);
+}
+
+/// The descriptor's file still stands under this name.
+bool stands_at(int fd, const std::string& path) {
+  struct stat own {
+  }, there{};
+  return ::fstat(fd, &own) == 0 && ::lstat(path.c_str(), &there) == 0 && own.st_dev == there.st_dev &&
+         own.st_ino == there.st_ino;
+}
+
+/// An empty file under `temp`, locked, which is what tells it from one that a killed process left. -1 with
+/// errno; EEXIST when somebody else has it.
+int open_temporary(const std::string& temp) {
+  constexpr int kAttempts = 100;  // each is lost only to a cleaner that has just removed the file
+  for (int i = 0; i < kAttempts; ++i) {
+    const int fd = ::open(temp.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (fd < 0) return -1;
+    const bool taken = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    if (!taken && stands_at(fd, temp) && ::ftruncate(fd, 0) == 0) return fd;
+    const int error = taken ? EEXIST : errno;
+    const bool lost = !taken && !stands_at(fd, temp);
+    ::close(fd);
+    errno = error;
+    if (!lost) return -1;
+  }
+  errno = EEXIST;
+  return -1;
+}
+
+/// What stands before ".tmp<digits>-<digits>"; "" when the name does not end so.
+std::string_view without_temporary_ending(std::string_view name) {
+  const std::size_t at = name.rfind(".tmp");
+  if (at == std::string_view::npos) return {};
+  std::string_view rest = name.substr(at + 4);
+  const std::size_t dash = rest.find('-');
+  const auto is_number = [](std::string_view s) {
+    return !s.empty() && s.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  if (dash == std::string_view::npos || !is_number(rest.substr(0, dash)) || !is_number(rest.substr(dash + 1)))
+    return {};
+  return name.substr(0, at);
+}
+
+/// Follows symbolic links, dangling ones too. More than 40 of them lead nowhere, as for open().
+std::string behind_links(const std::string& path) {
+  std::filesystem::path at = path;
+  std::error_code ec;
+  for (int i = 0; i < 40 && std::filesystem::is_symlink(at, ec); ++i) {
+    const std::filesystem::path there = std::filesystem::canonical(at, ec);
+    if (!ec) return there.string();
+    at = at.parent_path() / std::filesystem::read_symlink(at, ec);
+  }
+  if (std::filesystem::is_symlink(at, ec)) {
+    errno = ELOOP;
+    fail(path, "open");
+  }
+  return at.string();
+}
+
+}  // namespace
+
+std::string temporary_name(const std::string& path, std::size_t number) {
+  return path + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(number);
+}
+
+void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
+                           const std::string& temporary) {
+  std::string temp = temporary.empty() ? own_temporary(path) : temporary;
+  Descriptor d{open_temporary(temp)};
+  for (int i = 0; d.fd < 0 && errno == EEXIST && i < 100; ++i) {
+    temp = own_temporary(path);
+    d.fd = open_temporary(temp);
+  }
+  if (d.fd < 0) fail(path, "open");
+  try {
+    write_all(d.fd, bytes, path);
+    if (::fdatasync(d.fd) != 0) fail(path, "fdatasync");
+    // Under the lock: a cleaner must not take the finished file for one that was left.
+    if (::rename(temp.c_str(), path.c_str()) != 0) fail(path, "rename");
+  } catch (...) {
+    ::unlink(temp.c_str());
+    throw;
+  }
+  sync_folder(path);
+}
+
+bool is_special_file(const std::string& path) {
+  // /dev/stdout is a link to what may be a regular file, which somebody else holds open.
+  for (const char* folder : {"/dev/", "/proc/"})
+    if (path.starts_with(folder) && !path.starts_with("/dev/shm/")) return true;
+  std::error_code ec;
+  const std::filesystem::file_status status = std::filesystem::status(path, ec);
+  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
+         !std::filesystem::is_directory(status);
+}
+
+void check_output_file(const std::string& path) {
+  const std::filesystem::path file(path);
+  std::error_code error;
+  if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
+  if (std::filesystem::is_directory(file, error))
+    throw InputError(path, "", "a file that can be written", "a folder");
+  const std::string folder = file.parent_path().string();
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    throw InputError(path, "", "a file that can be written", std::strerror(errno));
+}
+
+void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
+                       const std::string& temporary) {
+  if (is_special_file(path)) {
+    const Descriptor d{::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
+    if (d.fd < 0) fail(path, "open");
+    return write_all(d.fd, bytes, path);
+  }
+  const std::string target = behind_links(path);
+  write_file_atomically(target, bytes, target == path ? temporary : "");
+}
+
+bool remove_stale_temporary(const std::string& path) {
+  if (without_temporary_ending(std::filesystem::path(path).filename().string()).empty()) return false;
+  const Descriptor d{::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)};
+  return d.fd >= 0 && ::flock(d.fd, LOCK_EX | LOCK_NB) == 0 && stands_at(d.fd, path) &&
+         ::unlink(path.c_str()) == 0;
+}
+
+std::size_t remove_stale_temporaries(const std::string& folder, const std::string& ending) {
+  std::vector<std::string> found;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, ec), end; !ec && it != end;
+       it.increment(ec)) {
+    const std::string name = it->path().filename().string();
+    const std::string_view stem = without_temporary_ending(name);
+    if (!stem.empty() && stem.ends_with(ending)) found.push_back(it->path().string());
+  }
+  return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), remove_stale_temporary));
+}
+
+bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes) {
+  Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  struct stat st {};
+  if (d.fd < 0 || ::fstat(d.fd, &st) != 0 || !S_ISREG(st.st_mode) ||
+      static_cast<std::uint64_t>(st.st_size) != bytes.size())
+    return false;
+  std::vector<std::uint8_t> buffer(1 << 20);
+  while (!bytes.empty()) {
+    const ssize_t n = ::read(d.fd, buffer.data(), std::min(buffer.size(), bytes.size()));
+    if (n <= 0 || std::memcmp(buffer.data(), bytes.data(), static_cast<std::size_t>(n)) != 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+}  // namespace texmesh

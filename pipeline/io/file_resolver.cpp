@@ -1,0 +1,241 @@
+#include "pipeline/io/file_resolver.h"
+
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "pipeline/io/resource_error.h"
+#include "pipeline/io/uri.h"
+
+namespace texmesh {
+namespace {
+
+// O_NONBLOCK: opening a FIFO or a device returns at once, fstat then refuses it.
+constexpr int kReadFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
+constexpr const char* kRegularFile = "a regular file, no symbolic link, beneath the model's folder";
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  ~Descriptor() { reset(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+  void reset(int fd = -1) {
+    if (fd_ >= 0) ::close(fd_);
+    fd_ = fd;
+  }
+
+ private:
+  int fd_;
+};
+
+std::string message(int error) { return std::generic_category().message(error); }
+
+/// What says nothing about the file is an error of the machine.
+[[noreturn]] void fail_to_read(const std::string& name, const std::string& place, const char* expected,
+                               int error) {
+  switch (error) {
+    case EACCES:  // another moment or another user may read it: not the model is wrong
+    case EIO:
+    case EMFILE:
+    case ENFILE:
+    case ENOMEM:
+    case ESTALE:
+    case ETIMEDOUT:
+    case EAGAIN:
+      throw ResourceError(name, place, expected, message(error));
+    default:
+      throw InputError(name, place, expected, message(error));
+  }
+}
+
+template <class F>
+auto retry_on_signal(F&& call) {
+  for (;;) {
+    const auto result = call();
+    if (result >= 0 || errno != EINTR) return result;
+  }
+}
+
+/// -1 with errno; ENOSYS also stands for "this sandbox does not let openat2 through".
+int open_with_openat2(int folder, const std::string& name) {
+  open_how how{};
+  how.flags = kReadFlags | O_NOFOLLOW;
+  how.resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS | RESOLVE_NO_MAGICLINKS;
+  for (int attempt = 0; attempt < 16; ++attempt) {
+    const long fd = ::syscall(SYS_openat2, folder, name.c_str(), &how, sizeof how);
+    if (fd >= 0) return static_cast<int>(fd);
+    // EAGAIN: something was renamed meanwhile. EPERM: what container runtimes without openat2 answer.
+    if (errno == EPERM || errno == EINVAL || errno == E2BIG) errno = ENOSYS;
+    if (errno != EINTR && errno != EAGAIN) return -1;
+  }
+  errno = ENOSYS;
+  return -1;
+}
+
+/// `name` has passed check_relative_name, so no component is "..".
+int open_component_wise(int folder, const std::string& name) {
+  Descriptor held;
+  int at = folder;
+  for (std::size_t begin = 0;;) {
+    const std::size_t end = std::min(name.find('/', begin), name.size());
+    const std::string part = name.substr(begin, end - begin);
+    const bool last = end == name.size();
+    begin = end + 1;
+    if (!last && (part.empty() || part == ".")) continue;
+    const int flags = last ? kReadFlags | O_NOFOLLOW : O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
+    const int fd = retry_on_signal([&] { return ::openat(at, part.c_str(), flags); });
+    if (fd < 0) {
+      // O_PATH|O_DIRECTORY|O_NOFOLLOW says ENOTDIR for a link to a folder; openat2 says ELOOP.
+      struct stat s {};
+      if (errno == ENOTDIR && ::fstatat(at, part.c_str(), &s, AT_SYMLINK_NOFOLLOW) == 0) {
+        errno = S_ISLNK(s.st_mode) ? ELOOP : ENOTDIR;
+      }
+      return -1;
+    }
+    held.reset(fd);
+    at = fd;
+    if (last) return held.release();
+  }
+}
+
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a FIFO";
+  if (S_ISSOCK(mode)) return "a socket";
+  if (S_ISCHR(mode) || S_ISBLK(mode)) return "a device";
+  return "something else";
+}
+
+/// The stamp is taken before the first byte is read: a change while reading gives another one later.
+FileStamp checked_stamp(int fd, const std::string& name, const std::string& expected) {
+  struct stat s {};
+  if (::fstat(fd, &s) != 0) fail_to_read(name, "", "a readable file", errno);
+  if (!S_ISREG(s.st_mode)) throw InputError(name, "", expected, kind_of(s.st_mode));
+  return stamp_of(s);
+}
+
+std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::string& name,
+                                   const std::string& expected, FileStamp& stamp) {
+  stamp = checked_stamp(fd, name, expected);
+  const auto too_long = [&](std::uint64_t size) {
+    return InputError(name, "", "a file of at most " + std::to_string(max_bytes) + " bytes",
+                      std::to_string(size));
+  };
+  const std::uint64_t declared = stamp.bytes;
+  if (declared > max_bytes) throw too_long(declared);
+  // The file may grow or shrink meanwhile, and files of /proc declare 0 bytes: read until its end, not until
+  // st_size.
+  std::vector<std::uint8_t> bytes(declared + 1);
+  for (std::size_t size = 0;;) {
+    if (size > max_bytes) throw too_long(size);
+    if (size == bytes.size()) bytes.resize(size + (std::size_t{1} << 16));
+    const ssize_t got = retry_on_signal([&] { return ::read(fd, bytes.data() + size, bytes.size() - size); });
+    if (got < 0) fail_to_read(name, "byte " + std::to_string(size), "readable bytes", errno);
+    size += static_cast<std::size_t>(got);
+    if (got == 0) {
+      bytes.resize(size);
+      return bytes;
+    }
+  }
+}
+
+}  // namespace
+
+FileResolver::FileResolver(const std::filesystem::path& folder, Method method)
+    : walk_(method == Method::kWalk) {
+  const std::string name = folder.empty() ? "." : folder.string();
+  folder_ = ::open(name.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
+  if (folder_ < 0) throw InputError(name, "", "the model's folder", message(errno));
+}
+
+FileResolver::~FileResolver() { ::close(folder_); }
+
+std::size_t FileResolver::record(const std::string& uri) {
+  const auto [it, is_new] = index_of_.try_emplace(uri, requests_.size());
+  if (is_new) requests_.push_back({uri, false, {}, 0, {}});
+  return it->second;
+}
+
+int FileResolver::open_beneath(const std::string& uri) {
+  if (!walk_) {
+    const int fd = open_with_openat2(folder_, uri);
+    if (fd >= 0 || errno != ENOSYS) return fd;
+    walk_ = true;
+  }
+  return open_component_wise(folder_, uri);
+}
+
+/// Opens a uri that was recorded; -1 when there is no such file.
+int FileResolver::open_regular(const std::string& uri) {
+  check_relative_name(uri, "", "");
+  const int fd = open_beneath(uri);
+  if (fd >= 0) return fd;
+  switch (errno) {
+    case ENOENT:
+    case ENOTDIR:
+    case ENAMETOOLONG:
+      return -1;
+    case ELOOP:
+    case EXDEV:
+      throw InputError(uri, "", kRegularFile, "a symbolic link");
+    case ENXIO:
+      throw InputError(uri, "", kRegularFile, "a socket");
+    default:
+      fail_to_read(uri, "", "a readable file", errno);
+  }
+}
+
+std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
+  const std::size_t index = record(uri);
+  try {
+    const Descriptor fd(open_regular(uri));
+    if (fd.get() < 0) return std::nullopt;
+    FileStamp stamp;
+    std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
+    requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp};
+    return bytes;
+  } catch (const ResourceError&) {
+    failed_for_resources_ = true;
+    throw;
+  }
+}
+
+void FileResolver::expect(std::vector<FileRequest> known) {
+  for (FileRequest& r : known)
+    if (r.found) expected_[r.uri] = std::move(r);
+}
+
+bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {
+  const auto known = expected_.find(uri);
+  if (known != expected_.end()) {
+    const std::size_t index = record(uri);
+    const Descriptor fd(open_regular(uri));
+    if (fd.get() < 0) return false;
+    if (checked_stamp(fd.get(), uri, kRegularFile) == known->second.stamp) {
+      requests_[index] = known->second;
+      return true;
+    }
+  }
+  return read(uri, max_bytes).has_value();
+}
+
+std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
+                                          FileStamp* stamp) {
+  const std::string name = path.string();
+  const Descriptor fd(retry_on_signal([&] { return ::open(name.c_str(), kReadFlags); }));
+  if (fd.get() < 0) fail_to_read(name, "", "a readable file", errno);
+  FileStamp own;
+  return read_all(fd.get(), max_bytes, name, "a regular file", stamp ? *stamp : own);
+}
+
+}  // namespace texmesh

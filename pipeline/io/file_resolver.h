@@ -1,0 +1,72 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "format/base/sha256.h"
+#include "pipeline/import/import.h"
+#include "pipeline/io/file_stamp.h"
+
+namespace texmesh {
+
+/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
+/// bytes become part of the cache key: the same requests with the same answers give the same model.
+struct FileRequest {
+  std::string uri;  // as the model names it; "" = the model itself
+  bool found = false;
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+  FileStamp stamp;  // when it was read; no part of any key
+  friend bool operator==(const FileRequest&, const FileRequest&) = default;
+};
+
+/// Opens files beneath one folder only: openat2 with RESOLVE_BENEATH, RESOLVE_NO_SYMLINKS and
+/// RESOLVE_NO_MAGICLINKS, or, where the kernel or a sandbox has no openat2, component by component with
+/// O_NOFOLLOW. Regular files only; a FIFO does not block. What cannot be opened for want of permission counts
+/// as missing. The folder itself may be reached over symbolic links: the user named it, not the model. Not
+/// thread-safe.
+class FileResolver : public Resolver {
+ public:
+  enum class Method : std::uint8_t { kBest, kWalk };  // kWalk: as if there were no openat2
+  /// Throws InputError when `folder` is not a folder that can be opened; "" is the current one.
+  explicit FileResolver(const std::filesystem::path& folder, Method method = Method::kBest);
+  ~FileResolver() override;
+  FileResolver(const FileResolver&) = delete;
+  FileResolver& operator=(const FileResolver&) = delete;
+
+  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) override;
+
+  /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.
+  void expect(std::vector<FileRequest> known);
+  /// As read(), but for the digest only: reads the file only when its stamp is not an expected one. False
+  /// when it is not there.
+  bool look(const std::string& uri, std::uint64_t max_bytes);
+
+  /// A read has failed for reasons of the machine (ResourceError), whatever the reader made of that.
+  bool failed_for_resources() const { return failed_for_resources_; }
+
+  /// Every uri that was asked for, once, in the order of first use; refused ones as not found.
+  const std::vector<FileRequest>& requests() const { return requests_; }
+
+ private:
+  int open_beneath(const std::string& uri);
+  int open_regular(const std::string& uri);
+  std::size_t record(const std::string& uri);
+
+  int folder_ = -1;
+  bool walk_ = false, failed_for_resources_ = false;
+  std::vector<FileRequest> requests_;
+  std::map<std::string, std::size_t> index_of_;
+  std::map<std::string, FileRequest> expected_;
+};
+
+/// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
+/// missing, not a regular file, unreadable or longer than max_bytes; ResourceError where the machine is to
+/// blame.
+std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
+                                          FileStamp* stamp = nullptr);
+
+}  // namespace texmesh

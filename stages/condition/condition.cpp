@@ -1,0 +1,398 @@
+#include "stages/condition/condition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "stages/condition/manifold.h"
+#include "stages/geometry/mesh_topology.h"
+#include "stages/geometry/weld.h"
+
+namespace texmesh {
+namespace {
+
+void require(bool sound, const char* place, const char* expected, std::size_t found) {
+  if (!sound) throw StageError("condition", place, expected, std::to_string(found));
+}
+
+void check_indices(const Mesh& m) {
+  require(m.triangles.size() <= kNoIndex / 3, "triangles", "at most 2^32 / 3", m.triangles.size());
+  for (std::uint32_t p : m.wedge_position)
+    require(p < m.positions.size(), "wedge_position", "an index of a position", p);
+  for (const Triangle& t : m.triangles)
+    for (std::uint32_t w : t) require(w < m.wedge_count(), "triangles", "an index of a wedge", w);
+  require(m.triangle_material.size() == m.triangles.size(), "triangle_material", "one per triangle",
+          m.triangle_material.size());
+  require(m.triangle_part.size() == m.triangles.size(), "triangle_part", "one per triangle",
+          m.triangle_part.size());
+  for (std::size_t size : {m.uv0.size(), m.uv1.size(), m.normals.size(), m.colours.size(), m.tangents.size()})
+    require(size == 0 || size == m.wedge_count(), "wedge attributes", "none or one per wedge", size);
+}
+
+bool finite(float x) { return std::isfinite(x); }
+
+/// Turns -0 into +0, so that equal attributes have equal bits, and what is not finite into `fallback`.
+bool clean(float& x, float fallback) {
+  const bool sound = finite(x);
+  x = sound ? x + 0.0f : fallback;
+  return sound;
+}
+
+/// Unit length; zero where there is no direction, to be filled in by smooth normals.
+bool clean_normal(Vec3f& n) {
+  const double l = finite(n.x) && finite(n.y) && finite(n.z) ? length(to_double(n)) : 0;
+  if (l == 0) {
+    n = {};
+    return false;
+  }
+  // Normals of a source are rounded; renormalising those that are unit within 1e-6 would only churn their
+  // bits.
+  if (std::fabs(l - 1) > 1e-6) n = to_float(to_double(n) * (1 / l));
+  n = n + Vec3f{0, 0, 0};
+  return true;
+}
+
+/// A copy of the wedges and attributes of `in` (nothing else) with sound attributes.
+Mesh clean_attributes(const Mesh& in, std::uint64_t& repaired) {
+  Mesh m;
+  m.wedge_position = in.wedge_position;
+  m.uv0 = in.uv0;
+  m.uv1 = in.uv1;
+  m.normals = in.normals;
+  m.colours = in.colours;
+  m.tangents = in.tangents;
+  m.positions = in.positions;
+  for (std::size_t w = 0; w < m.wedge_count(); ++w) {
+    bool sound = true;
+    for (auto* uv : {&m.uv0, &m.uv1})
+      if (!uv->empty()) {
+        sound = clean((*uv)[w].x, 0) && sound;
+        sound = clean((*uv)[w].y, 0) && sound;
+      }
+    if (!m.colours.empty())
+      for (float* x : {&m.colours[w].x, &m.colours[w].y, &m.colours[w].z, &m.colours[w].w})
+        sound = clean(*x, 1) && sound;
+    if (!m.normals.empty()) sound = clean_normal(m.normals[w]) && sound;
+    if (!m.tangents.empty())
+      for (float* x : {&m.tangents[w].x, &m.tangents[w].y, &m.tangents[w].z, &m.tangents[w].w})
+        sound = clean(*x, 0) && sound;
+    repaired += !sound;
+  }
+  return m;
+}
+
+/// The triangles that stay, with welded wedges and, in `corner`, welded positions (numbers of the input).
+struct Kept {
+  std::vector<std::uint32_t> source;
+  std::vector<Triangle> wedges;
+  std::vector<std::uint32_t> corner;
+
+  void add(std::uint32_t t, const Triangle& w, const Triangle& p) {
+    source.push_back(t);
+    wedges.push_back(w);
+    corner.insert(corner.end(), p.begin(), p.end());
+  }
+  Triangle positions(std::size_t i) const { return {corner[3 * i], corner[3 * i + 1], corner[3 * i + 2]}; }
+  Kept filter(const std::vector<bool>& drop) const {
+    Kept out;
+    for (std::size_t i = 0; i < source.size(); ++i)
+      if (!drop[i]) out.add(source[i], wedges[i], positions(i));
+    return out;
+  }
+};
+
+bool has_area(const std::vector<Vec3f>& positions, const Triangle& t) {
+  const Vec3d a = to_double(positions[t[0]]), b = to_double(positions[t[1]]), c = to_double(positions[t[2]]);
+  return !(cross(b - a, c - a) == Vec3d{});
+}
+
+Kept keep_sound_triangles(const Mesh& in, const std::vector<std::uint32_t>& position_weld,
+                          const std::vector<std::uint32_t>& wedge_weld, ConditionReport& report) {
+  Kept kept;
+  for (std::uint32_t t = 0; t < in.triangles.size(); ++t) {
+    Triangle w{}, p{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = position_weld[in.wedge_position[in.triangles[t][k]]];
+      w[k] = wedge_weld[in.triangles[t][k]];
+    }
+    if (p[0] == kNoIndex || p[1] == kNoIndex || p[2] == kNoIndex)
+      ++report.non_finite_triangles;
+    else if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0])
+      ++report.degenerate_triangles;
+    else
+      kept.add(t, w, p);
+  }
+  return kept;
+}
+
+Kept drop_duplicates(const Mesh& in, const Kept& kept, ConditionReport& report) {
+  struct Key {
+    Triangle wedges;
+    std::uint32_t material_part, index;
+    auto tie() const { return std::tie(wedges, material_part); }
+  };
+  // Buckets by the lowest wedge keep the sorts short.
+  std::vector<std::uint32_t> start(in.wedge_count() + 1, 0);
+  const auto lowest = [](const Triangle& w) { return std::min({w[0], w[1], w[2]}); };
+  for (const Triangle& w : kept.wedges) ++start[lowest(w) + 1];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<Key> keys(kept.wedges.size());
+  std::vector<std::uint32_t> at(start.begin(), start.end() - 1);
+  for (std::uint32_t i = 0; i < kept.wedges.size(); ++i) {
+    Triangle w = kept.wedges[i];
+    std::rotate(w.begin(), std::min_element(w.begin(), w.end()), w.end());
+    const std::uint32_t t = kept.source[i];
+    keys[at[w[0]]++] = {w, std::uint32_t{in.triangle_material[t]} << 16 | in.triangle_part[t], i};
+  }
+  std::vector<bool> drop(kept.source.size(), false);
+  std::uint64_t dropped = 0;
+  for (std::size_t w = 0; w + 1 < start.size(); ++w) {
+    const auto begin = keys.begin() + start[w], end = keys.begin() + start[w + 1];
+    std::sort(begin, end, [](const Key& a, const Key& b) {
+      return a.tie() != b.tie() ? a.tie() < b.tie() : a.index < b.index;
+    });
+    for (auto i = begin; i != end; ++i)
+      if (i != begin && i->tie() == (i - 1)->tie()) {
+        drop[i->index] = true;
+        ++dropped;
+      }
+  }
+  report.duplicate_triangles = dropped;
+  return dropped ? kept.filter(drop) : kept;
+}
+
+/// Triangles without area whose edges have at most one neighbour: nothing gapes without them.
+Kept drop_slivers(const Mesh& in, const Kept& kept, EdgeTable& edges, ConditionReport& report) {
+  std::vector<bool> drop(kept.source.size(), false);
+  std::uint64_t dropped = 0;
+  std::vector<std::uint8_t> shared;
+  for (std::size_t i = 0; i < kept.source.size(); ++i) {
+    if (has_area(in.positions, kept.positions(i))) continue;
+    if (shared.empty()) {
+      shared.assign(kept.source.size(), 0);
+      for (std::size_t e = 0; e < edges.edge_count(); ++e)
+        if (edges.edge(e).size() > 1)
+          for (std::uint32_t h : edges.edge(e)) ++shared[h / 3];
+    }
+    drop[i] = shared[i] < 2;
+    ++(drop[i] ? dropped : report.slivers_kept);
+  }
+  report.degenerate_triangles += dropped;
+  if (dropped == 0) return kept;
+  Kept out = kept.filter(drop);
+  edges = group_edges(out.corner, in.positions.size());
+  return out;
+}
+
+void count_edges(const EdgeTable& edges, ConditionReport& report) {
+  for (std::size_t e = 0; e < edges.edge_count(); ++e) {
+    report.boundary_edges += edges.edge(e).size() == 1;
+    report.non_manifold_edges_found += edges.edge(e).size() > 2;
+  }
+}
+
+/// New numbers for the positions in use: those of the input in its order, then those that splits added.
+std::vector<std::uint32_t> number_positions(const Mesh& in, const ManifoldSplit& split,
+                                            ConditionedMesh& out) {
+  const auto old_count = static_cast<std::uint32_t>(in.positions.size());
+  std::vector<std::uint32_t> number(old_count + split.split_from.size(), kNoIndex);
+  for (std::uint32_t p : split.corner_position) number[p] = 0;
+  for (std::uint32_t p = 0; p < number.size(); ++p) {
+    if (number[p] == kNoIndex) continue;
+    number[p] = static_cast<std::uint32_t>(out.mesh.positions.size());
+    const std::uint32_t source = p < old_count ? p : split.split_from[p - old_count];
+    out.mesh.positions.push_back(in.positions[source] + Vec3f{0, 0, 0});
+    out.position_source.push_back(source);
+    out.twin.push_back(number[source]);
+  }
+  return number;
+}
+
+void append_wedge(const Mesh& from, std::uint32_t w, std::uint32_t position, Mesh& to) {
+  to.wedge_position.push_back(position);
+  if (!from.uv0.empty()) to.uv0.push_back(from.uv0[w]);
+  if (!from.uv1.empty()) to.uv1.push_back(from.uv1[w]);
+  if (!from.normals.empty()) to.normals.push_back(from.normals[w]);
+  if (!from.colours.empty()) to.colours.push_back(from.colours[w]);
+  if (!from.tangents.empty()) to.tangents.push_back(from.tangents[w]);
+}
+
+/// Wedges in the input's order, then one for every wedge and position that a split added.
+void number_wedges(const Mesh& attributes, const Kept& kept, const ManifoldSplit& split,
+                   const std::vector<std::uint32_t>& position_number, Mesh& out) {
+  const auto old_count = static_cast<std::uint32_t>(attributes.positions.size());
+  std::vector<std::uint32_t> number(attributes.wedge_count(), kNoIndex);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> added;  // position, wedge
+  for (std::size_t c = 0; c < split.corner_position.size(); ++c) {
+    const std::uint32_t w = kept.wedges[c / 3][c % 3], p = split.corner_position[c];
+    if (p < old_count)
+      number[w] = p;
+    else
+      added.emplace_back(p, w);
+  }
+  for (std::uint32_t w = 0; w < number.size(); ++w) {
+    if (number[w] == kNoIndex) continue;
+    const std::uint32_t position = position_number[number[w]];
+    number[w] = static_cast<std::uint32_t>(out.wedge_count());
+    append_wedge(attributes, w, position, out);
+  }
+  std::sort(added.begin(), added.end());
+  added.erase(std::unique(added.begin(), added.end()), added.end());
+  const auto first_added = static_cast<std::uint32_t>(out.wedge_count());
+  for (const auto& [p, w] : added) append_wedge(attributes, w, position_number[p], out);
+  out.triangles.resize(kept.source.size());
+  for (std::size_t c = 0; c < split.corner_position.size(); ++c) {
+    const std::uint32_t w = kept.wedges[c / 3][c % 3], p = split.corner_position[c];
+    const auto find = [&] {
+      return static_cast<std::uint32_t>(std::lower_bound(added.begin(), added.end(), std::pair(p, w)) -
+                                        added.begin());
+    };
+    out.triangles[c / 3][c % 3] = p < old_count ? number[w] : first_added + find();
+  }
+}
+
+/// Per position the area-weighted sum of its triangles' normals, unit length.
+std::vector<Vec3f> smooth_normals(const Mesh& m) {
+  std::vector<Vec3d> sum(m.positions.size());
+  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) {
+    const Vec3d a = to_double(m.positions[m.position_of(t, 0)]);
+    const Vec3d n = cross(to_double(m.positions[m.position_of(t, 1)]) - a,
+                          to_double(m.positions[m.position_of(t, 2)]) - a);
+    for (int k = 0; k < 3; ++k) sum[m.position_of(t, k)] = sum[m.position_of(t, k)] + n;
+  }
+  std::vector<Vec3f> normals(m.positions.size());
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    const double l = length(sum[p]);
+    // No direction: slivers only, or a fold that cancels out. Any unit vector is as good as another.
+    normals[p] = l > 0 ? to_float(sum[p] * (1 / l)) : Vec3f{0, 1, 0};
+  }
+  return normals;
+}
+
+void fill_normals(Mesh& m, bool add_missing) {
+  const bool missing = m.normals.empty();
+  if (missing && !add_missing) return;
+  if (!missing && std::find(m.normals.begin(), m.normals.end(), Vec3f{}) == m.normals.end()) return;
+  const std::vector<Vec3f> smooth = smooth_normals(m);
+  m.normals.resize(m.wedge_count());
+  for (std::size_t w = 0; w < m.wedge_count(); ++w)
+    if (m.normals[w] == Vec3f{}) m.normals[w] = smooth[m.wedge_position[w]];
+}
+
+void number_components(ConditionedMesh& out) {
+  DisjointSets sets(out.mesh.positions.size());
+  for (std::uint32_t t = 0; t < out.mesh.triangles.size(); ++t)
+    for (int k = 1; k < 3; ++k) sets.join(out.mesh.position_of(t, 0), out.mesh.position_of(t, k));
+  for (std::uint32_t p = 0; p < out.twin.size(); ++p) sets.join(p, out.twin[p]);
+  out.component.resize(out.mesh.positions.size());
+  for (std::uint32_t p = 0; p < out.component.size(); ++p) {
+    const std::uint32_t root = sets.find(p);
+    out.component[p] = root == p ? out.component_count++ : out.component[root];
+  }
+  out.report.components = out.component_count;
+}
+
+std::string count_of(std::uint64_t n, const char* what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+Notes describe(const ConditionReport& r) {
+  Notes notes;
+  if (r.non_finite_triangles)
+    add_warning(notes, "non-finite-position", "",
+                count_of(r.non_finite_triangles, "triangle") + " with a corner that is not finite dropped");
+  if (r.repaired_wedges)
+    add_warning(notes, "bad-attribute", "",
+                count_of(r.repaired_wedges, "wedge") +
+                    " with a UV, colour or normal that is not finite, or a normal of no length, repaired");
+  if (r.degenerate_triangles)
+    add_warning(notes, "degenerate-triangle", "",
+                count_of(r.degenerate_triangles, "triangle") + " without area dropped");
+  if (r.duplicate_triangles)
+    add_warning(notes, "duplicate-triangle", "",
+                count_of(r.duplicate_triangles, "triangle") + " that repeated another dropped");
+  if (r.slivers_kept)
+    add_info(notes, "sliver", "",
+             count_of(r.slivers_kept, "triangle") + " without area kept, to leave no crack");
+  if (r.split_non_manifold_edges)
+    add_info(notes, "non-manifold-edge", "",
+             count_of(r.split_non_manifold_edges, "non-manifold edge") + " split");
+  if (r.split_bow_ties)
+    add_info(notes, "bow-tie", "",
+             count_of(r.split_bow_ties, "position") + " where surfaces touch in a point split");
+  return notes;
+}
+
+double diagonal(const std::vector<Vec3f>& positions) {
+  Vec3d lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+  for (Vec3f p : positions) {
+    if (!finite(p.x) || !finite(p.y) || !finite(p.z)) continue;
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], double{p[k]});
+      hi[k] = std::max(hi[k], double{p[k]});
+    }
+  }
+  return lo.x <= hi.x ? length(hi - lo) : 0;
+}
+
+}  // namespace
+
+ConditionedMesh condition_mesh(const Mesh& mesh, bool normals_by_specification,
+                               const ConditionOptions& options, const RunContext& context) {
+  check_indices(mesh);
+  ConditionedMesh out;
+  ConditionReport& report = out.report;
+
+  const Mesh attributes = clean_attributes(mesh, report.repaired_wedges);
+  const std::vector<std::uint32_t> position_weld =
+      weld_positions(mesh.positions, options.weld_distance * diagonal(mesh.positions));
+  const std::vector<std::uint32_t> wedge_weld = weld_wedges(attributes, position_weld);
+  context.check_cancelled();
+  context.report(0.3);
+
+  Kept kept = drop_duplicates(mesh, keep_sound_triangles(mesh, position_weld, wedge_weld, report), report);
+  EdgeTable edges = group_edges(kept.corner, mesh.positions.size());
+  kept = drop_slivers(mesh, kept, edges, report);
+  const auto shows = [&](std::size_t i) { return has_area(mesh.positions, kept.positions(i)); };
+  bool any = false;
+  for (std::size_t i = 0; i < kept.source.size() && !any; ++i) any = shows(i);
+  if (!any)
+    throw StageError("condition", "triangles", "at least one with three finite corners and an area",
+                     "none of " + std::to_string(mesh.triangles.size()));
+  context.check_cancelled();
+  context.report(0.6);
+
+  std::vector<std::uint16_t> material(kept.source.size());
+  for (std::size_t i = 0; i < kept.source.size(); ++i) material[i] = mesh.triangle_material[kept.source[i]];
+  const ManifoldSplit split = split_non_manifold({mesh.positions, kept.wedges, material, kept.corner}, edges);
+  count_edges(edges, report);
+  report.split_non_manifold_edges = split.non_manifold_edges;
+  report.split_bow_ties = split.bow_ties;
+
+  const std::vector<std::uint32_t> position_number = number_positions(mesh, split, out);
+  number_wedges(attributes, kept, split, position_number, out.mesh);
+  out.mesh.origin = mesh.origin;
+  out.mesh.triangle_material = std::move(material);
+  for (std::uint32_t t : kept.source) out.mesh.triangle_part.push_back(mesh.triangle_part[t]);
+  out.mesh.part_names = mesh.part_names;
+  out.triangle_source = std::move(kept.source);
+  fill_normals(out.mesh, options.normals == NormalsPolicy::kSmooth ||
+                             (options.normals == NormalsPolicy::kAuto && !normals_by_specification));
+  number_components(out);
+
+  for (std::uint32_t p = 0; p < position_weld.size(); ++p)
+    report.welded_positions += position_weld[p] != kNoIndex && position_weld[p] != p;
+  for (std::uint32_t w = 0; w < wedge_weld.size(); ++w)
+    report.welded_wedges += wedge_weld[w] != kNoIndex && wedge_weld[w] != w;
+  const std::size_t used = out.mesh.positions.size() - split.split_from.size();
+  report.unused_positions = mesh.positions.size() - report.welded_positions - used;
+  out.notes = describe(report);
+  context.report(1);
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,23 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/model/model.h"
+
+namespace texmesh {
+
+/// Which sets of texture coordinates a material's textures use (0 -> uv0, 1 -> uv1).
+struct UvSets {
+  std::uint8_t guide = 0;  // of the base colour; where that has no texture, of the first texture there is
+  std::uint8_t both = 0;   // 1 = some texture uses the other set
+  friend bool operator==(const UvSets&, const UvSets&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.guide, s.both);
+  }
+};
+
+/// Per material; empty when all textures use the first set, as with nearly every model.
+std::vector<UvSets> uv_sets_of(const std::vector<Material>& materials);
+
+}  // namespace texmesh

@@ -1,0 +1,33 @@
+#include "stages/fragment_codec/fragment_codec.h"
+
+#include <string>
+
+#include "format/base/errors.h"
+#include "stages/fragment_codec/codec_list.h"
+
+namespace texmesh {
+
+std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding& plane) {
+  if (plane.channels != 1 && plane.channels != 3)
+    throw StageError("ladder", "channels", "1 or 3", std::to_string(plane.channels));
+  if (plane.qualities.empty()) throw StageError("ladder", "rungs", "at least one", "none");
+  switch (codec) {
+    case Codec::kJpegProgressive:
+      return make_progressive_codec(plane);
+    case Codec::kWebp:
+      return make_webp_codec(plane);
+    case Codec::kJpeg:
+      break;
+  }
+  return make_jpeg_codec(plane);
+}
+
+Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels) {
+  return codec == Codec::kWebp ? decode_webp(file, max_pixels) : decode_jpeg(file, max_pixels);
+}
+
+Pixels decode_fragment_file_luma(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels) {
+  return codec == Codec::kWebp ? luma_of(decode_webp(file, max_pixels)) : decode_jpeg_luma(file, max_pixels);
+}
+
+}  // namespace texmesh

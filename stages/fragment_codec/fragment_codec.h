@@ -1,0 +1,81 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "format/model/codec.h"
+#include "stages/base/run_context.h"
+#include "stages/jpeg/jpeg.h"
+
+namespace texmesh {
+
+/// Which texels of a window are covered, as TexturePlane::coverage has them; without bits all are.
+struct CoverageWindow {
+  const std::uint8_t* bits = nullptr;
+  std::size_t stride_bytes = 0;
+  std::uint32_t left_px = 0, top_px = 0;      // of the window
+  std::uint32_t width_px = 0, height_px = 0;  // of the plane proper: what lies beyond is not covered
+  bool covered(std::uint32_t x, std::uint32_t y) const {
+    const std::uint32_t u = left_px + x, v = top_px + y;
+    return u < width_px && v < height_px && bits[v * stride_bytes + u / 8] >> (7 - u % 8) & 1;
+  }
+};
+
+/// A rectangle of interleaved 8-bit pixels within a larger image.
+struct PixelWindow {
+  const std::uint8_t* data = nullptr;
+  std::size_t stride_bytes = 0;
+  std::uint32_t width_px = 0, height_px = 0;
+  CoverageWindow coverage{};
+};
+
+/// What is coded: all fragments of one plane.
+struct PlaneCoding {
+  std::uint32_t channels = 3;                                   // 1 or 3
+  std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
+  bool colour = true;                           // sRGB colours; otherwise data, whose channels are kept apart
+  Subsampling subsampling = Subsampling::k420;  // of colours
+  std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
+};
+
+/// A rung as the package describes it: its quality on IJG's scale and the table stream that its fragments
+/// share.
+struct CodecRung {
+  int quality = 0;
+  std::vector<std::uint8_t> tables;
+};
+
+/// Encodes fragments, one thread's at a time.
+class FragmentEncoder {
+ public:
+  virtual ~FragmentEncoder() = default;
+  /// Appends the fragment's stream of the encoder's rung r to streams[r].
+  virtual void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) = 0;
+};
+
+/// A way to code the fragments of one plane at all rungs. What is done with the streams afterwards (joining
+/// them to files, cutting files to streams) needs no pixels and stands in format/model/codec.h.
+class TextureCodec {
+ public:
+  virtual ~TextureCodec() = default;
+  virtual Codec id() const = 0;
+  /// Chooses rungs and makes their shared tables from a sample of the plane; once, before encoder(). The
+  /// sample may be empty. Same result for any thread count.
+  virtual std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) = 0;
+  /// Encoders of several threads may run at once. The codec must outlive them. `rungs`: rising indices of
+  /// those that are wanted, of an incremental codec (format/model/codec.h) the first ones; none stands for
+  /// all.
+  virtual std::unique_ptr<FragmentEncoder> encoder(std::span<const std::size_t> rungs = {}) const = 0;
+};
+
+/// StageError when the codec cannot code such planes.
+std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding& plane);
+
+/// Pixels of a complete file (join_fragment()), 1 or 3 channels. FormatError when it is damaged, larger than
+/// max_pixels, or not of that codec; nothing is allocated for pixels before their number is checked.
+Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
+/// The same, but luma as JPEG defines it (grey planes: as they are).
+Pixels decode_fragment_file_luma(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
+
+}  // namespace texmesh

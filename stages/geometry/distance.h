@@ -1,0 +1,65 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/base/vec.h"
+#include "format/model/model.h"
+
+namespace texmesh {
+
+/// A triangle and its place along a space-filling curve.
+struct CurvedTriangle {
+  std::uint64_t code = 0;
+  std::uint32_t triangle = 0;
+};
+
+/// Answers "how far is this point from the surface" exactly (point to triangle), about a million times a
+/// second. Binary tree of boxes over the triangles in the order of a space-filling curve: built in linear
+/// time, since most surfaces are asked a few thousand questions only. Deterministic.
+class SurfaceDistance {
+ public:
+  /// Triangles index `wedge_position`, which indexes `positions`. At least one triangle.
+  SurfaceDistance(const std::vector<Vec3f>& positions, const std::vector<std::uint32_t>& wedge_position,
+                  const std::vector<Triangle>& triangles);
+  /// Distance in the positions' unit; safe to call from several threads. A caller that only asks whether the
+  /// distance exceeds `enough` gets some upper bound <= enough, several times faster, where it does not.
+  double operator()(Vec3d p, double enough = 0) const;
+
+  /// A triangle to begin with: where one near the point is known, the search is several times shorter.
+  struct Hint {
+    std::uint32_t leaf = 0xffffffffu;  // of the last answer; none at first
+  };
+  /// As operator(), beginning with the triangle of the hint, which becomes the closest one found. With the
+  /// same chain of points and hints the same bits; another chain may differ in the last one.
+  double operator()(Vec3d p, Hint& hint) const;
+  /// The hint that names the triangle with this index in the constructor's list.
+  Hint hint_of(std::uint32_t triangle) const { return {leaf_of_[triangle]}; }
+
+ private:
+  struct Node {
+    Vec3f lo, hi;
+    std::uint32_t first = 0,
+                  count = 0;  // leaf: corners_[3 * first ..]; inner (count 0): children at first, first + 1
+  };
+  void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
+             const std::vector<CurvedTriangle>& order);
+  double search(Vec3d p, double enough, double best, std::uint32_t& leaf) const;
+
+  std::vector<Node> nodes_;
+  std::vector<Vec3f> corners_;  // three per triangle, in the order of the leaves
+  std::vector<std::uint32_t> leaf_of_;
+};
+
+/// A point on a triangle: weights of its three corners, summing to 1.
+struct SurfaceSample {
+  std::uint32_t triangle = 0;
+  float weight[3] = {1, 0, 0};
+};
+
+/// `count` points spread over the surface in proportion to area: equal steps along the running sum of areas,
+/// weights from a low-discrepancy sequence. Deterministic; empty when no triangle has an area.
+std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
+                                          const std::vector<std::uint32_t>& wedge_position,
+                                          const std::vector<Triangle>& triangles, std::size_t count);
+
+}  // namespace texmesh

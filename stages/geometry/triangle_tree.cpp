@@ -1,0 +1,220 @@
+#include "stages/geometry/triangle_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kLeaf = 4;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double box_distance2(Vec3d lo, Vec3d hi, Vec3d p) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double d = std::max({lo[k] - p[k], p[k] - hi[k], 0.0});
+    sum += d * d;
+  }
+  return sum;
+}
+
+/// Whether a ray meets a box before t = limit; inverse may hold infinities.
+bool meets_box(Vec3d lo, Vec3d hi, Vec3d origin, Vec3d direction, double limit) {
+  double from = 0, to = limit;
+  for (int k = 0; k < 3; ++k) {
+    if (direction[k] == 0) {
+      if (origin[k] < lo[k] || origin[k] > hi[k]) return false;
+      continue;
+    }
+    double a = (lo[k] - origin[k]) / direction[k], b = (hi[k] - origin[k]) / direction[k];
+    if (a > b) std::swap(a, b);
+    from = std::max(from, a), to = std::min(to, b);
+  }
+  // Rounding may make a flat box a little too thin.
+  return from <= to * (1 + 1e-12);
+}
+
+double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
+  const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
+  const double det = dot(u, h);
+  if (!(det < 0)) return kInfinity;  // dot(direction, normal) = -det: only what looks along the ray
+  const Vec3d s = origin - c[0];
+  const double a = dot(s, h) / det;
+  if (!(a >= 0 && a <= 1)) return kInfinity;
+  const Vec3d q = cross(s, u);
+  const double b = dot(direction, q) / det;
+  if (!(b >= 0 && a + b <= 1)) return kInfinity;
+  const double t = dot(v, q) / det;
+  return t > 0 ? t : kInfinity;
+}
+
+struct OnTriangle {
+  double distance2 = kInfinity;
+  std::array<double, 3> weight{};
+};
+
+void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
+  const Vec3d along = c[j] - c[i];
+  const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - c[i], along) / l, 0.0, 1.0) : 0;
+  const Vec3d d = p - (c[i] + along * t);
+  if (dot(d, d) >= best.distance2) return;
+  best.distance2 = dot(d, d);
+  best.weight = {};
+  best.weight[i] = 1 - t, best.weight[j] += t;
+}
+
+OnTriangle closest_on(const std::array<Vec3d, 3>& c, Vec3d p) {
+  OnTriangle best;
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+  const double square = dot(n, n);
+  if (square > 0) {
+    std::array<double, 3> w{};
+    for (std::size_t k = 0; k < 3; ++k) w[k] = dot(cross(c[(k + 1) % 3] - p, c[(k + 2) % 3] - p), n) / square;
+    if (w[0] >= 0 && w[1] >= 0 && w[2] >= 0) {
+      const double d = dot(p - c[0], n);
+      return {d * d / square, w};
+    }
+  }
+  for (std::size_t k = 0; k < 3; ++k) try_segment(p, c, k, (k + 1) % 3, best);
+  return best;
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triangle> triangles)
+    : order_(triangles.size()) {
+  std::vector<Vec3d> centres;
+  for (const Triangle& t : triangles)
+    centres.push_back((points[t[0]] + points[t[1]] + points[t[2]]) * (1.0 / 3));
+  std::iota(order_.begin(), order_.end(), 0u);
+  corners_.resize(triangles.size());
+  nodes_.reserve(triangles.size());
+  build(0, static_cast<std::uint32_t>(triangles.size()), centres);
+  for (std::size_t i = 0; i < order_.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k) corners_[i][k] = points[triangles[order_[i]][k]];
+  // Children stand behind their parents, so one pass from the back fits all boxes.
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    Node& node = nodes_[n];
+    Vec3d lo{kInfinity, kInfinity, kInfinity}, hi = lo * -1.0;
+    const auto take = [&](Vec3d p) {
+      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+    };
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
+      for (const Vec3d& p : corners_[i]) take(p);
+    if (node.count == 0)
+      for (const std::size_t child : {n + 1, std::size_t{node.first}})
+        take(nodes_[child].lo), take(nodes_[child].hi);
+    node.lo = lo, node.hi = hi;
+  }
+}
+
+void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres) {
+  const std::size_t node = nodes_.size();
+  nodes_.push_back({{}, {}, first, count});
+  if (count <= kLeaf) return;
+  Vec3d lo = centres[order_[first]], hi = lo;
+  for (std::uint32_t i = first; i < first + count; ++i)
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], centres[order_[i]][k]);
+      hi[k] = std::max(hi[k], centres[order_[i]][k]);
+    }
+  int axis = 0;
+  for (int k = 1; k < 3; ++k)
+    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  const auto begin = order_.begin() + first;
+  std::nth_element(begin, begin + count / 2, begin + count, [&](std::uint32_t a, std::uint32_t b) {
+    return centres[a][axis] < centres[b][axis] || (centres[a][axis] == centres[b][axis] && a < b);
+  });
+  build(first, count / 2, centres);
+  nodes_[node].first = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[node].count = 0;
+  build(first + count / 2, count - count / 2, centres);
+}
+
+double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
+  double best = kInfinity;
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (!meets_box(n.lo, n.hi, origin, direction, best)) continue;
+    if (n.count == 0) {
+      stack[depth++] = n.first;
+      stack[depth++] = at + 1;
+      continue;
+    }
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+      best = std::min(best, leaving_hit(corners_[i], origin, direction));
+  }
+  return best;
+}
+
+struct TriangleTree::Found {
+  OnTriangle on;
+  std::uint32_t triangle = 0;
+};
+
+TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& tried) const {
+  Found best;
+  best.on.distance2 = limit2;
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (box_distance2(n.lo, n.hi, p) >= best.on.distance2) continue;
+    if (n.count > 0) {
+      tried += n.count;
+      for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+        if (const OnTriangle on = closest_on(corners_[i], p); on.distance2 < best.on.distance2)
+          best = {on, order_[i]};
+      continue;
+    }
+    std::uint32_t nearer = at + 1, farther = n.first;
+    if (box_distance2(nodes_[farther].lo, nodes_[farther].hi, p) <
+        box_distance2(nodes_[nearer].lo, nodes_[nearer].hi, p))
+      std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
+  }
+  return best;
+}
+
+TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
+  std::uint64_t tried = 0;
+  return nearest(p, tried);
+}
+
+TriangleTree::Nearest TriangleTree::nearest(Vec3d p, std::uint64_t& tried) const {
+  const Found best = search(p, kInfinity, tried);
+  return {best.triangle, best.on.weight};
+}
+
+double TriangleTree::distance2(Vec3d p, double limit2, std::uint64_t& tried) const {
+  const double best = search(p, limit2, tried).on.distance2;
+  return best < limit2 ? best : kInfinity;
+}
+
+bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (!solid.may_meet_box(n.lo, n.hi)) continue;
+    if (n.count == 0) {
+      stack[depth++] = n.first;
+      stack[depth++] = at + 1;
+      continue;
+    }
+    tried += n.count;
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+      if (solid.meets(corners_[i])) return true;
+  }
+  return false;
+}
+
+}  // namespace texmesh

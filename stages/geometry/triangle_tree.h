@@ -1,0 +1,57 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "format/base/vec.h"
+#include "format/model/model.h"
+#include "stages/geometry/tetrahedron.h"
+
+namespace texmesh {
+
+/// A bounding-volume tree over a small triangle mesh (a wrap) for rays and closest points, in plain double
+/// arithmetic: the same bits on every machine, which a ray caster with SIMD dispatch does not promise.
+/// Binary, split at the median of the centres. Safe to ask from many threads.
+class TriangleTree {
+ public:
+  /// At least one triangle; indices below points.size().
+  TriangleTree(std::span<const Vec3d> points, std::span<const Triangle> triangles);
+
+  /// Least t > 0 at which origin + t * direction leaves the solid, that is crosses a triangle whose normal
+  /// looks along the direction; infinite when it does not. Rays through an edge may count as hits or misses.
+  double exit(Vec3d origin, Vec3d direction) const;
+
+  struct Nearest {
+    std::uint32_t triangle = 0;      // index in the constructor's list; ties: the first one found
+    std::array<double, 3> weight{};  // of its corners, >= 0, summing to 1
+  };
+  Nearest nearest(Vec3d p) const;
+  /// The same; `tried` grows by the triangles that were looked at: what a query costs, the same on every
+  /// machine.
+  Nearest nearest(Vec3d p, std::uint64_t& tried) const;
+
+  /// Square of the distance to the closest point; infinite when that is not below `limit2`, where the search
+  /// ends.
+  double distance2(Vec3d p, double limit2, std::uint64_t& tried) const;
+  /// Whether any triangle meets the solid.
+  bool meets(const Tetrahedron& solid, std::uint64_t& tried) const;
+  /// The box around all triangles.
+  Vec3d lo() const { return nodes_[0].lo; }
+  Vec3d hi() const { return nodes_[0].hi; }
+
+ private:
+  struct Node {
+    Vec3d lo, hi;
+    std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
+  };
+  struct Found;
+  Found search(Vec3d p, double limit2, std::uint64_t& tried) const;
+  void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
+
+  std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace texmesh

@@ -1,0 +1,98 @@
+#include "stages/gltf/glb_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+namespace texmesh {
+namespace {
+
+void put_u32(std::vector<std::uint8_t>& out, std::size_t x) {
+  for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(x >> shift));
+}
+
+void pad(std::vector<std::uint8_t>& out, std::uint8_t with) {
+  while (out.size() % 4 != 0) out.push_back(with);
+}
+
+}  // namespace
+
+std::size_t GlbWriter::add_bytes(std::span<const std::uint8_t> bytes) {
+  pad(bin_, 0);
+  const std::size_t offset = bin_.size();
+  bin_.insert(bin_.end(), bytes.begin(), bytes.end());
+  return offset;
+}
+
+std::size_t GlbWriter::add_view(std::span<const std::uint8_t> bytes, std::size_t stride, int target) {
+  Json view{{"buffer", 0}, {"byteOffset", add_bytes(bytes)}, {"byteLength", bytes.size()}};
+  if (stride) view["byteStride"] = stride;
+  if (target) view["target"] = target;
+  return add_json_view(std::move(view));
+}
+
+std::size_t GlbWriter::add_json_view(Json view) {
+  views_.push_back(std::move(view));
+  return views_.size() - 1;
+}
+
+std::size_t GlbWriter::add_accessor(Json accessor) {
+  accessors_.push_back(std::move(accessor));
+  return accessors_.size() - 1;
+}
+
+void GlbWriter::use_extension(const std::string& name, bool required) {
+  auto add = [&](std::vector<std::string>& list) {
+    if (std::find(list.begin(), list.end(), name) == list.end())
+      list.insert(std::upper_bound(list.begin(), list.end(), name), name);
+  };
+  add(used_);
+  if (required) add(required_);
+}
+
+double GlbWriter::shortest(float x) {
+  std::array<char, 64> text;
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
+  double d = 0;
+  std::from_chars(text.data(), end, d);
+  return d;
+}
+
+std::vector<std::uint8_t> GlbWriter::finish() const {
+  std::vector<std::uint8_t> bin = bin_;
+  pad(bin, 0);
+  Json root;
+  root["asset"] = {{"version", "2.0"}, {"generator", "texmesh"}};
+  if (!used_.empty()) root["extensionsUsed"] = used_;
+  if (!required_.empty()) root["extensionsRequired"] = required_;
+  root["scene"] = 0;
+  Json nodes = Json::array();
+  for (std::size_t i = 0; i < arrays_.at("nodes").size(); ++i) nodes.push_back(i);
+  root["scenes"] = Json::array({{{"nodes", nodes}}});
+  for (const char* name : {"nodes", "meshes", "materials", "textures", "images", "samplers"})
+    if (!arrays_.at(name).empty()) root[name] = arrays_.at(name);
+  if (!accessors_.empty()) root["accessors"] = accessors_;
+  if (!views_.empty()) root["bufferViews"] = views_;
+  root["buffers"] = Json::array({{{"byteLength", bin.size()}}});
+  if (fallback_bytes_)
+    root["buffers"].push_back({{"byteLength", fallback_bytes_},
+                               {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
+
+  const std::string text = root.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::vector<std::uint8_t> json(text.begin(), text.end());
+  pad(json, ' ');
+  std::vector<std::uint8_t> out;
+  out.reserve(28 + json.size() + bin.size());
+  put_u32(out, 0x46546c67);  // "glTF"
+  put_u32(out, 2);
+  put_u32(out, 28 + json.size() + bin.size());
+  put_u32(out, json.size());
+  put_u32(out, 0x4e4f534a);  // "JSON"
+  out.insert(out.end(), json.begin(), json.end());
+  put_u32(out, bin.size());
+  put_u32(out, 0x004e4942);  // "BIN"
+  out.insert(out.end(), bin.begin(), bin.end());
+  return out;
+}
+
+}  // namespace texmesh

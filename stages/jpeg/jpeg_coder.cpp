@@ -1,0 +1,343 @@
+#include "stages/jpeg/jpeg_coder.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include <jerror.h>
+
+#include "format/base/errors.h"
+#include "stages/jpeg/jpeg_guard.h"
+#include "stages/jpeg/jpeg_stream.h"
+
+namespace texmesh {
+namespace {
+
+/// A destination that grows with realloc, because nothing that throws may run beneath libjpeg.
+struct GrowingBuffer {
+  jpeg_destination_mgr base{};  // first: libjpeg hands back a pointer to it
+  JOCTET* data = nullptr;
+  std::size_t capacity = 0, size = 0;
+
+  GrowingBuffer() {
+    base.init_destination = [](j_compress_ptr info) {
+      auto* self = reinterpret_cast<GrowingBuffer*>(info->dest);
+      if (self->capacity == 0) self->grow(info);
+      self->base.next_output_byte = self->data;
+      self->base.free_in_buffer = self->capacity;
+    };
+    base.empty_output_buffer = [](j_compress_ptr info) -> boolean {
+      auto* self = reinterpret_cast<GrowingBuffer*>(info->dest);
+      const std::size_t full = self->capacity;  // libjpeg calls this only when the whole buffer is used
+      self->grow(info);
+      self->base.next_output_byte = self->data + full;
+      self->base.free_in_buffer = self->capacity - full;
+      return TRUE;
+    };
+    base.term_destination = [](j_compress_ptr info) {
+      auto* self = reinterpret_cast<GrowingBuffer*>(info->dest);
+      self->size = self->capacity - self->base.free_in_buffer;
+    };
+  }
+  ~GrowingBuffer() { std::free(data); }
+  GrowingBuffer(const GrowingBuffer&) = delete;
+  GrowingBuffer& operator=(const GrowingBuffer&) = delete;
+
+ private:
+  void grow(j_compress_ptr info) {
+    const std::size_t wanted = std::max<std::size_t>(capacity * 2, std::size_t{1} << 16);
+    auto* larger = static_cast<JOCTET*>(std::realloc(data, wanted));
+    if (!larger) ERREXIT1(info, JERR_OUT_OF_MEMORY, 0);
+    data = larger;
+    capacity = wanted;
+  }
+};
+
+HuffmanTable copy_of(const JHUFF_TBL& table) {
+  HuffmanTable out;
+  std::size_t count = 0;
+  for (std::size_t k = 1; k <= 16; ++k) count += out.bits[k] = table.bits[k];
+  out.symbols.assign(table.huffval, table.huffval + count);
+  return out;
+}
+
+/// Scans of a progressive file (thesis-like refinement, one bit of all coefficients at a time): DC without
+/// its last 3 bits, AC without its last 4, then bit by bit, luma before chroma, because a cut after a luma
+/// pass is worth 0.2 to 0.5 dB more than one within it.
+std::vector<jpeg_scan_info> progressive_scans(int components) {
+  constexpr int kDcShift = 3, kAcShift = 4, kLastCoefficient = 63;
+  std::vector<jpeg_scan_info> scans;
+  const auto add_dc = [&](int from, int to) { scans.push_back({components, {0, 1, 2, 0}, 0, 0, from, to}); };
+  const auto add_ac = [&](int component, int from, int to) {
+    scans.push_back({1, {component, 0, 0, 0}, 1, kLastCoefficient, from, to});
+  };
+  add_dc(0, kDcShift);
+  for (int c = 0; c < components; ++c) add_ac(c, 0, kAcShift);
+  for (int bit = kAcShift; bit > 0; --bit) {
+    add_ac(0, bit, bit - 1);
+    if (bit > 1) add_dc(bit - 1, bit - 2);
+    for (int c = 1; c < components; ++c) add_ac(c, bit, bit - 1);
+  }
+  return scans;
+}
+
+/// What tells decoders that three channels are not YCbCr: APP14 "Adobe", version 100, no flags, no transform.
+constexpr std::array<std::uint8_t, 16> kAdobeMarker{0xff, 0xee, 0,   14, 'A', 'd', 'o', 'b',
+                                                    'e',  0,    100, 0,  0,   0,   0,   0};
+constexpr std::size_t kMarkerBytes = 2;
+
+constexpr std::size_t kBlockCoefficients = 64;
+
+/// No coefficient of 8-bit samples is larger than 1024 (DC; AC stay under 930) before it is quantised.
+unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
+  const unsigned q = quantisers.quantval[kNaturalOfZigzag[zigzag]];
+  return (1024 + q / 2) / q;
+}
+
+unsigned bits_of(unsigned value) {
+  unsigned bits = 0;
+  for (; value > 0; value >>= 1) ++bits;
+  return bits;
+}
+
+std::vector<std::uint8_t> dc_symbols(unsigned most_bits) {
+  std::vector<std::uint8_t> symbols;
+  for (unsigned bits = 0; bits <= std::min(most_bits, 11u); ++bits)
+    symbols.push_back(static_cast<std::uint8_t>(bits));
+  return symbols;
+}
+
+/// After a run of r zeros the coefficient is the (r + 1)th or a later one.
+std::vector<std::uint8_t> ac_symbols(std::span<const unsigned> most_bits) {
+  std::vector<std::uint8_t> symbols{0x00, 0xf0};  // end of block, sixteen zeros
+  for (unsigned run = 0; run < 16; ++run)
+    for (unsigned bits = 1; bits <= std::min(most_bits[run + 1], 10u); ++bits)
+      symbols.push_back(static_cast<std::uint8_t>(run << 4 | bits));
+  return symbols;
+}
+
+}  // namespace
+
+struct JpegCoder::State {
+  JpegKind kind;
+  jpeg_compress_struct info{};
+  JpegErrors errors;
+  GrowingBuffer buffer;
+  std::vector<JSAMPROW> rows;
+  std::vector<jpeg_scan_info> scans;
+
+  explicit State(const JpegKind& k) : kind(k) {}
+  ~State() { jpeg_destroy_compress(&info); }
+
+  template <class Body>
+  void run(Body&& body) {
+    if (jpeg_guarded(errors, body)) return;
+    const std::string message = errors.message;
+    jpeg_abort_compress(&info);
+    throw StageError("jpeg", "", "an image that libjpeg can code", message);
+  }
+  void set_image(const PixelWindow& image) {
+    info.image_width = image.width_px;
+    info.image_height = image.height_px;
+    rows.resize(image.height_px);
+    for (std::size_t y = 0; y < rows.size(); ++y)  // libjpeg's interface lacks const; it does not write there
+      rows[y] = const_cast<JSAMPROW>(image.data + y * image.stride_bytes);
+  }
+  /// With every pixel of the image set by set_image().
+  void write(boolean all_tables) {
+    jpeg_start_compress(&info, all_tables);
+    while (info.next_scanline < info.image_height)
+      jpeg_write_scanlines(&info, rows.data() + info.next_scanline, info.image_height - info.next_scanline);
+    jpeg_finish_compress(&info);
+  }
+  /// SOI SOF [SOS] data EOI of the image into the buffer.
+  void write_abbreviated(const PixelWindow& image) {
+    set_image(image);
+    run([&] {
+      info.write_JFIF_header = FALSE;
+      info.write_Adobe_marker = FALSE;
+      jpeg_suppress_tables(&info, TRUE);
+      write(FALSE);
+    });
+  }
+  std::span<const std::uint8_t> output() const { return {buffer.data, buffer.size}; }
+  /// Bytes of SOI SOF [SOS] in front of an abbreviated stream's own part. A progressive stream has its tables
+  /// in front of each SOS, so there the frame header is all.
+  std::size_t frame_head_bytes() const {
+    const std::size_t n = kind.channels, sof = kMarkerBytes + 8 + 3 * n, sos = kMarkerBytes + 6 + 2 * n;
+    return kMarkerBytes + sof + (kind.progressive ? 0 : sos);
+  }
+  std::size_t table_pairs() const { return info.num_components == 1 ? 1 : 2; }
+  void suppress_huffman_tables() {
+    for (JHUFF_TBL** tables : {info.dc_huff_tbl_ptrs, info.ac_huff_tbl_ptrs})
+      for (int k = 0; k < NUM_HUFF_TBLS; ++k)
+        if (tables[k]) tables[k]->sent_table = TRUE;
+  }
+
+  /// Runs within run(): sets colours, sampling and tables up.
+  void set_up() {
+    info.image_width = info.image_height = 16;
+    info.input_components = static_cast<int>(kind.channels);
+    info.in_color_space = kind.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+    jpeg_set_defaults(&info);
+    if (kind.channels == 3 && kind.rgb) jpeg_set_colorspace(&info, JCS_RGB);
+    jpeg_set_quality(&info, kind.quality, TRUE);
+    info.dct_method = JDCT_ISLOW;
+    if (kind.channels == 1) {  // jpeg_write_tables() writes every table there is
+      info.quant_tbl_ptrs[1] = nullptr;
+      info.dc_huff_tbl_ptrs[1] = info.ac_huff_tbl_ptrs[1] = nullptr;
+    } else if (kind.rgb) {
+      use_second_tables_for_last();
+    } else {
+      const int factor = kind.subsampling == Subsampling::k420 ? 2 : 1;
+      info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = factor;
+    }
+    if (kind.progressive) {
+      info.scan_info = scans.data();
+      info.num_scans = static_cast<int>(scans.size());
+    }
+  }
+
+ private:
+  /// Three channels of data are three different things, but there are two pairs of Huffman tables: the last
+  /// channel (z of a normal, metalness) differs most from the others. All are quantised like luma.
+  void use_second_tables_for_last() {
+    info.comp_info[2].dc_tbl_no = info.comp_info[2].ac_tbl_no = 1;
+    info.quant_tbl_ptrs[1] = nullptr;
+  }
+};
+
+JpegCoder::JpegCoder(const JpegKind& kind) : state_(new State(kind)) {
+  if (kind.channels != 1 && kind.channels != 3)
+    throw StageError("jpeg", "channels", "1 or 3", std::to_string(kind.channels));
+  if (kind.progressive) state_->scans = progressive_scans(static_cast<int>(kind.channels));
+  jpeg_compress_struct& info = state_->info;
+  info.err = &state_->errors.base;
+  state_->run([&] {
+    jpeg_create_compress(&info);
+    info.dest = &state_->buffer.base;
+    state_->set_up();
+  });
+}
+
+JpegCoder::~JpegCoder() = default;
+
+HuffmanTables JpegCoder::tables() const {
+  HuffmanTables out;
+  for (std::size_t k = 0; k < state_->table_pairs(); ++k) {
+    out.push_back(copy_of(*state_->info.dc_huff_tbl_ptrs[k]));
+    out.push_back(copy_of(*state_->info.ac_huff_tbl_ptrs[k]));
+  }
+  return out;
+}
+
+void JpegCoder::use_tables(const HuffmanTables& tables) {
+  jpeg_compress_struct& info = state_->info;
+  if (tables.size() != 2 * state_->table_pairs())
+    throw StageError("jpeg", "Huffman tables", std::to_string(2 * state_->table_pairs()),
+                     std::to_string(tables.size()));
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    JHUFF_TBL* const* const kind =
+        k % 2 ? info.ac_huff_tbl_ptrs : info.dc_huff_tbl_ptrs;  // g++ 12's -fsanitize=bounds
+    JHUFF_TBL& to = *kind[k / 2];                               // breaks on one expression
+    std::copy(tables[k].bits.begin(), tables[k].bits.end(), to.bits);
+    std::memset(to.huffval, 0, sizeof to.huffval);
+    std::copy(tables[k].symbols.begin(), tables[k].symbols.end(), to.huffval);
+  }
+}
+
+std::vector<std::array<std::uint16_t, 64>> JpegCoder::quantisers() const {
+  const jpeg_compress_struct& info = state_->info;
+  std::vector<std::array<std::uint16_t, 64>> out(static_cast<std::size_t>(info.num_components));
+  for (std::size_t c = 0; c < out.size(); ++c)
+    for (std::size_t k = 0; k < kBlockCoefficients; ++k)
+      out[c][k] = info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no]->quantval[kNaturalOfZigzag[k]];
+  return out;
+}
+
+std::vector<std::vector<std::uint8_t>> JpegCoder::possible_symbols() const {
+  const jpeg_compress_struct& info = state_->info;
+  std::vector<std::vector<std::uint8_t>> out;
+  for (int pair = 0; pair < static_cast<int>(state_->table_pairs()); ++pair) {
+    unsigned dc = 0;
+    std::array<unsigned, kBlockCoefficients + 1> ac{};  // [k]: of coefficient k or a later one
+    for (int c = 0; c < info.num_components; ++c) {
+      if (info.comp_info[c].dc_tbl_no != pair) continue;
+      const JQUANT_TBL& quantisers = *info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no];
+      dc = std::max(dc, bits_of(2 * largest_coefficient(quantisers, 0)));
+      unsigned later = 0;
+      for (std::size_t k = kBlockCoefficients - 1; k > 0; --k) {
+        later = std::max(later, bits_of(largest_coefficient(quantisers, k)));
+        ac[k] = std::max(ac[k], later);
+      }
+    }
+    out.push_back(dc_symbols(dc));
+    out.push_back(ac_symbols(ac));
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> JpegCoder::head_stream(std::uint32_t width_px, std::uint32_t height_px) {
+  const std::vector<std::uint8_t> grey(std::size_t{width_px} * height_px * state_->kind.channels, 128);
+  state_->write_abbreviated(
+      {grey.data(), std::size_t{width_px} * state_->kind.channels, width_px, height_px});
+  const auto frame = state_->output().subspan(kMarkerBytes, state_->frame_head_bytes() - kMarkerBytes);
+  std::vector<std::uint8_t> out{0xff, 0xd8};
+  const std::vector<std::uint8_t> frame_bytes(frame.begin(), frame.end());
+  if (state_->kind.rgb) out.insert(out.end(), kAdobeMarker.begin(), kAdobeMarker.end());
+  state_->run([&] {
+    jpeg_suppress_tables(&state_->info, FALSE);
+    if (state_->kind.progressive) state_->suppress_huffman_tables();
+    jpeg_write_tables(&state_->info);
+  });
+  const auto tables = state_->output();
+  out.insert(out.end(), tables.begin() + kMarkerBytes, tables.end() - kMarkerBytes);
+  out.insert(out.end(), frame_bytes.begin(), frame_bytes.end());
+  out.insert(out.end(), {0xff, 0xd9});
+  return out;
+}
+
+void JpegCoder::append_body(const PixelWindow& image, std::vector<std::uint8_t>& out) {
+  state_->write_abbreviated(image);
+  const auto body = state_->output().subspan(state_->frame_head_bytes());
+  if (state_->kind.progressive) {
+    out.insert(out.end(), body.begin(), body.end() - kMarkerBytes);
+  } else {
+    out.insert(out.end(), {0xff, 0xd8});
+    out.insert(out.end(), body.begin(), body.end());
+  }
+}
+
+std::vector<std::uint8_t> JpegCoder::complete(const PixelWindow& image) {
+  jpeg_compress_struct& info = state_->info;
+  state_->set_image(image);
+  state_->run([&] {
+    info.write_JFIF_header = state_->kind.rgb ? FALSE : TRUE;
+    info.write_Adobe_marker = state_->kind.rgb ? TRUE : FALSE;
+    info.optimize_coding = TRUE;
+    state_->write(TRUE);
+    info.optimize_coding = state_->kind.progressive ? TRUE : FALSE;
+  });
+  return {state_->output().begin(), state_->output().end()};
+}
+
+void JpegCoder::count_symbols(const PixelWindow& image, SymbolCounts& counts) {
+  state_->write_abbreviated(image);
+  std::vector<std::uint8_t> mcu;
+  const jpeg_compress_struct& info = state_->info;
+  for (int c = 0; c < info.num_components; ++c) {
+    const jpeg_component_info& component = info.comp_info[c];
+    const int blocks = info.num_components == 1 ? 1 : component.h_samp_factor * component.v_samp_factor;
+    mcu.insert(mcu.end(), static_cast<std::size_t>(blocks), static_cast<std::uint8_t>(component.dc_tbl_no));
+  }
+  const std::uint32_t side = mcu.size() > 3 ? 16 : 8;
+  const std::size_t mcus =
+      std::size_t{(image.width_px + side - 1) / side} * ((image.height_px + side - 1) / side);
+  const auto stream = state_->output().subspan(state_->frame_head_bytes());
+  texmesh::count_symbols(stream.first(stream.size() - kMarkerBytes), mcu, mcus * mcu.size(), tables(),
+                         counts);
+}
+
+}  // namespace texmesh

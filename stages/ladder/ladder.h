@@ -1,0 +1,145 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "format/base/fields.h"
+#include "format/base/note.h"
+#include "format/model/codec.h"
+#include "stages/fragment_codec/fragment_codec.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/ladder/size_knots.h"
+
+namespace texmesh {
+
+inline constexpr int kLadderVersion = 10;
+
+/// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
+/// than refinement saves.
+inline constexpr std::uint32_t kLeastProgressiveSide = 256;
+
+enum class LadderMode : std::uint8_t { kJpeg, kProgressive, kWebp };
+template <>
+struct EnumNames<LadderMode> {
+  static constexpr std::array<std::string_view, 3> names{"jpeg", "progressive", "webp"};
+};
+
+enum class Uncovered : std::uint8_t { kFree, kKept };
+template <>
+struct EnumNames<Uncovered> {
+  static constexpr std::array<std::string_view, 2> names{"free", "kept"};
+};
+
+struct LadderOptions {
+  LadderMode mode = LadderMode::kJpeg;
+  // IJG qualities, strictly rising, for colours, normals, other data, and alpha:
+  std::vector<int> rungs{5, 8, 11, 18, 30, 53, 75, 86, 93, 97};
+  std::vector<int> normal_rungs{30, 53, 75, 86, 93, 97};
+  std::vector<int> data_rungs{18, 30, 53, 75, 86, 93, 97};
+  std::vector<int> alpha_rungs{18, 30, 53, 75, 86, 93, 97};
+  int progressive_quality = 92;                 // of a colour plane's whole progressive files
+  Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
+  Uncovered uncovered = Uncovered::kFree;
+  int training_fragments = 64;
+  int preview_quality = 60;
+  double hull_gain = 0.05;
+  bool lossless_top = false;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("mode", s.mode,
+      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, where "
+      "fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = lossy WebP "
+      "for colours");
+    v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
+    v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
+    v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");
+    v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "the same for alpha channels");
+    v("progressive_quality", s.progressive_quality, Range{10, 100},
+      "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
+    v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
+    v("uncovered", s.uncovered,
+      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks cheap; "
+      "kept = what the fill, or the source with --fill none, has there");
+    v("training_fragments", s.training_fragments, Range{1, 256},
+      "fragments that a rung's Huffman tables are trained on");
+    v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
+    v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
+      "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
+      "that "
+      "rises by more than this share without it, or where displays of the mip's size need it; -1 = store "
+      "all");
+    v("lossless_top", s.lossless_top,
+      "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
+  }
+};
+
+/// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
+struct LadderRung {
+  int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
+  std::vector<std::uint8_t> tables;  // what the rung's streams share
+  std::vector<std::uint8_t> data;    // the fragments' streams, in fragment order
+  std::vector<std::uint64_t> offset;  // [fragments + 1] into data; empty range = fragment not stored
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.quality, s.tables, s.data, s.offset);
+  }
+};
+/// Whether the package holds the plane's source image as a file, and whether its colours are the plane's.
+enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
+
+struct PlaneLadder {
+  Codec codec = Codec::kJpeg;
+  bool lossless =
+      false;  // the last rung holds the coefficients of the source, see stages/ladder/lossless_top.h
+  SourceFile source = SourceFile::kNone;
+  std::vector<LadderRung> rungs;  // rising quality
+  std::vector<std::uint8_t>
+      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
+                // mips are means of (stages/image/halve_pixels.h); mips have none
+  std::uint32_t preview_width_px = 0, preview_height_px = 0;
+  // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
+  // of its source's quantisers away
+  SizeKnots knots;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px, s.knots);
+  }
+};
+struct Ladder {
+  std::vector<PlaneLadder> planes;
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.planes, s.notes);
+  }
+};
+
+/// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
+/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
+/// with uncovered texels, when those are free, by stages/jpeg/masked_jpeg.h, so that only covered texels cost
+/// bytes. Tables are trained on covered fragments spread over the plane and have a code for every symbol, so
+/// that no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment
+/// has tables and a preview but no data. Works on the pixels as they stand: beside the result it takes some
+/// fragments' streams per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for
+/// pixels that do not fit the planes. Same bytes for any thread count. Of mips a few
+/// fragments are encoded at every rung, which decide what rungs are worth storing
+/// (stages/ladder/rung_hull.h), and then the others at these.
+Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                     const LadderOptions& options, const RunContext& context);
+
+/// The rung's own stream of one fragment; empty when it is not stored.
+std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment);
+
+/// The bytes a client needs to show a fragment at a rung: its stream, and those below it where they are parts
+/// of one file. 0 when it is not stored.
+std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
+/// The complete image file of a stored fragment at a rung. FormatError when a part is damaged.
+std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
+/// Its pixels, or luma only. FormatError when it is damaged or has more than max_pixels.
+Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels);
+Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                            std::uint64_t max_pixels);
+
+}  // namespace texmesh

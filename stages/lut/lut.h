@@ -1,0 +1,62 @@
+#pragma once
+#include <string_view>
+#include <vector>
+
+#include "format/base/fields.h"
+#include "format/documents/tables.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/ladder/ladder.h"
+#include "stages/zim/zim.h"
+
+namespace texmesh {
+
+inline constexpr int kLutVersion = 7;
+
+enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
+template <>
+struct EnumNames<Allocation> {
+  static constexpr std::array<std::string_view, 3> names{"thesis", "log", "rd"};
+};
+
+struct LutOptions {
+  Allocation allocate = Allocation::kLog;
+  double quality_fine = 80, quality_coarse = 40;  // Q_i falls linearly from S_0 to S_max
+  double quality_width = 60;                      // dQ of (3.2)
+  double log_width = 0.42;                        // dg of the log-quantiser form
+  double quality_min = 5, quality_max = 97;       // clip
+  double normal_quality_min = 30, data_quality_min = 18, alpha_quality_min = 18;  // beside quality_min
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("allocate", s.allocate,
+      "how bytes are shared among fragments: thesis = equation 3.2 in quality; log = the same in the "
+      "logarithm "
+      "of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - SSIM x "
+      "surface)");
+    v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
+    v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
+    v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
+    v("log_width", s.log_width, Range{0, 4},
+      "dg: how far feature density moves the logarithm of the quantiser; below 0.6 by at most one of the "
+      "default rungs");
+    v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
+    v("normal_quality_min", s.normal_quality_min, Range{1, 100},
+      "the same for normal maps, where it is more than quality_min; at most quality_max");
+    v("data_quality_min", s.data_quality_min, Range{1, 100},
+      "the same for occlusion, roughness, metalness and other data");
+    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, "the same for alpha channels");
+    v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
+  }
+};
+
+/// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the
+/// exact bytes, the digest, MSE and 1 - SSIM of luma, for data of every channel, over covered texels, and 1 -
+/// SSIM of the preview, scaled up bilinearly, where no rung is shown; Q_i, D_i over 21 values of Gamma (bytes
+/// of the fragments' streams, tables not counted; with `allocate = rd` the bytes of log, which rungs_of()
+/// spends); the order of falling importance: eta of scale 0, then surface, then index; and the size model
+/// (stages/lut/size_model.h). `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each
+/// other, FormatError for a stream that does not decode. Same result for any thread count.
+PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
+                           const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,64 @@
+#include "stages/measure/fragment_meter.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace texmesh {
+namespace {
+
+bool varies(const std::vector<std::uint8_t>& values, const std::vector<std::uint8_t>& mask) {
+  std::uint8_t low = 255, high = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!mask[i]) continue;
+    low = std::min(low, values[i]);
+    high = std::max(high, values[i]);
+  }
+  return low < high;
+}
+
+}  // namespace
+
+std::size_t measured_channels(const TexturePlane& plane) {
+  return is_colour(plane.role) ? 1 : plane.channels;
+}
+
+Samples split_samples(const Pixels& pixels, std::size_t measured) {
+  const std::size_t texels = std::size_t{pixels.width_px} * pixels.height_px;
+  if (pixels.channels == 1) return {pixels.data};
+  Samples out(measured, std::vector<std::uint8_t>(texels));
+  for (std::size_t c = 0; c < measured; ++c)
+    for (std::size_t i = 0; i < texels; ++i)
+      out[c][i] = measured_value(pixels.data.data() + i * pixels.channels, pixels.channels, measured, c);
+  return out;
+}
+
+Samples decode_samples(const PlaneLadder& ladder, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels, std::size_t measured) {
+  if (measured > 1) return split_samples(decode_fragment(ladder, rung, fragment, max_pixels), measured);
+  return {decode_fragment_luma(ladder, rung, fragment, max_pixels).data};
+}
+
+FragmentMeter::FragmentMeter(Samples source, const std::vector<std::uint8_t>& mask, std::uint32_t width,
+                             std::uint32_t height) {
+  double varying = 0;
+  for (const std::vector<std::uint8_t>& channel : source) {
+    weights_.push_back(varies(channel, mask) ? 1 : 0);
+    varying += weights_.back();
+  }
+  for (double& weight : weights_)
+    weight = varying > 0 ? weight / varying : 1 / static_cast<double>(source.size());
+  for (std::vector<std::uint8_t>& channel : source)
+    meters_.emplace_back(std::move(channel), mask, width, height);
+}
+
+Distortion FragmentMeter::against(const Samples& shown) const {
+  Distortion out;
+  for (std::size_t c = 0; c < meters_.size(); ++c) {
+    const Distortion channel = meters_[c].against(shown[c]);
+    out.mse += channel.mse / static_cast<double>(meters_.size());
+    out.dssim += weights_[c] * channel.dssim;
+  }
+  return out;
+}
+
+}  // namespace texmesh

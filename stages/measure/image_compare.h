@@ -1,0 +1,39 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/base/vec.h"
+
+namespace texmesh {
+
+/// A picture in linear light, square, row-major, with the pixels that show the object.
+struct Picture {
+  std::uint32_t side_px = 0;
+  std::vector<Vec3f> linear;          // RGB of BT.709 primaries, 0..1 (brighter is cut off)
+  std::vector<std::uint8_t> covered;  // 0 or 1
+};
+
+/// What of a reference is computed once for many comparisons.
+struct ComparedPicture {
+  std::uint32_t side_px = 0;
+  std::vector<float> luma, luma_mean,
+      luma_square_mean;    // luma: sRGB-encoded, 0..1; means: Gaussian, deviation 1.5 px
+  std::vector<Vec3f> lab;  // after the eye's blur, Hunt-adjusted
+  std::vector<std::uint8_t> covered;
+};
+ComparedPicture prepare_comparison(const Picture& picture);
+
+struct PictureDifference {
+  double ssim = 0, difference = 0;  // sums over the pixels that either picture covers
+  std::uint64_t pixels = 0;
+};
+
+/// SSIM of luma: Gaussian windows (11 x 11, deviation 1.5 px), C1 = 0.01^2, C2 = 0.03^2 (Wang et al. 2004).
+/// Difference: the colour part of LDR-FLIP (Andersson et al. 2020) at its standard 67 px per degree: opponent
+/// colours blurred as the eye does at that distance (one Gaussian a channel: 1.03 px achromatic, 1.10 px
+/// red-green, 2.9 px blue-yellow, FLIP's own filter taken as one instead of two), Hunt-adjusted L*a*b*, HyAB
+/// distance, its exponent 0.7 and its remapping to 0..1. FLIP's edge and point detectors are left out: SSIM
+/// stands beside it for structure.
+PictureDifference compare_pictures(const ComparedPicture& reference, const ComparedPicture& test);
+
+}  // namespace texmesh

@@ -1,0 +1,255 @@
+#include "stages/package/package.h"
+
+#include <algorithm>
+#include <set>
+
+#include "format/container/layout.h"
+#include "format/documents/viewing.h"
+#include "stages/image/decode_image.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
+  throw StageError("package", place, expected, found);
+}
+
+std::string plane_place(std::size_t plane) { return "texture plane " + std::to_string(plane); }
+
+Bytes to_bytes(const std::string& s) { return {s.begin(), s.end()}; }
+
+/// Source names are shown by tools, so bytes that are not UTF-8 and control characters become '?', and what
+/// is longer than `max_bytes` is cut at a character.
+std::string clean_text(const std::string& text, std::size_t max_bytes) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto at = [&](std::size_t k) {
+      return i + k < text.size() ? static_cast<std::uint8_t>(text[i + k]) : 0u;
+    };
+    const unsigned c = at(0);
+    const std::size_t length = c < 0x80                ? 1
+                               : c >= 0xc2 && c < 0xe0 ? 2
+                               : c >= 0xe0 && c < 0xf0 ? 3
+                               : c >= 0xf0 && c < 0xf5 ? 4
+                                                       : 0;
+    bool good = length > 0 && (c >= 0x20 && c != 0x7f);
+    for (std::size_t k = 1; k < length; ++k) good = good && (at(k) & 0xc0) == 0x80;
+    // Overlong forms, surrogates and numbers past U+10FFFF show in the second byte.
+    good = good && !(c == 0xe0 && at(1) < 0xa0) && !(c == 0xed && at(1) > 0x9f) &&
+           !(c == 0xf0 && at(1) < 0x90) && !(c == 0xf4 && at(1) > 0x8f);
+    const std::string part = good ? text.substr(i, length) : "?";
+    if (out.size() + part.size() > max_bytes) break;
+    out += part;
+    i += good ? length : 1;
+  }
+  return out;
+}
+
+/// Stage results must belong together before anything is read from them by index.
+void check_inputs(const NestedScales& scales, const PerceptualValues& perceptual,
+                  const std::vector<Image>& images, const Fragments& fragments, const Ladder& ladder,
+                  const PackageTables& tables, const ScaleFiles& files) {
+  const std::size_t n = scales.scales.size(), planes = fragments.planes.size();
+  const auto require = [](const std::string& what, std::size_t expected, std::size_t found) {
+    if (expected != found) fail(what, std::to_string(expected), std::to_string(found));
+  };
+  if (n == 0 || scales.scales.front().scale != 0) fail("scales", "S_0 first", "none");
+  require("perceptual values p95", n * n, perceptual.p95.size());
+  require("perceptual values p99", n * n, perceptual.p99.size());
+  require("perceptual values major", n, perceptual.major.size());
+  require("perceptual values kept", n, perceptual.kept.size());
+  for (const auto* v :
+       {&perceptual.display_px_edge, &perceptual.display_px_error, &perceptual.display_px_jnd})
+    require("displayed sizes", n, v->size());
+  require("planes of the ladder", planes, ladder.planes.size());
+  require("planes of the tables", planes, tables.planes.size());
+  if (files.files.empty()) fail("scale files", "at least one", "none");
+  for (std::size_t p = 0; p < planes; ++p) {
+    if (fragments.planes[p].image >= images.size()) fail(plane_place(p), "an image of the model", "none");
+    if (fragments.planes[p].mip > 0 && fragments.planes[p].base >= p)
+      fail(plane_place(p), "a mip of a plane before it", std::to_string(fragments.planes[p].base));
+    if ((fragments.planes[p].mip > 0) != ladder.planes[p].preview.empty())
+      fail(plane_place(p), "a preview for full-size planes, none for mips",
+           std::to_string(ladder.planes[p].preview.size()) + " bytes");
+    const PlaneTables& t = tables.planes[p];
+    require(plane_place(p) + ": rungs of the ladder", t.rung_count(), ladder.planes[p].rungs.size());
+    require(plane_place(p) + ": fragments", fragments.planes[p].fragment_count(), t.fragment_count());
+    for (const LadderRung& rung : ladder.planes[p].rungs)
+      require(plane_place(p) + ": offsets of a rung", t.fragment_count() + 1, rung.offset.size());
+  }
+}
+
+std::size_t index_of_scale(const NestedScales& scales, int scale) {
+  const auto it = std::ranges::find(scales.scales, scale, &NestedScale::scale);
+  if (it == scales.scales.end())
+    fail("scale files", "files of nested scales", "scale " + std::to_string(scale));
+  return static_cast<std::size_t>(it - scales.scales.begin());
+}
+
+double displayed(float px) { return std::clamp(static_cast<double>(px), 0.0, kAnyDisplayPx); }
+
+std::vector<ManifestScale> describe_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                                           const ScaleFiles& files) {
+  std::vector<ManifestScale> result;
+  for (const ScaleFile& file : files.files) {
+    const std::size_t k = index_of_scale(scales, file.scale);
+    const NestedScale& nested = scales.scales[k];
+    ManifestScale s;
+    s.scale = file.scale;
+    s.triangles = file.triangles;
+    s.vertices = file.vertices;
+    s.glb.path = mesh_path(file.scale);
+    s.major = perceptual.major[k] != 0;
+    s.error_max = static_cast<double>(nested.error_max);
+    s.error_rms = static_cast<double>(nested.error_rms);
+    s.floor = nested.floor_reason;
+    s.p95 = k == 0 ? 0 : static_cast<double>(perceptual.p95[k]);  // row 0: from S_0
+    s.p99 = k == 0 ? 0 : static_cast<double>(perceptual.p99[k]);
+    s.display_px_jnd = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_jnd[k]);
+    s.display_px_error = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_error[k]);
+    s.display_px_edge = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_edge[k]);
+    result.push_back(std::move(s));
+  }
+  std::ranges::sort(result, {}, &ManifestScale::scale);
+  if (result.front().scale != 0) fail("scale files", "S_0", "none");
+  return result;
+}
+
+double surface_area(const Mesh& mesh, const NestedScale& scale) {
+  double area = 0;
+  for (const Triangle& t : scale.triangles) {
+    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
+  }
+  return area;
+}
+
+Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
+                        const ScaleFiles& files, const Fragments& fragments, double jnd,
+                        const std::string& title) {
+  Manifest m;
+  m.title = title;
+  m.origin = scales.mesh.origin;
+  const auto& positions = scales.mesh.positions;
+  if (positions.empty()) fail("mesh", "positions", "none");
+  m.bounds_min = m.bounds_max = to_double(positions.front());
+  for (const Vec3f& p : positions)
+    for (int i = 0; i < 3; ++i) {
+      m.bounds_min[i] = std::min(m.bounds_min[i], static_cast<double>(p[i]));
+      m.bounds_max[i] = std::max(m.bounds_max[i], static_cast<double>(p[i]));
+    }
+  m.object_height = static_cast<double>(perceptual.object_height);
+  m.surface_area = surface_area(scales.mesh, scales.scales.front());
+  m.jnd = jnd;
+  m.scales = describe_scales(scales, perceptual, files);
+  m.steps = step_function(m.scales, StepRule::kDefault);
+  m.plane_count = static_cast<std::uint32_t>(fragments.planes.size());
+  return m;
+}
+
+/// `base` is the ladder of the full-size plane.
+TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladder, const PlaneLadder& base,
+                             const std::vector<Image>& images) {
+  TextureInfo t;
+  t.image = plane.image;
+  t.mip = plane.mip;
+  t.base = plane.base;
+  t.role = enum_name(plane.role);
+  t.name = clean_text(images[plane.image].name, 200);
+  t.colour_space = is_colour(plane.role) ? "srgb" : "linear";
+  t.codec = ladder.codec;
+  t.width_px = plane.width_px;
+  t.height_px = plane.height_px;
+  t.channels = plane.channels;
+  t.fragment_width_px = plane.fragment_width_px;
+  t.fragment_height_px = plane.fragment_height_px;
+  t.columns = plane.columns;
+  t.rows = plane.rows;
+  t.grid_reason = clean_text(plane.grid_reason, 1000);
+  t.preview_width_px = base.preview_width_px;
+  t.preview_height_px = base.preview_height_px;
+  for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
+  t.lossless = ladder.lossless;
+  if (ladder.source != SourceFile::kNone) t.source_extension = image_extension(images[plane.image].format);
+  t.source_colours = ladder.source != SourceFile::kOtherColours;
+  return t;
+}
+
+/// What a reader must know to show the textures, each once, by name.
+std::vector<std::string> required_features(const Ladder& ladder) {
+  std::set<std::string> features;
+  for (const PlaneLadder& plane : ladder.planes) features.emplace(codec_traits(plane.codec).required_feature);
+  features.erase("");
+  return {features.begin(), features.end()};
+}
+
+/// The fragments of a rung in the order of their importance, so that a prefix of the entry is worth the most.
+Bytes pack_rung(const LadderRung& rung, const PlaneTables& tables, std::size_t r, std::size_t plane) {
+  Bytes pack;
+  for (const std::uint16_t f : tables.order) {
+    if (f >= tables.fragment_count()) fail(plane_place(plane), "fragments in the order", std::to_string(f));
+    const std::uint64_t begin = rung.offset[f], end = rung.offset[f + std::size_t{1}];
+    if (begin > end || end > rung.data.size())
+      fail(plane_place(plane), "offsets within the rung", std::to_string(end));
+    if (end - begin != tables.size_bytes[r * tables.fragment_count() + f])
+      fail(plane_place(plane) + ", fragment " + std::to_string(f),
+           std::to_string(tables.size_bytes[r * tables.fragment_count() + f]) + " bytes, as the tables say",
+           std::to_string(end - begin));
+    pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(begin),
+                rung.data.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  return pack;
+}
+
+void add_texture_entries(const PlaneLadder& ladder, const PlaneTables& tables, std::size_t plane,
+                         std::vector<PackageEntry>& entries) {
+  const auto p = static_cast<std::uint32_t>(plane);
+  if (!ladder.preview.empty()) entries.push_back({preview_path(p), ladder.preview});
+  Bytes streams;
+  for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
+    const LadderRung& rung = ladder.rungs[r];
+    if (rung.tables.size() != tables.table_bytes[r] || rung.quality != tables.rung_quality[r])
+      fail(plane_place(plane) + ", rung " + std::to_string(r), "size and quality as the tables say",
+           "others");
+    streams.insert(streams.end(), rung.tables.begin(), rung.tables.end());
+    entries.push_back({rung_path(p, static_cast<std::uint32_t>(r)), pack_rung(rung, tables, r, plane)});
+  }
+  entries.push_back({table_streams_path(p), std::move(streams)});
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
+                                           const std::vector<Image>& images, const Fragments& fragments,
+                                           const Ladder& ladder, const PackageTables& tables,
+                                           const ScaleFiles& files, const QualityTable& quality, double jnd,
+                                           const std::string& provenance_json, const PackageOptions& options,
+                                           const RunContext& context) {
+  check_inputs(scales, perceptual, images, fragments, ladder, tables, files);
+  Manifest manifest = describe_model(scales, perceptual, files, fragments, jnd, options.title);
+  manifest.required_features = required_features(ladder);
+  std::vector<TextureInfo> textures;
+  std::vector<PackageEntry> entries;
+  entries.push_back({kTablesPath, write_tables(tables)});
+  entries.push_back({kQualityPath, to_bytes(write_quality(quality))});
+  entries.push_back({kProvenancePath, to_bytes(provenance_json)});
+  for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  if (!files.stream.empty()) entries.push_back({kSplitStreamPath, files.stream});
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
+    context.check_cancelled();
+    const TexturePlane& plane = fragments.planes[p];
+    const std::size_t base = plane.mip > 0 ? plane.base : p;
+    textures.push_back(describe_texture(plane, ladder.planes[p], ladder.planes[base], images));
+    add_texture_entries(ladder.planes[p], tables.planes[p], p, entries);
+    if (const std::string& extension = textures.back().source_extension; !extension.empty())
+      entries.push_back({source_path(static_cast<std::uint32_t>(p), extension), images[plane.image].bytes});
+  }
+  context.check_cancelled();
+  std::vector<std::uint8_t> package = write_package(manifest, std::move(textures), entries);
+  context.report(1);
+  return package;
+}
+
+}  // namespace texmesh

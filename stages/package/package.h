@@ -1,0 +1,39 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "format/documents/package_writer.h"
+#include "format/documents/tables.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/ladder/ladder.h"
+#include "stages/lut/lut.h"
+#include "stages/perceptual_values/perceptual_values.h"
+#include "stages/scales/scales.h"
+#include "stages/simplification/simplification.h"
+
+namespace texmesh {
+
+inline constexpr int kPackageVersion = 2;
+
+struct PackageOptions {
+  std::string title;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("title", s.title, "shown by viewers; nothing is taken from file names");
+  }
+};
+
+/// Describes the model in a manifest, packs every rung's fragments by importance, and lays out the container
+/// (format/documents/package_writer.h). Throws StageError when the stages' results do not belong together,
+/// FormatError when the title or a value breaks a rule of the format. A pure function of its inputs: nothing
+/// runs in parallel here. `provenance_json` is made by the pipeline (options, input digests, stage versions;
+/// no dates, hosts or paths).
+std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
+                                           const std::vector<Image>& images, const Fragments& fragments,
+                                           const Ladder& ladder, const PackageTables& tables,
+                                           const ScaleFiles& files, const QualityTable& quality, double jnd,
+                                           const std::string& provenance_json, const PackageOptions& options,
+                                           const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,281 @@
+#include "stages/perceptual_values/perceptual_values.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <string>
+
+#include "format/base/errors.h"
+#include "format/base/portable_math.h"
+#include "stages/base/parallel.h"
+#include "stages/geometry/distance.h"
+
+namespace texmesh {
+namespace {
+
+/// Points on one scale, with the skeleton distance that stands for the size of the shape around them.
+struct SampledScale {
+  std::vector<Vec3d> points;
+  std::vector<double> radius;
+  std::vector<std::uint32_t> source;  // the triangle of S_0 that the point's triangle comes from
+};
+
+SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius,
+                          std::size_t count) {
+  SampledScale out;
+  for (const SurfaceSample& s : sample_surface(mesh.positions, mesh.wedge_position, scale.triangles, count)) {
+    Vec3d p;
+    double r = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t position = mesh.wedge_position[scale.triangles[s.triangle][k]];
+      p = p + to_double(mesh.positions[position]) * static_cast<double>(s.weight[k]);
+      r += static_cast<double>(s.weight[k]) * radius[position];
+    }
+    out.points.push_back(p);
+    out.radius.push_back(r);
+    out.source.push_back(scale.triangle_source[s.triangle]);
+  }
+  return out;
+}
+
+/// Nearest-rank percentile; reorders the values. 0 for none.
+double percentile(std::vector<double>& values, double percent) {
+  if (values.empty()) return 0;
+  const double rank = std::floor(percent / 100 * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Table 7.1: one scale change.
+CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k, const Skeleton& skeleton,
+                                       std::vector<std::uint32_t>& survivor) {
+  const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
+  // Backwards, so that a chain's end is known before the links that lead to it.
+  for (std::size_t i = end; i-- > begin;)
+    survivor[scales.collapses[i].from] = survivor[scales.collapses[i].to];
+  CollapseStatistics out;
+  double sum = 0, squares = 0, least = 0, most = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::uint32_t removed = scales.collapses[i].from, left = survivor[removed];
+    const double rho = std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) /
+                       skeleton.radius[left];
+    sum += rho, squares += rho * rho;
+    least = i == begin ? rho : std::min(least, rho);
+    most = std::max(most, rho);
+  }
+  const auto n = static_cast<double>(end - begin);
+  if (end == begin) return out;
+  const double mean = sum / n;
+  out.collapses = static_cast<std::uint32_t>(end - begin);
+  out.mean = static_cast<float>(mean), out.max = static_cast<float>(most),
+  out.min = static_cast<float>(least);
+  out.deviation = static_cast<float>(std::sqrt(std::max(squares / n - mean * mean, 0.0)));
+  out.sum = static_cast<float>(sum), out.rss = static_cast<float>(std::sqrt(squares));
+  return out;
+}
+
+constexpr std::uint32_t kNoTriangle = 0xffffffffu;
+/// A chain of hints begins anew with every so many samples, wherever the threads' pieces begin.
+constexpr std::size_t kHintChain = 64;
+
+/// Per triangle of S_0: the triangle of this scale that it has become.
+std::vector<std::uint32_t> triangle_of_source(const NestedScale& scale, std::size_t source_count) {
+  std::vector<std::uint32_t> of(source_count, kNoTriangle);
+  for (std::size_t t = 0; t < scale.triangles.size(); ++t)
+    of[scale.triangle_source[t]] = static_cast<std::uint32_t>(t);
+  return of;
+}
+
+/// One scale j seen from the samples of finer ones. A sample's own triangle, where j still has it, is the
+/// place to begin the search at; the last answer's, where it has not.
+class ScaleComparison {
+ public:
+  ScaleComparison(const Mesh& mesh, const NestedScale& scale, std::size_t source_count)
+      : surface_(mesh.positions, mesh.wedge_position, scale.triangles),
+        of_source_(triangle_of_source(scale, source_count)) {}
+
+  std::vector<double> distances(const SampledScale& sampled) const {
+    std::vector<double> distance(sampled.points.size());
+    SurfaceDistance::Hint hint;
+    for (std::size_t s = 0; s < distance.size(); ++s) {
+      if (s % kHintChain == 0) hint = {};
+      const std::uint32_t own = of_source_[sampled.source[s]];
+      if (own != kNoTriangle) hint = surface_.hint_of(own);
+      distance[s] = surface_(sampled.points[s], hint);
+    }
+    return distance;
+  }
+
+ private:
+  SurfaceDistance surface_;
+  std::vector<std::uint32_t> of_source_;
+};
+
+/// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
+std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
+                                   const RunContext& context, PerceptualValues& out) {
+  const std::size_t n = scales.scales.size();
+  std::vector<SampledScale> sampled(n);
+  parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius, samples);
+  });
+  std::vector<double> error(n, 0);
+  std::atomic<std::size_t> done = 0;
+  parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t j = begin + 1; j <= end; ++j) {
+      const ScaleComparison comparison(scales.mesh, scales.scales[j], scales.mesh.triangles.size());
+      for (std::size_t i = 0; i < j; ++i) {
+        context.check_cancelled();
+        std::vector<double> distance = comparison.distances(sampled[i]), rho(distance.size());
+        for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
+        out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
+        out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
+        if (i == 0) error[j] = percentile(distance, 95);
+      }
+      context.report(static_cast<double>(++done) / static_cast<double>(n));
+    }
+  });
+  return error;
+}
+
+void find_majors(const std::vector<float>& value, std::size_t n, double jnd,
+                 std::vector<std::uint8_t>& major) {
+  for (std::size_t i = 0; i + 1 < n;) {
+    std::size_t last = i + 1;
+    while (last + 1 < n && value[i * n + last] < jnd && value[i * n + last + 1] < jnd) ++last;
+    major[last] = 1;
+    i = last;
+  }
+}
+
+/// Of kept scales with nearly the same number of triangles the finest stays (and the coarsest of all): it is
+/// enough wherever the others are, majors too, and what each of them would add to the package buys nothing.
+/// Atlases at their floor make such rows.
+template <class LogTriangles>
+void drop_neighbours(std::size_t n, const LogTriangles& log_triangles, std::vector<std::uint8_t>& kept) {
+  const double least = portable::log(1.5);
+  std::size_t finer = 0;
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    if (!kept[k]) continue;
+    const bool near =
+        log_triangles(finer) - log_triangles(k) < least || log_triangles(k) - log_triangles(n - 1) < least;
+    if (near)
+      kept[k] = 0;
+    else
+      finer = k;
+  }
+}
+
+void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& out) {
+  const std::size_t n = scales.scales.size();
+  out.kept = out.major;
+  out.kept[0] = out.kept[n - 1] = 1;
+  auto log_triangles = [&](std::size_t k) {
+    return portable::log(static_cast<double>(scales.scales[k].triangles.size()));
+  };
+  const double top = log_triangles(0), span = top - log_triangles(n - 1);
+  const double step = std::max(span / kept_scales, portable::log(2));
+  for (int m = 1; m <= kept_scales; ++m) {
+    const double want = top - step * m;
+    std::size_t nearest = 0;
+    for (std::size_t k = 1; k < n; ++k)
+      if (std::fabs(log_triangles(k) - want) < std::fabs(log_triangles(nearest) - want)) nearest = k;
+    out.kept[nearest] = 1;
+  }
+  drop_neighbours(n, log_triangles, out.kept);
+}
+
+double shortest_edge(const Mesh& mesh, const NestedScale& scale, double percent) {
+  std::vector<double> edges;
+  edges.reserve(3 * scale.triangles.size());
+  for (const Triangle& t : scale.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      edges.push_back(length(to_double(mesh.positions[mesh.wedge_position[t[k]]]) -
+                             to_double(mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]])));
+  return percentile(edges, percent);
+}
+
+float height_px(double numerator, double denominator) {
+  const double px = denominator > 0 ? numerator / denominator : kAnyHeightPx;
+  return static_cast<float>(std::min<double>(px, kAnyHeightPx));
+}
+
+void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
+                            const PerceptualValuesOptions& options, const std::vector<float>& value,
+                            const RunContext& context, PerceptualValues& out) {
+  Vec3f lo = scales.mesh.positions.at(0), hi = lo;
+  for (Vec3f p : scales.mesh.positions)
+    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+  out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  std::vector<double> edge(scales.scales.size());
+  parallel_for(context, edge.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k)
+      edge[k] = shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile);
+  });
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) {
+    out.display_px_edge.push_back(height_px(out.object_height, edge[k]));
+    out.display_px_error.push_back(height_px(out.object_height, error[k]));
+    out.display_px_jnd.push_back(height_px(options.jnd_reference_px * options.jnd, value[k]));
+    if (k == 0) continue;
+    for (std::vector<float>* px : {&out.display_px_edge, &out.display_px_error, &out.display_px_jnd})
+      (*px)[k] = std::min((*px)[k], (*px)[k - 1]);
+  }
+}
+
+double strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy) {
+  if (strategy == PerceptualStatistic::kConservative) return static_cast<double>(s.max);
+  return static_cast<double>(strategy == PerceptualStatistic::kAggressive ? s.min : s.mean);
+}
+
+}  // namespace
+
+std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
+                                    PerceptualStatistic strategy) {
+  if (strategy == PerceptualStatistic::kP95 || strategy == PerceptualStatistic::kP99)
+    throw StageError("perceptual_values", "statistic", "average, conservative or aggressive",
+                     std::string(enum_name(strategy)));
+  const std::size_t n = step.size();
+  std::vector<float> table(n * n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    double squares = 0;
+    for (std::size_t j = i + 1; j < n; ++j) {
+      const double value = strategy_value(step[j], strategy);
+      squares += value * value;
+      table[i * n + j] = static_cast<float>(std::sqrt(squares));
+    }
+  }
+  return table;
+}
+
+std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic) {
+  if (statistic == PerceptualStatistic::kP95) return values.p95;
+  if (statistic == PerceptualStatistic::kP99) return values.p99;
+  return cumulative_table(values.step, statistic);
+}
+
+PerceptualValues measure_perceptual_values(const NestedScales& scales, const Skeleton& skeleton,
+                                           const PerceptualValuesOptions& options,
+                                           const RunContext& context) {
+  const std::size_t n = scales.scales.size(), positions = scales.mesh.positions.size();
+  if (skeleton.distance.size() != positions || skeleton.radius.size() != positions)
+    throw StageError("perceptual_values", "skeleton", std::to_string(positions) + " positions",
+                     std::to_string(skeleton.distance.size()));
+  PerceptualValues out;
+  out.step.resize(n);
+  out.p95.assign(n * n, 0), out.p99.assign(n * n, 0);
+  out.major.assign(n, 0);
+  std::vector<std::uint32_t> survivor(positions);
+  for (std::size_t p = 0; p < positions; ++p) survivor[p] = static_cast<std::uint32_t>(p);
+  for (std::size_t k = 1; k < n; ++k) out.step[k] = collapse_statistics(scales, k, skeleton, survivor);
+  const std::vector<double> error =
+      compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
+  const std::vector<float> value = value_table(out, options.statistic);
+  find_majors(value, n, options.jnd, out.major);
+  choose_kept(scales, options.kept_scales, out);
+  find_displayed_heights(scales, error, options, value, context, out);
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,27 @@
+#pragma once
+#include <vector>
+
+#include "format/model/model.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/gltf/glb_writer.h"
+#include "stages/ladder/ladder.h"
+
+namespace texmesh {
+
+/// One preview image of a GLB, made once for all scales.
+struct PreviewImage {
+  std::uint32_t image = 0;  // source image: named "texture/<image>"
+  const char* mime_type = "";
+  std::vector<std::uint8_t> bytes;
+};
+
+/// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane
+/// stands beside it.
+std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladder& ladder);
+
+/// Materials, textures, samplers and images of the document. Textures whose texture coordinates or previews
+/// do not exist are left out. Factors are clipped to the ranges of glTF.
+void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
+                     const std::vector<PreviewImage>& previews, bool has_uv0, bool has_uv1);
+
+}  // namespace texmesh

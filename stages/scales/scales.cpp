@@ -1,0 +1,325 @@
+#include "stages/scales/scales.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "format/split/split_stream.h"
+#include "stages/base/parallel.h"
+#include "stages/scales/scale_codecs.h"
+#include "stages/scales/scale_materials.h"
+#include "stages/scales/vertex_split.h"
+
+namespace texmesh {
+namespace {
+
+using Json = GlbWriter::Json;
+
+/// Largest factor by which a material stretches texture coordinates, times the largest image's side.
+double largest_texture_px(const std::vector<Material>& materials, const std::vector<Image>& images, int set) {
+  constexpr double kUntextured =
+      4096;  // coordinates without a texture are kept as if there were one of this size
+  double largest = 0;
+  for (const Material& m : materials)
+    for_each_texture(m, [&](const TextureRef& t) {
+      if (!t.used() || t.texcoord != set) return;
+      const Image& image = images.at(static_cast<std::size_t>(t.image));
+      const double stretch = std::max(std::fabs(t.transform.scale.x), std::fabs(t.transform.scale.y));
+      largest = std::max(largest, stretch * std::max(image.width_px, image.height_px));
+    });
+  return largest > 0 ? largest : kUntextured;
+}
+
+bool uses_texcoord(const std::vector<Material>& materials, int set) {
+  bool used = false;
+  for (const Material& m : materials)
+    for_each_texture(m, [&](const TextureRef& t) { used = used || (t.used() && t.texcoord == set); });
+  return used;
+}
+
+/// 8 bits lose something of these colours.
+bool needs_fine_colours(const std::vector<Vec4f>& colours) {
+  auto coarse = [](float x) {
+    const float scaled = std::clamp(x, 0.0f, 1.0f) * 255;
+    return std::fabs(scaled - std::floor(scaled + 0.5f)) < 1e-3f;
+  };
+  return !std::all_of(colours.begin(), colours.end(),
+                      [&](Vec4f c) { return coarse(c.x) && coarse(c.y) && coarse(c.z) && coarse(c.w); });
+}
+
+ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials,
+                        const std::vector<Image>& images, const ScalesOptions& options) {
+  constexpr int kDracoBits = 24, kShortBits = 16;  // floats hold no more than 24; an unsigned short 16
+  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours), {}};
+  for (const Material& m : materials) coding.tangents.push_back(needs_tangents(m));
+  const bool draco = options.mesh_codec == MeshCodec::kDraco;
+  coding.write_uv[1] = !mesh.uv1.empty() && uses_texcoord(materials, 1);
+  coding.write_uv[0] = !mesh.uv0.empty();
+  if (options.mesh_codec == MeshCodec::kNone) return coding;
+  coding.position = position_grid(mesh, options, draco ? kDracoBits : kShortBits);
+  for (int set = 0; set < 2; ++set) {
+    if (!coding.write_uv[set]) continue;
+    QuantisationGrid& grid = coding.uv[set];
+    grid = uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), options,
+                   draco ? kDracoBits : kShortBits);
+    if (draco) continue;
+    const bool unit = grid.bits > 0 && grid.origin.x >= 0 && grid.origin.y >= 0 &&
+                      grid.origin.x + grid.range <= 1 && grid.origin.y + grid.range <= 1;
+    grid = QuantisationGrid{};
+    if (unit) grid.bits = kShortBits;
+  }
+  return coding;
+}
+
+/// Above this many parts they are merged: each costs 0.8 KB of JSON and a code stream of its own in every
+/// scale (a SketchUp model of 5,391 groups took 5.9 MB per scale, 4.2 MB of it JSON). The names then stand in
+/// the mesh's extras, and a feature id per vertex (EXT_mesh_features) says which is whose.
+constexpr std::size_t kMostNodes = 256;
+
+bool parts_merged(const Mesh& mesh) { return mesh.part_names.size() > kMostNodes; }
+
+/// Numbers wedges in the order of their use. Where parts are merged a wedge that two of them share becomes
+/// two.
+void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
+                   std::vector<std::uint32_t>& index) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::map<std::pair<std::uint32_t, std::uint16_t>, std::uint32_t> shared;
+  for (std::size_t i = 0; i < p.indices.size(); ++i) {
+    const std::uint32_t wedge = p.indices[i];
+    const std::uint16_t of = part.empty() ? std::uint16_t{0} : part[i / 3];
+    std::uint32_t* at = &index[wedge];
+    if (*at != kNone && !part.empty() && p.wedge_part[*at] != of)
+      at = &shared.try_emplace({wedge, of}, kNone).first->second;
+    if (*at == kNone) {
+      *at = static_cast<std::uint32_t>(p.wedges.size());
+      p.wedges.push_back(wedge);
+      if (!part.empty()) p.wedge_part.push_back(of);
+    }
+    p.indices[i] = *at;
+  }
+  for (std::uint32_t w : p.wedges) index[w] = kNone;
+}
+
+/// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
+/// go.
+std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale,
+                                             const QuantisationGrid& grid) {
+  std::map<std::array<std::uint16_t, 2>, std::pair<ScalePrimitive, std::vector<std::uint16_t>>> primitives;
+  const bool merged = parts_merged(mesh);
+  for (std::size_t i = 0; i < scale.triangles.size(); ++i) {
+    const Triangle& t = scale.triangles[i];
+    if (grid.bits > 0) {
+      Vec3f at[3];
+      for (std::size_t k = 0; k < 3; ++k) at[k] = grid.place(mesh.positions[mesh.wedge_position[t[k]]]);
+      if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+    }
+    const std::uint32_t source = scale.triangle_source[i];
+    const std::uint16_t part = mesh.triangle_part[source];
+    const std::array<std::uint16_t, 2> key{merged ? std::uint16_t{0} : part, mesh.triangle_material[source]};
+    auto& [p, parts] = primitives[key];
+    p.part = key[0], p.material = key[1];
+    for (std::uint32_t w : t) p.indices.push_back(w);
+    if (merged) parts.push_back(part);
+  }
+  std::vector<ScalePrimitive> out;
+  std::vector<std::uint32_t> index(mesh.wedge_count(), 0xffffffffu);
+  for (auto& [key, value] : primitives) {
+    number_wedges(value.first, value.second, index);
+    out.push_back(std::move(value.first));
+  }
+  return out;
+}
+
+/// Names of the parts that a scale still has, and their numbers in wedge_part: most of a many-part model's
+/// are gone from its coarse scales, whose names would cost a hundred times their meshes.
+std::vector<std::string> name_merged_parts(const Mesh& mesh, std::vector<ScalePrimitive>& primitives) {
+  std::vector<std::uint16_t> number(mesh.part_names.size(), 0);
+  for (const ScalePrimitive& p : primitives)
+    for (std::uint16_t part : p.wedge_part) number.at(part) = 1;
+  std::vector<std::string> names;
+  for (std::size_t part = 0; part < number.size(); ++part) {
+    if (number[part] == 0) continue;
+    number[part] = static_cast<std::uint16_t>(names.size());
+    names.push_back(mesh.part_names[part]);
+  }
+  for (ScalePrimitive& p : primitives)
+    for (std::uint16_t& part : p.wedge_part) part = number[part];
+  return names;
+}
+
+std::string node_name(const Mesh& mesh, std::uint16_t part) {
+  return parts_merged(mesh) ? "parts" : mesh.part_names.at(part);
+}
+
+Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_index) {
+  Json node{{"name", node_name(coding.mesh, part)}, {"mesh", mesh_index}};
+  if (coding.positions_are_indices()) {
+    const Vec3f origin = coding.position.origin;
+    const float step = coding.position.step();
+    node["translation"] = {origin.x, origin.y, origin.z};
+    node["scale"] = {step, step, step};
+  }
+  return node;
+}
+
+ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
+                      const std::vector<Material>& materials, const std::vector<PreviewImage>& previews) {
+  ScaleFile file;
+  file.scale = scale.scale;
+  GlbWriter writer;
+  std::size_t fallback_bytes = 0;
+  int open_part = -1;
+  std::vector<ScalePrimitive> primitives = split_primitives(coding.mesh, scale, coding.position);
+  const std::vector<std::string> merged_names = name_merged_parts(coding.mesh, primitives);
+  for (ScalePrimitive& primitive : primitives) {
+    const std::uint16_t part = primitive.part, material = primitive.material;
+    CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco
+                               ? code_draco(writer, coding, primitive)
+                               : code_plain(writer, coding, std::move(primitive), fallback_bytes);
+    coded.json["material"] = material;
+    file.triangles += coded.triangles;
+    file.vertices += coded.vertices;
+    if (open_part != part) {
+      open_part = part;
+      writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
+      writer.array("meshes").push_back(
+          {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
+      if (parts_merged(coding.mesh)) writer.array("meshes").back()["extras"]["partNames"] = merged_names;
+    }
+    if (parts_merged(coding.mesh)) {
+      coded.json["extensions"]["EXT_mesh_features"]["featureIds"] =
+          Json::array({{{"featureCount", merged_names.size()}, {"attribute", 0}, {"label", "part"}}});
+      writer.use_extension("EXT_mesh_features", false);
+    }
+    writer.array("meshes").back()["primitives"].push_back(std::move(coded.json));
+  }
+  if (file.triangles == 0)
+    throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid",
+                     std::to_string(coding.position.bits) + " bits per coordinate collapse all");
+  writer.set_fallback_buffer(fallback_bytes);
+  write_materials(writer, materials, previews, coding.write_uv[0], coding.write_uv[1]);
+  file.glb = writer.finish();
+  return file;
+}
+
+/// What the stream rounds to: as Draco, whatever the files are; at most 24 bits.
+VertexSplitCoding stream_coding(const ScaleCoding& coding, const std::vector<Material>& materials,
+                                const std::vector<Image>& images) {
+  constexpr int kMostBits = 24;
+  VertexSplitCoding out;
+  ScalesOptions most = coding.options;
+  out.position = coding.position;
+  if (out.position.bits == 0) out.position = position_grid(coding.mesh, most, kMostBits);
+  for (int set = 0; set < 2; ++set)
+    if (coding.write_uv[set])
+      out.uv[set] =
+          uv_grid(coding.uv_values(set), largest_texture_px(materials, images, set), most, kMostBits);
+  most.position_bits = most.uv_bits = kMostBits;
+  if (out.position.bits == 0) out.position = position_grid(coding.mesh, most, kMostBits);
+  for (int set = 0; set < 2; ++set)
+    if (coding.write_uv[set] && out.uv[set].bits == 0)
+      out.uv[set] = uv_grid(coding.uv_values(set), 1, most, kMostBits);
+  out.normal_bits = coding.options.normal_bits;
+  out.colour_bits = coding.mesh.colours.empty() ? 0 : coding.fine_colours ? 16 : 8;
+  out.merge_parts = coding.mesh.part_names.size() > kMostNodes;
+  return out;
+}
+
+/// Whether the stream's scales show the files' triangles. Files keep positions as they are where no grid is
+/// fine enough (slivers of 1e-12 of the size); the stream has none but its grid.
+bool shows_the_same(const std::vector<std::uint8_t>& stream, const std::vector<ScaleFile>& files) {
+  const SplitStreamHead head = read_split_head(stream);
+  return std::all_of(head.scales.begin(), head.scales.end(), [&](const SplitScale& s) {
+    return std::any_of(files.begin(), files.end(), [&](const ScaleFile& file) {
+      return file.scale == s.scale && file.triangles == s.triangles;
+    });
+  });
+}
+
+void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
+                  const std::vector<Material>& materials, const std::vector<Image>& images,
+                  const RunContext& context, ScaleFiles& result) {
+  if (!coding.options.stream || kept.size() < 2) return;
+  try {
+    result.stream = write_split_stream(
+        make_vertex_splits(scales, kept, stream_coding(coding, materials, images), context));
+    if (shows_the_same(result.stream, result.files)) return;
+    result.stream.clear();
+    add_info(result.notes, "no-stream", "",
+             "the scales have no vertex-split stream: triangles are too small for any grid");
+  } catch (const FormatError& e) {
+    add_info(result.notes, "no-stream", "",
+             std::string("the scales have no vertex-split stream: ") + e.what());
+  }
+}
+
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
+  double largest = 0;
+  if (grid.bits == 0) return largest;
+  for (Vec3f p : mesh.positions) {
+    const Vec3f q = grid.rounded(p);
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(static_cast<double>(q[k]) - p[k]));
+  }
+  return largest;
+}
+
+void note_parts(const Mesh& mesh, Notes& notes) {
+  if (!parts_merged(mesh)) return;
+  add_info(notes, "parts-merged", "",
+           std::to_string(mesh.part_names.size()) + " parts became one node, because more than " +
+               std::to_string(kMostNodes) +
+               " would cost more bytes than the mesh; feature ids of the vertices count their names, which "
+               "its mesh lists in extras.partNames");
+}
+
+void note_grid(const ScaleCoding& coding, std::size_t triangles, std::size_t written, Notes& notes) {
+  const int bits = coding.position.bits, asked = coding.options.position_bits;
+  if (bits > 0 && bits < asked)
+    add_info(notes, "fewer-bits", "",
+             "position_bits is " + std::to_string(asked) + ", of which mesh_codec " +
+                 std::string(enum_name(coding.options.mesh_codec)) + " holds " + std::to_string(bits));
+  if (written >= triangles) return;
+  constexpr std::size_t kManyPart = 100;  // more than a hundredth of all: that may show
+  const Severity severity =
+      (triangles - written) * kManyPart > triangles ? Severity::kWarning : Severity::kInfo;
+  notes.push_back({severity, "flattened-triangles", "scale 0",
+                   std::to_string(triangles - written) + " of " + std::to_string(triangles) +
+                       " triangles have two corners in one place of the grid of " + std::to_string(bits) +
+                       " bits per coordinate, show nothing and were left out"});
+}
+
+}  // namespace
+
+bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
+  if (mesh.tangents.empty() || mesh.normals.empty() || !tangents.at(primitive.material)) return false;
+  return std::all_of(primitive.wedges.begin(), primitive.wedges.end(),
+                     [&](std::uint32_t w) { return mesh.tangents[w].w != 0; });
+}
+
+ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                        const std::vector<Material>& materials, const std::vector<Image>& images,
+                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const RunContext& context) {
+  const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
+  const std::vector<PreviewImage> previews = preview_images(fragments, ladder);
+  std::vector<std::size_t> kept;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k)
+    if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
+  ScaleFiles result;
+  note_parts(scales.mesh, result.notes);
+  result.position_bits = coding.position.bits;
+  result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
+  result.position_error = largest_rounding(scales.mesh, coding.position);
+  result.files.resize(kept.size());
+  parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, previews);
+      context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
+    }
+  });
+  note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
+  write_stream(coding, scales, kept, materials, images, context, result);
+  return result;
+}
+
+}  // namespace texmesh

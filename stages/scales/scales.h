@@ -1,0 +1,98 @@
+#pragma once
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "format/base/fields.h"
+#include "format/model/model.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/ladder/ladder.h"
+#include "stages/perceptual_values/perceptual_values.h"
+#include "stages/simplification/simplification.h"
+
+namespace texmesh {
+
+inline constexpr int kScalesVersion = 4;
+
+enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
+template <>
+struct EnumNames<MeshCodec> {
+  static constexpr std::array<std::string_view, 4> names{"draco", "meshopt", "quantized", "none"};
+};
+
+struct ScalesOptions {
+  MeshCodec mesh_codec = MeshCodec::kDraco;
+  int draco_level = 7;  // compression level
+  // At most 24 (a float's mantissa; Draco takes minutes beyond) and 16 for the codecs on unsigned shorts;
+  // where 0 would need more, coordinates stay floats.
+  int position_bits = 0;  // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
+  int uv_bits = 0;        // 0 = error <= 1/8 texel of the largest texture
+  // Where 0: at least so many. A picture 512 px high still tells 12 bits from floats (FLIP .005 to .010).
+  int least_position_bits = 14;
+  int least_uv_bits = 14;
+  int normal_bits = 10;
+  int tangent_bits = 8;
+  bool stream = true;  // the vertex-split stream beside the files
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
+    v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
+    v("position_bits", s.position_bits, Range{0, 24},
+      "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at most "
+      "16");
+    v("uv_bits", s.uv_bits, Range{0, 24},
+      "bits per texture coordinate; 0 = so that the error is under 1/8 texel; quantized and meshopt: 16 "
+      "where "
+      "that is so fine, or floats");
+    v("least_position_bits", s.least_position_bits, Range{1, 24},
+      "fewest bits per position coordinate where they follow from the edge lengths");
+    v("least_uv_bits", s.least_uv_bits, Range{1, 24},
+      "fewest bits per texture coordinate where they follow from the textures");
+    v("normal_bits", s.normal_bits, Range{4, 16},
+      "bits per normal component; quantized and meshopt: 8 or 16");
+    v("tangent_bits", s.tangent_bits, Range{4, 16},
+      "bits per tangent component; quantized and meshopt: 8 or 16");
+    v("stream", s.stream, "also write all scales as one stream of vertex splits");
+  }
+};
+
+struct ScaleFile {
+  int scale = 0;                              // scale number
+  std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
+  std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.scale, s.glb, s.triangles, s.vertices);
+  }
+};
+struct ScaleFiles {
+  std::vector<ScaleFile> files;        // kept scales, S_0 first
+  int position_bits = 0, uv_bits = 0;  // as used; 0 = float
+  double position_error = 0;           // largest rounding of a coordinate, object units
+  std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.stream, s.notes);
+  }
+};
+
+/// Writes every kept scale as a GLB: one node per part, one primitive per material in it (above 256 parts one
+/// node for all, whose mesh lists the names of those that are left in extras.partNames and whose vertices
+/// have feature ids), the source's materials with the previews of the planes as images (RGBA PNG where a
+/// material needs alpha). GLB image k is named "texture/<k>" for source image k. Positions are quantised on
+/// one grid for all scales, so shared vertices are bit-equal between scales; triangles with two corners in
+/// one place of the grid are left out, and a note says how many of S_0's. Texture coordinates of unused sets
+/// are left out, and textures whose coordinates the mesh does not have. Tangents of the source are kept where
+/// a normal map needs them; none are made, since glTF says how a viewer makes them (MikkTSpace). Positions
+/// stay in the local frame (Mesh::origin is the manifest's). draco = KHR_draco_mesh_compression; quantized =
+/// KHR_mesh_quantization; meshopt = the same under EXT_meshopt_compression; none = plain floats. The stream
+/// (format/split/split_stream.h) holds the same scales on the same grid, or on one of 24 bits where the files
+/// have floats; there is none, and a note says so, when only one scale is kept or it would break the format's
+/// bounds. Throws StageError when nothing is left on the grid. Same bytes for any thread count.
+ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                        const std::vector<Material>& materials, const std::vector<Image>& images,
+                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const RunContext& context);
+
+}  // namespace texmesh

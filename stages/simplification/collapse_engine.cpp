@@ -1,0 +1,306 @@
+#include "stages/simplification/collapse_engine.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/base/parallel.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kFadeBelow = 0.05;  // of the vertices: there the attributes' weight starts to fall to 0
+// A little of the moved distance keeps flat places, where every collapse is free, from growing slivers.
+constexpr double kDistanceWeight = 1e-6;
+// The hub of a fan of more corners is left alone until the fan has shrunk: every look at it, or at what would
+// collapse into it, takes as many steps.
+constexpr std::uint32_t kMostCorners = 256;
+
+}  // namespace
+
+CollapseEngine::CollapseEngine(const ConditionedMesh& input, const ScaleMap& scale_map,
+                               const SimplificationOptions& options, const RunContext& context)
+    : options_(options),
+      mesh_(input),
+      cost_(mesh_, input.mesh, options),
+      components_(mesh_, input),
+      ring_(mesh_),
+      initial_positions_(mesh_.alive_positions()),
+      persistence_(mesh_.point_count(), 0),
+      flags_(mesh_.point_count(), 0),
+      target_(mesh_.point_count(), kNone),
+      queue_(mesh_.point_count() + components_.count()) {
+  for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
+    for (std::uint32_t position : mesh_.members(p))
+      persistence_[p] = std::max(persistence_[p], scale_map.persistence[position]);
+  context.check_cancelled();
+  fill_queue(context);
+}
+
+void CollapseEngine::fill_queue(const RunContext& context) {
+  const std::size_t count = mesh_.point_count();
+  std::vector<double> key(count, 0);
+  const std::size_t threads = static_cast<std::size_t>(std::max(context.threads, 1));
+  parallel_for(
+      context, count, std::max<std::size_t>(count / threads + 1, 4096),
+      [&](std::size_t begin, std::size_t end) {
+        CollapseRing ring(mesh_);
+        for (std::size_t p = begin; p < end; ++p) {
+          const Choice choice = evaluate(ring, static_cast<std::uint32_t>(p));
+          flags_[p] = static_cast<std::uint8_t>((choice.exact ? kExact : 0) | (choice.too_far ? kTooFar : 0));
+          if (!choice.found()) continue;
+          target_[p] = ring.neighbours()[choice.slot].point;
+          key[p] = choice.key;
+        }
+      });
+  for (std::uint32_t p = 0; p < count; ++p)
+    if (target_[p] != kNone) queue_.append(p, key[p]);
+  if (options_.order != CollapseOrder::kThesis)
+    for (std::uint32_t c = 0; c < components_.count(); ++c)
+      if (c != components_.largest && components_.size[c] <= options_.max_error)
+        queue_.append(mesh_.point_count() + c, components_.cost[c]);
+  queue_.order();
+}
+
+/// The cheapest collapses lie anywhere on the surface: on millions of triangles nearly all time would go in
+/// waiting for memory. What comes out next stands in the first places of the heap, the sooner the nearer to
+/// its top, so its data are asked for some collapses ahead, in the order in which one leads to the next.
+void CollapseEngine::look_ahead() const {
+  constexpr std::size_t kFaces = 5, kCorners = 21, kLists = 85;  // ends of the levels of a 4-ary heap
+  const std::size_t count = std::min(queue_.size(), kLists);
+  const auto is_point = [&](std::size_t i) { return queue_.item(i) < mesh_.point_count(); };
+  for (std::size_t i = kCorners; i < count; ++i)
+    if (is_point(i)) mesh_.prefetch_list(queue_.item(i));
+  for (std::size_t i = kFaces; i < std::min(count, kCorners); ++i)
+    if (is_point(i)) mesh_.prefetch_corners(queue_.item(i)), cost_.prefetch_point(queue_.item(i));
+  std::size_t next = 0;
+  for (std::size_t i = 1; i < std::min(count, kFaces); ++i) {
+    if (!is_point(i)) continue;
+    mesh_.prefetch_faces(queue_.item(i));
+    if (next == 0 || queue_.less(i, next)) next = i;
+  }
+  if (next == 0) return;
+  for (std::uint32_t entry : mesh_.corners(queue_.item(next))) {
+    const CollapseMesh::Face& face = mesh_.faces()[entry / 4];
+    if (!face.alive()) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      mesh_.prefetch_point(face.point[k]);
+      ring_.prefetch(face.point[k]);
+      cost_.prefetch_wedge(face.wedge[k]);
+    }
+  }
+}
+
+/// The part of a collapse's cost that needs no wedge map, a lower bound of the whole.
+double CollapseEngine::shape_cost(std::uint32_t u, std::uint32_t v) const {
+  const Vec3d p = mesh_.point(v), moved = p - mesh_.point(u);
+  const Quadric& q = cost_.quadric(u);
+  const double weight =
+      options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
+  return (q.at(p) + kDistanceWeight * q.weight * dot(moved, moved)) * (1 + weight);
+}
+
+/// In the unit-diagonal frame.
+double CollapseEngine::error_of(std::uint32_t u, std::uint32_t v) const {
+  const Quadric& q = cost_.quadric(u);
+  return q.weight > 0 ? std::sqrt(q.at(mesh_.point(v)) / q.weight) : 0;
+}
+
+/// The cheapest collapse of u that is allowed; the ring holds its wedge map afterwards.
+CollapseEngine::Choice CollapseEngine::evaluate(CollapseRing& ring, std::uint32_t u) const {
+  if (mesh_.corner_count(u) > kMostCorners) return {};
+  ring.gather(u);
+  return choose(ring);
+}
+
+CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring) const {
+  using State = Neighbour::State;
+  const std::uint32_t u = ring.centre();
+  const bool thesis = options_.order == CollapseOrder::kThesis;
+  Choice choice;
+  for (Neighbour& n : ring.neighbours()) {
+    n.state = State::kOut;
+    if (!ring.allowed_by_borders(n) || mesh_.corner_count(n.point) > kMostCorners) continue;
+    n.error = error_of(u, n.point);
+    if (n.error > options_.max_error) {
+      choice.too_far = true;
+      continue;
+    }
+    const Vec3d moved = mesh_.point(n.point) - mesh_.point(u);
+    n.cost = thesis ? dot(moved, moved) : shape_cost(u, n.point);
+    n.state = State::kBounded;
+  }
+  for (;;) {
+    std::uint32_t slot = kNone;
+    for (std::uint32_t i = 0; i < ring.neighbours().size(); ++i) {
+      const Neighbour& n = ring.neighbours()[i];
+      if (n.state == State::kOut) continue;
+      const Neighbour* best = slot == kNone ? nullptr : &ring.neighbours()[slot];
+      if (!best || n.cost < best->cost || (n.cost == best->cost && n.point < best->point)) slot = i;
+    }
+    if (slot == kNone) return choice;
+    Neighbour& n = ring.neighbours()[slot];
+    if (!ring.map_wedges(slot)) {
+      n.state = State::kOut;
+      choice.exact = false;
+    } else if (n.state == State::kBounded && cost_.has_attributes()) {
+      // The rest of the cost is only asked for where the shape's part is the least.
+      const double weight =
+          options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
+      const CollapseCost::Distortion d = cost_.distortion(ring, n);
+      n.cost += fade_ * d.cost * (1 + weight);
+      n.state = State::kPriced;
+      if (d.shift <= options_.max_shift) continue;
+      n.state = State::kOut;
+      choice.exact = false;
+      choice.too_far = true;
+    } else if (ring.keeps_topology(slot) && ring.keeps_orientation(slot)) {
+      choice.slot = slot;
+      choice.key = thesis ? persistence_[u] : n.cost;
+      return choice;
+    } else {
+      n.state = State::kOut;
+      choice.exact = false;
+    }
+  }
+}
+
+/// Looks at a point whose key has come out first. Where nothing has changed around it, only whether its
+/// collapse is still legal.
+CollapseEngine::Choice CollapseEngine::confirm(std::uint32_t u) {
+  ring_.gather(u);
+  if (flags_[u] & kStale) return choose(ring_);
+  for (std::uint32_t slot = 0; slot < ring_.neighbours().size(); ++slot) {
+    Neighbour& n = ring_.neighbours()[slot];
+    if (n.point != target_[u]) continue;
+    if (!ring_.allowed_by_borders(n) || !ring_.map_wedges(slot) || !ring_.keeps_topology(slot) ||
+        !ring_.keeps_orientation(slot))
+      break;
+    n.error = error_of(u, n.point);
+    return {.slot = slot, .key = queue_.key(u), .exact = (flags_[u] & kExact) != 0};
+  }
+  return choose(ring_);
+}
+
+void CollapseEngine::take(std::uint32_t u, std::uint32_t target_point, const Choice& choice) {
+  flags_[u] = static_cast<std::uint8_t>((choice.exact ? kExact : 0) | (choice.too_far ? kTooFar : 0));
+  target_[u] = target_point;
+  if (choice.found())
+    queue_.set(u, choice.key);
+  else
+    queue_.erase(u);
+}
+
+void CollapseEngine::refresh(std::uint32_t u) {
+  const Choice choice = evaluate(ring_, u);
+  take(u, choice.found() ? ring_.neighbours()[choice.slot].point : kNone, choice);
+}
+
+/// Merges the ring's centre as chosen.
+void CollapseEngine::apply(const Choice& choice) {
+  const Neighbour& n = ring_.neighbours()[choice.slot];
+  const std::uint32_t u = ring_.centre(), v = n.point;
+  const auto error = static_cast<float>(n.error * mesh_.diagonal());
+  for (std::uint32_t position : mesh_.members(u))
+    collapses_.push_back({position, ring_.destination(n, position), error});
+  wedge_target_ = ring_.target();
+  for (std::size_t w = 0; w < wedge_target_.size(); ++w) {
+    const std::uint32_t wedge = ring_.wedges()[w];
+    if (wedge_target_[w] == kNone)
+      wedge_target_[w] = mesh_.add_wedge(wedge, ring_.destination(n, mesh_.wedge_position(wedge)));
+  }
+  cost_.merge(ring_, n, wedge_target_);
+  around_.clear();
+  for (const Neighbour& other : ring_.neighbours())
+    if (other.point != v) around_.push_back(other.point);
+  mesh_.collapse(u, v, [&](std::uint32_t wedge) {
+    const auto& wedges = ring_.wedges();
+    return wedge_target_[static_cast<std::size_t>(std::find(wedges.begin(), wedges.end(), wedge) -
+                                                  wedges.begin())];
+  });
+}
+
+/// After a collapse into v: its own key anew; the points around the one that is gone have v as neighbour now.
+/// Points without a legal collapse may have got one, those two edges away included.
+void CollapseEngine::look_around(std::uint32_t v) {
+  const bool thesis = options_.order == CollapseOrder::kThesis;
+  for (std::uint32_t x : around_) {
+    if (!queue_.contains(x)) continue;
+    if (!(flags_[x] & kExact)) {
+      refresh(x);
+      continue;
+    }
+    flags_[x] |= kStale;
+    if (thesis) continue;
+    const double bound = shape_cost(x, v);
+    if (bound < queue_.key(x)) queue_.set(x, bound);
+  }
+  around_.clear();
+  refresh(v);
+  if (mesh_.corner_count(v) > kMostCorners) return;
+  for (const Neighbour& n : ring_.neighbours())
+    if (!queue_.contains(n.point)) around_.push_back(n.point);
+  for (std::uint32_t x : around_) refresh(x);
+}
+
+void CollapseEngine::vanish(std::uint32_t component) {
+  const auto points = components_.members(component);
+  const auto error = static_cast<float>(components_.size[component] * mesh_.diagonal());
+  for (std::uint32_t p : points) {
+    if (!mesh_.is_alive(p)) continue;
+    for (std::uint32_t position : mesh_.members(p)) collapses_.push_back({position, position, error});
+    queue_.erase(p);
+  }
+  mesh_.remove(points);
+}
+
+/// Points without a legal collapse are looked at again when their own ring changes; changes farther away may
+/// free them as well, so before giving up all of them are tried once more.
+bool CollapseEngine::retry_locked() {
+  if (given_up_at_ == collapses_.size()) return false;
+  given_up_at_ = collapses_.size();
+  for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
+    if (mesh_.is_alive(p) && !queue_.contains(p)) refresh(p);
+  return !queue_.empty();
+}
+
+CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const RunContext& context) {
+  const bool thesis = options_.order == CollapseOrder::kThesis;
+  constexpr int kRetries = 8;  // each costs a pass over all points; later ones free next to nothing
+  int retries = 0;
+  for (std::uint32_t step = 0; mesh_.alive_positions() > positions; ++step) {
+    if (step % 4096 == 0) context.check_cancelled();
+    if (mesh_.alive_faces() <= static_cast<std::uint32_t>(options_.min_triangles))
+      return CollapseStop::kFewTriangles;
+    if (queue_.empty() && (++retries > kRetries || !retry_locked())) {
+      for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
+        if (mesh_.is_alive(p) && flags_[p] & kTooFar) return CollapseStop::kTooFar;
+      return CollapseStop::kLocked;
+    }
+    const std::uint32_t u = queue_.top();
+    if (u >= mesh_.point_count()) {
+      queue_.erase(u);
+      vanish(u - mesh_.point_count());
+      continue;
+    }
+    if (thesis && persistence_[u] >= scale) return CollapseStop::kReached;
+    look_ahead();
+    fade_ = std::min(1.0, mesh_.alive_positions() / (kFadeBelow * initial_positions_));
+    const Choice choice = confirm(u);
+    if (!choice.found()) {
+      take(u, kNone, choice);
+      continue;
+    }
+    const std::uint32_t v = ring_.neighbours()[choice.slot].point;
+    if (choice.key > queue_.key(u)) {
+      take(u, v, choice);
+      if (queue_.top() != u) continue;
+      // Still the cheapest; the ring in scratch is its own.
+    }
+    apply(choice);
+    queue_.erase(u);
+    look_around(v);
+  }
+  return CollapseStop::kReached;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,24 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "stages/skeletonization/wrap.h"
+
+namespace texmesh {
+
+/// Line segments between nodes.
+struct CurveSkeleton {
+  std::vector<Vec3d> nodes;
+  std::vector<std::array<std::uint32_t, 2>> segments;
+};
+
+/// The mean curvature flow skeleton (Tagliasacchi et al. 2012, CGAL's defaults) of one connected closed
+/// oriented 2-manifold, contracted at most `max_contractions` times. CGAL's test whether a point is inside
+/// tries one random ray after the other until one misses every edge, which never happens on surfaces that lie
+/// on themselves (known upstream): after 1,000 rays from one point the contraction is given
+/// up. Throws whatever CGAL throws, and std::runtime_error for a surface that is not closed or that CGAL
+/// would not end on. Deterministic, single-threaded.
+CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions = 500);
+
+}  // namespace texmesh

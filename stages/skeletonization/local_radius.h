@@ -1,0 +1,33 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "format/base/vec.h"
+#include "stages/base/run_context.h"
+#include "stages/skeletonization/wrap.h"
+
+namespace texmesh {
+
+struct LocalRadiusOptions {
+  double plate_ratio = 5;  // a part whose median skeleton distance / half thickness is above it is a plate
+  double limb_ratio = 3;   // elsewhere R is at most this many half thicknesses
+  double offset = 0;       // how far the wrap stands off the shape
+};
+
+struct LocalRadius {
+  std::vector<double> radius;  // R, per point
+  std::size_t parts = 0, plates = 0;
+  std::size_t limited = 0;  // points whose skeleton distance the thickness has lowered
+};
+
+/// The skeleton distance, corrected by the local thickness of the wrap where a curve cannot be a skeleton: on
+/// plates (a medial *sheet*), R is half the thickness; on extremities that the contraction has swallowed, R
+/// is at most limb_ratio half thicknesses. A wrap whose walls are little farther apart than its own offsets
+/// tells nothing of a shape: it runs around a sheet, and there the skeleton distance stays (between half an
+/// offset and one and a half the two are blended). `parts` = the wrap's, `points` and `distance` = what R is
+/// asked for, in the same frame. Same bits for any thread count.
+LocalRadius limit_by_thickness(const std::vector<TriangleSoup>& parts, std::span<const Vec3d> points,
+                               std::span<const double> distance, const LocalRadiusOptions& options,
+                               const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,204 @@
+#include "stages/skeletonization/skeletonization.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "stages/base/parallel.h"
+#include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/local_radius.h"
+#include "stages/skeletonization/segment_tree.h"
+#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/wrap_soup.h"
+
+namespace texmesh {
+namespace {
+
+/// No radius is smaller than this fraction of the diagonal: R divides.
+constexpr double kLeastRadius = 1e-6;
+/// A note about thin parts is worth reading from this share of the vertices on.
+constexpr double kWorthANote = 0.01;
+constexpr int kWrapAttempts = 3;
+
+void append(const CurveSkeleton& part, CurveSkeleton& all) {
+  const auto base = static_cast<std::uint32_t>(all.nodes.size());
+  all.nodes.insert(all.nodes.end(), part.nodes.begin(), part.nodes.end());
+  for (const auto& s : part.segments) all.segments.push_back({base + s[0], base + s[1]});
+  // A part that contracted to a point has a node and no segment.
+  if (part.segments.empty())
+    for (std::uint32_t n = base; n < all.nodes.size(); ++n) all.segments.push_back({n, n});
+}
+
+bool is_finite(const CurveSkeleton& skeleton) {
+  return !skeleton.nodes.empty() && std::all_of(skeleton.nodes.begin(), skeleton.nodes.end(), [](Vec3d p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+  });
+}
+
+CurveSkeleton centroid_of(const TriangleSoup& part) {
+  Vec3d sum;
+  for (const Vec3d& p : part.points) sum = sum + p;
+  return {{sum * (1 / static_cast<double>(part.points.size()))}, {}};
+}
+
+/// Errors that mean "not this way"; the others (Cancelled, a lack of memory: a limit of the machine must not
+/// decide about the result) pass through.
+template <class Try, class Else>
+void try_or(Try&& attempt, Else&& otherwise) {
+  try {
+    attempt();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    otherwise();
+  }
+}
+
+CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_contractions, Notes& notes,
+                             const RunContext& context) {
+  CurveSkeleton all;
+  std::size_t failed = 0;
+  for (const TriangleSoup& part : parts) {
+    context.check_cancelled();
+    CurveSkeleton skeleton;
+    try_or([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
+    if (!is_finite(skeleton)) {
+      skeleton = centroid_of(part);
+      ++failed;
+    }
+    append(skeleton, all);
+  }
+  if (failed > 0)
+    add_warning(notes, "skeleton-part-centroid", "",
+                std::to_string(failed) + " of " + std::to_string(parts.size()) +
+                    " parts cannot be contracted to a curve, their centroids take its place");
+  return all;
+}
+
+/// The wrap at the finest alpha that comes to an end within the cap.
+std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOptions& options, Notes& notes,
+                               const RunContext& context) {
+  double alpha = 1.0 / options.alpha_divisor;
+  for (int attempt = 1;; ++attempt, alpha *= 2) {
+    context.check_cancelled();
+    std::vector<TriangleSoup> parts;
+    try_or(
+        [&] {
+          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
+                               static_cast<std::size_t>(options.max_wrap_faces),
+                               static_cast<std::size_t>(options.max_wrap_steps), context);
+        },
+        [&] {
+          if (attempt == kWrapAttempts) throw;
+        });
+    if (parts.empty() && attempt == kWrapAttempts) throw std::runtime_error("the wrap is empty");
+    if (parts.empty()) continue;
+    if (attempt > 1)
+      add_warning(notes, "skeleton-coarser-wrap", "",
+                  "the surface is too intricate for alpha_divisor " + std::to_string(options.alpha_divisor) +
+                      ", wrapped with " + std::to_string(options.alpha_divisor >> (attempt - 1)));
+    return parts;
+  }
+}
+
+std::vector<double> distances_to(const CurveSkeleton& skeleton, const std::vector<Vec3d>& points,
+                                 const RunContext& context) {
+  const SegmentTree tree(skeleton.nodes, skeleton.segments);
+  std::vector<double> distance(points.size());
+  parallel_for(context, points.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) distance[p] = tree.distance(points[p]);
+  });
+  return distance;
+}
+
+void note_limits(const LocalRadius& local, Notes& notes) {
+  if (local.plates > 0)
+    add_info(notes, "skeleton-plates", "",
+             std::to_string(local.plates) + " of " + std::to_string(local.parts) +
+                 " parts are plates, where R is half the local thickness");
+  const auto count = static_cast<double>(local.radius.size());
+  if (local.plates < local.parts && static_cast<double>(local.limited) >= kWorthANote * count)
+    add_info(notes, "skeleton-thin-parts", "",
+             "R is bounded by the local thickness at " +
+                 std::to_string(static_cast<int>(100 * static_cast<double>(local.limited) / count + 0.5)) +
+                 " % of the vertices, which the skeleton does not reach");
+}
+
+/// Skeleton and R in the unit frame, then in the mesh's.
+CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
+                      const SkeletonizationOptions& options, const RunContext& context,
+                      std::vector<float>& distance, Notes& notes) {
+  const TriangleSoup soup = make_wrap_soup(mesh, frame);
+  const std::vector<TriangleSoup> parts = wrap(soup, options, notes, context);
+  context.report(0.7);
+  CurveSkeleton skeleton = contract_parts(parts, options.max_contractions, notes, context);
+  context.report(0.8);
+  std::vector<Vec3d> points;
+  points.reserve(mesh.mesh.positions.size());
+  for (Vec3f p : mesh.mesh.positions) points.push_back(frame.to_unit(p));
+  const std::vector<double> far = distances_to(skeleton, points, context);
+  const LocalRadius local = limit_by_thickness(
+      parts, points, far, {options.plate_ratio, options.limb_ratio, 1.0 / options.offset_divisor}, context);
+  note_limits(local, notes);
+  for (double r : local.radius) distance.push_back(static_cast<float>(r * frame.diagonal));
+  for (Vec3d& p : skeleton.nodes) p = frame.from_unit(p);
+  return skeleton;
+}
+
+/// The mean of each component's positions; distances are to the own one, not to the closest.
+void use_centroids(const ConditionedMesh& mesh, CurveSkeleton& skeleton, std::vector<float>& distance) {
+  skeleton = {};
+  skeleton.nodes.resize(mesh.component_count);
+  std::vector<double> count(mesh.component_count, 0);
+  const auto& positions = mesh.mesh.positions;
+  for (std::size_t p = 0; p < positions.size(); ++p) {
+    Vec3d& sum = skeleton.nodes[mesh.component[p]];
+    sum = sum + to_double(positions[p]);
+    ++count[mesh.component[p]];
+  }
+  for (std::uint32_t c = 0; c < mesh.component_count; ++c) {
+    skeleton.nodes[c] = skeleton.nodes[c] * (1 / count[c]);
+    skeleton.segments.push_back({c, c});
+  }
+  distance.resize(positions.size());
+  for (std::size_t p = 0; p < positions.size(); ++p)
+    distance[p] = static_cast<float>(length(to_double(positions[p]) - skeleton.nodes[mesh.component[p]]));
+}
+
+std::vector<float> floored(const std::vector<float>& distance, double floor, double diagonal) {
+  std::vector<float> sorted = distance;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const auto least = static_cast<float>(std::max(floor * sorted[sorted.size() / 2], kLeastRadius * diagonal));
+  std::vector<float> radius(distance.size());
+  for (std::size_t p = 0; p < radius.size(); ++p) radius[p] = std::max(distance[p], least);
+  return radius;
+}
+
+}  // namespace
+
+Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& options,
+                     const RunContext& context) {
+  const UnitFrame frame = unit_frame_of(mesh.mesh.positions);
+  Skeleton out;
+  CurveSkeleton skeleton;
+  try_or([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
+         [&] {
+           use_centroids(mesh, skeleton, out.distance);
+           out.fallback_centroid = true;
+           add_warning(out.notes, "skeleton-fallback", "",
+                       "no skeleton, distances are to the centroids of the components");
+         });
+  for (const Vec3d& p : skeleton.nodes) out.nodes.push_back(to_float(p));
+  out.segments = std::move(skeleton.segments);
+  out.radius = floored(out.distance, options.radius_floor, frame.diagonal);
+  context.report(1);
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,74 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "format/base/fields.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "stages/condition/condition.h"
+
+namespace texmesh {
+
+inline constexpr int kSkeletonizationVersion = 4;
+
+struct SkeletonizationOptions {
+  // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
+  int alpha_divisor = 80;      // alpha = diagonal / this
+  int offset_divisor = 600;    // offset = diagonal / this
+  int max_wrap_faces = 8000;   // the wrap is decimated to this before contraction
+  double radius_floor = 0.25;  // R_eff = max(R, floor * median R)
+  double plate_ratio = 5;      // median R / half thickness above which a part is a plate
+  double limb_ratio = 3;       // R <= this * half thickness
+  // Work caps: what CGAL does not end on is given up there, with the fallback that skeletonize() tells.
+  int max_wrap_steps = 1000000;
+  int max_contractions = 500;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("alpha_divisor", s.alpha_divisor, Range{5, 400}, "alpha of the wrap = bounding-box diagonal / this");
+    v("offset_divisor", s.offset_divisor, Range{50, 6000},
+      "offset of the wrap = bounding-box diagonal / this");
+    v("max_wrap_faces", s.max_wrap_faces, Range{100, 100000},
+      "faces of the wrap that is contracted to the skeleton");
+    v("radius_floor", s.radius_floor, Range{0, 1}, "least skeleton distance, as a fraction of its median");
+    v("plate_ratio", s.plate_ratio, Range{1, 1e9},
+      "a part whose median distance to the skeleton is more than this many half thicknesses is a plate: its "
+      "R "
+      "is half the local thickness");
+    v("limb_ratio", s.limb_ratio, Range{1, 1e9},
+      "R is at most this many half thicknesses (thin parts that the skeleton does not reach)");
+    v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9},
+      "work cap: steps of a wrap before a coarser one; they may look at 50 times as many triangles");
+    v("max_contractions", s.max_contractions, Range{1, 100000}, "work cap: contractions of a part");
+  }
+};
+
+/// The curve skeleton and the skeleton distance R(v) (thesis 6.2): alpha wrap, mean curvature flow, distance
+/// to segments, corrected by the local thickness where a curve is no skeleton (local_radius.h). Parts that
+/// contract to a point, and the centroids of the fallbacks, are segments of no length.
+struct Skeleton {
+  std::vector<Vec3f> nodes;                            // mesh-local coordinates
+  std::vector<std::array<std::uint32_t, 2>> segments;  // node indices
+  std::vector<float> distance;     // R(v) per position: distance to the closest segment, at most what the
+                                   // local thickness allows; object units, >= 0
+  std::vector<float> radius;       // R_eff(v) per position = max(R, floor * median R); > 0
+  bool fallback_centroid = false;  // no wrap: distance to the component's centroid
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.nodes, s.segments, s.distance, s.radius, s.fallback_centroid, s.notes);
+  }
+};
+
+/// Works for any conditioned mesh (open, several components, one triangle); it never fails (but for Cancelled
+/// and bad_alloc). What falls back says so with a warning: a wrap that takes more than max_wrap_steps (or
+/// looks at 50 times as many triangles: thousands of needles around one point) is
+/// tried with twice and four times its alpha ("skeleton-coarser-wrap"); a part of the wrap that cannot be
+/// contracted has its centroid for a skeleton ("skeleton-part-centroid"); where there is no wrap, R is the
+/// distance to the component's centroid ("skeleton-fallback"). Plates and thin limbs give notes
+/// ("skeleton-plates", "skeleton-thin-parts"). Meshes of more than 100,000 triangles are clustered to that
+/// first. Wrap and contraction run on one thread. Deterministic.
+Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& options,
+                     const RunContext& context);
+
+}  // namespace texmesh

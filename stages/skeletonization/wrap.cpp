@@ -1,0 +1,164 @@
+// CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
+// not a crash.
+#define CGAL_DEBUG
+#include "stages/skeletonization/wrap.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_ratio_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <CGAL/alpha_wrap_3.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "stages/geometry/triangle_tree.h"
+
+namespace texmesh {
+namespace {
+
+namespace aw3 = CGAL::Alpha_wraps_3::internal;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using SurfaceMesh = CGAL::Surface_mesh<Point>;
+using PartMap = SurfaceMesh::Property_map<SurfaceMesh::Face_index, std::size_t>;
+
+/// What a wrap may cost. Steps are CGAL's, and all together may look at 50 triangles for each of the most
+/// steps: where thousands of needles meet, every query meets all of them, and a cone of 5,000 took minutes of
+/// few steps. Scans take 25,000 to 100,000 steps and 1 to 4 million triangles.
+class WorkCap {
+ public:
+  WorkCap(std::size_t steps, const RunContext& context)
+      : steps_(steps), triangles_(steps * kTrianglesPerStep), context_(context) {}
+
+  void count_step() {
+    context_.check_cancelled();
+    if (steps_-- == 0 || tried > triangles_) throw std::runtime_error("the wrap takes too many steps");
+  }
+
+  std::uint64_t tried = 0;
+
+ private:
+  static constexpr std::size_t kTrianglesPerStep = 50;
+  std::size_t steps_;
+  std::uint64_t triangles_;
+  const RunContext& context_;
+};
+
+/// CGAL calls it before each step.
+class StepCounter : public aw3::Wrapping_default_visitor {
+ public:
+  explicit StepCounter(WorkCap& cap) : cap_(cap) {}
+  template <class Wrapper, class Gate>
+  void before_facet_treatment(const Wrapper&, const Gate&) {
+    cap_.count_step();
+  }
+
+ private:
+  WorkCap& cap_;
+};
+
+/// What the wrapping asks of its input. CGAL's own oracle answers with exact predicates; in plain double
+/// arithmetic a wrap takes a sixth of the time, and a cell that touches the input by a rounding error does
+/// not matter at an offset of 1/600.
+class SoupOracle {
+ public:
+  using Geom_traits = aw3::Alpha_wrap_AABB_traits<Kernel>;
+
+  SoupOracle(const TriangleSoup& soup, WorkCap& cap)
+      : soup_(soup), tree_(soup.points, soup.triangles), cap_(cap) {}
+
+  const Geom_traits& geom_traits() const { return traits_; }
+  CGAL::Bbox_3 bbox() const {
+    const Vec3d lo = tree_.lo(), hi = tree_.hi();
+    return {lo.x, lo.y, lo.z, hi.x, hi.y, hi.z};
+  }
+
+  template <class K>
+  bool do_intersect(const aw3::Tetrahedron_with_outside_info<K>& cell) const {
+    return tree_.meets(
+        Tetrahedron({vec(cell.m_tet[0]), vec(cell.m_tet[1]), vec(cell.m_tet[2]), vec(cell.m_tet[3])}),
+        cap_.tried);
+  }
+  template <class K>
+  bool do_intersect(const aw3::Ball_3<K>& ball) const {
+    const double radius2 = ball.boundary().squared_radius();
+    return tree_.distance2(vec(ball.boundary().center()), std::nextafter(radius2, 2 * radius2), cap_.tried) <=
+           radius2;
+  }
+
+  double squared_distance(const Point& p) const { return tree_.distance2(vec(p), kInfinity, cap_.tried); }
+  Point closest_point(const Point& p) const {
+    const TriangleTree::Nearest at = tree_.nearest(vec(p), cap_.tried);
+    Vec3d on;
+    for (std::size_t k = 0; k < 3; ++k)
+      on = on + soup_.points[soup_.triangles[at.triangle][k]] * at.weight[k];
+    return {on.x, on.y, on.z};
+  }
+
+  /// The first point of a segment that is `offset` away from the input, within 1 % of it.
+  bool first_intersection(const Point& from, const Point& to, Point& found, double offset) const {
+    const auto distance = [this](const Point& p) { return std::sqrt(squared_distance(p)); };
+    return aw3::Offset_intersection<Geom_traits, decltype(distance)>(distance, offset, 0.01 * offset, 1)
+        .first_intersection(from, to, found);
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  static Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
+
+  const TriangleSoup& soup_;
+  TriangleTree tree_;
+  WorkCap& cap_;
+  Geom_traits traits_;
+};
+
+void decimate(SurfaceMesh& wrap, std::size_t max_faces) {
+  if (wrap.number_of_faces() <= max_faces) return;
+  // A closed triangle mesh has three edges for two faces.
+  CGAL::Surface_mesh_simplification::Count_stop_predicate<SurfaceMesh> stop(max_faces * 3 / 2);
+  CGAL::Surface_mesh_simplification::edge_collapse(wrap, stop);
+  wrap.collect_garbage();
+}
+
+std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
+  const PartMap part = wrap.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part", 0).first;
+  std::vector<TriangleSoup> parts(CGAL::Polygon_mesh_processing::connected_components(wrap, part));
+  std::vector<std::uint32_t> number(wrap.number_of_vertices(), 0xffffffffu);
+  for (const auto face : wrap.faces()) {
+    TriangleSoup& to = parts[part[face]];
+    Triangle triangle{};
+    std::size_t k = 0;
+    for (const auto v : wrap.vertices_around_face(wrap.halfedge(face))) {
+      if (number[v] == 0xffffffffu) {
+        number[v] = static_cast<std::uint32_t>(to.points.size());
+        to.points.push_back({wrap.point(v).x(), wrap.point(v).y(), wrap.point(v).z()});
+      }
+      triangle[k++] = number[v];
+    }
+    to.triangles.push_back(triangle);
+  }
+  return parts;
+}
+
+}  // namespace
+
+std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
+                                       std::size_t max_faces, std::size_t max_steps,
+                                       const RunContext& context) {
+  WorkCap cap(max_steps, context);
+  const SoupOracle oracle(soup, cap);
+  SurfaceMesh wrap;
+  StepCounter counter(cap);
+  aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
+  wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
+  decimate(wrap, max_faces);
+  return split_parts(wrap);
+}
+
+}  // namespace texmesh

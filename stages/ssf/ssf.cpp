@@ -1,0 +1,296 @@
+#include "stages/ssf/ssf.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "stages/base/parallel.h"
+#include "stages/geometry/morton.h"
+#include "stages/ssf/ssf_component.h"
+
+namespace texmesh {
+namespace {
+
+/// Components below this many vertices are solved whole by one thread each, many at a time.
+constexpr std::size_t kSmallComponent = 8192;
+
+/// Positions (lowest twins alone) and triangles, grouped by component: items of component c are
+/// [first[c], first[c + 1]).
+struct Layout {
+  std::vector<std::uint32_t> position, first_position;  // within a component in Morton order
+  std::vector<std::uint32_t> triangle, first_triangle;
+  std::vector<std::uint32_t> vertex;        // per lowest twin: its index within the component
+  std::vector<double> diagonal, mean_edge;  // per component, object units
+  std::size_t component_count() const { return diagonal.size(); }
+  std::size_t size(std::size_t c) const { return first_position[c + 1] - first_position[c]; }
+};
+
+/// Places of positions along a Morton curve: neighbours in space are neighbours in memory.
+class MortonCode {
+ public:
+  explicit MortonCode(const std::vector<Vec3f>& positions) : lo_(to_double(positions[0])) {
+    Vec3d hi = lo_;
+    for (Vec3f p : positions)
+      for (int k = 0; k < 3; ++k) {
+        lo_[k] = std::min(lo_[k], double{p[k]});
+        hi[k] = std::max(hi[k], double{p[k]});
+      }
+    side_ = std::max({hi.x - lo_.x, hi.y - lo_.y, hi.z - lo_.z, 1e-300});
+  }
+  std::uint64_t operator()(Vec3f p) const {
+    std::uint64_t bits = 0;
+    for (int k = 0; k < 3; ++k)
+      bits |= spread_bits(static_cast<std::uint64_t>((double{p[k]} - lo_[k]) / side_ * 0x1fffff)) << k;
+    return bits;
+  }
+
+ private:
+  Vec3d lo_;
+  double side_ = 0;
+};
+
+void group_positions(const ConditionedMesh& mesh, Layout& layout) {
+  const auto& positions = mesh.mesh.positions;
+  const MortonCode code(positions);
+  auto& first = layout.first_position;
+  first.assign(mesh.component_count + 1, 0);
+  for (std::uint32_t p = 0; p < positions.size(); ++p)
+    if (mesh.twin[p] == p) ++first[mesh.component[p] + 1];
+  for (std::size_t c = 0; c < mesh.component_count; ++c) first[c + 1] += first[c];
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed(first.back());
+  std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
+  for (std::uint32_t p = 0; p < positions.size(); ++p)
+    if (mesh.twin[p] == p) keyed[at[mesh.component[p]]++] = {code(positions[p]), p};
+  for (std::size_t c = 0; c < mesh.component_count; ++c)
+    std::sort(keyed.begin() + first[c], keyed.begin() + first[c + 1]);
+  layout.position.resize(keyed.size());
+  layout.vertex.assign(positions.size(), 0);
+  for (std::size_t c = 0; c < mesh.component_count; ++c)
+    for (std::uint32_t i = first[c]; i < first[c + 1]; ++i) {
+      layout.position[i] = keyed[i].second;
+      layout.vertex[keyed[i].second] = i - first[c];
+    }
+}
+
+void group_triangles(const ConditionedMesh& mesh, Layout& layout) {
+  const Mesh& m = mesh.mesh;
+  auto& first = layout.first_triangle;
+  first.assign(mesh.component_count + 1, 0);
+  const auto component = [&](std::uint32_t t) { return mesh.component[m.position_of(t, 0)]; };
+  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) ++first[component(t) + 1];
+  for (std::size_t c = 0; c < mesh.component_count; ++c) first[c + 1] += first[c];
+  layout.triangle.resize(m.triangles.size());
+  std::vector<std::uint32_t> at(first.begin(), first.end() - 1);
+  for (std::uint32_t t = 0; t < m.triangles.size(); ++t) layout.triangle[at[component(t)]++] = t;
+}
+
+void measure(const Mesh& m, Layout& layout) {
+  for (std::size_t c = 0; c + 1 < layout.first_position.size(); ++c) {
+    Vec3d lo = to_double(m.positions[layout.position[layout.first_position[c]]]), hi = lo;
+    for (std::uint32_t i = layout.first_position[c]; i < layout.first_position[c + 1]; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const double x = m.positions[layout.position[i]][k];
+        lo[k] = std::min(lo[k], x);
+        hi[k] = std::max(hi[k], x);
+      }
+    double sum = 0;
+    for (std::uint32_t i = layout.first_triangle[c]; i < layout.first_triangle[c + 1]; ++i)
+      for (int k = 0; k < 3; ++k)
+        sum += length(to_double(m.positions[m.position_of(layout.triangle[i], k)]) -
+                      to_double(m.positions[m.position_of(layout.triangle[i], (k + 1) % 3)]));
+    layout.diagonal.push_back(length(hi - lo));
+    layout.mean_edge.push_back(sum / (3.0 * (layout.first_triangle[c + 1] - layout.first_triangle[c])));
+  }
+}
+
+Layout make_layout(const ConditionedMesh& mesh) {
+  Layout layout;
+  group_positions(mesh, layout);
+  group_triangles(mesh, layout);
+  measure(mesh.mesh, layout);
+  return layout;
+}
+
+SurfaceComponent cut_out(const ConditionedMesh& mesh, const Layout& layout, std::size_t c) {
+  const Mesh& m = mesh.mesh;
+  SurfaceComponent out;
+  out.mean_edge = layout.mean_edge[c];
+  out.diagonal = layout.diagonal[c];
+  const std::uint32_t* position = layout.position.data() + layout.first_position[c];
+  Vec3d lo = to_double(m.positions[position[0]]), hi = lo;
+  double largest = 0;
+  for (std::size_t v = 0; v < layout.size(c); ++v)
+    for (int k = 0; k < 3; ++k) {
+      const double x = m.positions[position[v]][k];
+      lo[k] = std::min(lo[k], x);
+      hi[k] = std::max(hi[k], x);
+      largest = std::max(largest, std::fabs(x));
+    }
+  const Vec3d centre = (lo + hi) * 0.5;
+  out.points.reserve(layout.size(c));
+  for (std::size_t v = 0; v < layout.size(c); ++v)
+    out.points.push_back((to_double(m.positions[position[v]]) - centre) * (1 / out.mean_edge));
+  out.noise = largest * 0x1p-24 / out.mean_edge;
+  const std::size_t triangles = layout.first_triangle[c + 1] - layout.first_triangle[c];
+  out.corners.reserve(3 * triangles);
+  out.fan_of_position.reserve(3 * triangles);
+  for (std::uint32_t i = layout.first_triangle[c]; i < layout.first_triangle[c + 1]; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t p = m.position_of(layout.triangle[i], k);
+      out.corners.push_back(layout.vertex[mesh.twin[p]]);
+      out.fan_of_position.push_back(mesh.twin[p] == p);
+    }
+  return out;
+}
+
+/// What the notes tell, over all components.
+struct Totals {
+  std::size_t slowed = 0, clustered = 0;
+  void add(const ComponentScales& s) {
+    slowed += s.slowed;
+    clustered += s.clustered;
+  }
+};
+
+class MeshFilter {
+ public:
+  MeshFilter(const ConditionedMesh& mesh, const SsfOptions& options, const RunContext& context)
+      : mesh_(mesh), options_(options), context_(context), layout_(make_layout(mesh)) {
+    const auto entries = static_cast<std::size_t>(options.scales) + 1;
+    map_.scales = options.scales;
+    map_.sigma.assign(entries, 0);
+    map_.convergence.assign(entries, 1);
+    map_.crossings_at.assign(entries, 0);
+    map_.crossings_at[0] = static_cast<std::uint32_t>(mesh.mesh.positions.size());
+    map_.persistence.assign(mesh.mesh.positions.size(), 0);
+    map_.crossing.assign(mesh.mesh.positions.size(), 0);
+  }
+
+  ScaleMap run() {
+    const std::size_t largest = largest_component();
+    if (!is_below_first_scale(largest)) {
+      take_whole(largest);
+      take_others(largest);
+    }
+    for (std::size_t p = 0; p < map_.persistence.size(); ++p) {
+      map_.persistence[p] = map_.persistence[mesh_.twin[p]];
+      map_.crossing[p] = map_.crossing[mesh_.twin[p]];
+    }
+    describe();
+    context_.report(1);
+    return std::move(map_);
+  }
+
+ private:
+  bool is_below_first_scale(std::size_t c) const {
+    return below_first_scale(layout_.diagonal[c], layout_.mean_edge[c], options_);
+  }
+
+  std::size_t largest_component() const {
+    const auto rank = [&](std::size_t c) { return std::pair(!is_below_first_scale(c), layout_.size(c)); };
+    std::size_t best = 0;
+    for (std::size_t c = 1; c < layout_.component_count(); ++c)
+      if (rank(c) > rank(best)) best = c;
+    return best;
+  }
+
+  void take_whole(std::size_t c) {
+    const ComponentScales s = filter_component(cut_out(mesh_, layout_, c), {}, options_, context_);
+    whole_sigma_ = s.sigma;
+    std::copy(s.sigma.begin(), s.sigma.end(), map_.sigma.begin() + 1);
+    map_.convergence = s.convergence;
+    totals_.add(s);
+    place(c, s);
+    count(s);
+  }
+
+  void take_others(std::size_t largest) {
+    std::vector<std::uint32_t> small;
+    for (std::uint32_t c = 0; c < layout_.component_count(); ++c) {
+      if (c == largest || is_below_first_scale(c)) continue;
+      if (layout_.size(c) < kSmallComponent) {
+        small.push_back(c);
+        continue;
+      }
+      const ComponentScales s =
+          filter_component(cut_out(mesh_, layout_, c), whole_sigma_, options_, context_);
+      totals_.add(s);
+      place(c, s);
+      count(s);
+    }
+    take_small(small);
+  }
+
+  /// In batches, so that counts need not be kept per component.
+  void take_small(const std::vector<std::uint32_t>& small) {
+    constexpr std::size_t kBatch = 4096;
+    RunContext alone = context_;
+    alone.threads = 1;
+    alone.progress = nullptr;
+    for (std::size_t batch = 0; batch < small.size(); batch += kBatch) {
+      std::vector<ComponentScales> done(std::min(kBatch, small.size() - batch));
+      parallel_for(context_, done.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          done[i] =
+              filter_component(cut_out(mesh_, layout_, small[batch + i]), whole_sigma_, options_, alone);
+          place(small[batch + i], done[i]);
+          done[i].persistence = done[i].crossing = {};
+        }
+      });
+      for (const ComponentScales& s : done) {
+        totals_.add(s);
+        count(s);
+      }
+    }
+  }
+
+  void place(std::size_t c, const ComponentScales& s) {
+    for (std::size_t v = 0; v < s.persistence.size(); ++v) {
+      const std::uint32_t p = layout_.position[layout_.first_position[c] + v];
+      map_.persistence[p] = s.persistence[v];
+      map_.crossing[p] = s.crossing[v];
+    }
+  }
+
+  void count(const ComponentScales& s) {
+    for (std::size_t i = 1; i < s.crossings_at.size(); ++i) map_.crossings_at[i] += s.crossings_at[i];
+  }
+
+  void describe() {
+    if (totals_.slowed)
+      add_info(map_.notes, "scale-space-work-cap", "",
+               "heat flow on " + std::to_string(totals_.slowed) +
+                   " component(s) slowed down where it is fastest, to fit max_terms");
+    if (totals_.clustered)
+      add_info(map_.notes, "scale-space-clusters", "",
+               std::to_string(totals_.clustered) +
+                   " component(s) sampled so unevenly that positions closer than half a mean edge share one "
+                   "feature point");
+  }
+
+  const ConditionedMesh& mesh_;
+  const SsfOptions& options_;
+  const RunContext& context_;
+  Layout layout_;
+  std::vector<double> whole_sigma_;  // of the largest component
+  ScaleMap map_;
+  Totals totals_;
+};
+
+}  // namespace
+
+SurfaceComponent largest_surface(const ConditionedMesh& mesh) {
+  const Layout layout = make_layout(mesh);
+  std::size_t best = 0;
+  for (std::size_t c = 1; c < layout.component_count(); ++c)
+    if (layout.size(c) > layout.size(best)) best = c;
+  return cut_out(mesh, layout, best);
+}
+
+ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
+                            const RunContext& context) {
+  return MeshFilter(mesh, options, context).run();
+}
+
+}  // namespace texmesh

@@ -1,0 +1,92 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/base/fields.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "stages/condition/condition.h"
+
+namespace texmesh {
+
+inline constexpr int kSsfVersion = 3;
+
+struct SsfOptions {
+  int scales = 20;          // smoothed copies beside the original
+  double sigma_max = 0.15;  // of a component's diagonal
+  double convergence =
+      0.3;                // eps_conv: sigma stops growing where the signal's range falls below this fraction
+  double band = 2.75;     // C_i = t_i (H(sigma_i) - H(band * sigma_i))
+  double contrast = 0.3;  // tau: of the response's rms
+  double component_cap =
+      0.25;                // persistence ends where sigma exceeds this fraction of the component's diagonal
+  double rate_cap = 10;    // w_ij <= cap * min(M_i, M_j) / h^2
+  double error_ratio = 5;  // sigma / vertex spacing below which no level of the pyramid goes: more = nearer
+                           // to the full resolution, and slower
+  int max_terms = 3000;  // work cap: Chebyshev terms of a level; heat flows slower where more would be needed
+  double window = 1.4;   // range scans: half-width of the Gaussian's window, in sigma
+  double range_band = 0;  // range scans: as `band`; 0 = the Laplacian of Gaussian alone, as the thesis has it
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
+    v("sigma_max", s.sigma_max, Range{0.01, 0.5}, "largest sigma, as a fraction of a component's diagonal");
+    v("convergence", s.convergence, Range{0, 1},
+      "sigma stops growing where the signal's range falls below this fraction");
+    v("band", s.band, Range{1.5, 6}, "ratio of the two sigmas whose difference is the band-passed signal");
+    v("contrast", s.contrast, Range{0, 3}, "least contrast of a feature, in rms of the response");
+    v("component_cap", s.component_cap, Range{0.05, 1},
+      "persistence ends where sigma exceeds this fraction of the component");
+    v("rate_cap", s.rate_cap, Range{3, 1000}, "cap of the Laplacian's rates, in 1 / (mean edge)^2");
+    v("error_ratio", s.error_ratio, Range{2, 1000},
+      "least ratio of sigma and vertex spacing on the coarser levels of the solver; 1000 = one level");
+    v("max_terms", s.max_terms, Range{100, 100000},
+      "most Chebyshev terms of a level; its fastest rates are slowed down to fit");
+    v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
+    v("range_band", s.range_band, Range{0, 6},
+      "range scans: as band, at most 1 = the Laplacian of Gaussian alone");
+  }
+};
+
+/// The scale map (thesis 2.4, 3.1): for every position the highest scale at which it is still a feature
+/// point.
+struct ScaleMap {
+  int scales = 0;            // scale indices run 0 (original) .. scales
+  std::vector<float> sigma;  // [scales + 1], of the largest component, object units; sigma[0] = 0
+  std::vector<std::uint8_t> persistence;  // per position, 0..scales: extrema and zero crossings (geometry)
+  std::vector<std::uint8_t> crossing;     // per position, 0..scales: zero crossings only (fragment density)
+  std::vector<float> convergence;  // [scales + 1]: (max - min) of the smoothed signal, as a fraction of S_0's
+  std::vector<std::uint32_t> crossings_at;  // [scales + 1]: positions at a zero crossing of that very scale;
+                                            // [0]: all (mesh), samples at one of the raw grid (range)
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.scales, s.sigma, s.persistence, s.crossing, s.convergence, s.crossings_at, s.notes);
+  }
+};
+
+/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (of the positions that
+/// the heat flow smooths), over the position graph (twins joined). Independent of skeletonization. Every
+/// component has a sigma ladder of its own, from its mean edge to sigma_max of its diagonal or the first
+/// sigma at which the smoothed component has shrunk to `convergence` of its extent. A scale counts for a
+/// component only while its sigma, there and on the largest component (most positions), is within
+/// component_cap of the component's diagonal: small parts are detail of the whole. Large sigmas are solved on
+/// coarser levels, whose vertices are positions of the mesh: feature points of a scale are no closer than
+/// 0.8 sigma / error_ratio to one another on any of them. O(n log n); deterministic for any thread count.
+ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
+                            const RunContext& context);
+
+/// Faithful filtering of a cylindrical range scan (thesis 2.2-2.4): separable Gaussian and LoG on r(alpha,
+/// y), periodic in alpha when the grid is a full turn, windows cut off at `window` sigma. Sigma is a length
+/// on the surface, so that unequal spacing along alpha and y counts (phi, psi); it runs from the mean spacing
+/// to sigma_max of the object's diagonal or the first sigma at which max - min of the smoothed radius falls
+/// below `convergence` of S_0's. Feature points are zero crossings alone and have no contrast rule:
+/// persistence equals crossing. Samples that are missing take no part. A Gaussian cut off at 1.4 sigma is one
+/// of 0.71 sigma, and a LoG keeps the base shape's curvature, which the mesh's signal has not: on equal terms
+/// (window >= 3, range_band = band) both filters mark the same places up to sigmas of a fifth of the radius,
+/// where heat begins to round the cross-section itself. `position_count` sizes the maps;
+/// positions without a sample get 0. Throws StageError for a grid whose arrays or steps are wrong.
+/// Deterministic for any thread count.
+ScaleMap filter_range_scan(const RangeGrid& range, std::size_t position_count, const SsfOptions& options,
+                           const RunContext& context);
+
+}  // namespace texmesh

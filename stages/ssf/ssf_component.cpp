@@ -1,0 +1,379 @@
+#include "stages/ssf/ssf_component.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "format/base/portable_math.h"
+#include "stages/base/parallel.h"
+#include "stages/ssf/heat_levels.h"
+
+namespace texmesh {
+namespace {
+
+/// The response of a surface without relief is what discretisation makes of its curvature, some percent of
+/// it. Contrast is measured against at least this share of the curvature's rms, and this many roundings of a
+/// coordinate.
+constexpr double kBaseShare = 0.15, kNoise = 4;
+
+/// Where more edges than this have a capped rate, scales are 20 % off on an unevenly sampled head.
+constexpr double kManyCapped = 0.1;
+/// What is closer than this, in mean edges, is one vertex then.
+constexpr double kCluster = 0.5;
+
+/// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more
+/// terms.
+constexpr std::size_t kTimesAtOnce = 8;
+
+constexpr std::size_t kGrain = 4096;
+constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
+
+Vec3d moved(Vec3d point, Vec3f by) { return point + to_double(by); }
+
+double extent(std::span<const Vec3d> points) {
+  Vec3d lo = points[0], hi = lo;
+  for (Vec3d p : points)
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], p[k]);
+      hi[k] = std::max(hi[k], p[k]);
+    }
+  return std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+}
+
+double rms(const std::vector<float>& values) {
+  double squares = 0;
+  for (float x : values) squares += double{x} * x;
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+/// Finds feature points of one response on one level.
+class FeatureFinder {
+ public:
+  /// The response is taken about its mean, which is what heat flow makes of the shape as a whole (a sphere
+  /// shrinks) and would leave convex shapes without zero crossings above mid scale. `least` stands in for its
+  /// rms where that is lower.
+  FeatureFinder(const HeatLevel& level, std::vector<float> g, double sigma, double least, double contrast)
+      : level_(level), g_(std::move(g)), sigma_(sigma) {
+    double sum = 0;
+    for (float x : g_) sum += double{x};
+    const auto mean = static_cast<float>(sum / static_cast<double>(g_.size()));
+    threshold_ = contrast * std::max(rms(g_), least);
+    for (float& x : g_) x -= mean;
+  }
+
+  /// 1-ring extrema, and zero crossings at the endpoint that is closer to zero, both with the contrast rule;
+  /// none of a kind closer than `apart` to another along the surface.
+  std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
+    std::vector<std::uint8_t> found(g_.size(), 0);
+    parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) found[v] = look_at(static_cast<std::uint32_t>(v));
+    });
+    for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
+    return found;
+  }
+
+ private:
+  std::uint8_t look_at(std::uint32_t v) const {
+    const HeatOperator& graph = level_.laplacian;
+    bool highest = true, lowest = true, crossing = false;
+    double edges = 0, difference = 0;
+    for (std::uint32_t k = graph.first[v]; k < graph.first[v + 1]; ++k) {
+      const std::uint32_t u = graph.column[k];
+      const double edge = length(level_.points[u] - level_.points[v]), step = double{g_[v]} - double{g_[u]};
+      edges += edge;
+      difference += step;
+      highest = highest && (g_[v] > g_[u] || (g_[v] == g_[u] && v < u));
+      lowest = lowest && (g_[v] < g_[u] || (g_[v] == g_[u] && v < u));
+      const float here = std::fabs(g_[v]), there = std::fabs(g_[u]);
+      crossing = crossing || ((g_[v] < 0) != (g_[u] < 0) && (here < there || (here == there && v < u)) &&
+                              std::fabs(step) * sigma_ > threshold_ * edge);
+    }
+    // A response of scale sigma falls off by about (edge / sigma)^2 / 2 around its extremum; ripples of the
+    // mesh on a plateau do not.
+    const double degree = std::max(1u, graph.first[v + 1] - graph.first[v]), mean = edges / degree;
+    const double fall = 2 * std::fabs(difference) / degree * (sigma_ / mean) * (sigma_ / mean);
+    const bool extremum = (highest || lowest) && std::fabs(g_[v]) > threshold_ && fall > threshold_;
+    return static_cast<std::uint8_t>((extremum ? kExtremum : 0) | (crossing ? kCrossing : 0));
+  }
+
+  /// In the order of the vertices, each keeps what is near from counting.
+  void thin_out(std::vector<std::uint8_t>& found, std::uint8_t kind, double apart) const {
+    const HeatOperator& graph = level_.laplacian;
+    std::vector<std::uint32_t> seen_from(found.size(), 0xffffffffu), near;
+    for (std::uint32_t v = 0; v < found.size(); ++v) {
+      if (!(found[v] & kind)) continue;
+      near.assign(1, v);
+      seen_from[v] = v;
+      for (std::size_t i = 0; i < near.size(); ++i)
+        for (std::uint32_t k = graph.first[near[i]]; k < graph.first[near[i] + 1]; ++k) {
+          const std::uint32_t u = graph.column[k];
+          if (seen_from[u] == v || length(level_.points[u] - level_.points[v]) > apart) continue;
+          seen_from[u] = v;
+          near.push_back(u);
+          found[u] = static_cast<std::uint8_t>(found[u] & ~kind);
+        }
+    }
+  }
+
+  const HeatLevel& level_;
+  std::vector<float> g_;
+  double sigma_, threshold_ = 0;
+};
+
+/// The signal on one level and what the next one takes over.
+struct LevelState {
+  HeatLevel level;
+  std::vector<std::uint32_t> vertex;  // per vertex of the level: the component's
+  std::vector<Vec3d> points;          // as smoothed by `time`
+  double time = 0;
+  std::vector<Vec3f> normals;  // at that time; empty on the component's own vertices
+};
+
+class ComponentFilter {
+ public:
+  ComponentFilter(SurfaceComponent component, std::span<const double> whole_sigma, const SsfOptions& options,
+                  const RunContext& context)
+      : component_(std::move(component)),
+        whole_sigma_(whole_sigma),
+        options_(options),
+        context_(context),
+        scales_(static_cast<std::size_t>(options.scales)),
+        range_(extent(component_.points)) {}
+
+  ComponentScales run() {
+    double sigma_max = options_.sigma_max * component_.diagonal / component_.mean_edge;
+    // The ladder is laid anew up to the first scale that has converged, once.
+    for (bool again = true;; again = false) {
+      start(sigma_max);
+      const std::size_t converged = climb(again);
+      if (converged >= scales_) return std::move(out_);
+      sigma_max = ladder_.sigma[converged];
+    }
+  }
+
+ private:
+  void start(double sigma_max) {
+    ladder_ = make_sigma_ladder(sigma_max, options_);
+    out_ = {};
+    out_.persistence.assign(component_.points.size(), 0);
+    out_.crossing.assign(component_.points.size(), 0);
+    out_.crossings_at.assign(scales_ + 1, 0);
+    out_.convergence.assign(scales_ + 1, 1);
+    for (std::size_t i = 0; i < scales_; ++i) out_.sigma.push_back(ladder_.sigma[i] * component_.mean_edge);
+    last_ = 0;
+    const auto within = [&](double sigma) { return sigma <= options_.component_cap * component_.diagonal; };
+    while (last_ < scales_ && within(out_.sigma[last_]) &&
+           (whole_sigma_.empty() || within(whole_sigma_[last_])))
+      ++last_;
+    // The curve is the largest component's to tell: it goes through all scales.
+    if (whole_sigma_.empty()) last_ = scales_;
+  }
+
+  /// All scales, level by level. Returns the scale to end at where one before the last has converged and
+  /// `may_stop`.
+  std::size_t climb(bool may_stop) {
+    LevelState state = first_state();
+    for (std::size_t begin = 0; begin < last_;) {
+      const std::size_t end = reach(state.level, begin);
+      const std::size_t converged = carry(state, begin, end);
+      if (may_stop && converged + 1 < scales_) return converged;
+      if (end < last_)
+        state = next_state(std::move(state), seed_radius(ladder_.sigma[end], options_.error_ratio));
+      context_.report(static_cast<double>(end) / static_cast<double>(scales_));
+      begin = end;
+    }
+    return scales_;
+  }
+
+  LevelState first_state() {
+    LevelState state;
+    state.level = finest_level(component_.points, component_.corners, 1, options_.rate_cap);
+    out_.capped = state.level.laplacian.capped;
+    state.points = component_.points;
+    state.vertex = state.level.vertex;
+    if (out_.capped <= kManyCapped) return state;
+    out_.clustered = true;
+    state.normals = normals_of(state, {});
+    return next_state(std::move(state), kCluster);
+  }
+
+  LevelState next_state(LevelState fine, double radius) const {
+    LevelState coarse;
+    coarse.level = coarsen(fine.level, radius, options_.rate_cap);
+    coarse.time = fine.time;
+    for (std::uint32_t v : coarse.level.vertex) {
+      coarse.vertex.push_back(fine.vertex[v]);
+      coarse.points.push_back(fine.points[v]);
+      coarse.normals.push_back(fine.normals[v]);
+    }
+    return coarse;
+  }
+
+  /// One past the last scale that a level carries, at least one.
+  std::size_t reach(const HeatLevel& level, std::size_t begin) const {
+    std::size_t end = begin + 1;
+    while (end < last_ && carries(level, ladder_.sigma[end], options_.error_ratio)) ++end;
+    return end;
+  }
+
+  /// One past the scale, of [begin, end), whose points the next level starts from; `begin` for those that
+  /// this level started from, unless nothing has smoothed them.
+  std::size_t handover_scale(const LevelState& state, std::size_t begin, std::size_t end) const {
+    const std::size_t first = state.time > 0 ? begin : begin + 1;
+    std::size_t scale = end;
+    while (scale > first && ladder_.sigma[scale - 1] > handover_sigma(ladder_.sigma[end])) --scale;
+    return scale;
+  }
+
+  /// Features of the scales [begin, end), whose subtrahends are taken on the same level: operators of
+  /// different levels differ by more than shallow relief. Leaves `state` where the next level starts. Returns
+  /// the first scale after the first one that has converged, or `scales`.
+  std::size_t carry(LevelState& state, std::size_t begin, std::size_t end) {
+    fit_work(state, ladder_.time[end - 1 + ladder_.band]);
+    std::size_t converged = scales_;
+    std::vector<std::vector<float>> curvature;
+    LevelState walker{{}, {}, state.points, state.time, state.normals};
+    const std::size_t handover = handover_scale(state, begin, end);
+    for (std::size_t i = begin; i < end + ladder_.band;) {
+      const std::size_t stop = std::min(i + kTimesAtOnce, i < handover ? handover : end + ladder_.band);
+      const std::span<const double> times(ladder_.time.data() + i, stop - i);
+      const std::vector<HeatFlow> flows =
+          diffuse(state.level.laplacian, walker.points, walker.time, times, context_);
+      curvature.resize(curvature.size() + flows.size());
+      parallel_for(context_, flows.size(), 1, [&](std::size_t from, std::size_t to) {
+        for (std::size_t f = from; f < to; ++f)
+          curvature[i - begin + f] = curvature_of(state, walker.points, flows[f]);
+      });
+      for (std::size_t s = i; s < std::min(stop, scales_) && s < end; ++s)
+        if (has_converged(walker.points, flows[s - i], s)) converged = std::min(converged, s);
+      walker.time = times.back();
+      for (std::size_t v = 0; v < walker.points.size(); ++v)
+        walker.points[v] = moved(walker.points[v], flows.back().moved[v]);
+      if (stop == handover) {
+        state.normals = normals_of(state, walker.points);
+        state.time = walker.time;
+        state.points = walker.points;
+      }
+      i = stop;
+    }
+    for (std::size_t i = begin; i < end; ++i)
+      mark(state, i, curvature[i - begin], curvature[i - begin + ladder_.band]);
+    return converged;
+  }
+
+  /// The work cap: rates are slowed down until the level's last time needs no more than max_terms.
+  void fit_work(LevelState& state, double last_time) {
+    HeatOperator& l = state.level.laplacian;
+    const double allowed = options_.max_terms, needed = heat_terms(last_time - state.time, l.bound);
+    if (needed <= allowed) return;
+    out_.slowed = true;
+    limit_spectrum(l, l.bound * (allowed / needed) * (allowed / needed));
+  }
+
+  bool has_converged(const std::vector<Vec3d>& points, const HeatFlow& flow, std::size_t scale) {
+    Vec3d lo = moved(points[0], flow.moved[0]), hi = lo;
+    for (std::size_t v = 1; v < points.size(); ++v) {
+      const Vec3d p = moved(points[v], flow.moved[v]);
+      for (int k = 0; k < 3; ++k) {
+        lo[k] = std::min(lo[k], p[k]);
+        hi[k] = std::max(hi[k], p[k]);
+      }
+    }
+    const double now = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+    out_.convergence[scale + 1] = static_cast<float>(now / range_);
+    return scale > 0 && now / range_ < options_.convergence;
+  }
+
+  /// Unit normals of the smoothed surface. Of a joined twin one fan decides on the component's own vertices:
+  /// the two sides of a sheet would cancel out. On coarser levels triangles turn to the side of the vertex's
+  /// normal before, which also stands where no triangle is left.
+  std::vector<Vec3f> normals_of(const LevelState& state, std::span<const Vec3d> smoothed) const {
+    const std::vector<std::uint32_t>& corners = state.level.corners;
+    const std::span<const Vec3d> points = smoothed.empty() ? std::span<const Vec3d>(state.points) : smoothed;
+    const std::vector<Vec3f>& before = state.normals;
+    std::vector<Vec3d> sum(points.size());
+    for (std::size_t h = 0; h < corners.size(); h += 3) {
+      const Vec3d a = points[corners[h]], n = cross(points[corners[h + 1]] - a, points[corners[h + 2]] - a);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t v = corners[h + k];
+        if (before.empty() ? component_.fan_of_position[h + k] : dot(n, to_double(before[v])) >= 0)
+          sum[v] = sum[v] + n;
+        else if (!before.empty())
+          sum[v] = sum[v] - n;
+      }
+    }
+    std::vector<Vec3f> normal(points.size());
+    for (std::size_t v = 0; v < points.size(); ++v) {
+      normal[v] = to_float(normalized(sum[v]));
+      if (!before.empty() && dot(sum[v], sum[v]) == 0) normal[v] = before[v];
+    }
+    return normal;
+  }
+
+  /// t H per vertex. With L positive semi-definite, L x = 2 H n.
+  std::vector<float> curvature_of(const LevelState& state, const std::vector<Vec3d>& points,
+                                  const HeatFlow& flow) const {
+    std::vector<Vec3d> smoothed(points.size());
+    for (std::size_t v = 0; v < points.size(); ++v) smoothed[v] = moved(points[v], flow.moved[v]);
+    const std::vector<Vec3f> normal = normals_of(state, smoothed);
+    std::vector<float> curvature(points.size());
+    for (std::size_t v = 0; v < points.size(); ++v)
+      curvature[v] = static_cast<float>(0.5 * dot(to_double(flow.response[v]), to_double(normal[v])));
+    return curvature;
+  }
+
+  void mark(const LevelState& state, std::size_t scale, const std::vector<float>& fine,
+            const std::vector<float>& coarse) {
+    const auto ratio = static_cast<float>(ladder_.time[scale] / ladder_.time[scale + ladder_.band]);
+    std::vector<float> g(fine.size());
+    for (std::size_t v = 0; v < g.size(); ++v) g[v] = fine[v] - ratio * coarse[v];
+    const double least = std::max(kNoise * component_.noise, kBaseShare * rms(fine));
+    const std::vector<std::uint8_t> found =
+        FeatureFinder(state.level, std::move(g), ladder_.sigma[scale], least, options_.contrast)
+            .find(seed_radius(ladder_.sigma[scale], options_.error_ratio), context_);
+    for (std::size_t v = 0; v < found.size(); ++v) {
+      if (!found[v]) continue;
+      out_.persistence[state.vertex[v]] = static_cast<std::uint8_t>(scale + 1);
+      if (!(found[v] & kCrossing)) continue;
+      out_.crossing[state.vertex[v]] = static_cast<std::uint8_t>(scale + 1);
+      ++out_.crossings_at[scale + 1];
+    }
+  }
+
+  SurfaceComponent component_;
+  std::span<const double> whole_sigma_;
+  const SsfOptions& options_;
+  const RunContext& context_;
+  std::size_t scales_, last_ = 0;  // scales from last_ on cannot count
+  double range_;
+  SigmaLadder ladder_;
+  ComponentScales out_;
+};
+
+}  // namespace
+
+bool below_first_scale(double diagonal, double mean_edge, const SsfOptions& options) {
+  return options.sigma_max * diagonal <= mean_edge;
+}
+
+SigmaLadder make_sigma_ladder(double sigma_max, const SsfOptions& options) {
+  const auto scales = static_cast<std::size_t>(options.scales);
+  const double step =
+      options.scales > 1 ? portable::log(sigma_max) / (options.scales - 1) : portable::log(options.band);
+  SigmaLadder ladder;
+  ladder.band = static_cast<std::size_t>(std::max(1.0, std::floor(portable::log(options.band) / step + 0.5)));
+  // A ladder that spans less than the band has small steps; its subtrahends are as many as its scales then.
+  ladder.band = std::min(ladder.band, scales);
+  for (std::size_t i = 0; i < scales + ladder.band; ++i) {
+    ladder.sigma.push_back(portable::exp(step * static_cast<double>(i)));
+    ladder.time.push_back(0.5 * ladder.sigma.back() * ladder.sigma.back());
+  }
+  return ladder;
+}
+
+ComponentScales filter_component(SurfaceComponent component, std::span<const double> whole_sigma,
+                                 const SsfOptions& options, const RunContext& context) {
+  return ComponentFilter(std::move(component), whole_sigma, options, context).run();
+}
+
+}  // namespace texmesh

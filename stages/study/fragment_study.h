@@ -1,0 +1,37 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/image/decode_image.h"
+#include "stages/jpeg/jpeg.h"
+
+namespace texmesh {
+
+/// Thesis 3.3.1: what does cutting a texture into fragments cost?
+struct FragmentStudyOptions {
+  std::vector<int> grids{2, 4, 8, 16};                      // fragments in a row and in a column, 1..64
+  std::vector<int> qualities{10, 20, 40, 60, 80, 90, 100};  // IJG, strictly rising, at most 16
+  Subsampling subsampling = Subsampling::k420;
+};
+
+/// One grid at one quality; bytes. "Standard" files have the Huffman tables of ISO 10918-1 annex K.3 and a
+/// JFIF header, as most programs write them; "optimised" ones have tables made for them; "shared" is what
+/// packages hold: abbreviated streams behind one table stream, which is counted.
+struct FragmentStudyRow {
+  int grid = 0, quality = 0;
+  std::uint32_t columns = 0, rows = 0;  // at most grid: fragments without a pixel of the image do not count
+  std::uint32_t fragment_width_px = 0, fragment_height_px = 0;
+  std::uint64_t file_standard = 0, file_optimised = 0;                // the whole image in one file
+  std::uint64_t sum_standard = 0, sum_optimised = 0, sum_shared = 0;  // of the columns * rows fragments
+};
+
+/// By grid, then quality, as the options list them; a grid that is listed twice counts once. Fragments have
+/// sides that are multiples of 16 and at least image side / grid, the image's edges repeated to fill them
+/// ("the entire texture is adjusted so that there is no partial fragment"), and there are as many as the
+/// image reaches into. `pixels` have 1 or 3 channels. Throws StageError for options or pixels outside these
+/// ranges. Same result for any thread count.
+std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const FragmentStudyOptions& options,
+                                              const RunContext& context);
+
+}  // namespace texmesh

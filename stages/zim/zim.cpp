@@ -1,0 +1,185 @@
+#include "stages/zim/zim.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "stages/base/parallel.h"
+
+namespace texmesh {
+namespace {
+
+[[noreturn]] void fail(std::string place, std::string expected, std::string found) {
+  throw StageError("zim", std::move(place), std::move(expected), std::move(found));
+}
+
+void check(const Fragments& fragments, const std::vector<Pixels>& pixels) {
+  if (pixels.size() != fragments.planes.size())
+    fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
+  for (std::size_t p = 0; p < pixels.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    if (pixels[p].width_px < plane.width_px || pixels[p].height_px < plane.height_px ||
+        pixels[p].channels != plane.channels ||
+        pixels[p].data.size() != std::size_t{pixels[p].width_px} * pixels[p].height_px * plane.channels ||
+        plane.covered_texels.size() != plane.fragment_count() || plane.eta.size() < plane.fragment_count() ||
+        plane.coverage.size() != (std::size_t{plane.width_px} + 7) / 8 * plane.height_px)
+      fail("plane " + std::to_string(p), "pixels, coverage and counts that fit each other",
+           std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
+  }
+}
+
+/// Sums over the covered texels of one fragment. At most 2^32 texels of 255: squares fit 64 bits.
+struct Sums {
+  std::uint64_t count = 0, pairs = 0, different = 0;
+  std::array<std::uint64_t, 3> sum{}, square{};
+};
+
+class FragmentReader {
+ public:
+  FragmentReader(const TexturePlane& plane, const Pixels& pixels, int difference)
+      : plane_(plane),
+        pixels_(pixels),
+        stride_((std::size_t{plane.width_px} + 7) / 8),
+        difference_(difference) {}
+
+  Sums read(std::size_t fragment) const {
+    const auto column = static_cast<std::uint32_t>(fragment % plane_.columns);
+    const auto row = static_cast<std::uint32_t>(fragment / plane_.columns);
+    const std::uint32_t left = column * plane_.fragment_width_px, top = row * plane_.fragment_height_px;
+    const std::uint32_t right = std::min(plane_.width_px, left + plane_.fragment_width_px);
+    const std::uint32_t bottom = std::min(plane_.height_px, top + plane_.fragment_height_px);
+    Sums out;
+    for (std::uint32_t y = top; y < bottom; ++y)
+      for (std::uint32_t x = left; x < right; ++x) {
+        if (!covered(x, y)) {
+          if (coverage_byte(x, y) == 0) x |= 7;  // on to the next byte
+          continue;
+        }
+        add_texel(x, y, out);
+        if (x + 1 < right && y + 1 < bottom) {
+          add_pair(x, y, x + 1, y, out);
+          add_pair(x, y, x, y + 1, out);
+        }
+      }
+    return out;
+  }
+
+ private:
+  std::uint8_t coverage_byte(std::uint32_t x, std::uint32_t y) const {
+    return plane_.coverage[y * stride_ + x / 8];
+  }
+  bool covered(std::uint32_t x, std::uint32_t y) const { return coverage_byte(x, y) >> (7 - x % 8) & 1; }
+
+  void add_texel(std::uint32_t x, std::uint32_t y, Sums& out) const {
+    ++out.count;
+    const std::uint8_t* p = pixels_.at(x, y);
+    for (std::uint32_t c = 0; c < pixels_.channels; ++c) {
+      out.sum[c] += p[c];
+      out.square[c] += static_cast<std::uint64_t>(p[c]) * p[c];
+    }
+  }
+  void add_pair(std::uint32_t x, std::uint32_t y, std::uint32_t u, std::uint32_t v, Sums& out) const {
+    if (!covered(u, v)) return;
+    ++out.pairs;
+    const std::uint8_t *a = pixels_.at(x, y), *b = pixels_.at(u, v);
+    for (std::uint32_t c = 0; c < pixels_.channels; ++c)
+      if (std::abs(a[c] - b[c]) >= difference_) {
+        ++out.different;
+        return;
+      }
+  }
+
+  const TexturePlane& plane_;
+  const Pixels& pixels_;
+  std::size_t stride_;
+  int difference_;
+};
+
+void predict_fragment(const Sums& sums, std::uint32_t channels, const ZimOptions& options, std::size_t f,
+                      PlanePredictors& out) {
+  const auto count = static_cast<double>(sums.count);
+  double deviation = 0, mean = 0;
+  for (std::uint32_t c = 0; c < channels; ++c) {
+    const double m = static_cast<double>(sums.sum[c]) / count;
+    mean += m / channels;
+    deviation += std::sqrt(std::max(0.0, static_cast<double>(sums.square[c]) / count - m * m)) / channels;
+  }
+  const double z = std::min(1.0, deviation / 127.5), i = mean / 255;
+  const double zeta =
+      sums.pairs > 0 ? static_cast<double>(sums.different) / static_cast<double>(sums.pairs) : 0;
+  const double m = 1 - (options.weight_intensity * (1 - i) + options.weight_complexity * zeta);
+  out.z[f] = static_cast<float>(z);
+  out.i[f] = static_cast<float>(i);
+  out.zeta[f] = static_cast<float>(zeta);
+  out.m[f] = static_cast<float>(std::clamp(m, 0.0, 1.0));
+}
+
+void add_spread(const TexturePlane& plane, const std::vector<double>& values, double weight,
+                std::vector<double>& to) {
+  double lo = 0, hi = 0;
+  bool first = true;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
+    if (plane.covered_texels[f] == 0) continue;
+    lo = first ? values[f] : std::min(lo, values[f]);
+    hi = first ? values[f] : std::max(hi, values[f]);
+    first = false;
+  }
+  if (!(hi > lo)) return;  // all alike: 0, as eta
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    if (plane.covered_texels[f] > 0) to[f] += weight * (values[f] - lo) / (hi - lo);
+}
+
+/// (8.4)
+void combine(const TexturePlane& plane, const Pixels& pixels, const std::vector<WeightedPredictor>& weights,
+             const RunContext& context, PlanePredictors& out) {
+  std::vector<double> vqp(plane.fragment_count()), values(plane.fragment_count());
+  for (const WeightedPredictor& w : weights) {
+    parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t f = begin; f < end; ++f) {
+        if (plane.covered_texels[f] == 0) continue;
+        values[f] = w.predictor->value({plane, pixels, f, static_cast<double>(out.z[f]),
+                                        static_cast<double>(out.i[f]), static_cast<double>(out.zeta[f]),
+                                        static_cast<double>(out.m[f])});
+        if (!std::isfinite(values[f]))
+          fail("predictor " + w.predictor->name, "finite numbers", std::to_string(values[f]));
+      }
+    });
+    add_spread(plane, values, w.weight, vqp);
+  }
+  for (std::size_t f = 0; f < vqp.size(); ++f) out.vqp[f] = static_cast<float>(std::min(vqp[f], 1.0));
+}
+
+}  // namespace
+
+Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                           const ZimOptions& options, const RunContext& context,
+                           const PredictorRegistry& registry) {
+  check(fragments, pixels);
+  const std::vector<WeightedPredictor> weights = parse_weights(registry, options.weights);
+  Predictors out;
+  out.planes.resize(fragments.planes.size());
+  for (std::size_t p = 0; p < out.planes.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    PlanePredictors& predictors = out.planes[p];
+    for (auto* values : {&predictors.z, &predictors.i, &predictors.zeta, &predictors.m, &predictors.vqp})
+      values->resize(plane.fragment_count());
+    const FragmentReader reader(plane, pixels[p], options.difference);
+    parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t f = begin; f < end; ++f) {
+        if (plane.covered_texels[f] == 0) continue;
+        const Sums sums = reader.read(f);
+        if (sums.count != plane.covered_texels[f])
+          fail("plane " + std::to_string(p) + " fragment " + std::to_string(f),
+               std::to_string(plane.covered_texels[f]) + " covered texels", std::to_string(sums.count));
+        predict_fragment(sums, plane.channels, options, f, predictors);
+      }
+    });
+    combine(plane, pixels[p], weights, context, predictors);
+    context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));
+  }
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,41 @@
+// Estimates of throughput from transfers that have ended.
+#include "delivery/cpp/decide/throughput.h"
+
+#include <gtest/gtest.h>
+
+namespace texmesh {
+namespace {
+
+Throughput of(std::initializer_list<std::pair<double, double>> samples, Estimator estimator) {
+  Throughput t({estimator, 2, 0.5, 100, 1000});
+  for (const auto& [bytes, seconds] : samples) t.add(bytes, seconds);
+  return t;
+}
+
+TEST(Throughput, IsBeta0UntilThereIsASample) {
+  for (const Estimator e : {Estimator::kLast, Estimator::kHarmonic, Estimator::kEwma}) {
+    EXPECT_EQ(of({}, e).bytes_s(), 1000);
+    EXPECT_EQ(of({}, e).recent_bytes_s(5), 1000);
+    EXPECT_EQ(of({}, e).mean_bytes_s(3), 1000);
+  }
+}
+
+TEST(Throughput, EstimatorsWeighSamplesAsTheySay) {
+  EXPECT_DOUBLE_EQ(of({{500, 1}, {900, 3}}, Estimator::kLast).bytes_s(), 300);
+  EXPECT_DOUBLE_EQ(of({{9, 9}, {500, 1}, {900, 3}}, Estimator::kHarmonic).bytes_s(), 350);
+  EXPECT_DOUBLE_EQ(of({{500, 1}}, Estimator::kEwma).bytes_s(), 750);
+  EXPECT_DOUBLE_EQ(of({{50, 0.1}}, Estimator::kEwma).bytes_s(), 875);  // half as large counts half
+}
+
+TEST(Throughput, TheMeanOfATimeCutsTransfersWhereItBegins) {
+  const Throughput t = of({{100, 1}, {600, 2}, {50, 1}}, Estimator::kLast);
+  EXPECT_DOUBLE_EQ(t.mean_bytes_s(0.5), 50);
+  EXPECT_DOUBLE_EQ(t.mean_bytes_s(1), 50);
+  EXPECT_DOUBLE_EQ(t.mean_bytes_s(2), (50 + 300) / 2.0);
+  EXPECT_DOUBLE_EQ(t.mean_bytes_s(4), 750 / 4.0);
+  EXPECT_DOUBLE_EQ(t.mean_bytes_s(8), (750 + 4 * 1000) / 8.0);  // before the first: beta_0
+  EXPECT_GE(t.mean_bytes_s(1e-300), 0);
+}
+
+}  // namespace
+}  // namespace texmesh

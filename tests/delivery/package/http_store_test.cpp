@@ -1,0 +1,348 @@
+// Packages from web servers: a good one, one without ranges, and every kind of bad one.
+#include "delivery/cpp/package/http_store.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "tests/delivery/package/raw_server.h"
+#include "tests/format/container/package_fixture.h"
+
+namespace texmesh {
+namespace {
+
+using namespace testing;  // the server
+using Bytes = std::vector<std::uint8_t>;
+
+const std::string& package() {
+  static const std::string bytes = text_of(make_package(2, 40000));
+  return bytes;
+}
+
+/// Reads everything that a client may ask for.
+std::size_t read_all(PackageReader& reader) {
+  std::size_t bytes = 0;
+  for (const EntryRef& e : reader.index()) bytes += reader.entry(e).size();
+  return bytes;
+}
+
+TEST(HttpStore, OneRequestStartsAndNothingIsFetchedTwice) {
+  RawServer server([](const Request& r) { return Reply{ranged(package(), r)}; });
+  PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+  EXPECT_EQ(server.requests().size(), 1u);
+  EXPECT_EQ(server.requests()[0].first, 0u);
+  EXPECT_EQ(server.requests()[0].last, kBootstrapBytes - 1);
+  EXPECT_GT(read_all(reader), 0u);
+  const std::size_t requests = server.requests().size();
+  read_all(reader);
+  EXPECT_EQ(server.requests().size(), requests);
+  std::vector<int> fetched(package().size(), 0);
+  for (const Request& r : server.requests())
+    for (std::uint64_t i = r.first; i <= std::min<std::uint64_t>(r.last, package().size() - 1); ++i)
+      ++fetched[i];
+  EXPECT_LE(*std::max_element(fetched.begin(), fetched.end()), 1);
+}
+
+TEST(HttpStore, WithoutRangesTheTreeIsTaken) {
+  std::map<std::string, std::string> files;
+  const auto source =
+      memory_source(std::span(reinterpret_cast<const std::uint8_t*>(package().data()), package().size()));
+  for (const ContainerEntry& e : read_container(*source))
+    files["/x/a/" + e.path] = text_of(source->read(e.offset, e.bytes));
+  files["/x/a.texmesh"] = package();
+  RawServer server([&](const Request& r) {
+    const auto it = files.find(r.path);
+    return Reply{it == files.end() ? answer(404, "", "no") : answer(200, "", it->second)};
+  });
+  PackageReader reader(open_url(server.url("/x/a.texmesh"), quick()));
+  EXPECT_GT(read_all(reader), 0u);
+  EXPECT_EQ(server.requests()[1].path, "/x/a/manifest.json");
+  PackageReader tree(open_url(server.url("/x/a/"), quick()));
+  EXPECT_EQ(tree.id(), reader.id());
+}
+
+TEST(HttpStore, WithoutRangesAndTreeTheWholeFileIsTakenWithinItsLimit) {
+  RawServer server([](const Request& r) {
+    return Reply{r.path == "/a.texmesh" ? answer(200, "", package()) : answer(404, "", "")};
+  });
+  PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+  EXPECT_GT(read_all(reader), 0u);
+  HttpOptions small = quick();
+  small.max_whole_bytes = package().size() - 1;
+  EXPECT_THROW(PackageReader(open_url(server.url("/a.texmesh"), small)), InputError);
+}
+
+TEST(HttpStore, BrokenTransfersAreResumedWhereTheyBroke) {
+  RawServer server([](const Request& r) {
+    std::string bytes = ranged(package(), r, "ETag: \"one\"\r\n");
+    if (r.number % 2 == 1) return Reply{bytes};
+    return Reply{bytes.substr(0, bytes.size() - 10), true};
+  });
+  PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+  EXPECT_GT(read_all(reader), 0u);
+  const std::vector<Request> requests = server.requests();
+  ASSERT_GE(requests.size(), 2u);
+  EXPECT_EQ(requests[1].last, requests[0].last);
+  EXPECT_GT(requests[1].first, requests[0].first);
+  EXPECT_EQ(requests[1].if_range, "\"one\"");
+}
+
+TEST(HttpStore, PassingFailuresAreRetriedLastingOnesAreErrors) {
+  for (const int status : {408, 429, 500, 503}) {
+    RawServer passing([&](const Request& r) {
+      return Reply{r.number < 2 ? answer(status, "", "later") : ranged(package(), r)};
+    });
+    EXPECT_NO_THROW(PackageReader(open_url(passing.url("/a.texmesh"), quick()))) << status;
+    RawServer lasting([&](const Request&) { return Reply{answer(status, "", "later")}; });
+    EXPECT_THROW(PackageReader(open_url(lasting.url("/a.texmesh"), quick())), InputError) << status;
+    EXPECT_EQ(lasting.requests().size(), 4u) << status;
+  }
+  for (const int status : {403, 404}) {
+    RawServer server([&](const Request&) { return Reply{answer(status, "", "no")}; });
+    EXPECT_THROW(PackageReader(open_url(server.url("/a.texmesh"), quick())), InputError);
+    EXPECT_EQ(server.requests().size(), 1u);
+  }
+}
+
+TEST(HttpStore, SilentServersAreGivenUp) {
+  RawServer closes([](const Request&) { return Reply{"", true}; });
+  EXPECT_THROW(PackageReader(open_url(closes.url("/a.texmesh"), quick())), InputError);
+  HttpOptions once = quick();
+  once.retries = 0;
+  RawServer stalls([](const Request& r) {
+    const std::string bytes = ranged(package(), r);
+    return Reply{bytes.substr(0, bytes.size() / 2)};  // and then nothing
+  });
+  EXPECT_THROW(PackageReader(open_url(stalls.url("/a.texmesh"), once)), InputError);
+  EXPECT_THROW(PackageReader(open_url("http://127.0.0.1:1/a.texmesh", once)), InputError);
+}
+
+TEST(HttpStore, LiesAboutRangesAreFound) {
+  const auto refused = [](const std::function<std::string(const Request&)>& handler) {
+    RawServer server([&](const Request& r) { return Reply{handler(r), true}; });
+    EXPECT_ANY_THROW({
+      PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+      read_all(reader);
+    });
+  };
+  const std::string head = package().substr(0, kBootstrapBytes), size = std::to_string(package().size());
+  refused([&](const Request&) { return answer(206, "", head); });
+  refused([&](const Request&) { return answer(206, "Content-Range: bytes 5-9/" + size + "\r\n", head); });
+  refused([&](const Request&) { return answer(206, "Content-Range: bytes 0-99999999999/100\r\n", head); });
+  refused([&](const Request&) { return answer(206, "Content-Range: items 0-1/2\r\n", head); });
+  refused([&](const Request&) {
+    return answer(206, "Content-Range: bytes 0-16383/" + size + "\r\n", head + "more");
+  });
+  refused(
+      [&](const Request&) { return answer(206, "Content-Range: bytes 0-16383/" + size + "\r\n", "less"); });
+  refused([&](const Request&) { return answer(416, "", ""); });
+  refused([&](const Request&) { return answer(200, "", "no package"); });
+  refused([&](const Request&) { return std::string("this is no HTTP\r\n\r\n"); });
+  refused([&](const Request& r) { return r.number == 0 ? ranged(package(), r) : answer(416, "", ""); });
+  refused(
+      [&](const Request& r) { return r.number == 0 ? ranged(package(), r) : answer(200, "", package()); });
+  refused([&](const Request& r) {
+    return ranged(package() + std::string(static_cast<std::size_t>(r.number), 'x'), r);
+  });
+  refused([&](const Request& r) {
+    return ranged(package(), r, "ETag: \"" + std::to_string(r.number) + "\"\r\n");
+  });
+  refused([&](const Request& r) {
+    std::string changed = package();
+    for (std::size_t i = kBootstrapBytes; i < changed.size(); i += 7) changed[i] ^= 1;
+    return ranged(r.number == 0 ? package() : changed, r);
+  });
+}
+
+/// "HTTP/1.1 .." and headers alone; what follows is the server's.
+std::string head(int status, const std::string& headers) {
+  return "HTTP/1.1 " + std::to_string(status) + " X\r\n" + headers + "\r\n";
+}
+
+TEST(HttpStore, TricklesEnd) {
+  HttpOptions o = quick();
+  o.retries = 0;
+  o.stall_timeout_s = 30;  // never silent for as long
+  RawServer error([](const Request&) { return Reply{head(404, "Content-Length: 4000\r\n"), false, true}; });
+  EXPECT_THROW(PackageReader(open_url(error.url("/a.texmesh"), o)), InputError);
+  RawServer endless([](const Request&) { return Reply{head(404, ""), false, true}; });
+  EXPECT_THROW(PackageReader(open_url(endless.url("/a.texmesh"), o)), InputError);
+  o.connect_timeout_s = 0.2;
+  o.stall_timeout_s = 0.3;
+  o.least_bytes_s = 1e6;
+  RawServer slow([](const Request& r) {
+    const std::string bytes = ranged(std::string(20000, 'x'), r);
+    return Reply{bytes.substr(0, bytes.find("\r\n\r\n") + 4), false, true};
+  });
+  EXPECT_THROW(PackageReader(open_url(slow.url("/a.texmesh"), o)), InputError);
+}
+
+TEST(HttpStore, CancelEndsWaitingAtOnce) {
+  HttpOptions o = quick();
+  o.stall_timeout_s = o.retry_delay_s = 60;
+  const auto start = std::chrono::steady_clock::now();
+  o.cancelled = [start] { return std::chrono::steady_clock::now() - start > std::chrono::milliseconds(200); };
+  RawServer silent([](const Request&) { return Reply{}; });
+  EXPECT_THROW(PackageReader(open_url(silent.url("/a.texmesh"), o)), InputError);
+  RawServer busy([](const Request&) { return Reply{answer(503, "Retry-After: 60\r\n", "")}; });
+  EXPECT_THROW(PackageReader(open_url(busy.url("/a.texmesh"), o)), InputError);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+}
+
+using Files = std::map<std::string, std::string>;
+Files tree_files() {
+  Files files;
+  const auto source =
+      memory_source(std::span(reinterpret_cast<const std::uint8_t*>(package().data()), package().size()));
+  for (const ContainerEntry& e : read_container(*source))
+    files["/a/" + e.path] = text_of(source->read(e.offset, e.bytes));
+  return files;
+}
+
+TEST(HttpStore, SizesThatNoEntryHasAreNotAskedFor) {
+  const auto hostile = [](const std::function<void(Manifest&)>& change, const std::string& path) {
+    Files files = tree_files();
+    std::string& json = files["/a/manifest.json"];
+    Manifest m = read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+    change(m);
+    json = write_manifest(m);
+    RawServer server([&](const Request& r) {
+      if (r.path == path) return Reply{head(200, ""), false, true};
+      const auto it = files.find(r.path);
+      return Reply{it == files.end() ? answer(404, "", "no") : answer(200, "", it->second)};
+    });
+    PackageReader reader(open_url(server.url("/a/"), quick()));
+    EXPECT_THROW(read_all(reader), FormatError) << path;
+    for (const Request& r : server.requests()) EXPECT_NE(r.path, path);
+  };
+  hostile([](Manifest& m) { m.index.bytes = 1'000'000'000'000; }, "/a/index.bin");
+}
+
+TEST(HttpStore, AServerOfManyThatAnswersIsTaken) {
+  RawServer well([](const Request& r) { return Reply{ranged(package(), r)}; });
+  RawServer gone([](const Request&) { return Reply{answer(404, "", "")}; });
+  RawServer busy([](const Request&) { return Reply{answer(503, "", "")}; });
+  RawServer silent([](const Request&) { return Reply{}; });
+  RawServer lying([](const Request& r) { return Reply{ranged(std::string(20000, 'x'), r)}; });
+  const std::string nobody = "http://127.0.0.1:1/a.texmesh";
+  for (const std::string& bad : {nobody, gone.url("/a.texmesh"), busy.url("/a.texmesh"),
+                                 silent.url("/a.texmesh"), lying.url("/a.texmesh"), gone.url("/a/")}) {
+    auto store = open_urls({bad, well.url("/a.texmesh")}, quick());
+    const HttpStore& server = *store;
+    PackageReader reader(std::move(store));
+    EXPECT_EQ(server.place().mirror, 1u) << bad;
+    EXPECT_EQ(server.place().url, well.url("/a.texmesh"));
+    EXPECT_GT(read_all(reader), 0u);
+  }
+  EXPECT_THROW(PackageReader(open_urls({nobody, gone.url("/a.texmesh")}, quick())), InputError);
+  EXPECT_THROW(open_urls({}), InputError);
+}
+
+TEST(HttpStore, AnotherServerTakesTheRestWhenOneDies) {
+  RawServer well([](const Request& r) { return Reply{ranged(package(), r, "ETag: \"other\"\r\n")}; });
+  RawServer dies([](const Request& r) {
+    return r.number == 0 ? Reply{ranged(package(), r, "ETag: \"one\"\r\n")} : Reply{answer(500, "", "")};
+  });
+  PackageReader reader(open_urls({dies.url("/a.texmesh"), well.url("/a.texmesh")}, quick()));
+  EXPECT_GT(read_all(reader), 0u);
+  EXPECT_FALSE(well.requests().empty());
+}
+
+TEST(HttpStore, TriesThatBringSomethingDoNotCount) {
+  RawServer server([](const Request& r) {
+    const std::string bytes = ranged(package(), r);
+    return Reply{bytes.substr(0, std::min<std::size_t>(bytes.size(), 3000)), true};
+  });
+  HttpOptions o = quick();
+  o.retries = 1;
+  PackageReader reader(open_url(server.url("/a.texmesh"), o));
+  EXPECT_GT(read_all(reader), 0u);
+  EXPECT_GT(server.requests().size(), 10u);
+}
+
+TEST(HttpStore, FilesOfATreeAreResumed) {
+  Files files = tree_files();
+  RawServer server([&](const Request& r) {
+    const auto it = files.find(r.path);
+    if (it == files.end()) return Reply{answer(404, "", "")};
+    const std::string bytes =
+        r.ranged ? ranged(it->second, r, "ETag: \"e\"\r\n") : answer(200, "ETag: \"e\"\r\n", it->second);
+    return r.path == "/a/manifest.json" ? Reply{bytes} : Reply{bytes.substr(0, 9000), true};
+  });
+  HttpOptions o = quick();
+  o.retries = 1;
+  PackageReader reader(open_url(server.url("/a/"), o));
+  EXPECT_GT(read_all(reader), 0u);
+  bool resumed = false;
+  for (const Request& r : server.requests()) {
+    resumed |= r.ranged && r.first > 8000;
+    EXPECT_TRUE(!r.ranged || r.first == 0 || r.if_range == "\"e\"");
+  }
+  EXPECT_TRUE(resumed);
+}
+
+TEST(HttpStore, WhatIsKnownToBeNeededIsOneRequest) {
+  RawServer server([](const Request& r) { return Reply{ranged(package(), r)}; });
+  PackageReader reader(open_url(server.url("/a.texmesh"), quick()));
+  const Manifest& m = reader.manifest();
+  reader.store().prefetch({m.index,
+                           m.tables,
+                           m.textures,
+                           m.quality,
+                           m.scales.back().glb,
+                           {"", m.first_picture_offset, m.first_picture_bytes, {}}});
+  const std::size_t requests = server.requests().size();
+  EXPECT_LE(requests, 2u);
+  reader.tables();
+  reader.quality();
+  reader.scale_glb(m.scales.back().scale);
+  EXPECT_EQ(server.requests().size(), requests);
+  Files files = tree_files();
+  RawServer tree([&](const Request& r) {
+    const auto it = files.find(r.path);
+    return Reply{it == files.end() ? answer(404, "", "") : answer(200, "", it->second)};
+  });
+  PackageReader whole(open_url(tree.url("/a/"), quick()));
+  whole.store().prefetch({m.index, m.tables});
+  EXPECT_EQ(tree.requests().size(), 3u);
+  whole.index();
+  EXPECT_EQ(tree.requests().size(), 3u);
+}
+
+TEST(HttpStore, TellsHowItsServerCanBeRead) {
+  Files files = tree_files();
+  files["/a.texmesh"] = package();
+  files["/b.texmesh"] = package();
+  const auto place_of = [&](bool ranges, const std::string& path) {
+    RawServer server([&](const Request& r) {
+      const auto it = files.find(r.path);
+      if (it == files.end()) return Reply{answer(404, "", "")};
+      return Reply{ranges && r.ranged ? ranged(it->second, r, "ETag: \"e\"\r\n")
+                                      : answer(200, "", it->second)};
+    });
+    auto store = open_urls({server.url(path)}, quick());
+    const HttpStore& at = *store;
+    PackageReader reader(std::move(store));
+    HttpPlace place = at.place();
+    place.url = place.url.substr(server.url("").size());
+    return place;
+  };
+  EXPECT_TRUE(place_of(true, "/a.texmesh").ranges);
+  EXPECT_EQ(place_of(true, "/a.texmesh").etag, "\"e\"");
+  EXPECT_EQ(place_of(false, "/a.texmesh").url, "/a/");
+  EXPECT_FALSE(place_of(false, "/a.texmesh").ranges);
+  EXPECT_TRUE(place_of(false, "/b.texmesh").in_memory);
+  EXPECT_TRUE(place_of(true, "/a/").ranges);
+  EXPECT_FALSE(place_of(false, "/a/").ranges);
+}
+
+TEST(HttpStore, UrlsAreKnownAndPasswordsNotShown) {
+  EXPECT_TRUE(is_url("https://a/b.texmesh"));
+  EXPECT_FALSE(is_url("a/http://b"));
+  EXPECT_EQ(shown_url("http://me:secret@host/a@b"), "http://host/a@b");
+  EXPECT_EQ(shown_url("http://host/x"), "http://host/x");
+  EXPECT_THROW(open_url("ftp://a/b"), InputError);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,155 @@
+#include "format/documents/viewing.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace {
+
+/// Scales 0, 3, 7, 9; heights up to which the coarser three are enough by JND, error and edges.
+Manifest make_manifest() {
+  Manifest m;
+  m.object_height = 2;
+  m.scales.resize(4);
+  const int number[4]{0, 3, 7, 9};
+  const double jnd[4]{kAnyDisplayPx, 4000, 500, 80}, error[4]{kAnyDisplayPx, 2000, 400, 100},
+      edge[4]{kAnyDisplayPx, 360, 90, 40};
+  for (std::size_t k = 0; k < 4; ++k) {
+    ManifestScale& s = m.scales[k];
+    s.scale = number[k];
+    s.triangles = static_cast<std::uint32_t>(160000 >> (4 * k));
+    s.display_px_jnd = jnd[k], s.display_px_error = error[k], s.display_px_edge = edge[k];
+    s.p95 = k == 0 ? 0 : 51.2 / jnd[k];
+    s.error_rms = k == 0 ? 0 : 0.5 * m.object_height / error[k];
+    s.error_max = 4 * s.error_rms;
+  }
+  return m;
+}
+
+TEST(Viewing, DistanceAndHeightAreInverse) {
+  const Camera camera{90, 1000};  // tan 45 degrees = 1: at distance d a length of 2 d fills the picture
+  EXPECT_NEAR(displayed_height_px(2, 1, camera), 1000, 1e-9);
+  EXPECT_NEAR(displayed_height_px(2, 4, camera), 250, 1e-9);
+  for (double px : {1.0, 17.0, 512.0, 5000.0})
+    EXPECT_NEAR(displayed_height_px(3, viewing_distance(3, px, {}), {}), px, 1e-9 * px);
+  EXPECT_EQ(viewing_distance(2, kAnyDisplayPx, camera), 0);
+  EXPECT_EQ(viewing_distance(2, 0, camera), std::numeric_limits<double>::infinity());
+  EXPECT_THROW(displayed_height_px(2, 0, camera), FormatError);
+  EXPECT_THROW(displayed_height_px(2, 1, {180, 1000}), FormatError);
+  EXPECT_THROW(viewing_distance(2, 10, {0, 1000}), FormatError);
+  EXPECT_THROW(viewing_distance(2, 10, {std::nan(""), 1000}), FormatError);
+}
+
+TEST(Viewing, StepFunctionsOfEveryRule) {
+  const Manifest m = make_manifest();
+  const auto steps = [&](StepRule rule) {
+    std::vector<std::pair<int, double>> out;
+    for (const ManifestStep& s : step_function(m.scales, rule)) out.emplace_back(s.scale, s.up_to_px);
+    return out;
+  };
+  using Steps = std::vector<std::pair<int, double>>;
+  EXPECT_EQ(steps(StepRule::kJnd), (Steps{{9, 80}, {7, 500}, {3, 4000}, {0, kAnyDisplayPx}}));
+  EXPECT_EQ(steps(StepRule::kError), (Steps{{9, 100}, {7, 400}, {3, 2000}, {0, kAnyDisplayPx}}));
+  EXPECT_EQ(steps(StepRule::kDefault), (Steps{{9, 80}, {7, 400}, {3, 2000}, {0, kAnyDisplayPx}}));
+  // O_V / E_S 40, 90, 360 and, from 16 times the triangles, 4 * 360 for S_0: the nearer ratio wins.
+  EXPECT_EQ(steps(StepRule::kEdge), (Steps{{9, 60}, {7, 180}, {3, 720}, {0, kAnyDisplayPx}}));
+}
+
+TEST(Viewing, ScalesThatAcceptNoMoreGiveNoStep) {
+  Manifest m = make_manifest();
+  m.scales[2].display_px_jnd = 80;  // S_7 no better than S_9
+  EXPECT_EQ(step_function(m.scales, StepRule::kJnd).size(), 3u);
+  m.scales[3].display_px_jnd = kAnyDisplayPx;  // S_9 equals S_0: S_0 still has the last step
+  const std::vector<ManifestStep> steps = step_function(m.scales, StepRule::kJnd);
+  ASSERT_EQ(steps.size(), 2u);
+  EXPECT_EQ(steps[0].scale, 9);
+  EXPECT_LT(steps[0].up_to_px, kAnyDisplayPx);
+  m.scales.resize(1);
+  EXPECT_EQ(step_function(m.scales, StepRule::kEdge), (std::vector<ManifestStep>{{kAnyDisplayPx, 0}}));
+}
+
+TEST(Viewing, ScaleAtAHeight) {
+  const Manifest m = make_manifest();
+  const std::vector<ManifestStep> steps = step_function(m.scales, StepRule::kDefault);
+  EXPECT_EQ(scale_at(steps, 0), 9);
+  EXPECT_EQ(scale_at(steps, 80), 9);
+  EXPECT_EQ(scale_at(steps, 80.1), 7);
+  EXPECT_EQ(scale_at(steps, 2001), 0);
+  EXPECT_EQ(scale_at(steps, 1e12), 0);
+}
+
+TEST(Viewing, PixelErrorGrowsWithTheDisplayedHeight) {
+  const Manifest m = make_manifest();
+  const PixelError at400 = pixel_error(m, m.scales[2], 400);
+  EXPECT_NEAR(at400.p95, 1, 1e-12);
+  EXPECT_NEAR(at400.rms, 0.5, 1e-12);
+  EXPECT_NEAR(at400.max, 2, 1e-12);
+  EXPECT_NEAR(pixel_error(m, m.scales[2], 800).p95, 2, 1e-12);
+  EXPECT_EQ(pixel_error(m, m.scales[0], 800).max, 0);
+  Manifest other = m;  // both are sampled, each for itself
+  other.scales[2].error_max = 0.1 * other.scales[2].error_rms;
+  EXPECT_EQ(pixel_error(other, other.scales[2], 400).max, pixel_error(other, other.scales[2], 400).p95);
+}
+
+TEST(Viewing, ClipsToTheViewAndToTheFovea) {
+  const ScreenRect object{100, 200, 300, 600};
+  VisiblePart part = clip_to(object, ScreenRect{0, 0, 1000, 1000});
+  EXPECT_FALSE(part.clipped);
+  EXPECT_EQ(part.width_px, 200);
+  EXPECT_EQ(part.height_px, 400);
+  part = clip_to(object, ScreenRect{0, 0, 1000, 500});
+  EXPECT_TRUE(part.clipped);
+  EXPECT_EQ(part.height_px, 300);
+  part = clip_to(object, ScreenRect{300, 0, 1000, 500});  // touches only
+  EXPECT_TRUE(part.clipped);
+  EXPECT_EQ(part.width_px, 0);
+  part = clip_to(object, ScreenCircle{200, 400, 50});
+  EXPECT_TRUE(part.clipped);
+  EXPECT_EQ(part.width_px, 100);
+  EXPECT_EQ(part.height_px, 100);
+  EXPECT_FALSE(clip_to(object, ScreenCircle{200, 400, 500}).clipped);
+  // A cone of 90 degrees at 100 px reaches 100 px to either side.
+  EXPECT_NEAR(fovea_radius_px(100, 90), 100, 1e-9);
+  EXPECT_THROW(fovea_radius_px(100, 0), FormatError);
+}
+
+TEST(Viewing, AClippedObjectNeedsTheScaleOfItsPart) {
+  const Manifest m = make_manifest();
+  const ScreenRect view{0, 0, 800, 600};
+  // All of it to be seen: the step function's answer.
+  EXPECT_EQ(select_scale(m, 300, clip_to({10, 10, 200, 310}, view)), 7);
+  // Displayed 450 px high: JND alone is content with S_7 while it is whole...
+  EXPECT_EQ(select_scale(m, 450, {200, 450, false}, StepRule::kJnd), 7);
+  // ... and with a part that is large: the part is less high than the object.
+  EXPECT_EQ(select_scale(m, 450, {200, 300, true}, StepRule::kJnd), 7);
+  // A narrow part: half of 12 px is less than a radius anywhere on the object; one pixel is much of it.
+  EXPECT_EQ(select_scale(m, 450, {12, 300, true}, StepRule::kJnd), 3);
+  // Far larger than the view: the whole would want S_0, the part is content with S_3.
+  EXPECT_EQ(select_scale(m, 6000, {8000, 6000, false}, StepRule::kJnd), 0);
+  EXPECT_EQ(select_scale(m, 6000, clip_to({-4000, -3000, 4000, 3000}, view), StepRule::kJnd), 3);
+  // The other rules know no shapes.
+  EXPECT_EQ(select_scale(m, 6000, {800, 600, true}, StepRule::kError), 0);
+  EXPECT_EQ(select_scale(m, 6000, {800, 600, true}, StepRule::kDefault), 0);
+  EXPECT_EQ(select_scale(m, 150, {80, 60, true}, StepRule::kEdge), 7);
+  // Nothing to be seen.
+  EXPECT_EQ(select_scale(m, 6000, {0, 0, true}), 9);
+}
+
+TEST(Viewing, ASmallerPartNeverAllowsMoreErrorRelativeToIt) {
+  const Manifest m = make_manifest();
+  // Narrower and narrower at the same height: never a coarser scale.
+  int last = 9;
+  for (double width = 400; width >= 1; width /= 1.5) {
+    const int scale = select_scale(m, 450, {width, 300, true}, StepRule::kJnd);
+    EXPECT_LE(scale, last);
+    last = scale;
+  }
+  EXPECT_EQ(last, 0);
+}
+
+}  // namespace
+}  // namespace texmesh

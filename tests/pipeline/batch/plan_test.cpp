@@ -1,0 +1,187 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "format/base/errors.h"
+#include "pipeline/batch/collection.h"
+#include "pipeline/batch/plan.h"
+#include "tests/support/command.h"
+
+namespace texmesh {
+namespace {
+namespace fs = std::filesystem;
+using testing::TemporaryFolder;
+
+std::vector<CollectionModel> read(const std::string& json, const FolderLister& list = {}) {
+  return read_collection(json, "collection.json", {}, list);
+}
+
+TEST(Collection, PatternsApplyInTheirOrderAndTheModelsOwnOptionsWin) {
+  const auto models = read(R"({"version":1,
+    "options":{"ssf":{"scales":3},"zim":{"difference":10}},
+    "patterns":[{"match":"statues/*","options":{"zim":{"difference":20},"ladder":{"rungs":[30]}}},
+                {"match":"*.ply","options":{"zim":{"difference":40}}},
+                {"match":"b?g.obj","options":{"ssf":{"scales":9}}}],
+    "models":[{"input":"coin.obj"},{"input":"statues/old/turtle.obj"},{"input":"statues/bust.ply"},
+              {"input":"big.obj","options":{"ssf":{"scales":5}}},{"input":"bug.obj"}]})");
+  ASSERT_EQ(models.size(), 5u);
+  EXPECT_EQ(models[0].options->ssf.scales, 3);
+  EXPECT_EQ(models[0].options->zim.difference, 10);
+  EXPECT_EQ(models[1].options->zim.difference, 20);  // '*' goes past '/'
+  EXPECT_EQ(models[1].options->ladder.rungs, std::vector<int>{30});
+  EXPECT_EQ(models[2].options->zim.difference, 40);  // the later pattern
+  EXPECT_EQ(models[2].options->ladder.rungs, std::vector<int>{30});
+  EXPECT_EQ(models[3].options->ssf.scales, 5);
+  EXPECT_EQ(models[4].options->ssf.scales, 9);
+}
+
+TEST(Collection, ModelsWithEqualOptionsShareThem) {
+  const auto models = read(R"({"version":1,"patterns":[{"match":"*","options":{"ssf":{"scales":4}}}],
+                               "models":[{"input":"a.obj"},{"input":"b.obj"},{"input":"c.obj","options":{}}]})");
+  EXPECT_EQ(models[0].options, models[1].options);
+  EXPECT_EQ(models[2].options->ssf.scales, 4);
+}
+
+TEST(Collection, WhatIsListedAndFoundIsCompiledOnceAsListed) {
+  const auto list = [](const std::string& folder) -> std::vector<std::string> {
+    EXPECT_EQ(folder, "scans");
+    return {"a.obj", "deep/b.glb", "same.obj", "same.ply"};
+  };
+  const auto models = read(
+      R"({"version":1,"folders":["scans"],"models":[{"input":"scans/./a.obj","output":"first.texmesh"}]})",
+      list);
+  std::map<std::string, std::string> outputs;
+  for (const CollectionModel& m : models) outputs[m.input] = m.output;
+  EXPECT_EQ(outputs, (std::map<std::string, std::string>{{"scans/./a.obj", "first.texmesh"},
+                                                         {"scans/deep/b.glb", "deep/b.texmesh"},
+                                                         {"scans/same.obj", "same.obj.texmesh"},
+                                                         {"scans/same.ply", "same.ply.texmesh"}}));
+}
+
+TEST(Collection, TheSamePackageTwiceAndWrongOptionsAreRefusedWithTheirPlace) {
+  const auto place_of = [](const std::string& json) -> std::string {
+    try {
+      read(json);
+    } catch (const InputError& e) {
+      return e.place();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.obj"},{"input":"b/a.ply"}]})"),
+            "/models/1/output");
+  EXPECT_EQ(place_of(R"({"version":1,"patterns":[{"match":"x","options":{"ssf":{"scales":0}}}],
+                         "models":[{"input":"a.obj"}]})"),
+            "/patterns/0/options/ssf/scales");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.obj","output":"../a.texmesh"}]})"),
+            "/models/0/output");
+}
+
+TEST(Collection, PathsWithControlCharactersAreRefused) {
+  const auto read = [](const std::string& model) {
+    return read_collection(R"({"version":1,"models":[)" + model + "]}", "c.json", {}, {});
+  };
+  EXPECT_THROW(read(R"({"input":"a.obj","output":"a\u0000.texmesh"})"), InputError);
+  EXPECT_THROW(read(R"({"input":"a\n.obj"})"), InputError);
+}
+
+TEST(Collection, TooDeepIsRefusedAndBracketsInTextsDoNotCount) {
+  std::string deep = R"({"version":1,"models":[{"input":"a.obj","options":)";
+  for (int i = 0; i < 20; ++i) deep += "[";
+  EXPECT_THROW(read(deep), InputError);
+  EXPECT_EQ(read(R"({"version":1,"models":[{"input":"[[[[[[[[[[[[[[[[[[[[\"[[.obj"}]})").size(), 1u);
+  EXPECT_THROW(read(R"({"version":1,"models":[{"input":"a.obj"}]}])"), InputError);
+}
+
+class Plan : public ::testing::Test {
+ protected:
+  void add(const std::string& name, const std::string& text = "v 0 0 0") {
+    fs::create_directories(fs::path(folder_ / name).parent_path());
+    testing::write_text(folder_ / name, text);
+  }
+  BatchPlan plan(const std::vector<std::string>& names, int shard = 0, int shards = 1) {
+    PlanRequest request;
+    for (const std::string& n : names) request.inputs.push_back(folder_ / n);
+    request.output = folder_ / "out";
+    request.shard = shard;
+    request.shards = shards;
+    request.apply_flags = [](CompileOptions& o) { o.package.title = "by flag"; };
+    return plan_batch(request);
+  }
+  static std::set<std::string> outputs(const BatchPlan& p) {
+    std::set<std::string> all;
+    for (const PlannedModel& m : p.models) all.insert(m.output);
+    return all;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Plan, ShardsPartitionExactlyAndAModelKeepsItsShard) {
+  constexpr int kModels = 200, kShards = 7;
+  for (int i = 0; i < kModels; ++i) add("in/m" + std::to_string(i) + ".obj");
+  const auto whole = outputs(plan({"in"}));
+  ASSERT_EQ(whole.size(), static_cast<std::size_t>(kModels));
+  std::set<std::string> together;
+  std::map<std::string, int> shard_of;
+  for (int s = 0; s < kShards; ++s)
+    for (const std::string& o : outputs(plan({"in"}, s, kShards))) {
+      EXPECT_TRUE(together.insert(o).second) << o << " is in two shards";
+      shard_of[o] = s;
+    }
+  EXPECT_EQ(together, whole);
+  std::map<int, int> sizes;
+  for (const auto& [o, s] : shard_of) ++sizes[s];
+  for (int s = 0; s < kShards; ++s) EXPECT_GT(sizes[s], kModels / kShards / 3) << s;
+  // Others come and go.
+  for (int i = 0; i < kModels; i += 3) fs::remove(folder_ / ("in/m" + std::to_string(i) + ".obj"));
+  add("in/new.obj");
+  for (int s = 0; s < kShards; ++s)
+    for (const std::string& o : outputs(plan({"in"}, s, kShards)))
+      if (shard_of.contains(o)) EXPECT_EQ(shard_of[o], s) << o;
+}
+
+TEST_F(Plan, AShardDoesNotDependOnWhereTheOutputFolderIs) {
+  for (int i = 0; i < 30; ++i) add("in/m" + std::to_string(i) + ".obj");
+  const auto names = [&](const std::string& output) {
+    PlanRequest request;
+    request.inputs = {folder_ / "in"};
+    request.output = output;
+    request.shards = 3;
+    std::set<std::string> all;
+    for (const PlannedModel& m : plan_batch(request).models) all.insert(fs::path(m.output).filename());
+    return all;
+  };
+  EXPECT_EQ(names("/somewhere"), names("else/where/"));
+}
+
+TEST_F(Plan, FlagsWinOverWhatACollectionSays) {
+  add("a.obj");
+  add("c.json", R"({"version":1,"models":[{"input":"a.obj","options":{"package":{"title":"by model"},
+                    "ssf":{"scales":6}}}]})");
+  const BatchPlan p = plan({"c.json"});
+  ASSERT_EQ(p.models.size(), 1u);
+  EXPECT_EQ(p.files, std::vector<std::string>{folder_ / "c.json"});
+  CompileOptions options;
+  read_profile(options, *p.models[0].profile, "profile");
+  EXPECT_EQ(options.package.title, "by flag");
+  EXPECT_EQ(options.ssf.scales, 6);
+}
+
+TEST_F(Plan, TwoModelsForOnePackageAreRefused) {
+  add("x/a.obj");
+  add("c.json", R"({"version":1,"models":[{"input":"x/a.obj"}]})");
+  EXPECT_THROW(plan({"c.json", "x"}), InputError);
+}
+
+TEST_F(Plan, EqualProfilesAreOneText) {
+  for (int i = 0; i < 10; ++i) add("in/m" + std::to_string(i) + ".obj");
+  add("c.json", R"({"version":1,"models":[{"input":"in/m0.obj","output":"x.texmesh","options":{}}]})");
+  const BatchPlan p = plan({"in", "c.json"});
+  std::set<const std::string*> texts;
+  for (const PlannedModel& m : p.models) texts.insert(m.profile.get());
+  EXPECT_EQ(texts.size(), 1u);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,83 @@
+// texmesh extract as a program, on the golden package.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "stages/gltf/check_glb.h"
+#include "tests/support/command.h"
+
+namespace texmesh::testing {
+namespace {
+
+using Json = nlohmann::json;
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+
+CommandResult extract(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {TEXMESH_BINARY, "extract"});
+  return run_command(arguments);
+}
+
+void expect_valid(const std::string& path) {
+  const std::string text = read_text(path);
+  Findings findings;
+  check_glb({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, path, findings,
+            GlbRules::kStandalone);
+  for (const Finding& f : findings.list()) ADD_FAILURE() << to_string(f);
+}
+
+TEST(CliExtract, EveryWayToAskGivesAFile) {
+  TemporaryFolder folder;
+  const std::vector<std::vector<std::string>> ways{{"--bytes", "20kB", "--display", "100"},
+                                                   {"--scale", "0", "--rung", "max"},
+                                                   {"--display", "300"},
+                                                   {"--lods"},
+                                                   {"--lods", "--image-format", "webp", "--rung", "0"},
+                                                   {"--image-format", "png"}};
+  for (std::size_t k = 0; k < ways.size(); ++k) {
+    const std::string out = folder / (std::to_string(k) + ".glb");
+    std::vector<std::string> arguments{kGolden, "-o", out, "--json"};
+    arguments.insert(arguments.end(), ways[k].begin(), ways[k].end());
+    const CommandResult r = extract(arguments);
+    ASSERT_TRUE(r.exit_code == 0 || (r.exit_code == 4 && k == 0)) << r.errors;
+    const Json json = Json::parse(r.output);
+    EXPECT_EQ(json["bytes"], std::filesystem::file_size(out));
+    EXPECT_EQ(json["file"], std::to_string(k) + ".glb");
+    expect_valid(out);
+  }
+}
+
+TEST(CliExtract, BytesOutOfReachHaveAnExitCodeAndTheNearestFile) {
+  TemporaryFolder folder;
+  const std::string out = folder / "a.glb";
+  const CommandResult small = extract({kGolden, "--bytes", "10", "-o", out, "--display", "64"});
+  EXPECT_EQ(small.exit_code, 4) << small.errors;
+  EXPECT_NE(small.output.find("cannot be reached"), std::string::npos);
+  expect_valid(out);
+}
+
+TEST(CliExtract, FaultsLeaveNoFile) {
+  TemporaryFolder folder;
+  const std::string out = folder / "a.glb", damaged = folder / "damaged.texmesh";
+  std::string package = read_text(kGolden);
+  write_text(damaged, package.substr(0, package.size() / 2));
+  EXPECT_EQ(extract({damaged, "-o", out}).exit_code, 1);
+  for (std::size_t at = 16384; at < package.size(); at += 1 + package.size() / 40) package[at] ^= 0x41;
+  write_text(damaged, package);
+  const CommandResult r = extract({damaged, "-o", out});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_NE(r.errors.find("texmesh: "), std::string::npos);
+  EXPECT_EQ(extract({kGolden, "--scale", "98", "-o", out}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "--rung", "best", "-o", out}).exit_code, 2);
+  EXPECT_EQ(extract({folder / "none", "-o", out}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "-o", folder / "none/a.glb"}).exit_code, 1);
+  EXPECT_EQ(extract({kGolden, "-o", out, "--display", "nan"}).exit_code, 2);
+  EXPECT_EQ(extract({kGolden}).exit_code, 2);
+  EXPECT_EQ(extract({kGolden, "-o", out, "--bytes", "1kB", "--rung", "max"}).exit_code, 2);
+  EXPECT_EQ(extract({kGolden, "-o", out, "--image-format", "gif"}).exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_EQ(files_beneath(folder.path().string()), std::vector<std::string>{"damaged.texmesh"});
+}
+
+}  // namespace
+}  // namespace texmesh::testing

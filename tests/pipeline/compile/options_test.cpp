@@ -1,0 +1,110 @@
+#include "pipeline/compile/options.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace {
+
+OptionField& field(std::vector<OptionField>& fields, const std::string& path) {
+  auto it =
+      std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
+  if (it == fields.end()) throw std::out_of_range(path);
+  return *it;
+}
+
+TEST(Options, EveryFieldHasAHelpTextAndAUniquePath) {
+  CompileOptions o;
+  std::set<std::string> paths;
+  for (const OptionField& f : list_options(o)) {
+    EXPECT_TRUE(paths.insert(f.path()).second) << f.path();
+    EXPECT_GT(f.help.size(), 10u) << f.path();
+  }
+  EXPECT_GT(paths.size(), 40u);
+}
+
+TEST(Options, DefaultsLieInTheirRanges) {
+  CompileOptions o;
+  EXPECT_NO_THROW(read_profile(o, write_profile(o), "defaults"));
+}
+
+TEST(Options, ProfileRoundTripKeepsEveryChangedValue) {
+  CompileOptions o;
+  o.ssf.scales = 12;
+  o.ladder.rungs = {10, 50, 90};
+  o.scales.mesh_codec = MeshCodec::kMeshopt;
+  o.perceptual_values.jnd = 0.07;
+  o.package.title = "Bust \"A\" \xc3\xa9";
+  CompileOptions back;
+  read_profile(back, write_profile(o), "p");
+  EXPECT_EQ(write_profile(back), write_profile(o));
+  EXPECT_EQ(back.ladder.rungs, o.ladder.rungs);
+  EXPECT_EQ(back.scales.mesh_codec, MeshCodec::kMeshopt);
+  EXPECT_NE(write_profile(o), write_profile(CompileOptions{}));
+}
+
+TEST(Options, FlagsAndProfilesMeanTheSame) {
+  CompileOptions by_flag, by_profile;
+  auto fields = list_options(by_flag);
+  set_option(field(fields, "ssf.scales"), "12", "--ssf.scales");
+  set_option(field(fields, "ladder.rungs"), "8,18,53", "--rungs");
+  set_option(field(fields, "scales.mesh_codec"), "none", "--mesh-codec");
+  set_option(field(fields, "package.title"), "12", "--title");
+  read_profile(
+      by_profile,
+      R"({"version":1,"ssf":{"scales":12},"ladder":{"rungs":[8,18,53]},"scales":{"mesh_codec":"none"},"package":{"title":"12"}})",
+      "p");
+  EXPECT_EQ(write_profile(by_flag), write_profile(by_profile));
+}
+
+struct Bad {
+  const char* json;
+  const char* place;
+};
+class BadProfile : public ::testing::TestWithParam<Bad> {};
+TEST_P(BadProfile, NamesThePlace) {
+  CompileOptions o;
+  try {
+    read_profile(o, GetParam().json, "p.json");
+    FAIL() << "accepted " << GetParam().json;
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.file(), "p.json");
+    EXPECT_EQ(e.place(), GetParam().place) << e.what();
+    EXPECT_FALSE(e.found().empty());
+  }
+}
+INSTANTIATE_TEST_SUITE_P(
+    Options, BadProfile,
+    ::testing::Values(Bad{"[]", ""}, Bad{"{", "byte 2"}, Bad{"{}", "/version"},
+                      Bad{R"({"version":2})", "/version"}, Bad{R"({"version":1,"sfs":{}})", "/sfs"},
+                      Bad{R"({"version":1,"ssf":3})", "/ssf"},
+                      Bad{R"({"version":1,"ssf":{"scale":3}})", "/ssf/scale"},
+                      Bad{R"({"version":1,"ssf":{"scales":"3"}})", "/ssf/scales"},
+                      Bad{R"({"version":1,"ssf":{"scales":0}})", "/ssf/scales"},
+                      Bad{R"({"version":1,"ssf":{"scales":1e99}})", "/ssf/scales"},
+                      Bad{R"({"version":1,"ssf":{"band":null}})", "/ssf/band"},
+                      Bad{R"({"version":1,"scales":{"mesh_codec":"zip"}})", "/scales/mesh_codec"},
+                      Bad{R"({"version":1,"ladder":{"rungs":[]}})", "/ladder/rungs"},
+                      Bad{R"({"version":1,"ladder":{"rungs":[50,10]}})", "ladder.rungs"},
+                      Bad{R"({"version":1,"lut":{"quality_min":90,"quality_max":20}})", "lut.quality_min"}));
+
+TEST(Options, DeepJsonIsRefusedBeforeItIsParsed) {
+  CompileOptions o;
+  EXPECT_THROW(read_profile(o, std::string(100000, '['), "deep"), InputError);
+}
+
+TEST(Options, SchemaInTheRepositoryIsTheGeneratedOne) {
+  std::ifstream in(TEXMESH_SOURCE_DIR "/schemas/profile.v1.schema.json");
+  std::ostringstream text;
+  text << in.rdbuf();
+  EXPECT_EQ(text.str(), profile_schema()) << "write it with: texmesh stages --profile-schema";
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,412 @@
+// One broken package per rule, caught by that rule.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "pipeline/inspect/verify/verify.h"
+#include "stages/jpeg/jpeg.h"
+#include "tests/support/images.h"
+#include "tests/support/packages.h"
+
+namespace texmesh {
+namespace {
+
+using testing::Bytes;
+using testing::GlbParts;
+using testing::make_package_parts;
+using testing::PackageParts;
+using testing::PackagePatcher;
+
+VerifyReport verify(const Bytes& package, int threads = 2) {
+  const auto store = open_container(memory_source(package));
+  RunContext context;
+  context.threads = threads;
+  return verify_package(*store, context);
+}
+
+std::string all_of(const VerifyReport& report) {
+  std::string text;
+  for (const Finding& f : report.findings) text += to_string(f) + "\n";
+  return text;
+}
+
+/// A finding of `check` in `entry` that says what was expected or found.
+::testing::AssertionResult catches(const Bytes& package, const std::string& check, const std::string& entry) {
+  const VerifyReport report = verify(package);
+  for (const Finding& f : report.findings)
+    if (f.check == check && f.entry == entry && !(f.expected.empty() && f.found.empty()))
+      return ::testing::AssertionSuccess();
+  return ::testing::AssertionFailure() << check << " in " << entry << " is not among:\n" << all_of(report);
+}
+
+/// The same, and no other rule complains.
+::testing::AssertionResult catches_only(const Bytes& package, const std::string& check,
+                                        const std::string& entry) {
+  const VerifyReport report = verify(package);
+  for (const Finding& f : report.findings)
+    if (f.check != check || f.entry != entry)
+      return ::testing::AssertionFailure() << "more than " << check << " in " << entry << ":\n"
+                                           << all_of(report);
+  return catches(package, check, entry);
+}
+
+PackageParts parts_with(const std::function<void(PackageParts&)>& change) {
+  PackageParts p = make_package_parts();
+  change(p);
+  return p;
+}
+
+Bytes built_with(const std::function<void(PackageParts&)>& change) { return parts_with(change).build(); }
+
+Bytes sealed_with(const std::function<void(Manifest&)>& change) {
+  return PackagePatcher(make_package_parts().build()).seal(change).package();
+}
+
+TEST(Verify, ASoundPackageHasNoFindings) {
+  const Bytes package = make_package_parts().build();
+  const VerifyReport report = verify(package);
+  EXPECT_EQ(all_of(report), "");
+  EXPECT_EQ(report.meshes, 2u);
+  EXPECT_EQ(report.previews, 1u);
+  EXPECT_EQ(report.fragments, 6u);
+  EXPECT_EQ(report.entries, 12u);
+}
+
+TEST(Verify, ThePatcherItselfKeepsAPackageSound) {
+  EXPECT_EQ(all_of(verify(PackagePatcher(make_package_parts().build()).seal().package())), "");
+}
+
+TEST(Verify, UntexturedPackage) {
+  const Bytes package = built_with([](PackageParts& p) {
+    p.textures.clear();
+    p.streams.clear();
+    p.tables.planes.clear();
+    p.quality = {{0, 5}, {100}, {1, 0.9f}, {0, 0.1f}, 2, 64};
+    p.manifest.plane_count = 0;
+    p.meshes[0] = testing::make_glb(testing::fine_mesh(), {}).glb();
+    p.meshes[5] = testing::make_glb(testing::coarse_mesh(), {}).glb();
+  });
+  EXPECT_EQ(all_of(verify(package)), "");
+}
+
+TEST(Verify, SameFindingsForAnyThreads) {
+  const Bytes package = PackagePatcher(make_package_parts().build())
+                            .edit(rung_path(0, 1),
+                                  [](Bytes& b) {
+                                    for (std::size_t i = 40; i < b.size(); i += 50) b[i] ^= 0x55;
+                                  })
+                            .package();
+  EXPECT_GT(verify(package, 1).findings.size(), 2u);
+  EXPECT_EQ(verify(package, 1).findings, verify(package, 8).findings);
+}
+
+// Container and index
+
+TEST(Verify, Container) {
+  Bytes package = make_package_parts().build();
+  package.push_back(0);
+  EXPECT_TRUE(catches_only(package, "container", ""));
+  for (const std::size_t keep : {std::size_t{0}, std::size_t{100}, package.size() / 2, package.size() - 2})
+    EXPECT_TRUE(
+        catches(Bytes(package.begin(), package.begin() + static_cast<std::ptrdiff_t>(keep)), "container", ""))
+        << keep;
+}
+
+TEST(Verify, Manifest) {
+  EXPECT_TRUE(catches_only(PackagePatcher(make_package_parts().build())
+                               .edit(kManifestPath, [](Bytes& b) { b[0] = '['; })
+                               .package(),
+                           "manifest", kManifestPath));
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.object_height = 3; }), "manifest", kManifestPath));
+}
+
+TEST(Verify, Index) {
+  EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
+                          .edit(kIndexPath, [](Bytes& b) { b[b.size() - 3] ^= 1; })
+                          .package(),
+                      "index", kIndexPath));
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.index.head_digest[3] ^= 1; }), "reference",
+                           kManifestPath));
+}
+
+TEST(Verify, EntryDigest) {
+  for (const std::string& path : {mesh_path(0), mesh_path(5), preview_path(0), rung_path(0, 1),
+                                  table_streams_path(0), std::string(kTablesPath), std::string(kTexturesPath),
+                                  std::string(kQualityPath), std::string(kProvenancePath)})
+    EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
+                            .edit(path, [](Bytes& b) { b[b.size() / 2] ^= 4; })
+                            .package(),
+                        "entry-digest", path))
+        << path;
+}
+
+TEST(Verify, EntryCrc) {
+  Bytes package = make_package_parts().build();
+  const auto source = memory_source(package);
+  const auto entries = read_container(*source);
+  package[entries.back().offset + 5] ^= 0x10;
+  EXPECT_TRUE(catches(package, "entry-crc", entries.back().path));
+}
+
+/// The package with its entries in another order or with others among them; digests and offsets fit.
+Bytes rearranged(const std::function<void(std::vector<std::pair<std::string, Bytes>>&)>& change,
+                 bool reindex) {
+  const Bytes package = make_package_parts().build();
+  PackagePatcher old(package);
+  std::vector<std::pair<std::string, Bytes>> entries;
+  const auto source = memory_source(package);
+  for (const ContainerEntry& e : read_container(*source)) entries.emplace_back(e.path, old.entry(e.path));
+  change(entries);
+  Bytes out;
+  ContainerWriter writer([&](std::span<const std::uint8_t> b) { out.insert(out.end(), b.begin(), b.end()); });
+  for (const auto& [path, bytes] : entries) writer.add(path, bytes);
+  writer.finish();
+  if (!reindex) return out;
+  PackagePatcher patcher(out);
+  const auto at = [&](const std::string& path) {
+    return std::find_if(writer.entries().begin(), writer.entries().end(),
+                        [&](const ContainerEntry& e) { return e.path == path; })
+        ->offset;
+  };
+  patcher.seal_index([&](std::vector<EntryRef>& index) {
+    for (EntryRef& e : index) e.offset = at(e.path);
+    std::sort(index.begin(), index.end(),
+              [](const EntryRef& a, const EntryRef& b) { return a.offset < b.offset; });
+  });
+  return patcher
+      .seal([&](Manifest& m) {
+        m.provenance.offset = at(kProvenancePath);
+        m.scales[0].glb.offset = at(mesh_path(0));
+      })
+      .package();
+}
+
+TEST(Verify, EntrySet) {
+  EXPECT_TRUE(catches_only(
+      rearranged([](auto& entries) { entries.emplace_back("notes.txt", Bytes(10, 'x')); }, false),
+      "entry-set", "notes.txt"));
+  EXPECT_TRUE(
+      catches(rearranged([](auto& entries) { entries.pop_back(); }, false), "entry-set", kProvenancePath));
+  EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.quality.bytes -= 1; }), "entry-set", kQualityPath));
+}
+
+TEST(Verify, EntryOrder) {
+  const Bytes package = rearranged(
+      [](auto& entries) { std::swap(entries[entries.size() - 1], entries[entries.size() - 2]); }, true);
+  EXPECT_TRUE(catches_only(package, "entry-order", kIndexPath));
+}
+
+TEST(Verify, Bootstrap) {
+  EXPECT_TRUE(
+      catches(rearranged([](auto& entries) { std::swap(entries[0], entries[1]); }, false), "bootstrap", ""));
+}
+
+TEST(Verify, EntryUnknown) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.streams["extra.bin"] = Bytes(5, 1); }),
+                           "entry-unknown", "extra.bin"));
+}
+
+void keep_source(PackageParts& p, const Bytes& image) {
+  p.textures[0].source_extension = "png";
+  p.streams[source_path(0, "png")] = image;
+}
+
+TEST(Verify, Source) {
+  EXPECT_EQ(
+      all_of(verify(built_with([](PackageParts& p) { keep_source(p, testing::png_bytes(64, 48, 3)); }))), "");
+  const std::string path = source_path(0, "png");
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { keep_source(p, testing::png_bytes(64, 47, 3)); }),
+                           "source", path));
+  EXPECT_TRUE(catches_only(
+      built_with([](PackageParts& p) { keep_source(p, testing::jpeg_bytes(64, 48, 3)); }), "source", path));
+  Bytes cut = testing::png_bytes(64, 48, 3);
+  cut.resize(cut.size() / 2);
+  EXPECT_TRUE(catches_only(built_with([&](PackageParts& p) { keep_source(p, cut); }), "source", path));
+  EXPECT_TRUE(catches_only(
+      built_with([](PackageParts& p) { p.streams[source_path(0, "png")] = testing::png_bytes(64, 48, 3); }),
+      "entry-set", path));
+}
+
+TEST(Verify, References) {
+  EXPECT_TRUE(
+      catches(sealed_with([](Manifest& m) { m.quality.digest[0] ^= 1; }), "reference", kManifestPath));
+  EXPECT_TRUE(
+      catches(sealed_with([](Manifest& m) { m.tables.head_digest[0] ^= 1; }), "reference", kManifestPath));
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.scales[0].glb.bytes -= 1; }), "reference", kManifestPath));
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.previews[0].bytes -= 1; }), "reference", kManifestPath));
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.first_picture_bytes -= 100; }), "first-picture",
+                           kManifestPath));
+}
+
+// Figures of the manifest
+
+TEST(Verify, ScalesAndSteps) {
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.scales[1].error_rms = 0.5; }), "scale", kManifestPath));
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.steps[0].up_to_px = 201; }), "step", kManifestPath));
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_jnd = 150; }), "step",
+                           kManifestPath));
+}
+
+// Documents
+
+TEST(Verify, Textures) {
+  EXPECT_TRUE(catches(sealed_with([](Manifest& m) {
+                        m.plane_count = 0;
+                        m.previews.clear();
+                      }),
+                      "textures", kTexturesPath));
+  EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
+                          .edit(kTexturesPath, [](Bytes& b) { b[2] = 'x'; })
+                          .seal()
+                          .package(),
+                      "textures", kTexturesPath));
+}
+
+TEST(Verify, TablesAgainstTextures) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             p.textures[0].fragment_width_px = 64;
+                             p.textures[0].columns = 1;
+                           }),
+                           "tables-grid", kTablesPath));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) {
+                        p.textures[0].rung_quality = {20, 71};
+                      }),
+                      "tables-rungs", kTablesPath));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.tables.planes[0].size_bytes[0] += 1; }),
+                      "tables-size", rung_path(0, 0)));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.tables.planes[0].table_bytes[1] += 1; }),
+                      "tables-size", table_streams_path(0)));
+}
+
+TEST(Verify, Tables) {
+  EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
+                          .edit(kTablesPath, [](Bytes& b) { b[b.size() - 9] ^= 1; })
+                          .seal()
+                          .package(),
+                      "tables", kTablesPath));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.tables.planes[0].covered_texels[3] = 9; }),
+                      "tables-coverage", kTablesPath));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.tables.planes[0].covered_texels[0] = 0; }),
+                      "tables-coverage", kTablesPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.tables.planes[0].covered_texels[1] = 1025; }),
+                           "tables", kTablesPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.tables.planes[0].surface_fraction[1] = 0.9f; }),
+                           "tables", kTablesPath));
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) {
+                        std::swap(p.tables.planes[0].order[0], p.tables.planes[0].order[1]);
+                      }),
+                      "tables-order", kTablesPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.tables.planes[0].total_bytes[25] += 1; }),
+                           "tables-total", kTablesPath));
+}
+
+TEST(Verify, Quality) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             p.quality.scales = {0, 6};
+                           }),
+                           "quality", kQualityPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             p.quality.rungs = {20, 71};
+                           }),
+                           "quality", kQualityPath));
+  EXPECT_TRUE(catches_only(PackagePatcher(make_package_parts().build())
+                               .edit(kQualityPath, [](Bytes& b) { b[b.size() - 1] = ' '; })
+                               .seal()
+                               .package(),
+                           "quality", kQualityPath));
+}
+
+TEST(Verify, Provenance) {
+  for (const auto& change : std::vector<std::function<void(nlohmann::json&)>>{
+           [](auto& j) { j["format"]["minor"] = 9; },
+           [](auto& j) { j["options"]["package"]["title"] = "Another"; },
+           [](auto& j) {
+             j["options"]["ladder"]["rungs"] = {20, 71};
+           },
+           [](auto& j) { j["options"]["perceptual_values"]["jnd"] = 0.2; },
+           [](auto& j) { j["inputs"] = nlohmann::json::array(); }, [](auto& j) { j["version"] = 2; }})
+    EXPECT_TRUE(catches_only(built_with([&](PackageParts& p) { change(p.provenance); }), "provenance",
+                             kProvenancePath));
+}
+
+// Meshes
+
+TEST(Verify, MeshesAgainstManifest) {
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].triangles -= 1; }), "mesh-counts",
+                           mesh_path(5)));
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.scales[0].vertices += 1; }), "mesh-counts", mesh_path(0)));
+  EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.bounds_max.x = 0.5; }), "mesh-bounds", mesh_path(0)));
+  EXPECT_TRUE(catches_only(
+      built_with([](PackageParts& p) { p.meshes[0] = testing::make_glb(testing::fine_mesh(), {}).glb(); }),
+      "mesh-images", mesh_path(0)));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             GlbParts g =
+                                 testing::make_glb(testing::coarse_mesh(), p.streams[preview_path(0)]);
+                             g.json["images"][0]["name"] = "texture/7";
+                             p.meshes[5] = g.glb();
+                           }),
+                           "mesh-images", mesh_path(5)));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.meshes[5].back() ^= 1, p.meshes[5][8] ^= 4; }),
+                           "glb-container", mesh_path(5)));
+}
+
+TEST(Verify, NestedMeshes) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             Mesh moved = testing::coarse_mesh();
+                             moved.positions[9].x *= 1.0001f;
+                             p.meshes[5] = testing::make_glb(moved, p.streams[preview_path(0)]).glb();
+                           }),
+                           "mesh-nested", mesh_path(5)));
+}
+
+// Images
+
+TEST(Verify, Preview) {
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.streams[preview_path(0)].resize(40); }), "preview",
+                      preview_path(0)));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.textures[0].preview_width_px += 1; }),
+                           "preview", preview_path(0)));
+}
+
+TEST(Verify, TableStreams) {
+  EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.streams[table_streams_path(0)][1] = 0xd9; }),
+                      "table-stream", table_streams_path(0)));
+}
+
+TEST(Verify, Fragments) {
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.tables.planes[0].digest[2] ^= 1; }),
+                           "fragment-digest", rung_path(0, 0)));
+  const auto broken = [](const std::function<void(Bytes&)>& change) {
+    return built_with(
+        [&](PackageParts& p) {  // the first fragment of the lower rung, fragment 1, and a digest that fits it
+          PlaneTables& t = p.tables.planes[0];
+          Bytes& pack = p.streams[rung_path(0, 0)];
+          const auto end = pack.begin() + static_cast<std::ptrdiff_t>(t.size_bytes[1]);
+          Bytes stream(pack.begin(), end);
+          change(stream);
+          std::copy(stream.begin(), stream.end(), pack.begin());
+          t.digest[1] = truncated(sha256(stream));
+        });
+  };
+  EXPECT_TRUE(catches_only(broken([](Bytes& b) { b[0] = 0; }), "fragment-decode", rung_path(0, 0)));
+  EXPECT_TRUE(
+      catches_only(broken([](Bytes& b) { b[b.size() - 2] = 0; }), "fragment-decode", rung_path(0, 0)));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
+                             // Another height in the frame header that the lower rung's fragments share:
+                             // SOF0, 2 bytes length, precision, height.
+                             Bytes& b = p.streams[table_streams_path(0)];
+                             for (std::size_t i = 0; i + 8 < p.tables.planes[0].table_bytes[0]; ++i)
+                               if (b[i] == 0xff && b[i + 1] == 0xc0) b[i + 6] = 16;
+                           }),
+                           "fragment-decode", rung_path(0, 0)));
+}
+
+}  // namespace
+}  // namespace texmesh

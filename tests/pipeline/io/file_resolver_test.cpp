@@ -1,0 +1,176 @@
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/resource_error.h"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string text(const std::optional<std::vector<std::uint8_t>>& bytes) {
+  return bytes ? std::string(bytes->begin(), bytes->end()) : "(none)";
+}
+
+/// Every case runs with openat2 and with the walk that replaces it.
+class FileResolverTest : public ::testing::TestWithParam<FileResolver::Method> {
+ protected:
+  void SetUp() override {
+    char name[] = "/tmp/texmesh_resolver_XXXXXX";
+    root_ = ::mkdtemp(name);
+    folder_ = root_ / "model";
+    write(root_ / "secret", "secret");
+    write(folder_ / "a.bin", "alpha");
+    write(folder_ / "tex/deep/b c.png", "beta");
+    write(folder_ / "empty", "");
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void expect_refused(const std::string& uri) {
+    FileResolver resolver(folder_, GetParam());
+    EXPECT_THROW(resolver.read(uri, 1000), InputError) << uri;
+    ASSERT_EQ(resolver.requests().size(), 1u);
+    EXPECT_FALSE(resolver.requests()[0].found);
+  }
+  void expect_missing(const std::string& uri) {
+    FileResolver resolver(folder_, GetParam());
+    EXPECT_EQ(text(resolver.read(uri, 1000)), "(none)") << uri;
+  }
+
+  fs::path root_, folder_;
+};
+
+TEST_P(FileResolverTest, ReadsFilesBeneathItsFolder) {
+  FileResolver resolver(folder_, GetParam());
+  EXPECT_EQ(text(resolver.read("a.bin", 1000)), "alpha");
+  EXPECT_EQ(text(resolver.read("tex/deep/b c.png", 1000)), "beta");
+  EXPECT_EQ(text(resolver.read("./tex//./deep/b c.png", 1000)), "beta");
+  EXPECT_EQ(text(resolver.read("empty", 0)), "");
+}
+
+TEST_P(FileResolverTest, RecordsEveryRequestOnceInOrder) {
+  FileResolver resolver(folder_, GetParam());
+  resolver.read("tex/none", 1000);
+  resolver.read("a.bin", 1000);
+  resolver.read("tex/none", 1000);
+  resolver.read("a.bin", 1000);
+  const std::vector<std::uint8_t> alpha{'a', 'l', 'p', 'h', 'a'};
+  std::vector<FileRequest> requests = resolver.requests();
+  for (FileRequest& request : requests) request.stamp = {};  // inode and times differ from run to run
+  EXPECT_EQ(requests, (std::vector<FileRequest>{{"tex/none", false, {}, 0, {}},
+                                                {"a.bin", true, sha256(alpha), 5, {}}}));
+}
+
+TEST_P(FileResolverTest, MissingFilesAreNoError) {
+  expect_missing("none");
+  expect_missing("none/none");
+  expect_missing("a.bin/none");
+  expect_missing(std::string(300, 'x'));
+}
+
+TEST_P(FileResolverTest, RefusesNamesThatLeaveTheFolder) {
+  for (const char* uri : {"../secret",
+                          "tex/../../secret",
+                          "tex/../a.bin",
+                          "..",
+                          "tex/..",
+                          "/etc/hostname",
+                          "//host/x",
+                          "C:/x",
+                          "c:x",
+                          "C:\\x",
+                          "tex\\a",
+                          "..\\secret",
+                          "http://host/x",
+                          "https://host/x",
+                          "file:///etc/hostname",
+                          "FILE:a",
+                          "data:,x",
+                          "",
+                          ".",
+                          "tex/",
+                          "tex/.",
+                          "a\nb"}) {
+    expect_refused(uri);
+  }
+  expect_refused(std::string("a.bin\0.png", 10));
+  expect_refused(std::string(5000, 'x'));
+}
+
+TEST_P(FileResolverTest, RefusesSymbolicLinksAnywhereInTheName) {
+  fs::create_symlink(root_ / "secret", folder_ / "out");
+  fs::create_symlink("a.bin", folder_ / "inside");
+  fs::create_symlink("nowhere", folder_ / "dangling");
+  fs::create_directory_symlink(root_, folder_ / "up");
+  fs::create_directory_symlink("tex", folder_ / "tex2");
+  for (const char* uri : {"out", "inside", "dangling", "up/secret", "tex2/deep/b c.png"}) expect_refused(uri);
+}
+
+TEST_P(FileResolverTest, RefusesWhatIsNoRegularFileWithoutWaitingForIt) {
+  ASSERT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+  const int s = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  (folder_ / "socket").string().copy(address.sun_path, sizeof address.sun_path - 1);
+  ASSERT_EQ(::bind(s, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  for (const char* uri : {"fifo", "socket", "tex"}) expect_refused(uri);
+  ::close(s);
+}
+
+TEST_P(FileResolverTest, RefusesFilesOverTheLimit) {
+  FileResolver resolver(folder_, GetParam());
+  EXPECT_EQ(text(resolver.read("a.bin", 5)), "alpha");
+  EXPECT_THROW(resolver.read("a.bin", 4), InputError);
+}
+
+TEST_P(FileResolverTest, FolderMayBeALinkButMustBeAFolder) {
+  fs::create_directory_symlink(folder_, root_ / "link");
+  EXPECT_EQ(text(FileResolver(root_ / "link", GetParam()).read("a.bin", 9)), "alpha");
+  EXPECT_THROW(FileResolver(root_ / "secret", GetParam()), InputError);
+  EXPECT_THROW(FileResolver(root_ / "none", GetParam()), InputError);
+}
+
+TEST_P(FileResolverTest, UnreadableFilesAreNoMatterOfTheModel) {
+  ASSERT_EQ(::chmod((folder_ / "a.bin").c_str(), 0), 0);
+  if (::access((folder_ / "a.bin").c_str(), R_OK) == 0) GTEST_SKIP() << "this user may read everything";
+  FileResolver resolver(folder_, GetParam());
+  EXPECT_THROW(resolver.read("a.bin", 9), ResourceError);
+  EXPECT_TRUE(resolver.failed_for_resources());
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, FileResolverTest,
+                         ::testing::Values(FileResolver::Method::kBest, FileResolver::Method::kWalk),
+                         [](const auto& p) {
+                           return p.param == FileResolver::Method::kBest ? "best" : "walk";
+                         });
+
+TEST(ReadInputFile, FollowsLinksAndRefusesTheRest) {
+  char name[] = "/tmp/texmesh_input_XXXXXX";
+  const fs::path root = ::mkdtemp(name);
+  write(root / "a", "alpha");
+  fs::create_symlink("a", root / "link");
+  ASSERT_EQ(::mkfifo((root / "fifo").c_str(), 0600), 0);
+  EXPECT_EQ(text(read_input_file(root / "link", 5)), "alpha");
+  EXPECT_THROW(read_input_file(root / "a", 4), InputError);
+  EXPECT_THROW(read_input_file(root / "fifo", 100), InputError);
+  EXPECT_THROW(read_input_file(root / "none", 100), InputError);
+  EXPECT_THROW(read_input_file(root, 100), InputError);
+  EXPECT_THROW(read_input_file("/dev/zero", 100), InputError);
+  EXPECT_GT(read_input_file("/proc/self/status", 1 << 20).size(), 0u);
+  EXPECT_THROW(read_input_file("/proc/self/status", 10), InputError);
+  fs::remove_all(root);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,477 @@
+#include "stages/lut/lut.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "format/base/archive.h"
+#include "format/base/sha256.h"
+#include "stages/lut/size_model.h"
+#include "stages/measure/distortion.h"
+#include "stages/measure/fragment_meter.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using testing::Random;
+
+struct Scene {
+  Fragments fragments;
+  std::vector<Pixels> pixels;
+  Predictors predictors;
+  Ladder ladder;
+};
+
+TexturePlane plane_of(std::uint32_t columns, std::uint32_t rows, std::uint32_t channels) {
+  TexturePlane p;
+  p.channels = channels;
+  p.columns = columns;
+  p.rows = rows;
+  p.fragment_width_px = 32;
+  p.fragment_height_px = 48;
+  p.width_px = columns * 32 - 5;
+  p.height_px = rows * 48 - 7;
+  p.coverage.assign((std::size_t{p.width_px} + 7) / 8 * p.height_px, 0);
+  p.covered_texels.assign(p.fragment_count(), 0);
+  for (std::uint32_t y = 0; y < p.height_px; ++y)
+    for (std::uint32_t x = 0; x < p.width_px; ++x) {
+      if (x / 32 == 1 || (x + y) % 11 == 0) continue;  // a column of empty fragments, and holes elsewhere
+      p.coverage[(std::size_t{p.width_px} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
+      ++p.covered_texels[y / 48 * columns + x / 32];
+    }
+  for (std::size_t f = 0; f < p.fragment_count(); ++f) {
+    p.surface_fraction.push_back(p.covered_texels[f] ? 0.01f * static_cast<float>(f % 3 + 1) : 0);
+    p.features.push_back(static_cast<std::uint32_t>(f * 7 % 5));
+  }
+  p.features.resize(3 * p.fragment_count());
+  const float most = 4;
+  for (std::uint32_t f : p.features) p.eta.push_back(static_cast<float>(f) / most);
+  return p;
+}
+
+Scene make_scene(LadderOptions ladder_options = {}) {
+  Scene s;
+  s.fragments.scales = 2;
+  s.fragments.planes = {plane_of(4, 3, 3), plane_of(2, 1, 1)};
+  Random random{12};
+  for (const TexturePlane& p : s.fragments.planes) {
+    Pixels pixels{p.columns * 32, p.rows * 48, p.channels, {}};
+    for (std::size_t k = 0; k < std::size_t{pixels.width_px} * pixels.height_px * p.channels; ++k)
+      pixels.data.push_back(static_cast<std::uint8_t>(80 + k / 7 % 90 + random.next() % 30));
+    s.pixels.push_back(pixels);
+  }
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, ladder_options, {});
+  return s;
+}
+
+PackageTables build(const Scene& s, const LutOptions& options = {}, int threads = 1) {
+  RunContext context;
+  context.threads = threads;
+  return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, options, context);
+}
+
+TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
+  const Scene s = make_scene();
+  const PackageTables tables = build(s);
+  ASSERT_EQ(tables.planes.size(), 2u);
+  for (std::size_t p = 0; p < 2; ++p) {
+    const PlaneTables& t = tables.planes[p];
+    ASSERT_EQ(t.rung_count(), 10u);
+    for (std::size_t r = 0; r < 10; ++r) {
+      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].tables.size());
+      for (std::size_t f = 0; f < t.fragment_count(); ++f) {
+        const auto stream = fragment_stream(s.ladder.planes[p].rungs[r], f);
+        const std::size_t at = r * t.fragment_count() + f;
+        EXPECT_EQ(t.size_bytes[at], stream.size());
+        EXPECT_EQ(t.digest[at], stream.empty() ? 0 : truncated(sha256(stream)));
+        EXPECT_EQ(stream.empty(), t.covered_texels[f] == 0);
+      }
+    }
+  }
+}
+
+TEST(Lut, DistortionIsMeasuredAndFallsWithTheRung) {
+  const Scene s = make_scene();
+  const PlaneTables t = build(s).planes[1];
+  const TexturePlane& plane = s.fragments.planes[1];
+  for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    const Pixels decoded = decode_fragment(s.ladder.planes[1], r, 0, 1 << 20);
+    double error = 0;
+    int count = 0;
+    for (std::uint32_t y = 0; y < plane.height_px; ++y)
+      for (std::uint32_t x = 0; x < 32; ++x) {
+        if (!(plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1)) continue;
+        error += std::pow(s.pixels[1].at(x, y)[0] - decoded.at(x, y)[0], 2);
+        ++count;
+      }
+    EXPECT_NEAR(t.mse[r * 2], error / count, 1e-3);
+    EXPECT_EQ(t.mse[r * 2 + 1], 0);
+    EXPECT_GT(t.dssim[r * 2], 0);
+    EXPECT_LT(t.dssim[r * 2], 1);
+    if (r == 0) continue;
+    EXPECT_LT(t.mse[r * 2], t.mse[r * 2 - 2] * 1.02);
+    EXPECT_LT(t.dssim[r * 2], t.dssim[r * 2 - 2] * 1.02);
+  }
+}
+
+TEST(Lut, NoChannelOfDataStandsForAnother) {
+  Scene s = make_scene();
+  for (std::size_t k = 0; k < s.pixels[0].data.size(); k += 3)
+    s.pixels[0].data[k] = s.pixels[0].data[k + 1] = 128;
+  const auto measured = [&](TextureRole role) {  // only blue varies: luma has 1/77 of its square error
+    s.fragments.planes[0].role = role;
+    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+    return build(s).planes[0];
+  };
+  const PlaneTables data = measured(TextureRole::kOcclusionRoughnessMetallic);
+  const Pixels decoded = decode_fragment(s.ladder.planes[0], 0, 0, 1 << 20);
+  const TexturePlane& plane = s.fragments.planes[0];
+  double error = 0;
+  for (std::uint32_t y = 0; y < 48; ++y)
+    for (std::uint32_t x = 0; x < 32; ++x)
+      if (plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1)
+        for (std::size_t c = 0; c < 3; ++c)
+          error += std::pow(s.pixels[0].at(x, y)[c] - decoded.at(x, y)[c], 2) / 3 / plane.covered_texels[0];
+  EXPECT_NEAR(data.mse[0], error, error / 500);
+  EXPECT_GT(data.mse[0], 10);
+  const PlaneTables normal = measured(TextureRole::kNormal);
+  EXPECT_GT(normal.dssim[0], 0.05) << "not a third of it: the constant channels say nothing";
+}
+
+TEST(Lut, OrderQualityAndTotals) {
+  const Scene s = make_scene();
+  for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis, Allocation::kRd}) {
+    LutOptions options;
+    options.allocate = allocate;
+    const PlaneTables t = build(s, options).planes[0];
+    const TexturePlane& plane = s.fragments.planes[0];
+    EXPECT_EQ(t.order.size(), 9u);
+    for (std::size_t k = 1; k < t.order.size(); ++k) {
+      const auto key = [&](std::uint16_t f) {
+        return std::tuple(-plane.eta[f], -plane.surface_fraction[f], f);
+      };
+      EXPECT_LT(key(t.order[k - 1]), key(t.order[k]));
+    }
+    EXPECT_EQ(t.quality, (std::vector<float>{80, 60, 40}));
+    EXPECT_EQ(t.allocation, static_cast<int>(allocate));
+    ASSERT_EQ(t.total_bytes.size(), 3u * 21u);
+    for (std::uint32_t scale = 0; scale < 3; ++scale)
+      for (std::size_t g = 0; g < 21; ++g) {
+        const auto quality = quality_of(t, scale, static_cast<double>(g) / 20);
+        std::uint64_t sum = 0;
+        for (std::size_t f = 0; f < t.fragment_count(); ++f)
+          sum += t.size_bytes[nearest_rung(t, quality[f]) * t.fragment_count() + f];
+        EXPECT_EQ(t.total_bytes[scale * 21 + g], sum);
+        EXPECT_LE(t.total_bytes[scale * 21 + g], t.total_bytes[scale * 21 + (g == 0 ? 0 : g - 1)]);
+      }
+  }
+}
+
+TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
+  const Scene s = make_scene();
+  for (std::size_t p = 0; p < 2; ++p) {
+    const PlaneTables t = build(s).planes[p];
+    for (std::size_t f = 0; f < t.fragment_count(); ++f) {
+      if (t.covered_texels[f] == 0) {
+        EXPECT_EQ(t.skip_dssim[f], 0);
+        continue;
+      }
+      EXPECT_GT(t.skip_dssim[f], t.dssim[f]);  // noise: an eighth of the resolution shows nothing of it
+      EXPECT_LT(t.skip_dssim[f], 1.5f);
+    }
+  }
+  // A flat texture is as good in the preview.
+  Scene flat = make_scene();
+  for (Pixels& pixels : flat.pixels) std::fill(pixels.data.begin(), pixels.data.end(), std::uint8_t{97});
+  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {});
+  const PlaneTables t = build(flat).planes[0];
+  for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
+}
+
+/// The texel between the four nearest centres of a picture that covers the same rectangle.
+double bilinear(const Pixels& picture, std::uint32_t x, std::uint32_t y, std::uint32_t width,
+                std::uint32_t height) {
+  const auto at = [](std::uint32_t k, std::uint32_t size, std::uint32_t coarse) {
+    return std::clamp((k + 0.5) * coarse / size - 0.5, 0.0, coarse - 1.0);
+  };
+  const double u = at(x, width, picture.width_px), v = at(y, height, picture.height_px);
+  double sum = 0;
+  for (std::uint32_t t = 0; t < picture.height_px; ++t)
+    for (std::uint32_t s = 0; s < picture.width_px; ++s)
+      sum += std::max(0.0, 1 - std::fabs(s - u)) * std::max(0.0, 1 - std::fabs(t - v)) * picture.at(s, t)[0];
+  return sum;
+}
+
+TEST(Lut, SkippedFragmentsShowThePreviewOfTheirOwnImageBilinearly) {
+  Scene s = make_scene();
+  s.fragments.planes.push_back(plane_of(1, 1, 1));  // a mip of the second image, which has no preview
+  s.fragments.planes[2].mip = 1;
+  s.fragments.planes[2].base = 1;
+  s.pixels.push_back({32, 48, 1, std::vector<std::uint8_t>(32 * 48)});
+  for (std::size_t p = 0; p < 3; ++p)  // waves that an eighth still shows, of other lengths in each image
+    for (std::size_t k = 0; k < s.pixels[p].data.size(); ++k) {
+      const std::size_t texel = k / s.pixels[p].channels, x = texel % s.pixels[p].width_px,
+                        y = texel / s.pixels[p].width_px;
+      const double length = p == 0 ? 37 : p == 1 ? 29 : 14.5;
+      s.pixels[p].data[k] = static_cast<std::uint8_t>(128 + 60 * std::sin((x + 2.0) / length * 6.28) +
+                                                      50 * std::cos(y / length * 6.28));
+    }
+  LadderOptions ladder;
+  ladder.preview_quality = 95;
+  ladder.hull_gain = -1;
+  s.ladder = encode_ladder(s.fragments, s.pixels, ladder, {});
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  const PackageTables tables = build(s);
+  for (std::size_t p = 0; p < 3; ++p) {
+    const TexturePlane& plane = s.fragments.planes[p];
+    const Pixels preview = decode_jpeg_luma(s.ladder.planes[p == 2 ? 1 : p].preview, 1 << 20);
+    for (const std::uint16_t f : tables.planes[p].order) {
+      std::vector<std::uint8_t> source, shown, mask;
+      for (std::uint32_t y = f / plane.columns * 48; y < (f / plane.columns + 1) * 48; ++y)
+        for (std::uint32_t x = f % plane.columns * 32; x < (f % plane.columns + 1) * 32; ++x) {
+          const bool covered = x < plane.width_px && y < plane.height_px &&
+                               plane.coverage[(plane.width_px + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
+          mask.push_back(covered ? 255 : 0);
+          source.push_back(measured_value(s.pixels[p].at(x, y), plane.channels, 1, 0));
+          shown.push_back(
+              static_cast<std::uint8_t>(bilinear(preview, x, y, plane.width_px, plane.height_px) + 0.5));
+        }
+      const double want = DistortionMeter(source, mask, 32, 48).against(shown).dssim;
+      EXPECT_NEAR(tables.planes[p].skip_dssim[f], want, 1e-3) << p << ' ' << f;
+    }
+  }
+}
+
+TEST(Lut, RateDistortionSpendsNoMoreAndLosesLess) {
+  const Scene s = make_scene();
+  LutOptions options;
+  const PlaneTables log = build(s, options).planes[0];
+  options.allocate = Allocation::kRd;
+  const PlaneTables rd = build(s, options).planes[0];
+  EXPECT_EQ(rd.total_bytes, log.total_bytes);
+  EXPECT_EQ(rd.allocation, 2);
+  for (std::uint32_t scale = 0; scale < 3; ++scale)
+    for (std::size_t g = 0; g < 21; g += 4) {
+      const auto a = rungs_of(log, scale, static_cast<double>(g) / 20),
+                 b = rungs_of(rd, scale, static_cast<double>(g) / 20);
+      EXPECT_EQ(sum_of(bytes_of(log, a)), log.total_bytes[scale * 21 + g]);
+      EXPECT_LE(sum_of(bytes_of(rd, b)), log.total_bytes[scale * 21 + g]);
+      // A step that does not fit ends its fragment's walk: with so few of them up to a step's bytes are left
+      // over.
+      EXPECT_LE(surface_dssim(rd, b), 1.01 * surface_dssim(log, a) + 1e-6);
+    }
+}
+
+TEST(Lut, SizeModelFitsAndIsAbsentForOneRung) {
+  const PlaneTables t = build(make_scene()).planes[0];
+  EXPECT_GT(t.model_correlation, 0.95f);
+  EXPECT_LT(t.model_error, 0.2f);
+  EXPECT_GT(t.model_r, 1.0f);
+  double predictor = 0;
+  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
+  EXPECT_NEAR(t.model_b, std::log(t.model_r) / std::log(100 * predictor), 1e-4);
+  // Nine fragments of 32 x 48 texels in 4:2:0: 36 blocks of two bits each, SOI and EOI.
+  const double constant = 9 * (4 + 36.0 / 4);
+  double error = 0;
+  for (std::size_t r = 2; r < 9; ++r) {  // of quality 10 to 95
+    double size = 0;
+    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
+    error += std::fabs(t.model_a * std::pow(t.model_r, t.rung_quality[r]) + constant - size) / size / 7;
+  }
+  EXPECT_NEAR(t.model_error, error, 1e-3);
+
+  LadderOptions one;
+  one.rungs = {50};
+  const PlaneTables single = build(make_scene(one)).planes[0];
+  EXPECT_EQ(single.model_a, 0);
+  EXPECT_EQ(single.model_error, 0);
+}
+
+TEST(Lut, SizeModelIsNotFittedOnARungWithoutLoss) {
+  LadderOptions options;
+  options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
+  Scene s = make_scene(options);
+  EXPECT_GT(build(s).planes[0].model_error, 0.01f);
+  s.ladder.planes[0].lossless = true;
+  const PlaneTables t = build(s).planes[0];
+  EXPECT_NEAR(t.model_error, 0, 1e-5) << "two points have a curve through both";
+  EXPECT_NEAR(t.model_correlation, 1, 1e-6);
+}
+
+TEST(Lut, ConstantBytesAreTheCodecs) {
+  const Scene s = make_scene();
+  EXPECT_EQ(constant_bytes(s.ladder.planes[0], 32, 48), 4 + 36 / 4.0);  // 4:2:0
+  EXPECT_EQ(constant_bytes(s.ladder.planes[1], 32, 48), 4 + 24 / 4.0);  // grey
+  LadderOptions options;
+  options.subsampling = Subsampling::k444;
+  EXPECT_EQ(constant_bytes(make_scene(options).ladder.planes[0], 32, 48), 4 + 72 / 4.0);
+  PlaneLadder other = s.ladder.planes[0];
+  other.codec = Codec::kWebp;
+  EXPECT_EQ(constant_bytes(other, 32, 48), 30);
+  other.codec = Codec::kJpegProgressive;
+  EXPECT_EQ(constant_bytes(other, 32, 48), 0);
+  other = s.ladder.planes[0];
+  std::vector<std::uint8_t>& tables = other.rungs[0].tables;
+  while (!tables.empty()) {  // cut anywhere: some number of blocks, nothing read beyond the end
+    tables.pop_back();
+    EXPECT_GE(constant_bytes(other, 32, 48), 4);
+  }
+  EXPECT_EQ(constant_bytes(other, 32, 48), 4 + 24 / 4.0);
+}
+
+/// Of quality and ln(bytes - c), over the rungs that the model is fitted on.
+double correlation_with(const PlaneTables& t, double constant) {
+  double q = 0, s = 0, qq = 0, qs = 0, ss = 0;
+  constexpr std::size_t kFirst = 2, kLast = 8;
+  const double n = kLast - kFirst + 1;
+  for (std::size_t r = kFirst; r <= kLast; ++r) {
+    double size = -constant;
+    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
+    const double x = t.rung_quality[r], y = std::log(size);
+    q += x / n, s += y / n, qq += x * x / n, qs += x * y / n, ss += y * y / n;
+  }
+  return (qs - q * s) / std::sqrt((qq - q * q) * (ss - s * s));
+}
+
+TEST(Lut, SizeModelHoldsForBlurredTextures) {  // whose blocks' shortest codes are most of the bytes
+  Scene s = make_scene();
+  Random random{5};
+  for (Pixels& pixels : s.pixels)
+    for (std::uint32_t y = 0; y < pixels.height_px; ++y)
+      for (std::uint32_t x = 0; x < pixels.width_px; ++x)
+        for (std::uint32_t c = 0; c < pixels.channels; ++c)
+          pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
+              static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+  const PackageTables tables = build(s);
+  for (std::size_t p = 0; p < tables.planes.size(); ++p) {
+    const PlaneTables& t = tables.planes[p];
+    const double constant = constant_bytes(s.ladder.planes[p], 32, 48), count = t.order.size();
+    for (const std::uint16_t f : t.order) EXPECT_LT(t.size_bytes[f], 2 * constant) << "the case is this one";
+    EXPECT_NEAR(t.model_correlation, correlation_with(t, constant * count), 1e-5);
+    EXPECT_GT(t.model_correlation, correlation_with(t, 4 * count) + 0.03) << "SOI and EOI alone";
+  }
+}
+
+TEST(Lut, EveryRoleHasItsOwnLeastQuality) {
+  Scene s = make_scene();
+  const auto least = [&](TextureRole role, const LutOptions& options) {
+    s.fragments.planes[1].role = role;
+    return build(s, options).planes[1].quality_min;
+  };
+  LutOptions options;
+  EXPECT_EQ(least(TextureRole::kAlpha, options), 18);
+  options.normal_quality_min = 41, options.data_quality_min = 42, options.alpha_quality_min = 43;
+  for (const TextureRole role : {TextureRole::kBaseColour, TextureRole::kEmissive, TextureRole::kColour})
+    EXPECT_EQ(least(role, options), 5);
+  EXPECT_EQ(least(TextureRole::kNormal, options), 41);
+  EXPECT_EQ(least(TextureRole::kOcclusionRoughnessMetallic, options), 42);
+  EXPECT_EQ(least(TextureRole::kData, options), 42);
+  EXPECT_EQ(least(TextureRole::kAlpha, options), 43);
+  options.quality_min = 60;
+  EXPECT_EQ(least(TextureRole::kNormal, options), 60) << "the least of all holds for all";
+  options.quality_min = 5, options.quality_max = 40;
+  EXPECT_EQ(least(TextureRole::kNormal, options), 40) << "the highest goes before";
+
+  // It is what the fragments are asked for, and what they cost.
+  options = {.quality_fine = 20, .quality_coarse = 20};
+  options.data_quality_min = 80;
+  s.fragments.planes[1].role = TextureRole::kData;
+  const PackageTables tables = build(s, options);
+  for (const float q : quality_of(tables.planes[1], 0, 0.5)) EXPECT_EQ(q, 80);
+  for (const float q : quality_of(tables.planes[0], 0, 0.5)) EXPECT_LT(q, 40);
+  options.data_quality_min = 18;
+  EXPECT_GT(tables.planes[1].total_bytes[0], build(s, options).planes[1].total_bytes[0]);
+}
+
+TEST(Lut, TablesPassTheirCodec) {
+  const PackageTables tables = build(make_scene());
+  const auto bytes = write_tables(tables);
+  EXPECT_EQ(write_tables(read_tables(bytes)), bytes);
+}
+
+TEST(Lut, SameTablesForAnyNumberOfThreads) {
+  const Scene s = make_scene();
+  EXPECT_EQ(encode_artefact(build(s, {}, 1)), encode_artefact(build(s, {}, 8)));
+}
+
+TEST(Lut, EmptyAndUnfitInput) {
+  EXPECT_TRUE(build({}).planes.empty());
+  Scene s = make_scene();
+  s.ladder.planes[0].rungs[3].offset.pop_back();
+  EXPECT_THROW(build(s), StageError);
+  s = make_scene();
+  s.predictors.planes.pop_back();
+  EXPECT_THROW(build(s), StageError);
+  s = make_scene();
+  s.ladder.planes[0].rungs[0].data[s.ladder.planes[0].rungs[0].data.size() / 2] = 0xff;
+  s.ladder.planes[0].rungs[0].data[s.ladder.planes[0].rungs[0].data.size() / 2 + 1] = 0xd9;
+  EXPECT_THROW(build(s), FormatError);
+  LutOptions options;
+  options.quality_min = 90;
+  options.quality_max = 50;
+  EXPECT_THROW(build(make_scene(), options), StageError);
+
+  s = make_scene();
+  for (TexturePlane& p : s.fragments.planes) {
+    std::fill(p.covered_texels.begin(), p.covered_texels.end(), 0u);
+    std::fill(p.coverage.begin(), p.coverage.end(), std::uint8_t{0});
+  }
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
+  const PackageTables none = build(s);
+  EXPECT_TRUE(none.planes[0].order.empty());
+  EXPECT_EQ(none.planes[0].total_bytes[0], 0u);
+  EXPECT_NO_THROW(write_tables(none));
+}
+
+TEST(Distortion, EqualOppositeAndMasked) {
+  Random random{1};
+  std::vector<std::uint8_t> source(16 * 16), mask(16 * 16, 255), other;
+  for (auto& v : source) v = static_cast<std::uint8_t>(random.next());
+  const DistortionMeter meter(source, mask, 16, 16);
+  EXPECT_EQ(meter.against(source).mse, 0);
+  EXPECT_NEAR(meter.against(source).dssim, 0, 1e-12);
+  other = source;
+  for (auto& v : other) v = static_cast<std::uint8_t>(255 - v);
+  EXPECT_GT(meter.against(other).dssim, 1);  // negative correlation
+  EXPECT_LT(meter.against(other).dssim, 2);
+
+  for (std::size_t k = 0; k < 256; ++k) mask[k] = k % 3 == 0 ? 255 : 0;
+  const DistortionMeter masked(source, mask, 16, 16);
+  EXPECT_EQ(masked.against(source).mse, 0);
+  other = source;
+  for (std::size_t k = 0; k < 256; ++k)
+    other[k] = mask[k] ? source[k] : static_cast<std::uint8_t>(random.next());
+  EXPECT_EQ(masked.against(other).mse, 0);
+  EXPECT_NEAR(masked.against(other).dssim, 0, 1e-12);
+  other[0] = static_cast<std::uint8_t>(source[0] ^ 16);
+  EXPECT_NEAR(masked.against(other).mse, 256.0 / 86, 1e-9);
+}
+
+TEST(Distortion, AgainstTheFormulaInOneWindow) {
+  Random random{2};
+  std::vector<std::uint8_t> a(64), b(64);
+  for (std::size_t k = 0; k < 64; ++k) {
+    a[k] = static_cast<std::uint8_t>(random.next() % 200);
+    b[k] = static_cast<std::uint8_t>(a[k] + random.next() % 40);
+  }
+  double ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
+  for (std::size_t k = 0; k < 64; ++k) ma += a[k] / 64.0, mb += b[k] / 64.0;
+  for (std::size_t k = 0; k < 64; ++k) {
+    va += (a[k] - ma) * (a[k] - ma) / 64;
+    vb += (b[k] - mb) * (b[k] - mb) / 64;
+    cov += (a[k] - ma) * (b[k] - mb) / 64;
+  }
+  const double ssim =
+      (2 * ma * mb + 6.5025) * (2 * cov + 58.5225) / ((ma * ma + mb * mb + 6.5025) * (va + vb + 58.5225));
+  const DistortionMeter meter(a, std::vector<std::uint8_t>(64, 255), 8, 8);
+  EXPECT_NEAR(meter.against(b).dssim, 1 - ssim, 1e-12);
+}
+
+}  // namespace
+}  // namespace texmesh

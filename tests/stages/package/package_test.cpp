@@ -1,0 +1,362 @@
+#include "stages/package/package.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "tests/format/documents/tables_fixture.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes fake_jpeg(std::size_t bytes, std::uint8_t value) {
+  Bytes b(bytes, value);
+  b[0] = 0xff, b[1] = 0xd8, b[bytes - 2] = 0xff, b[bytes - 1] = 0xd9;
+  return b;
+}
+
+/// What the stages would hand over: three scales (0, 4, 9) of a cube and `planes` planes of 3 x 2 fragments,
+/// two rungs.
+struct Inputs {
+  NestedScales scales;
+  PerceptualValues perceptual;
+  std::vector<Image> images;
+  Fragments fragments;
+  Ladder ladder;
+  PackageTables tables;
+  ScaleFiles files;
+  QualityTable quality;
+  PackageOptions options;
+
+  explicit Inputs(std::size_t planes) {
+    scales.mesh = testing::cube();
+    scales.mesh.origin = {5e6, 0, -5e6};
+    for (const int scale : {0, 4, 9}) {
+      scales.scales.emplace_back().scale = scale;
+      scales.scales.back().error_max = 0.01f * static_cast<float>(scale);
+      files.files.push_back({scale, Bytes(static_cast<std::size_t>(1000 - 100 * scale), 'g'),
+                             static_cast<std::uint32_t>(100 - scale),
+                             static_cast<std::uint32_t>(60 - scale)});
+    }
+    perceptual.p95 = {0, 0.05f, 0.2f, 0, 0, 0.15f, 0, 0, 0};
+    perceptual.p99 = {0, 0.06f, 0.3f, 0, 0, 0.25f, 0, 0, 0};
+    perceptual.major = {1, 0, 1};
+    perceptual.kept = {1, 1, 1};
+    perceptual.display_px_edge = {3e9f, 400, 100};
+    perceptual.display_px_error = {2e9f, 500, 200};
+    perceptual.display_px_jnd = {2e9f, 700, 150};
+    perceptual.object_height = 2;
+    quality = {{0, 4, 9}, {100}, {1, 0.9f, 0.8f}, {0, 0.1f, 0.2f}, 4, 128};
+    for (std::size_t p = 0; p < planes; ++p) add_plane(p);
+  }
+
+  void add_plane(std::size_t p) {
+    PlaneTables t = testing::make_tables(3, 2, 2, 1);
+    PlaneLadder rungs;
+    for (std::size_t r = 0; r < 2; ++r) {
+      LadderRung rung;
+      rung.quality = t.rung_quality[r];
+      rung.tables = fake_jpeg(t.table_bytes[r], 't');
+      rung.offset.push_back(0);
+      for (std::size_t f = 0; f < 6; ++f) {
+        const std::size_t bytes = t.size_bytes[r * 6 + f];
+        const Bytes stream = bytes ? fake_jpeg(bytes, static_cast<std::uint8_t>(f)) : Bytes{};
+        if (bytes) t.digest[r * 6 + f] = truncated(sha256(stream));
+        rung.data.insert(rung.data.end(), stream.begin(), stream.end());
+        rung.offset.push_back(rung.data.size());
+      }
+      rungs.rungs.push_back(std::move(rung));
+    }
+    rungs.preview = fake_jpeg(300 + p, 'p');
+    rungs.preview_width_px = 48;
+    rungs.preview_height_px = 32;
+    TexturePlane plane;
+    plane.image = static_cast<std::uint32_t>(p);
+    plane.width_px = 760;
+    plane.height_px = 500;
+    plane.fragment_width_px = plane.fragment_height_px = 256;
+    plane.columns = 3;
+    plane.rows = 2;
+    plane.grid_reason = "fits";
+    Image image;
+    image.name = "wall.jpg";
+    images.push_back(image);
+    fragments.planes.push_back(plane);
+    ladder.planes.push_back(std::move(rungs));
+    tables.planes.push_back(std::move(t));
+  }
+
+  Bytes assemble() const {
+    return assemble_package(scales, perceptual, images, fragments, ladder, tables, files, quality, 0.1,
+                            "{\"texmesh\":\"test\"}", options, {});
+  }
+};
+
+Manifest manifest_of(const Bytes& package) {
+  const auto source = memory_source(package);
+  const ContainerEntry entry = read_container(*source).front();
+  EXPECT_EQ(entry.path, "manifest.json");
+  EXPECT_LE(entry.offset + entry.bytes, kBootstrapBytes);
+  return read_manifest(source->read(entry.offset, entry.bytes));
+}
+
+Bytes part(const Bytes& package, const EntryRef& ref) {
+  return memory_source(package)->read(ref.offset, ref.bytes);
+}
+
+TEST(Package, EveryReferenceLeadsToItsBytes) {
+  for (const std::size_t planes : {0u, 1u, 3u}) {
+    const Inputs inputs(planes);
+    const Bytes package = inputs.assemble();
+    const Manifest m = manifest_of(package);
+    const std::vector<EntryRef> index = read_index(part(package, m.index));
+    const auto entries = read_container(*memory_source(package));
+    ASSERT_EQ(index.size() + 2, entries.size());
+    for (std::size_t i = 0; i < index.size(); ++i) {
+      EXPECT_EQ(index[i].path, entries[i + 2].path);
+      EXPECT_EQ(index[i].offset, entries[i + 2].offset);
+      EXPECT_EQ(sha256(part(package, index[i])), index[i].digest) << index[i].path;
+    }
+    for (const EntryRef& ref : {static_cast<EntryRef>(m.index), static_cast<EntryRef>(m.tables), m.textures,
+                                m.quality, m.provenance, m.scales[0].glb, m.scales[2].glb})
+      EXPECT_EQ(sha256(part(package, ref)), ref.digest) << ref.path;
+    for (const PagedRef& ref : {m.index, m.tables})
+      EXPECT_EQ(sha256(memory_source(package)->read(ref.offset, ref.head_bytes)), ref.head_digest);
+    const Bytes first = memory_source(package)->read(m.first_picture_offset, m.first_picture_bytes);
+    EXPECT_EQ(sha256(first), m.first_picture_digest);
+    EXPECT_EQ(part(package, m.provenance), (Bytes{'{', '"', 't', 'e', 'x', 'm', 'e', 's', 'h', '"', ':', '"',
+                                                  't', 'e', 's', 't', '"', '}'}));
+  }
+}
+
+TEST(Package, OrderIsStreamingOrder) {
+  std::vector<std::string> paths;
+  for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);
+  EXPECT_EQ(paths, (std::vector<std::string>{
+                       "manifest.json", "index.bin", "tables.bin", "textures.json", "quality.json",
+                       "mesh/s09.glb", "preview/000.jpg", "preview/001.jpg", "texture/0/tables.pack",
+                       "texture/1/tables.pack", "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
+                       "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb", "provenance.json"}));
+  EXPECT_EQ(streaming_order(paths), paths);
+}
+
+TEST(Package, PacksHoldFragmentsByImportance) {
+  const Inputs inputs(1);
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  std::vector<TextureInfo> textures = read_textures(part(package, m.textures));
+  resolve_textures(textures, read_index(part(package, m.index)));
+  const PlaneTables t = read_tables(part(package, m.tables)).planes[0];
+  EXPECT_EQ(t.order, inputs.tables.planes[0].order);
+  for (std::size_t r = 0; r < 2; ++r) {
+    const Bytes pack = part(package, textures[0].rungs[r]);
+    std::size_t at = 0;
+    for (const std::uint16_t f : t.order) {
+      const std::size_t bytes = t.size_bytes[r * 6 + f];
+      EXPECT_EQ(truncated(sha256(std::span(pack).subspan(at, bytes))), t.digest[r * 6 + f]);
+      at += bytes;
+    }
+    EXPECT_EQ(at, pack.size());
+  }
+  EXPECT_EQ(textures[0].name, "wall.jpg");
+  EXPECT_EQ(textures[0].colour_space, "srgb");
+  EXPECT_EQ(m.previews, (std::vector<ByteRange>{{textures[0].preview.offset, textures[0].preview.bytes}}));
+}
+
+TEST(Package, ManifestDescribesTheModel) {
+  const Manifest m = manifest_of(Inputs(1).assemble());
+  ASSERT_EQ(m.scales.size(), 3u);
+  EXPECT_EQ(m.scales[1].triangles, 96u);
+  EXPECT_EQ(m.scales[1].error_max, 0.04);
+  EXPECT_EQ(m.scales[1].p95, 0.05);
+  EXPECT_EQ(m.scales[2].p99, 0.3);
+  EXPECT_FALSE(m.scales[1].major);
+  EXPECT_EQ(m.scales[0].display_px_edge, kAnyDisplayPx);
+  EXPECT_EQ(m.origin, (Vec3d{5e6, 0, -5e6}));
+  EXPECT_EQ(m.bounds_max.x - m.bounds_min.x, 2);
+  // The finer of both rules: each scale up to the smaller of its two sizes.
+  EXPECT_EQ(m.steps, (std::vector<ManifestStep>{{150, 9}, {500, 4}, {kAnyDisplayPx, 0}}));
+}
+
+TEST(Package, StepsLeaveOutScalesThatAreNeverTheAnswer) {
+  Inputs inputs(0);
+  inputs.perceptual.display_px_jnd = {2e9f, 100, 150};  // S_4 accepts less than the coarser S_9
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{150, 9}, {kAnyDisplayPx, 0}}));
+  inputs.perceptual.display_px_jnd = inputs.perceptual.display_px_error = {2e9f, 150.0001f, 150};
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{150, 9}, {kAnyDisplayPx, 0}}));
+  inputs.perceptual.display_px_jnd =
+      inputs.perceptual.display_px_error = {2e9f, 2e9f, 2e9f};  // a flat object
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps,
+            (std::vector<ManifestStep>{{9.99e8, 9}, {kAnyDisplayPx, 0}}));
+  inputs.perceptual.display_px_jnd = {0, 0, 0};
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{kAnyDisplayPx, 0}}));
+}
+
+TEST(Package, DeterministicAndReproducedFromItsOwnEntries) {
+  const Bytes package = Inputs(3).assemble();
+  EXPECT_EQ(Inputs(3).assemble(), package);
+  // pack: the same entries in index order give the same bytes.
+  const auto source = memory_source(package);
+  Bytes again;
+  ContainerWriter writer(
+      [&](std::span<const std::uint8_t> p) { again.insert(again.end(), p.begin(), p.end()); });
+  std::vector<PackageEntry> files;
+  for (const ContainerEntry& e : read_container(*source)) {
+    writer.add(e.path, source->read(e.offset, e.bytes));
+    files.push_back({e.path, source->read(e.offset, e.bytes)});
+  }
+  writer.finish();
+  EXPECT_EQ(again, package);
+  // write_package from parsed documents and shuffled files, too.
+  const Manifest m = manifest_of(package);
+  const auto textures = read_textures(part(package, m.textures));
+  std::erase_if(files, [](const PackageEntry& e) {
+    return e.path == kManifestPath || e.path == kIndexPath || e.path == kTexturesPath;
+  });
+  std::ranges::reverse(files);
+  EXPECT_EQ(write_package(m, textures, files), package);
+}
+
+TEST(Package, HundredsOfPlanesStillBootstrapInOneRead) {
+  const Bytes package = Inputs(220).assemble();
+  const Manifest m = manifest_of(package);
+  EXPECT_EQ(m.plane_count, 220u);
+  EXPECT_EQ(m.previews.size(), 220u);
+  EXPECT_EQ(read_index_head(part(package, m.index)).pages.size(), 221u);
+}
+
+/// Turns the last planes into mips 1 and 2 of plane 0.
+Inputs inputs_with_mips(std::size_t full) {
+  Inputs inputs(full + 2);
+  for (std::uint32_t mip : {1u, 2u}) {
+    const std::size_t p = full + mip - 1;
+    TexturePlane& plane = inputs.fragments.planes[p];
+    plane.image = 0;
+    plane.mip = mip;
+    plane.base = 0;
+    plane.width_px = 760 >> mip;
+    plane.height_px = 500 >> mip;
+    plane.fragment_width_px = plane.fragment_height_px = mip == 1 ? 128 : 64;
+    plane.fragment_height_px = mip == 1 ? 128 : 64;
+    inputs.ladder.planes[p].preview.clear();
+  }
+  return inputs;
+}
+
+TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
+  const Bytes package = inputs_with_mips(2).assemble();
+  const Manifest m = manifest_of(package);
+  EXPECT_EQ(m.required_features, std::vector<std::string>{"mips"});
+  EXPECT_EQ(m.plane_count, 4u);
+  EXPECT_EQ(m.previews.size(), 2u);
+  std::vector<TextureInfo> textures = read_textures(part(package, m.textures));
+  const auto index = read_index(part(package, m.index));
+  resolve_textures(textures, index);
+  EXPECT_EQ(textures[3].preview, textures[0].preview);
+  EXPECT_EQ(textures[3].mip, 2u);
+  EXPECT_TRUE(std::ranges::none_of(index, [](const EntryRef& e) { return e.path == preview_path(2); }));
+  EXPECT_LE(textures[3].tables.offset + textures[3].tables.bytes,
+            m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_TRUE(manifest_of(Inputs(2).assemble()).required_features.empty());
+
+  Inputs wrong = inputs_with_mips(1);
+  wrong.fragments.planes[1].base = 1;
+  EXPECT_THROW(wrong.assemble(), StageError);
+  wrong = inputs_with_mips(1);
+  wrong.ladder.planes[1].preview = fake_jpeg(30, 'p');
+  EXPECT_THROW(wrong.assemble(), StageError);
+}
+
+TEST(Package, HundredsOfPlanesWithMipsStillBootstrapInOneRead) {
+  const Manifest m = manifest_of(inputs_with_mips(300).assemble());
+  EXPECT_EQ(m.plane_count, 302u);
+  EXPECT_EQ(m.previews.size(), kMaxManifestPreviews);
+}
+
+TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {
+  Inputs inputs(2);
+  inputs.images[0].bytes = {1, 2, 3};
+  inputs.images[0].format = ImageFormat::kTiff;
+  inputs.ladder.planes[0].source = SourceFile::kOtherColours;
+  inputs.ladder.planes[1].lossless = true;
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  EXPECT_TRUE(m.required_features.empty());
+  auto textures = read_textures(part(package, m.textures));
+  const std::vector<EntryRef> index = read_index(part(package, m.index));
+  resolve_textures(textures, index);
+  EXPECT_EQ(textures[0].source.path, "source/000.tif");
+  EXPECT_FALSE(textures[0].source_colours);
+  EXPECT_FALSE(textures[0].lossless);
+  EXPECT_TRUE(textures[1].lossless);
+  EXPECT_EQ(textures[1].source_extension, "");
+  EXPECT_EQ(part(package, textures[0].source), (Bytes{1, 2, 3}));
+  EXPECT_EQ(index[index.size() - 2].path, "source/000.tif");
+  EXPECT_EQ(index.back().path, kProvenancePath);
+  // Where readers of 1.0 look for what they do not know: on the page that belongs to no plane.
+  const Bytes bytes = part(package, m.index);
+  const IndexHead head = read_index_head(bytes);
+  const auto page = read_index_page(head, 0, std::span(bytes).subspan(head.bytes, head.pages[0].bytes));
+  EXPECT_TRUE(std::ranges::any_of(page, [](const EntryRef& e) { return e.path == "source/000.tif"; }));
+}
+
+TEST(Package, NamesFromTheSourceAreMadeSafe) {
+  Inputs inputs(1);
+  inputs.images[0].name = "a\xff\x1b[2J\xc3\xa4\xed\xa0\x80" + std::string(300, 'x');
+  const Bytes package = inputs.assemble();
+  const std::string name = read_textures(part(package, manifest_of(package).textures))[0].name;
+  EXPECT_EQ(name.substr(0, 11), "a\x3f\x3f[2J\xc3\xa4\x3f\x3f\x3f");
+  EXPECT_EQ(name.size(), 200u);
+}
+
+TEST(Package, InputsThatDoNotBelongTogetherAreRefused) {
+  const auto refused = [](auto change) {
+    Inputs inputs(1);
+    change(inputs);
+    EXPECT_THROW(inputs.assemble(), StageError);
+  };
+  refused([](Inputs& i) { i.perceptual.p95.pop_back(); });
+  refused([](Inputs& i) { i.files.files.clear(); });
+  refused([](Inputs& i) { i.files.files[0].scale = 5; });
+  refused([](Inputs& i) { i.files.files.erase(i.files.files.begin()); });
+  refused([](Inputs& i) { i.ladder.planes.clear(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs.pop_back(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset.pop_back(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset[3] += 1; });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].tables.pop_back(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].quality += 1; });
+  refused([](Inputs& i) { i.images.clear(); });
+  Inputs long_title(1);
+  long_title.options.title = std::string(201, 'a');
+  EXPECT_THROW(long_title.assemble(), FormatError);
+}
+
+TEST(Package, WriterRefusesMissingAndForeignEntries) {
+  const Bytes package = Inputs(1).assemble();
+  const Manifest m = manifest_of(package);
+  const auto textures = read_textures(part(package, m.textures));
+  std::vector<PackageEntry> files;
+  for (const EntryRef& e : read_index(part(package, m.index)))
+    if (e.path != kTexturesPath) files.push_back({e.path, part(package, e)});
+  EXPECT_EQ(write_package(m, textures, files), package);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    auto fewer = files;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
+    EXPECT_THROW(write_package(m, textures, fewer), FormatError) << files[i].path;
+  }
+  auto more = files;
+  more.push_back({"extra/later.bin", {1, 2, 3}});  // a later minor version may have entries of its own
+  EXPECT_EQ(read_container(*memory_source(write_package(m, textures, more))).size(), files.size() + 4);
+  more.back().path = "Extra";
+  EXPECT_THROW(write_package(m, textures, more), FormatError);
+  more.back().path = kManifestPath;
+  EXPECT_THROW(write_package(m, textures, more), FormatError);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,266 @@
+#include "stages/perceptual_values/perceptual_values.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "format/base/archive.h"
+#include "stages/condition/condition.h"
+#include "stages/geometry/distance.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+const RunContext kOneThread{};
+
+NestedScales make_scales(const Mesh& mesh, int count = 10, double max_error = 0.05) {
+  const ConditionedMesh conditioned = condition_mesh(mesh, false, {}, kOneThread);
+  ScaleMap map;
+  map.scales = count;
+  testing::Random random{5};
+  for (std::size_t p = 0; p < conditioned.mesh.positions.size(); ++p) {
+    int i = 0;
+    while (i < count && random.uniform() < 0.7) ++i;
+    map.persistence.push_back(static_cast<std::uint8_t>(i));
+  }
+  return simplify(conditioned, map, {.max_error = max_error, .min_triangles = 20}, kOneThread);
+}
+
+/// Skeleton of a ball: its centre.
+Skeleton centre_skeleton(const Mesh& mesh) {
+  Skeleton s;
+  for (Vec3f p : mesh.positions) {
+    s.distance.push_back(length(p));
+    s.radius.push_back(std::max(length(p), 0.25f));
+  }
+  return s;
+}
+
+TEST(PerceptualValues, TableHoldsDistancesOverTheRadius) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48));
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const PerceptualValues values = measure_perceptual_values(scales, skeleton, {}, kOneThread);
+  const std::size_t n = scales.scales.size();
+  ASSERT_GE(n, 6u);
+  ASSERT_EQ(values.p95.size(), n * n);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) {
+      const float a = values.p95[i * n + j], b = values.p99[i * n + j];
+      if (j <= i) {
+        EXPECT_EQ(a, 0);
+        EXPECT_EQ(b, 0);
+        continue;
+      }
+      EXPECT_GT(a, 0);
+      EXPECT_GE(b, a);
+      // The radius is 1 within a tenth, so the relative distance is about the distance.
+      EXPECT_LE(a, scales.scales[j].error_max * 1.2f + scales.scales[i].error_max * 1.2f);
+    }
+  for (std::size_t j = 2; j < n; ++j) EXPECT_GT(values.p95[j], 0.8f * values.p95[j - 1]);
+  EXPECT_GT(values.p95[n - 1], 0.25f * scales.scales[n - 1].error_rms);
+}
+
+TEST(PerceptualValues, StatisticsFollowChainsToTheSurvivor) {
+  NestedScales scales = make_scales(testing::sheet(3));
+  scales.collapses = {{1, 2, 0}, {2, 3, 0}, {5, 6, 0}};  // 1 -> 2 -> 3 in one step, 5 -> 6 in the next
+  scales.scales.resize(1);
+  scales.scales.push_back(scales.scales[0]);
+  scales.scales.push_back(scales.scales[0]);
+  scales.scales[1].scale = 1, scales.scales[1].collapse_count = 2;
+  scales.scales[2].scale = 2, scales.scales[2].collapse_count = 3;
+  Skeleton skeleton;
+  skeleton.distance.assign(16, 1), skeleton.radius.assign(16, 1);
+  skeleton.distance[1] = 0.5f, skeleton.distance[2] = 1.5f, skeleton.distance[3] = 2, skeleton.radius[3] = 2;
+  skeleton.distance[5] = 0.01f, skeleton.distance[6] = 0.02f, skeleton.radius[6] = 0.5f;  // floored
+  const PerceptualValues values = measure_perceptual_values(scales, skeleton, {}, kOneThread);
+  EXPECT_EQ(values.step[0].collapses, 0u);
+  EXPECT_EQ(values.step[1].collapses, 2u);
+  EXPECT_FLOAT_EQ(values.step[1].max, 0.75f);  // vertex 1 against 3, not against 2
+  EXPECT_FLOAT_EQ(values.step[1].min, 0.25f);
+  EXPECT_FLOAT_EQ(values.step[1].mean, 0.5f);
+  EXPECT_FLOAT_EQ(values.step[1].sum, 1.0f);
+  EXPECT_FLOAT_EQ(values.step[1].deviation, 0.25f);
+  EXPECT_FLOAT_EQ(values.step[1].rss, std::sqrt(0.625f));
+  EXPECT_FLOAT_EQ(values.step[2].mean, 0.02f);
+}
+
+TEST(PerceptualValues, MajorsAreTheLastOfTheirTier) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const std::size_t n = scales.scales.size();
+  for (double jnd : {0.005, 0.02, 0.1, 1.0}) {
+    for (PerceptualStatistic statistic : {PerceptualStatistic::kP95, PerceptualStatistic::kP99}) {
+      const PerceptualValues values =
+          measure_perceptual_values(scales, skeleton, {.jnd = jnd, .statistic = statistic}, kOneThread);
+      const std::vector<float>& table = statistic == PerceptualStatistic::kP95 ? values.p95 : values.p99;
+      EXPECT_EQ(values.major[0], 0);
+      EXPECT_EQ(values.major[n - 1], 1);
+      std::size_t from = 0;
+      for (std::size_t k = 1; k < n; ++k) {
+        if (k > from + 1 || values.major[k] == 0) {
+          EXPECT_LT(table[from * n + k], jnd) << k;  // only the first after a major may reach the JND
+        }
+        if (!values.major[k]) continue;
+        if (k + 1 < n && table[from * n + k] < jnd) {
+          EXPECT_GE(table[from * n + k + 1], jnd) << k;
+        }
+        from = k;
+      }
+    }
+  }
+  // Everything is under a JND of 1: one tier. Almost nothing is under one of 0.5 %: several.
+  auto majors = [&](double jnd) {
+    const PerceptualValues v = measure_perceptual_values(scales, skeleton, {.jnd = jnd}, kOneThread);
+    return std::count(v.major.begin(), v.major.end(), 1);
+  };
+  EXPECT_EQ(majors(1.0), 1);
+  EXPECT_GE(majors(0.005), 3);
+}
+
+TEST(PerceptualValues, KeepsAboutAsManyScalesAsAsked) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(48, 64), 20);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  for (int asked : {1, 4, 8}) {
+    const PerceptualValues values =
+        measure_perceptual_values(scales, skeleton, {.jnd = 1, .kept_scales = asked}, kOneThread);
+    EXPECT_EQ(values.kept.front(), 1);
+    EXPECT_EQ(values.kept.back(), 1);
+    const auto count = std::count(values.kept.begin(), values.kept.end(), 1);
+    EXPECT_LE(count, asked + 2);
+    EXPECT_GE(count, std::min(asked, 5));
+    if (asked < 8) continue;
+    std::size_t last = 0;
+    for (std::size_t k = 1; k < values.kept.size(); ++k) {
+      if (!values.kept[k]) continue;
+      EXPECT_LT(static_cast<double>(scales.scales[last].triangles.size()) /
+                    static_cast<double>(scales.scales[k].triangles.size()),
+                3.2);
+      last = k;
+    }
+  }
+}
+
+TEST(PerceptualValues, DisplayedHeights) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48));
+  const PerceptualValues values =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.jnd = 0.08}, kOneThread);
+  const std::size_t n = scales.scales.size();
+  EXPECT_NEAR(values.object_height, 2.1, 0.15);
+  EXPECT_EQ(values.display_px_error[0], kAnyHeightPx);
+  EXPECT_EQ(values.display_px_jnd[0], kAnyHeightPx);
+  for (std::size_t k = 1; k < n; ++k) {
+    EXPECT_LE(values.display_px_error[k], values.display_px_error[k - 1]);
+    EXPECT_LE(values.display_px_jnd[k], values.display_px_jnd[k - 1]);
+    EXPECT_LE(values.display_px_edge[k], values.display_px_edge[k - 1]);
+    EXPECT_LE(values.display_px_jnd[k], 512 * 0.08f / values.p95[k] * 1.001f);
+    // One pixel is object_height / px; the p95 error lies between a third of the rms and the largest error.
+    const float pixel = values.object_height / values.display_px_error[k];
+    EXPECT_LE(pixel, scales.scales[k].error_max * 1.1f);
+    EXPECT_GE(pixel, scales.scales[k].error_rms * 0.3f);
+  }
+  const PerceptualValues shortest =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {.edge_percentile = 0}, kOneThread);
+  EXPECT_GE(shortest.display_px_edge[0], values.display_px_edge[0]);
+}
+
+TEST(PerceptualValues, OneScaleOnly) {
+  const NestedScales scales = make_scales(testing::cube());
+  ASSERT_EQ(scales.scales.size(), 1u);
+  const PerceptualValues values =
+      measure_perceptual_values(scales, centre_skeleton(scales.mesh), {}, kOneThread);
+  EXPECT_EQ(values.kept, std::vector<std::uint8_t>{1});
+  EXPECT_EQ(values.major, std::vector<std::uint8_t>{0});
+  EXPECT_EQ(values.display_px_error, std::vector<float>{kAnyHeightPx});
+  EXPECT_FLOAT_EQ(values.display_px_edge[0], 1);  // height 2, edges 2 and longer
+}
+
+TEST(PerceptualValues, SameBytesForAnyNumberOfThreads) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(24, 36));
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  RunContext eight;
+  eight.threads = 8;
+  EXPECT_EQ(encode_artefact(measure_perceptual_values(scales, skeleton, {}, kOneThread)),
+            encode_artefact(measure_perceptual_values(scales, skeleton, {}, eight)));
+}
+
+TEST(PerceptualValues, RefusesASkeletonOfAnotherMesh) {
+  const NestedScales scales = make_scales(testing::cube());
+  EXPECT_THROW(measure_perceptual_values(scales, Skeleton{}, {}, kOneThread), StageError);
+}
+
+TEST(PerceptualValues, CumulativeTableIsTheRootOfTheSumOfSquares) {
+  // The thesis's Table 7.1 (averages) and 7.2: 0.0410 0.0616 0.0677 0.0759 0.1080.
+  std::vector<CollapseStatistics> step(6);
+  const float average[6]{0, 0.0410f, 0.0412f, 0.0478f, 0.0468f, 0.0678f};
+  for (std::size_t k = 1; k < 6; ++k)
+    step[k].mean = average[k], step[k].max = 2 * average[k], step[k].min = average[k] / 2;
+  const std::vector<float> table = cumulative_table(step, PerceptualStatistic::kAverage);
+  const float printed[6]{0, 0.0410f, 0.0616f, 0.0677f, 0.0759f, 0.1080f};
+  for (std::size_t j = 1; j < 6; ++j) EXPECT_NEAR(table[j] / printed[j], 1, 0.18) << j;
+  EXPECT_FLOAT_EQ(table[2 * 6 + 3], 0.0478f);
+  EXPECT_EQ(table[3 * 6 + 2], 0);
+  const std::vector<float> most = cumulative_table(step, PerceptualStatistic::kConservative),
+                           least = cumulative_table(step, PerceptualStatistic::kAggressive);
+  for (std::size_t k = 0; k < 36; ++k) {
+    EXPECT_FLOAT_EQ(most[k], 2 * table[k]);
+    EXPECT_FLOAT_EQ(least[k], table[k] / 2);
+  }
+  EXPECT_THROW(cumulative_table(step, PerceptualStatistic::kP95), StageError);
+}
+
+TEST(PerceptualValues, StrategiesDecideMajorsAndHeights) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const auto measure = [&](PerceptualStatistic statistic, double reference = kJndReferencePx) {
+    return measure_perceptual_values(
+        scales, skeleton, {.jnd = 0.05, .jnd_reference_px = reference, .statistic = statistic}, kOneThread);
+  };
+  const auto majors = [](const PerceptualValues& v) { return std::count(v.major.begin(), v.major.end(), 1); };
+  const PerceptualValues careful = measure(PerceptualStatistic::kConservative),
+                         average = measure(PerceptualStatistic::kAverage),
+                         bold = measure(PerceptualStatistic::kAggressive);
+  EXPECT_GE(majors(careful), majors(average));
+  EXPECT_GE(majors(average), majors(bold));
+  EXPECT_GT(majors(careful), majors(bold));
+  const std::vector<float> value = value_table(average, PerceptualStatistic::kAverage);
+  for (std::size_t k = 1; k < scales.scales.size(); ++k) {
+    EXPECT_LE(careful.display_px_jnd[k], average.display_px_jnd[k]);
+    EXPECT_LE(average.display_px_jnd[k], bold.display_px_jnd[k]);
+    EXPECT_FLOAT_EQ(average.display_px_jnd[k], std::min<float>(kAnyHeightPx, 512 * 0.05f / value[k]));
+    EXPECT_EQ(average.p95[k], bold.p95[k]);  // the table of distances stands beside every strategy
+  }
+  // Twice the reference height: the same change is just noticeable at twice the displayed height.
+  const PerceptualValues larger = measure(PerceptualStatistic::kP95, 1024),
+                         usual = measure(PerceptualStatistic::kP95);
+  EXPECT_FLOAT_EQ(larger.display_px_jnd.back(), 2 * usual.display_px_jnd.back());
+  EXPECT_EQ(larger.major, usual.major);
+}
+
+TEST(PerceptualValues, DistancesAgreeWithPlainSearches) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 6);
+  Skeleton skeleton = centre_skeleton(scales.mesh);
+  skeleton.radius.assign(skeleton.radius.size(), 1.0f);
+  const PerceptualValues values = measure_perceptual_values(scales, skeleton, {.samples = 2000}, kOneThread);
+  const std::size_t n = scales.scales.size();
+  for (std::size_t j = 1; j < n; ++j) {
+    const SurfaceDistance surface(scales.mesh.positions, scales.mesh.wedge_position,
+                                  scales.scales[j].triangles);
+    std::vector<double> distance;
+    for (const SurfaceSample& s : sample_surface(scales.mesh.positions, scales.mesh.wedge_position,
+                                                 scales.scales[0].triangles, 2000)) {
+      Vec3d p;
+      for (std::size_t k = 0; k < 3; ++k)
+        p = p +
+            to_double(scales.mesh
+                          .positions[scales.mesh.wedge_position[scales.scales[0].triangles[s.triangle][k]]]) *
+                static_cast<double>(s.weight[k]);
+      distance.push_back(surface(p));
+    }
+    std::sort(distance.begin(), distance.end());
+    EXPECT_NEAR(values.p95[j], distance[static_cast<std::size_t>(0.95 * 1999 + 0.5)], 1e-7) << j;
+  }
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,89 @@
+// Packages of every format version stay readable for ever (tests/golden/README.md).
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "format/documents/manifest.h"
+#include "pipeline/inspect/dump/dump.h"
+#include "pipeline/inspect/verify/verify.h"
+#include "stages/jpeg/jpeg.h"
+#include "tests/support/command.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+const fs::path kGolden = fs::path(TEXMESH_SOURCE_DIR) / "tests" / "golden";
+
+std::vector<std::string> golden_packages() {
+  std::vector<std::string> names;
+  for (const auto& e : fs::directory_iterator(kGolden))
+    if (e.path().extension() == ".texmesh") names.push_back(e.path().stem().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+struct Golden : ::testing::TestWithParam<std::string> {
+  std::string path = (kGolden / (GetParam() + ".texmesh")).string();
+};
+
+TEST_P(Golden, VerifiesWithoutAFinding) {
+  const auto store = open_store(path);
+  for (const Finding& f : verify_package(*store, {}).findings) ADD_FAILURE() << to_string(f);
+}
+
+/// Every figure that was told when the package was made is told today; later versions may tell more.
+void expect_contains(const Json& now, const Json& then, const std::string& place) {
+  if (then.is_object()) {
+    for (const auto& [key, value] : then.items()) {
+      ASSERT_TRUE(now.is_object() && now.contains(key)) << place << "/" << key;
+      expect_contains(now[key], value, place + "/" + key);
+    }
+  } else if (then.is_array()) {
+    ASSERT_TRUE(now.is_array() && now.size() == then.size()) << place;
+    for (std::size_t i = 0; i < then.size(); ++i)
+      expect_contains(now[i], then[i], place + "/" + std::to_string(i));
+  } else {
+    EXPECT_EQ(now, then) << place;
+  }
+}
+
+TEST_P(Golden, SaysWhatItSaidWhenItWasMade) {
+  PackageReader package(open_store(path));
+  const std::string then = testing::read_text((kGolden / (GetParam() + ".json")).string());
+  expect_contains(dump_json(package, DumpPart::kAll), Json::parse(then), "");
+}
+
+TEST_P(Golden, DecodesThroughTheRuntimeReader) {
+  PackageReader package(open_store(path));
+  for (const ManifestScale& s : package.manifest().scales)
+    EXPECT_EQ(package.scale_glb(s.scale).size(), s.glb.bytes);
+  for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
+    const TextureInfo& t = package.textures()[plane];
+    EXPECT_EQ(decode_jpeg(package.preview(plane), 1 << 24).width_px, t.preview_width_px);
+    for (std::uint32_t rung = 0; rung < t.rungs.size(); ++rung)
+      for (const std::uint16_t f : package.tables().planes[plane].order)
+        EXPECT_EQ(decode_jpeg(package.complete_fragment(plane, rung, f), 1 << 24).height_px,
+                  t.fragment_height_px);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Golden, ::testing::ValuesIn(golden_packages()), [](const auto& test) {
+  std::string name = test.param;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+  return name;
+});
+
+TEST(GoldenPackages, ThePresentVersionHasOne) {
+  const std::string prefix = "v" + std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor) + "-";
+  const auto names = golden_packages();
+  EXPECT_TRUE(std::any_of(names.begin(), names.end(), [&](const std::string& n) {
+    return n.starts_with(prefix);
+  })) << "run tests/golden/make, see its README.md";
+}
+
+}  // namespace
+}  // namespace texmesh
