@@ -5,7 +5,7 @@
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh::examples {
 

@@ -6,6 +6,8 @@
 #include <optional>
 #include <set>
 
+#include "format/base/errors.h"
+
 namespace texmesh {
 namespace {
 

@@ -5,7 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "format/base/errors.h"
 #include "format/base/sha256.h"
 
 namespace texmesh {

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "format/base/errors.h"
 #include "format/container/container.h"
 
 namespace texmesh {

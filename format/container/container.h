@@ -7,8 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "format/base/errors.h"
-
 namespace texmesh {
 
 /// Random access to a package's bytes: a file, memory, a server.

@@ -4,6 +4,7 @@
 
 #include "format/base/bytes.h"
 #include "format/container/container.h"
+#include "format/container/format_version.h"
 #include "format/container/layout.h"
 #include "format/documents/manifest.h"
 

@@ -4,8 +4,10 @@
 #include <array>
 #include <string_view>
 
+#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/container/container.h"
+#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

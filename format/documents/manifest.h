@@ -7,11 +7,11 @@
 
 #include "format/base/sha256.h"
 #include "format/base/vec.h"
+#include "format/container/format_version.h"
 #include "format/model/codec.h"
 
 namespace texmesh {
 
-inline constexpr int kFormatMajor = 1, kFormatMinor = 1;
 /// The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
 /// client.
 inline constexpr std::uint64_t kBootstrapBytes = 16384;

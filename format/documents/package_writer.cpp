@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
 #include "format/documents/tables.h"

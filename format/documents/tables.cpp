@@ -5,6 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/base/half.h"
+#include "format/container/format_version.h"
 #include "format/container/layout.h"
 #include "format/documents/manifest.h"
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 
+#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/container/layout.h"
 #include "format/documents/manifest.h"

@@ -1,6 +1,7 @@
 #include <limits>
 
 #include "format/base/errors.h"
+#include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_fill.h"

@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "format/base/bytes.h"
-#include "format/documents/manifest.h"
+#include "format/container/format_version.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"

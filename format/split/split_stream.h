@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "format/base/sha256.h"
 #include "format/split/split_mesh.h"
 
 namespace texmesh {

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "format/base/errors.h"
+#include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"

@@ -5,7 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/compile/worker.h"
+#include "pipeline/graph/graph_run.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
 

@@ -17,9 +17,9 @@
 #include "pipeline/batch/depfile.h"
 #include "pipeline/batch/reports.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cli/commands.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/core_path.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

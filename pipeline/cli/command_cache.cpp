@@ -11,6 +11,7 @@
 #include "pipeline/cache/prune.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

@@ -13,6 +13,7 @@
 #include "pipeline/cli/units.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 
 namespace texmesh {

@@ -12,6 +12,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/text_table.h"
 

@@ -4,6 +4,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/diff/diff.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

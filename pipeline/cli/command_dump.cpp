@@ -5,6 +5,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/dump/dump.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

@@ -8,6 +8,7 @@
 #include "pipeline/cli/units.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

@@ -11,10 +11,12 @@
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/transfer/package_transport.h"
+#include "format/container/layout.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/cli/units.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

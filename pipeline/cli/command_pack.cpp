@@ -3,6 +3,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/package_tree.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 

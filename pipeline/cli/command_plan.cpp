@@ -9,6 +9,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/cli/units.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

@@ -8,6 +8,7 @@
 #include "pipeline/cli/delivery_options.h"
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

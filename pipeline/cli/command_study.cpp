@@ -12,6 +12,7 @@
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/text_table.h"
 #include "stages/image/decode_image.h"

@@ -8,6 +8,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/inspect/verify/verify.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

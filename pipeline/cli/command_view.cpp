@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/view/view_server.h"
 
 namespace texmesh {

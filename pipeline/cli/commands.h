@@ -8,15 +8,6 @@ class App;
 
 namespace texmesh {
 
-/// Stable exit codes.
-enum ExitCode : int {
-  kExitOk = 0,
-  kExitModelFailed = 1,
-  kExitUsage = 2,
-  kExitInternal = 3,
-  kExitDifferent = 4
-};
-
 // Each adds one subcommand to `app`; when the user chose it, its callback runs and stores the exit code.
 void add_compile_command(CLI::App& app, int& exit_code);
 void add_cache_command(CLI::App& app, int& exit_code);     // command_cache.cpp

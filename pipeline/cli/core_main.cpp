@@ -4,11 +4,13 @@
 #include <iostream>
 
 #include "format/base/errors.h"
+#include "format/container/format_version.h"
 #include "format/documents/manifest.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/worker.h"
+#include "pipeline/io/exit_codes.h"
 
 int main(int argc, char** argv) {
   using namespace texmesh;

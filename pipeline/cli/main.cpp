@@ -10,6 +10,7 @@
 #include "format/base/errors.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/io/core_path.h"
+#include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
 namespace {

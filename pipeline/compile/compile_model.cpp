@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/container/format_version.h"
 #include "format/documents/manifest.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/io/atomic_file.h"

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stages/fill/fill.h"
+#include "stages/image/decode_image.h"
 #include "stages/ladder/lossless_top.h"
 
 namespace texmesh {

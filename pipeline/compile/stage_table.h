@@ -11,7 +11,7 @@
 #include "format/base/note.h"
 #include "pipeline/compile/options.h"
 #include "stages/base/run_context.h"
-#include "stages/condition/uv_sets.h"
+#include "stages/data/uv_sets.h"
 
 namespace texmesh {
 

@@ -20,9 +20,9 @@
 #include <set>
 
 #include "format/base/errors.h"
-#include "pipeline/cli/commands.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/core_path.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/wire_text.h"
 
 extern char** environ;

@@ -14,9 +14,9 @@
 
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cli/commands.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/worker.h"
+#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"
 

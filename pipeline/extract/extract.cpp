@@ -4,6 +4,7 @@
 #include <map>
 
 #include "delivery/cpp/decide/fragment_list.h"
+#include "format/container/layout.h"
 #include "format/documents/viewing.h"
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/glb/standalone_glb.h"

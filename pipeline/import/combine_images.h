@@ -3,7 +3,6 @@
 #include <string>
 
 #include "format/model/model.h"
-#include "pipeline/import/import.h"
 
 namespace texmesh {
 

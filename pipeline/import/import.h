@@ -9,7 +9,6 @@
 #include "format/base/fields.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

@@ -7,6 +7,7 @@
 #include "pipeline/import/near_uvs.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
 
 namespace texmesh {

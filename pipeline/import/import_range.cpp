@@ -10,6 +10,7 @@
 #include "pipeline/import/range_scan_document.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

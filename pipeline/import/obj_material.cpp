@@ -7,7 +7,7 @@
 #include "pipeline/import/combine_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/io/uri.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

@@ -6,6 +6,7 @@
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/bounded_json.h"
 #include "format/base/sha256.h"
+#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

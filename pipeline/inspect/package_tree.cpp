@@ -14,6 +14,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/sha256.h"
+#include "format/container/layout.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/io/atomic_file.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "delivery/cpp/client/delivery_plan.h"
+#include "delivery/cpp/simulate/simulation.h"
 
 namespace texmesh {
 

@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "format/base/errors.h"
-#include "format/container/container.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

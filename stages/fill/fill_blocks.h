@@ -4,7 +4,8 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/data/pixels.h"
+#include "stages/fill/fill.h"
 
 namespace texmesh {
 

@@ -5,6 +5,7 @@
 #include "format/base/errors.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/codec_list.h"
+#include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/jpeg_stream.h"
 

@@ -4,6 +4,7 @@
 
 #include "format/base/errors.h"
 #include "stages/fragment_codec/codec_list.h"
+#include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

@@ -6,26 +6,11 @@
 #include <vector>
 
 #include "format/model/model.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 
 inline constexpr int kDecodeImageVersion = 3;
-
-/// Decoded pixels, row-major, interleaved, top row first.
-struct Pixels {
-  std::uint32_t width_px = 0, height_px = 0, channels = 0;
-  std::vector<std::uint8_t> data;
-  const std::uint8_t* at(std::uint32_t x, std::uint32_t y) const {
-    return data.data() + (static_cast<std::size_t>(y) * width_px + x) * channels;
-  }
-};
-
-/// As Pixels, with the values of the file: integers keep their value (0..255, 0..65535), floats are as they
-/// are, NaN and infinities included.
-struct FloatPixels {
-  std::uint32_t width_px = 0, height_px = 0, channels = 0;
-  std::vector<float> data;
-};
 
 struct ImageLimits {
   std::uint32_t max_side_px = 65500;

@@ -10,6 +10,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
+#include "format/base/vec.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh {

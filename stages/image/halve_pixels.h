@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "stages/base/run_context.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/fragments.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

@@ -4,16 +4,10 @@
 #include <string_view>
 #include <vector>
 
-#include "format/base/fields.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
+#include "stages/data/subsampling.h"
 
 namespace texmesh {
-
-enum class Subsampling : std::uint8_t { k420, k444 };
-template <>
-struct EnumNames<Subsampling> {
-  static constexpr std::array<std::string_view, 2> names{"420", "444"};
-};
 
 /// Decodes a complete Huffman-coded JPEG of 8 bits, 1 or 3 channels, baseline or progressive, with
 /// libjpeg-turbo (ISLOW, fancy upsampling). Throws FormatError on any libjpeg error *or warning*, on bytes

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <mutex>
 
+#include "format/base/vec.h"
 #include "stages/base/parallel.h"
 #include "stages/jpeg/block_transform.h"
 #include "stages/jpeg/jpeg_samples.h"

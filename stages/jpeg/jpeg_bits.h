@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "stages/fragment_codec/fragment_codec.h"
+#include "stages/data/subsampling.h"
+#include "stages/image/pixel_window.h"
 #include "stages/jpeg/huffman_table.h"
-#include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
 

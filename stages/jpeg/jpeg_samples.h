@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

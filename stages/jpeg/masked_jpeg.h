@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/masked_block.h"

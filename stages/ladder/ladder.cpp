@@ -12,6 +12,7 @@
 #include "stages/image/halve_pixels.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/ladder/rung_hull.h"
+#include "stages/ladder/size_knots.h"
 
 namespace texmesh {
 namespace {
@@ -399,36 +400,6 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   auto kept = drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
   encode(remaining_work(first, std::move(kept), ladder.planes), {0.9, 1});
   return ladder;
-}
-
-std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment) {
-  return std::span(rung.data).subspan(rung.offset[fragment],
-                                      rung.offset[fragment + 1] - rung.offset[fragment]);
-}
-
-std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment) {
-  std::uint64_t bytes = 0;
-  for (std::size_t r = codec_traits(plane.codec).incremental ? 0 : rung; r <= rung; ++r)
-    bytes += fragment_stream(plane.rungs[r], fragment).size();
-  return bytes;
-}
-
-std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment) {
-  const bool incremental = codec_traits(plane.codec).incremental;
-  std::vector<std::span<const std::uint8_t>> streams;
-  for (std::size_t r = incremental ? 0 : rung; r <= rung; ++r)
-    streams.push_back(fragment_stream(plane.rungs[r], fragment));
-  return join_fragment(plane.codec, plane.rungs[incremental ? 0 : rung].tables, streams);
-}
-
-Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
-                       std::uint64_t max_pixels) {
-  return decode_fragment_file(plane.codec, fragment_file(plane, rung, fragment), max_pixels);
-}
-
-Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
-                            std::uint64_t max_pixels) {
-  return decode_fragment_file_luma(plane.codec, fragment_file(plane, rung, fragment), max_pixels);
 }
 
 }  // namespace texmesh

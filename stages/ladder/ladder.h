@@ -4,12 +4,11 @@
 #include <string_view>
 #include <vector>
 
-#include "format/base/fields.h"
-#include "format/base/note.h"
-#include "format/model/codec.h"
-#include "stages/fragment_codec/fragment_codec.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/size_knots.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
+#include "stages/data/stage.h"
+#include "stages/data/subsampling.h"
 
 namespace texmesh {
 
@@ -74,47 +73,6 @@ struct LadderOptions {
   }
 };
 
-/// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
-struct LadderRung {
-  int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
-  std::vector<std::uint8_t> tables;  // what the rung's streams share
-  std::vector<std::uint8_t> data;    // the fragments' streams, in fragment order
-  std::vector<std::uint64_t> offset;  // [fragments + 1] into data; empty range = fragment not stored
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.quality, s.tables, s.data, s.offset);
-  }
-};
-/// Whether the package holds the plane's source image as a file, and whether its colours are the plane's.
-enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
-
-struct PlaneLadder {
-  Codec codec = Codec::kJpeg;
-  bool lossless =
-      false;  // the last rung holds the coefficients of the source, see stages/ladder/lossless_top.h
-  SourceFile source = SourceFile::kNone;
-  std::vector<LadderRung> rungs;  // rising quality
-  std::vector<std::uint8_t>
-      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
-                // mips are means of (stages/image/halve_pixels.h); mips have none
-  std::uint32_t preview_width_px = 0, preview_height_px = 0;
-  // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
-  // of its source's quantisers away
-  SizeKnots knots;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px, s.knots);
-  }
-};
-struct Ladder {
-  std::vector<PlaneLadder> planes;
-  Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.planes, s.notes);
-  }
-};
-
 /// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
 /// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
 /// with uncovered texels, when those are free, by stages/jpeg/masked_jpeg.h, so that only covered texels cost
@@ -127,19 +85,5 @@ struct Ladder {
 /// (stages/ladder/rung_hull.h), and then the others at these.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
                      const LadderOptions& options, const RunContext& context);
-
-/// The rung's own stream of one fragment; empty when it is not stored.
-std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment);
-
-/// The bytes a client needs to show a fragment at a rung: its stream, and those below it where they are parts
-/// of one file. 0 when it is not stored.
-std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
-/// The complete image file of a stored fragment at a rung. FormatError when a part is damaged.
-std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
-/// Its pixels, or luma only. FormatError when it is damaged or has more than max_pixels.
-Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
-                       std::uint64_t max_pixels);
-Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
-                            std::uint64_t max_pixels);
 
 }  // namespace texmesh

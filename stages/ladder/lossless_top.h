@@ -3,9 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
 
 namespace texmesh {
 

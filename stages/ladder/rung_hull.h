@@ -3,8 +3,9 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

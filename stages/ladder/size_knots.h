@@ -5,19 +5,10 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
+#include "stages/data/ladder.h"
 #include "stages/fragment_codec/fragment_codec.h"
 
 namespace texmesh {
-
-/// PlaneTables::knot_quality and knot_position.
-struct SizeKnots {
-  std::vector<std::uint8_t> quality;
-  std::vector<float> position;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.quality, s.position);
-  }
-};
 
 /// Measures how the bytes of a plane of colours grow between the rungs of its baseline JPEGs: what `sample`
 /// takes at `plane.qualities` and at every whole quality between them (jpeg_bits()). What bends sizes there

@@ -2,11 +2,12 @@
 #include <string_view>
 #include <vector>
 
-#include "format/base/fields.h"
 #include "format/documents/tables.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
-#include "stages/zim/zim.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
+#include "stages/data/predictors.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 

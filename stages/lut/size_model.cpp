@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "format/documents/tables.h"
-#include "stages/ladder/ladder.h"
+#include "stages/data/ladder.h"
 
 namespace texmesh {
 

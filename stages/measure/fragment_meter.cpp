@@ -1,4 +1,5 @@
 #include "stages/measure/fragment_meter.h"
+#include "stages/fragment_codec/decode_rung.h"
 
 #include <algorithm>
 #include <utility>

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/ladder/ladder.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
 #include "stages/measure/distortion.h"
 
 namespace texmesh {

@@ -4,7 +4,9 @@
 #include <set>
 
 #include "format/container/layout.h"
+#include "format/documents/package_writer.h"
 #include "format/documents/viewing.h"
+#include "stages/base/run_context.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {

@@ -3,14 +3,13 @@
 #include <string>
 #include <vector>
 
-#include "format/documents/package_writer.h"
 #include "format/documents/tables.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
-#include "stages/lut/lut.h"
-#include "stages/perceptual_values/perceptual_values.h"
-#include "stages/scales/scales.h"
-#include "stages/simplification/simplification.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/perceptual_values.h"
+#include "stages/data/scale_files.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 

@@ -7,6 +7,7 @@
 
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
+#include "stages/fragment_codec/decode_rung.h"
 #include "stages/measure/image_compare.h"
 #include "stages/measure/render_view.h"
 

@@ -1,10 +1,12 @@
 #pragma once
-#include "format/base/fields.h"
 #include "format/base/note.h"
 #include "format/documents/tables.h"
-#include "stages/lut/lut.h"
-#include "stages/perceptual_values/perceptual_values.h"
-#include "stages/simplification/simplification.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/perceptual_values.h"
+#include "stages/data/pixels.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 

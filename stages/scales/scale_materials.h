@@ -2,9 +2,9 @@
 #include <vector>
 
 #include "format/model/model.h"
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
 #include "stages/gltf/glb_writer.h"
-#include "stages/ladder/ladder.h"
 
 namespace texmesh {
 

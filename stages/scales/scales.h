@@ -3,12 +3,13 @@
 #include <string_view>
 #include <vector>
 
-#include "format/base/fields.h"
 #include "format/model/model.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
-#include "stages/perceptual_values/perceptual_values.h"
-#include "stages/simplification/simplification.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/perceptual_values.h"
+#include "stages/data/scale_files.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 
@@ -53,27 +54,6 @@ struct ScalesOptions {
     v("tangent_bits", s.tangent_bits, Range{4, 16},
       "bits per tangent component; quantized and meshopt: 8 or 16");
     v("stream", s.stream, "also write all scales as one stream of vertex splits");
-  }
-};
-
-struct ScaleFile {
-  int scale = 0;                              // scale number
-  std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
-  std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.scale, s.glb, s.triangles, s.vertices);
-  }
-};
-struct ScaleFiles {
-  std::vector<ScaleFile> files;        // kept scales, S_0 first
-  int position_bits = 0, uv_bits = 0;  // as used; 0 = float
-  double position_error = 0;           // largest rounding of a coordinate, object units
-  std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
-  Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.stream, s.notes);
   }
 };
 

@@ -5,7 +5,6 @@
 #include "format/split/split_stream.h"
 #include "stages/base/run_context.h"
 #include "stages/scales/scale_grid.h"
-#include "stages/simplification/simplification.h"
 
 namespace texmesh {
 

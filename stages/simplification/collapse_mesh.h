@@ -5,7 +5,7 @@
 
 #include "format/base/vec.h"
 #include "format/model/model.h"
-#include "stages/condition/condition.h"
+#include "stages/data/conditioned_mesh.h"
 
 namespace texmesh {
 

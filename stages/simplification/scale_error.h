@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/simplification/simplification.h"
+#include "stages/data/nested_scales.h"
 
 namespace texmesh {
 

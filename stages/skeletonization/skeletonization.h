@@ -3,10 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/base/fields.h"
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
-#include "stages/condition/condition.h"
+#include "stages/data/conditioned_mesh.h"
+#include "stages/data/skeleton.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 
@@ -40,23 +39,6 @@ struct SkeletonizationOptions {
     v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9},
       "work cap: steps of a wrap before a coarser one; they may look at 50 times as many triangles");
     v("max_contractions", s.max_contractions, Range{1, 100000}, "work cap: contractions of a part");
-  }
-};
-
-/// The curve skeleton and the skeleton distance R(v) (thesis 6.2): alpha wrap, mean curvature flow, distance
-/// to segments, corrected by the local thickness where a curve is no skeleton (local_radius.h). Parts that
-/// contract to a point, and the centroids of the fallbacks, are segments of no length.
-struct Skeleton {
-  std::vector<Vec3f> nodes;                            // mesh-local coordinates
-  std::vector<std::array<std::uint32_t, 2>> segments;  // node indices
-  std::vector<float> distance;     // R(v) per position: distance to the closest segment, at most what the
-                                   // local thickness allows; object units, >= 0
-  std::vector<float> radius;       // R_eff(v) per position = max(R, floor * median R); > 0
-  bool fallback_centroid = false;  // no wrap: distance to the component's centroid
-  Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.nodes, s.segments, s.distance, s.radius, s.fallback_centroid, s.notes);
   }
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "stages/condition/condition.h"
+#include "stages/data/conditioned_mesh.h"
 #include "stages/skeletonization/wrap.h"
 
 namespace texmesh {

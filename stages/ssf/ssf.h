@@ -2,10 +2,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/base/fields.h"
 #include "format/model/model.h"
-#include "stages/base/run_context.h"
-#include "stages/condition/condition.h"
+#include "stages/data/conditioned_mesh.h"
+#include "stages/data/scale_map.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 
@@ -44,23 +44,6 @@ struct SsfOptions {
     v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
     v("range_band", s.range_band, Range{0, 6},
       "range scans: as band, at most 1 = the Laplacian of Gaussian alone");
-  }
-};
-
-/// The scale map (thesis 2.4, 3.1): for every position the highest scale at which it is still a feature
-/// point.
-struct ScaleMap {
-  int scales = 0;            // scale indices run 0 (original) .. scales
-  std::vector<float> sigma;  // [scales + 1], of the largest component, object units; sigma[0] = 0
-  std::vector<std::uint8_t> persistence;  // per position, 0..scales: extrema and zero crossings (geometry)
-  std::vector<std::uint8_t> crossing;     // per position, 0..scales: zero crossings only (fragment density)
-  std::vector<float> convergence;  // [scales + 1]: (max - min) of the smoothed signal, as a fraction of S_0's
-  std::vector<std::uint32_t> crossings_at;  // [scales + 1]: positions at a zero crossing of that very scale;
-                                            // [0]: all (mesh), samples at one of the raw grid (range)
-  Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.scales, s.sigma, s.persistence, s.crossing, s.convergence, s.crossings_at, s.notes);
   }
 };
 

@@ -3,9 +3,11 @@
 #include <vector>
 
 #include "format/documents/tables.h"
-#include "stages/condition/condition.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/ladder/ladder.h"
+#include "stages/base/run_context.h"
+#include "stages/data/conditioned_mesh.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

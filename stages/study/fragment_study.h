@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
-#include "stages/jpeg/jpeg.h"
+#include "stages/data/pixels.h"
+#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -1,4 +1,5 @@
 #include "stages/zim/predictors.h"
+#include "format/base/errors.h"
 
 #include <charconv>
 #include <cstdlib>

@@ -8,7 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/data/fragments.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

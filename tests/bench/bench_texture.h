@@ -14,7 +14,8 @@
 #include <jpeglib.h>
 
 #include "stages/base/run_context.h"
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/data/fragments.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

@@ -19,6 +19,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
+#include "format/model/model.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "delivery/cpp/client/delivery_plan.h"
+#include "delivery/cpp/decide/fragment_list.h"
 #include "delivery/cpp/simulate/simulation.h"
 
 namespace {

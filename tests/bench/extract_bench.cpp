@@ -23,6 +23,7 @@
 #include "pipeline/extract/extract.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

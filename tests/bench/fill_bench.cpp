@@ -8,6 +8,8 @@
 #include <iostream>
 #include <utility>
 
+#include "stages/fill/fill.h"
+#include "stages/fragment_codec/decode_rung.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
 #include "stages/zim/zim.h"

@@ -13,7 +13,11 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/fill/fill.h"
+#include "stages/fragmentation/fragmentation.h"
+#include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/zim/zim.h"
 #include "tests/bench/bench_texture.h"
 
 namespace texmesh {

@@ -15,6 +15,7 @@
 #include <iterator>
 #include <string>
 
+#include "stages/image/decode_image.h"
 #include "stages/ladder/ladder.h"
 #include "stages/ladder/lossless_top.h"
 #include "tests/bench/bench_texture.h"

@@ -8,6 +8,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "delivery/cpp/simulate/simulation.h"
+#include "format/container/layout.h"
 
 namespace {
 

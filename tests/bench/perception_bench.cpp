@@ -13,8 +13,10 @@
 #include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/condition/condition.h"
 #include "stages/perceptual_values/perceptual_values.h"
 #include "stages/simplification/simplification.h"
+#include "stages/skeletonization/skeletonization.h"
 #include "stages/ssf/ssf.h"
 #include "tests/bench/growth.h"
 

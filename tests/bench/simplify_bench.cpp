@@ -13,6 +13,7 @@
 #include <iostream>
 
 #include "examples/scan_model.h"
+#include "stages/condition/condition.h"
 #include "stages/simplification/collapse_engine.h"
 #include "stages/simplification/scale_error.h"
 

@@ -16,12 +16,13 @@
 #include <iostream>
 #include <limits>
 
-#include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/base/parallel.h"
+#include "stages/condition/condition.h"
 #include "stages/geometry/distance.h"
 #include "stages/simplification/collapse_engine.h"
+#include "stages/ssf/ssf.h"
 
 namespace {
 

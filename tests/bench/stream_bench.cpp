@@ -13,8 +13,10 @@
 
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/condition/condition.h"
 #include "stages/scales/scale_grid.h"
 #include "stages/scales/vertex_split.h"
+#include "stages/simplification/simplification.h"
 #include "stages/ssf/ssf.h"
 
 namespace {

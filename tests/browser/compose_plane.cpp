@@ -6,7 +6,6 @@
 #include <iostream>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/base/errors.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 

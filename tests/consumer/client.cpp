@@ -5,6 +5,8 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/transfer/package_transport.h"
+#include "format/base/errors.h"
+#include "format/container/layout.h"
 #include "format/split/split_stream.h"
 
 int main(int argc, char** argv) {

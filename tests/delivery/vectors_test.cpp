@@ -13,6 +13,7 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/base/portable_math.h"
+#include "format/container/layout.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh {

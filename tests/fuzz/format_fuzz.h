@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 #include "tests/format/documents/manifest_fixture.h"
 #include "tests/format/split/split_fixture.h"

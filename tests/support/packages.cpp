@@ -7,9 +7,11 @@
 #include <stdexcept>
 
 #include "format/container/container.h"
+#include "format/container/format_version.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
-#include "stages/jpeg/jpeg.h"
+#include "stages/base/run_context.h"
+#include "stages/ladder/ladder.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

@@ -7,7 +7,7 @@
 
 #include "format/documents/manifest.h"
 #include "format/documents/tables.h"
-#include "stages/ladder/ladder.h"
+#include "format/model/model.h"
 
 namespace texmesh::testing {
 

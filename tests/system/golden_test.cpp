@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "format/container/format_version.h"
 #include "format/documents/manifest.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/verify/verify.h"

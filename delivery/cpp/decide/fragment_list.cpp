@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/errors.h"
 #include "format/base/portable_math.h"
 
 namespace texmesh {

@@ -5,6 +5,9 @@
 #include <map>
 #include <thread>
 
+#include "format/base/errors.h"
+#include "format/container/layout.h"
+
 namespace texmesh {
 namespace {
 

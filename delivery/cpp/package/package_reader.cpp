@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "format/base/errors.h"
+#include "format/container/layout.h"
+
 namespace texmesh {
 namespace {
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "format/container/container.h"
-#include "format/container/layout.h"
 #include "format/documents/manifest.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"

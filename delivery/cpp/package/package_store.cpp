@@ -10,6 +10,8 @@
 
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
+#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

@@ -6,7 +6,6 @@
 #include <thread>
 
 #include "format/base/errors.h"
-#include "format/container/container.h"
 
 namespace texmesh {
 namespace {

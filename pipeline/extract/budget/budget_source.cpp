@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/container/layout.h"
 #include "pipeline/import/import.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "format/container/layout.h"
 #include "pipeline/extract/budget/budget_search.h"
 
 namespace texmesh {

@@ -6,7 +6,7 @@
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 #include "stages/measure/flip.h"
 #include "stages/measure/render_view.h"
 

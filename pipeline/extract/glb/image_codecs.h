@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

@@ -6,9 +6,10 @@
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/errors.h"
+#include "format/container/layout.h"
 #include "stages/base/parallel.h"
+#include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
-#include "stages/fragmentation/fragmentation.h"
 
 namespace texmesh {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

@@ -7,6 +7,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-#include "stages/image/decode_image.h"
+#include "stages/data/pixels.h"
 
 namespace texmesh {
 

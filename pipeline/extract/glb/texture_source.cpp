@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/container/layout.h"
 #include "pipeline/extract/glb/plane_pixels.h"
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/fill/fill.h"
 #include "stages/image/texel_coverage.h"
 
 namespace texmesh {

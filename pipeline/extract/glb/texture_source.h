@@ -7,10 +7,8 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
-#include "pipeline/extract/glb/image_codecs.h"
 #include "pipeline/extract/glb/resize.h"
 #include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

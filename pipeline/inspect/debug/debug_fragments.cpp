@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
-#include "format/base/portable_math.h"
+#include "format/container/layout.h"
 #include "pipeline/import/import.h"
 #include "pipeline/inspect/debug/debug_view.h"
-#include "pipeline/io/text_table.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

@@ -10,6 +10,7 @@
 #include "format/base/srgb.h"
 #include "pipeline/io/text_table.h"
 #include "stages/ssf/heat_levels.h"
+#include "stages/ssf/ssf.h"
 
 namespace texmesh {
 namespace {

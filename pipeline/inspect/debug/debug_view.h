@@ -8,12 +8,13 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
-#include "stages/condition/condition.h"
-#include "stages/fragmentation/fragmentation.h"
-#include "stages/image/decode_image.h"
-#include "stages/simplification/simplification.h"
-#include "stages/skeletonization/skeletonization.h"
-#include "stages/ssf/ssf.h"
+#include "stages/base/run_context.h"
+#include "stages/data/conditioned_mesh.h"
+#include "stages/data/fragments.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/pixels.h"
+#include "stages/data/scale_map.h"
+#include "stages/data/skeleton.h"
 
 namespace texmesh {
 

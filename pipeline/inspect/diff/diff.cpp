@@ -5,6 +5,7 @@
 #include <set>
 
 #include "format/base/sha256.h"
+#include "format/container/layout.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/inspect/provenance.h"
 

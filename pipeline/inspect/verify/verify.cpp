@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "format/base/sha256.h"
+#include "format/container/format_version.h"
+#include "format/container/layout.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 

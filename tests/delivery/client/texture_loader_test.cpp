@@ -12,6 +12,7 @@
 
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/transfer/package_transport.h"
+#include "format/base/errors.h"
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"
 

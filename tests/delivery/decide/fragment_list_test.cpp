@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "delivery/cpp/decide/harmonic_time.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {

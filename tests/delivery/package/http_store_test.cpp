@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "format/base/errors.h"
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"
 

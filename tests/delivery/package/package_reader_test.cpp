@@ -9,6 +9,7 @@
 #include <fstream>
 #include <utility>
 
+#include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 
 namespace texmesh {

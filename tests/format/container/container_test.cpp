@@ -1,4 +1,5 @@
 #include "format/container/container.h"
+#include "format/base/errors.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

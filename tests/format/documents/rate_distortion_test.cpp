@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "format/base/half.h"
 #include "format/documents/tables.h"
 #include "tests/format/documents/tables_fixture.h"
 

@@ -7,8 +7,6 @@
 #include <mutex>
 #include <thread>
 
-#include "format/base/errors.h"
-#include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "tests/support/command.h"

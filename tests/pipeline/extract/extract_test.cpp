@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/extract.h"
-#include "pipeline/extract/glb/standalone_glb.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {

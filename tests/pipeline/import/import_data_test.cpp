@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/import/import.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/memory_resolver.h"
 
 namespace texmesh {

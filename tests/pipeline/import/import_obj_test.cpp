@@ -5,7 +5,7 @@
 
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/mesh_builder.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 

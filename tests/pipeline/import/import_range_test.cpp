@@ -5,7 +5,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/range_scan_document.h"
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 

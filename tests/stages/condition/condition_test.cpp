@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "stages/base/run_context.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/fill/fill.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "stages/base/run_context.h"
 #include "stages/fragmentation/fragment_grid.h"
 #include "stages/image/texel_coverage.h"
 #include "tests/support/meshes.h"

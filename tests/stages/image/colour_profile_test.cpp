@@ -8,6 +8,7 @@
 #include <set>
 
 #include "format/base/errors.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
 #include "tests/support/images.h"
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/masked_jpeg.h"
 #include "tests/support/meshes.h"
 

@@ -6,6 +6,9 @@
 #include <bit>
 #include <cmath>
 
+#include "stages/base/run_context.h"
+#include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/ladder/ladder.h"
 #include "tests/support/meshes.h"

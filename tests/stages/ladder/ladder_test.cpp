@@ -10,6 +10,9 @@
 #include <jpeglib.h>
 
 #include "format/base/errors.h"
+#include "stages/base/run_context.h"
+#include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "tests/support/meshes.h"
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "format/base/errors.h"
+#include "stages/fragment_codec/decode_rung.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "tests/support/images.h"

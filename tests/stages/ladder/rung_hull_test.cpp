@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "stages/image/halve_pixels.h"
+#include "stages/ladder/ladder.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

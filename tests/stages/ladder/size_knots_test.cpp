@@ -1,4 +1,3 @@
-#include "stages/ladder/size_knots.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +5,11 @@
 #include <cmath>
 
 #include "format/documents/tables.h"
+#include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"
+#include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/zim/zim.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -8,9 +8,14 @@
 
 #include "format/base/archive.h"
 #include "format/base/sha256.h"
+#include "stages/base/run_context.h"
+#include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
+#include "stages/ladder/ladder.h"
 #include "stages/lut/size_model.h"
 #include "stages/measure/distortion.h"
 #include "stages/measure/fragment_meter.h"
+#include "stages/zim/zim.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 
+#include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
+#include "format/documents/package_writer.h"
+#include "stages/base/run_context.h"
 #include "tests/format/documents/tables_fixture.h"
 #include "tests/support/meshes.h"
 

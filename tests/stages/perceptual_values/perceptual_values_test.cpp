@@ -5,8 +5,10 @@
 #include <algorithm>
 
 #include "format/base/archive.h"
+#include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
 #include "stages/geometry/distance.h"
+#include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "stages/base/run_context.h"
+#include "stages/ladder/ladder.h"
 #include "stages/measure/image_compare.h"
 #include "stages/measure/render_view.h"
 #include "tests/support/meshes.h"

@@ -1,4 +1,6 @@
 // Materials, their textures' previews and tangents in the files of the scales.
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
 #include "tests/stages/scales/scales_checks.h"
 
 namespace texmesh {

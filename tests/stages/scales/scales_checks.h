@@ -11,10 +11,11 @@
 #include <set>
 
 #include "format/base/archive.h"
+#include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
-#include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/scales/scales.h"
+#include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

@@ -7,7 +7,10 @@
 #include <tuple>
 
 #include "format/split/split_stream.h"
+#include "stages/base/run_context.h"
+#include "stages/condition/condition.h"
 #include "stages/scales/scales.h"
+#include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

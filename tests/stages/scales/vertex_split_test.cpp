@@ -6,8 +6,10 @@
 #include <cmath>
 #include <map>
 
+#include "stages/condition/condition.h"
 #include "stages/scales/scale_grid.h"
 #include "stages/scales/scales.h"
+#include "stages/simplification/simplification.h"
 #include "tests/format/split/split_fixture.h"
 #include "tests/support/meshes.h"
 

@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "stages/base/run_context.h"
+#include "stages/condition/condition.h"
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "stages/condition/condition.h"
 #include "stages/simplification/simplification.h"
 #include "tests/stages/simplification/simplification_checks.h"
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "stages/condition/condition.h"
+#include "format/base/errors.h"
 #include "stages/simplification/simplification.h"
 #include "tests/stages/simplification/simplification_checks.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "format/base/archive.h"
-#include "stages/condition/condition.h"
+#include "stages/base/run_context.h"
 #include "tests/stages/simplification/simplification_checks.h"
 #include "tests/support/meshes.h"
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "format/base/portable_math.h"
 #include "stages/geometry/tetrahedron.h"
 #include "stages/geometry/triangle_tree.h"
 #include "stages/skeletonization/shape_thickness.h"

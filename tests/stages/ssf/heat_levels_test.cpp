@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "stages/condition/condition.h"
 #include "stages/ssf/ssf_component.h"
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "stages/base/run_context.h"
+#include "stages/condition/condition.h"
 #include "stages/ssf/ssf.h"
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"

@@ -9,6 +9,7 @@
 
 #include "format/base/archive.h"
 #include "format/base/portable_math.h"
+#include "stages/condition/condition.h"
 #include "stages/ssf/heat_kernel.h"
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"

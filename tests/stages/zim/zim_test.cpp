@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "stages/base/run_context.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "pipeline/extract/budget/budget_file.h"
+#include "pipeline/extract/budget/mesh_candidates.h"
 #include "pipeline/extract/budget/quality_search.h"
 #include "pipeline/extract/glb/fit_normals.h"
 #include "stages/condition/condition.h"

@@ -6,6 +6,7 @@
 #include "format/base/errors.h"
 #include "pipeline/extract/glb/image_codecs.h"
 #include "pipeline/extract/glb/resize.h"
+#include "stages/image/decode_image.h"
 #include "stages/measure/flip.h"
 
 namespace texmesh {

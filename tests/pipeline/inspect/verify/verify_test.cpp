@@ -6,7 +6,7 @@
 #include "format/container/container.h"
 #include "format/container/layout.h"
 #include "pipeline/inspect/verify/verify.h"
-#include "stages/jpeg/jpeg.h"
+#include "stages/data/fragments.h"
 #include "tests/support/images.h"
 #include "tests/support/packages.h"
 

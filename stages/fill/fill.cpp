@@ -3,8 +3,9 @@
 #include <string>
 
 #include "stages/base/parallel.h"
+#include "stages/fill/fill.h"
 #include "stages/fill/fill_blocks.h"
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/halve_pixels.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/condition/uv_sets.h"
+#include "stages/data/uv_sets.h"
 
 #include <algorithm>
 

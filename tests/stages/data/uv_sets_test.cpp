@@ -1,5 +1,5 @@
 // Models whose textures use the second set of texture coordinates, or both.
-#include "stages/condition/uv_sets.h"
+#include "stages/data/uv_sets.h"
 
 #include <gtest/gtest.h>
 

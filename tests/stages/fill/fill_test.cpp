@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "stages/fragmentation/fragmentation.h"
+#include "stages/fill/fill.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/halve_pixels.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"

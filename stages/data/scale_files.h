@@ -1,0 +1,31 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/base/note.h"
+
+namespace texmesh {
+
+struct ScaleFile {
+  int scale = 0;                              // scale number
+  std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
+  std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.scale, s.glb, s.triangles, s.vertices);
+  }
+};
+
+struct ScaleFiles {
+  std::vector<ScaleFile> files;        // kept scales, S_0 first
+  int position_bits = 0, uv_bits = 0;  // as used; 0 = float
+  double position_error = 0;           // largest rounding of a coordinate, object units
+  std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.stream, s.notes);
+  }
+};
+
+}  // namespace texmesh

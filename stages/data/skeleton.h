@@ -1,0 +1,28 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "format/base/note.h"
+#include "format/base/vec.h"
+
+namespace texmesh {
+
+/// The curve skeleton and the skeleton distance R(v) (thesis 6.2): alpha wrap, mean curvature flow, distance
+/// to segments, corrected by the local thickness where a curve is no skeleton (local_radius.h). Parts that
+/// contract to a point, and the centroids of the fallbacks, are segments of no length.
+struct Skeleton {
+  std::vector<Vec3f> nodes;                            // mesh-local coordinates
+  std::vector<std::array<std::uint32_t, 2>> segments;  // node indices
+  std::vector<float> distance;     // R(v) per position: distance to the closest segment, at most what the
+                                   // local thickness allows; object units, >= 0
+  std::vector<float> radius;       // R_eff(v) per position = max(R, floor * median R); > 0
+  bool fallback_centroid = false;  // no wrap: distance to the component's centroid
+  Notes notes;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.nodes, s.segments, s.distance, s.radius, s.fallback_centroid, s.notes);
+  }
+};
+
+}  // namespace texmesh
