@@ -6,6 +6,7 @@
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 
 namespace texmesh::examples {
@@ -114,7 +115,6 @@ void punch_holes(Sphere& sphere, int holes, std::uint32_t seed) {
 }
 
 std::vector<std::array<std::uint32_t, 3>> neighbours(const Corners& triangles) {
-  constexpr std::uint32_t kNone = 0xffffffff;
   std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>>
       edges;  // vertex pair, triangle, corner
   edges.reserve(triangles.size() * 3);
@@ -124,7 +124,7 @@ std::vector<std::array<std::uint32_t, 3>> neighbours(const Corners& triangles) {
       edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), t, k);
     }
   std::sort(edges.begin(), edges.end());
-  std::vector<std::array<std::uint32_t, 3>> out(triangles.size(), {kNone, kNone, kNone});
+  std::vector<std::array<std::uint32_t, 3>> out(triangles.size(), {kNoIndex, kNoIndex, kNoIndex});
   for (std::size_t i = 1; i < edges.size(); ++i) {
     const auto& [key_a, ta, ka] = edges[i - 1];
     const auto& [key_b, tb, kb] = edges[i];
@@ -138,33 +138,32 @@ std::vector<std::array<std::uint32_t, 3>> neighbours(const Corners& triangles) {
 // Charts grow from their seeds over edges of random length, which makes connected charts with ragged rims and
 // unequal sizes, as segmentation by camera does.
 std::vector<std::uint32_t> grow_charts(const Corners& triangles, int charts, std::uint32_t seed) {
-  constexpr std::uint32_t kNone = 0xffffffff;
   const auto next = neighbours(triangles);
-  std::vector<std::uint32_t> chart(triangles.size(), kNone);
+  std::vector<std::uint32_t> chart(triangles.size(), kNoIndex);
   using Front = std::tuple<double, std::uint32_t, std::uint32_t>;  // distance, triangle, chart
   std::priority_queue<Front, std::vector<Front>, std::greater<>> front;
   const auto count = static_cast<std::uint32_t>(triangles.size());
   for (std::uint32_t c = 0; c < static_cast<std::uint32_t>(charts); ++c)
     front.emplace(4 * hash01(c, 21, 0, seed), hash(c, 22, 0, seed) % count, c);
   std::uint32_t used = 0;
-  std::vector<std::uint32_t> number(static_cast<std::size_t>(charts), kNone);
+  std::vector<std::uint32_t> number(static_cast<std::size_t>(charts), kNoIndex);
   auto run = [&] {
     while (!front.empty()) {
       const auto [distance, t, c] = front.top();
       front.pop();
-      if (chart[t] != kNone) continue;
-      if (number[c] == kNone) number[c] = used++;
+      if (chart[t] != kNoIndex) continue;
+      if (number[c] == kNoIndex) number[c] = used++;
       chart[t] = number[c];
       for (std::uint32_t k = 0; k < 3; ++k)
-        if (const std::uint32_t o = next[t][k]; o != kNone && chart[o] == kNone)
+        if (const std::uint32_t o = next[t][k]; o != kNoIndex && chart[o] == kNoIndex)
           front.emplace(distance + 0.5 + hash01(t, k, 23, seed), o, c);
     }
   };
   run();
   // A triangle that holes have cut off from every seed becomes the seed of one more chart.
   for (std::uint32_t t = 0; t < count; ++t)
-    if (chart[t] == kNone) {
-      number.push_back(kNone);
+    if (chart[t] == kNoIndex) {
+      number.push_back(kNoIndex);
       front.emplace(0.0, t, static_cast<std::uint32_t>(number.size() - 1));
       run();
     }

@@ -6,13 +6,12 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh::examples {
 namespace {
-
-constexpr std::uint32_t kNone = 0xffffffff;
 
 struct TriangleInAtlas {
   Vec2d corner[3];  // px
@@ -36,7 +35,7 @@ Vec3d barycentric(const TriangleInAtlas& a, Vec2d p) {
 // Which triangle every texel belongs to: those whose middle it contains, then a rim of `rim` texels around
 // each chart that bilinear sampling needs (painted from the triangle next to it, by extrapolation).
 std::vector<std::uint32_t> texel_triangles(const Mesh& mesh, std::uint32_t side, int rim) {
-  std::vector<std::uint32_t> owner(static_cast<std::size_t>(side) * side, kNone);
+  std::vector<std::uint32_t> owner(static_cast<std::size_t>(side) * side, kNoIndex);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const TriangleInAtlas a = in_atlas(mesh, t, side);
     if (a.inverse_area == 0) continue;
@@ -55,13 +54,13 @@ std::vector<std::uint32_t> texel_triangles(const Mesh& mesh, std::uint32_t side,
     for (std::uint32_t y = 0; y < side; ++y)
       for (std::uint32_t x = 0; x < side; ++x) {
         const std::size_t i = static_cast<std::size_t>(y) * side + x;
-        if (owner[i] != kNone) continue;
-        std::uint32_t best = kNone;
+        if (owner[i] != kNoIndex) continue;
+        std::uint32_t best = kNoIndex;
         if (x > 0) best = std::min(best, owner[i - 1]);
         if (x + 1 < side) best = std::min(best, owner[i + 1]);
         if (y > 0) best = std::min(best, owner[i - side]);
         if (y + 1 < side) best = std::min(best, owner[i + side]);
-        if (best != kNone) grown.emplace_back(i, best);
+        if (best != kNoIndex) grown.emplace_back(i, best);
       }
     for (const auto& [i, t] : grown) owner[i] = t;
   }
@@ -99,9 +98,9 @@ void derive_normals(const std::vector<float>& height, const std::vector<std::uin
     for (std::size_t y = begin; y < end; ++y)
       for (std::size_t x = 0; x < side; ++x) {
         const std::size_t i = y * side + x;
-        if (owner[i] == kNone) continue;
+        if (owner[i] == kNoIndex) continue;
         auto at = [&](std::size_t j, bool inside) {
-          return inside && owner[j] != kNone ? height[j] : height[i];
+          return inside && owner[j] != kNoIndex ? height[j] : height[i];
         };
         const double dx = at(i + 1, x + 1 < side) - at(i - 1, x > 0);
         const double dy = at(i + side, y + 1 < side) - at(i - side, y > 0);
@@ -145,7 +144,7 @@ ScanTextures paint_atlas(const ScanShape& shape, const ScanMesh& scan, const Sca
       for (std::uint32_t x = 0; x < side; ++x) {
         const std::size_t i = y * side + x;
         const std::uint32_t t = owner[i];
-        if (t == kNone) continue;
+        if (t == kNoIndex) continue;
         Vec3d b = barycentric(in_atlas(scan.mesh, t, side), {x + 0.5, static_cast<double>(y) + 0.5});
         for (int k = 0; k < 3; ++k)
           b[k] = std::clamp(b[k], -1.0, 2.0);  // slivers at a rim extrapolate wildly

@@ -7,14 +7,13 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 
 namespace texmesh::examples {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Bytes = std::vector<std::uint8_t>;
-
 template <class T>
 void append(Bytes& out, const std::vector<T>& values) {
   const std::size_t at = out.size();

@@ -10,6 +10,9 @@
 
 namespace texmesh {
 
+using Bytes = std::vector<std::uint8_t>;
+using ByteSpan = std::span<const std::uint8_t>;
+
 // Little-endian building and bounded reading of binary entries: shared by the codecs of this folder, no
 // interface.
 

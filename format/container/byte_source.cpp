@@ -5,13 +5,12 @@
 #include <cerrno>
 #include <cstring>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/container.h"
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 class FileSource final : public ByteSource {
  public:

@@ -9,8 +9,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr std::uint64_t kAlignment = 64;
 constexpr std::uint64_t kMax16 = 0xffff, kMax32 = 0xffffffff;  // also what says "see ZIP64"
 constexpr std::uint16_t kDate1980 = 0x0021;

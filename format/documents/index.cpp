@@ -11,8 +11,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
 const std::string kFile = kIndexPath;
 constexpr std::string_view kMagic = "TXMX";
 constexpr std::size_t kHeadFixed = 16, kPageFixed = 44, kRecordFixed = 49;

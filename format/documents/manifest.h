@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "format/base/sha256.h"
 #include "format/base/vec.h"
 #include "format/container/format_version.h"
@@ -148,7 +149,7 @@ void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<Entr
 /// index.bin: every entry except manifest.json and index.bin itself. Page 0 holds the entries that belong to
 /// no texture plane, then one page per plane (SPEC.md). A client that needs one plane reads the head and that
 /// page.
-inline constexpr std::uint32_t kNoPlane = 0xffffffffu;
+inline constexpr std::uint32_t kNoPlane = kNoIndex;
 struct IndexPage {
   std::uint32_t plane = kNoPlane;
   std::uint32_t entries = 0;

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
@@ -12,8 +13,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
   throw FormatError("package", place, expected, found);

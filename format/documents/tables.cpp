@@ -12,8 +12,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
 const std::string kFile = kTablesPath;
 constexpr std::string_view kMagic = "TXMT";
 constexpr std::size_t kHeadFixed = 16, kDirectoryRecord = 36, kSectionFixed = 56;

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <string>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
 using Span = std::span<const std::uint8_t>;
 
 constexpr std::uint8_t kStart = 0xd8, kEnd = 0xd9;

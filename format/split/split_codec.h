@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"
@@ -46,7 +47,7 @@ template <class Channel>
 class SplitCodec {
  public:
   using Corner = SplitMesh::Corner;
-  static constexpr std::uint32_t kNone = SplitMesh::kNone;
+  static constexpr std::uint32_t kNone = kNoIndex;
 
   SplitCodec(SplitMesh& mesh, Channel& channel, std::size_t groups, SplitLimits limits)
       : mesh_(mesh), channel_(channel), groups_(groups), limits_(limits) {}

@@ -1,4 +1,5 @@
 #include "format/split/split_fill.h"
+#include "format/base/no_index.h"
 
 #include <algorithm>
 #include <array>
@@ -42,7 +43,7 @@ std::uint32_t main_wedge(const SplitMesh& mesh, std::uint32_t point) {
     else
       ++it->second;
   });
-  if (counts.empty()) return SplitMesh::kNone;
+  if (counts.empty()) return kNoIndex;
   return std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; })->first;
 }
 
@@ -52,7 +53,7 @@ void fill_lost_point(const SplitStreamHead& head, SplitMesh& mesh, std::uint32_t
   std::size_t k = 0;
   while (k < head.attributes.size() && head.attributes[k].kind != SplitKind::kUv0) ++k;
   const std::uint32_t wedge = main_wedge(mesh, point);
-  if (k == head.attributes.size() || wedge == SplitMesh::kNone) return;
+  if (k == head.attributes.size() || wedge == kNoIndex) return;
   const std::vector<Neighbour> ring = neighbours_in_chart(mesh, k, point, wedge);
   if (ring.size() < 3) return;
   // Least squares of place = c + a u + b v with weights 1 / distance^2: c is the place at the point. The

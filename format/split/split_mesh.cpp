@@ -1,4 +1,5 @@
 #include "format/split/split_mesh.h"
+#include "format/base/no_index.h"
 
 namespace texmesh {
 
@@ -16,9 +17,9 @@ std::vector<std::uint32_t> SplitMesh::visible_faces() const {
 
 std::uint32_t SplitMesh::add_point() {
   points_.push_back({});
-  head_.push_back(kNone);
+  head_.push_back(kNoIndex);
   degree_.push_back(0);
-  first_a_.push_back(kNone);
+  first_a_.push_back(kNoIndex);
   count_b_.push_back(0);
   return static_cast<std::uint32_t>(points_.size() - 1);
 }
@@ -49,7 +50,7 @@ std::uint32_t SplitMesh::add_face(std::array<std::uint32_t, 3> wedges, std::uint
 }
 
 void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners) {
-  head_[from] = head_[to] = kNone;
+  head_[from] = head_[to] = kNoIndex;
   degree_[from] = degree_[to] = 0;
   for (std::size_t i = corners.size(); i-- > 0;) {
     const Corner& c = corners[i];
@@ -64,11 +65,11 @@ void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vect
 /// Appends the fan that begins with the loose corner `start`.
 void SplitMesh::walk(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans) {
   Fan fan{static_cast<std::uint32_t>(corners.size()), 0, false};
-  for (std::uint32_t at = start; at != kNone;) {
+  for (std::uint32_t at = start; at != kNoIndex;) {
     taken_[at] = true;
     corners.push_back(loose_[at]);
     std::uint32_t& next = first_a_[loose_[at].b];
-    while (next != kNone && taken_[next]) next = chain_[next];
+    while (next != kNoIndex && taken_[next]) next = chain_[next];
     at = next;
   }
   fan.end = static_cast<std::uint32_t>(corners.size());
@@ -82,9 +83,9 @@ void SplitMesh::gather(std::uint32_t point, std::vector<Corner>& corners, std::v
   loose_.clear();
   each_corner(point, [&](std::uint32_t face, std::uint32_t corner) {
     loose_.push_back({face, corner, point_at(face, corner + 1), point_at(face, corner + 2),
-                      wedge_at(face, corner), false, kNone});
+                      wedge_at(face, corner), false, kNoIndex});
   });
-  chain_.assign(loose_.size(), kNone);
+  chain_.assign(loose_.size(), kNoIndex);
   taken_.assign(loose_.size(), false);
   for (std::size_t i = loose_.size(); i-- > 0;) {
     chain_[i] = first_a_[loose_[i].a];
@@ -95,7 +96,7 @@ void SplitMesh::gather(std::uint32_t point, std::vector<Corner>& corners, std::v
     if (!taken_[i] && count_b_[loose_[i].a] == 0) walk(i, corners, fans);
   for (std::uint32_t i = 0; i < loose_.size(); ++i)
     if (!taken_[i]) walk(i, corners, fans);
-  for (const Corner& c : loose_) first_a_[c.a] = kNone, count_b_[c.b] = 0;
+  for (const Corner& c : loose_) first_a_[c.a] = kNoIndex, count_b_[c.b] = 0;
 }
 
 }  // namespace texmesh

@@ -3,13 +3,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
+
 namespace texmesh {
 
 /// A mesh under refinement by vertex splits. Points and wedges are only ever appended; splits change which
 /// wedges a face has.
 class SplitMesh {
  public:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
   using Point = std::array<std::int32_t, 3>;
 
   /// A corner at a point, as gather() leaves them: the face is (point, a, b) in its own direction.
@@ -57,7 +58,7 @@ class SplitMesh {
   /// Calls visit(face, corner) for the corners at a point.
   template <class Visit>
   void each_corner(std::uint32_t point, Visit&& visit) const {
-    for (std::uint32_t c = head_[point]; c != kNone; c = next_[c]) visit(c / 3, c % 3);
+    for (std::uint32_t c = head_[point]; c != kNoIndex; c = next_[c]) visit(c / 3, c % 3);
   }
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in the
   /// point's list.

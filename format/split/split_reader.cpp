@@ -1,5 +1,6 @@
 #include <limits>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
@@ -11,12 +12,10 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
-
 /// Decodes the values of one part. Where the part was left out every residual is 0.
 class PartDecoder {
  public:
-  void start(Bytes bytes, const std::vector<std::uint8_t>& models) {
+  void start(ByteSpan bytes, const std::vector<std::uint8_t>& models) {
     present_ = !bytes.empty();
     if (!present_) return;
     for (std::size_t i = 0; i < models.size(); ++i)
@@ -49,7 +48,7 @@ class DecodingChannel {
  public:
   DecodingChannel(const SplitStreamHead& head, SplitFill fill)
       : head_(head), fill_(fill), parts_(head.attributes.size() + 1) {}
-  void start(std::span<const Bytes> parts) {
+  void start(std::span<const ByteSpan> parts) {
     connectivity_ = BitDecoder(parts[0]);
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
   }
@@ -162,7 +161,7 @@ const SplitStreamHead& SplitStreamReader::head() const { return state_->head; }
 const SplitMesh& SplitStreamReader::mesh() const { return state_->mesh; }
 std::size_t SplitStreamReader::next_block() const { return state_->block; }
 
-void SplitStreamReader::add_block(Bytes block) {
+void SplitStreamReader::add_block(ByteSpan block) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
   if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
@@ -172,7 +171,7 @@ void SplitStreamReader::add_block(Bytes block) {
   const Sha256 digest = sha256(block);
   if (!std::equal(b.digest.begin(), b.digest.end(), digest.begin()))
     fail(place, "bytes of the digest in the head", "others");
-  std::vector<Bytes> parts;
+  std::vector<ByteSpan> parts;
   std::size_t at = 0;
   for (std::uint32_t size : b.parts) {
     parts.push_back(block.subspan(at, size));
@@ -181,7 +180,7 @@ void SplitStreamReader::add_block(Bytes block) {
   add_parts(parts);
 }
 
-void SplitStreamReader::add_parts(std::span<const Bytes> parts) {
+void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
   if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
@@ -221,7 +220,7 @@ void SplitStreamReader::fill_again() {
   for (const std::uint32_t point : state_->channel.lost()) fill_lost_point(state_->head, state_->mesh, point);
 }
 
-void SplitStreamReader::read_to_scale(std::size_t index, Bytes stream) {
+void SplitStreamReader::read_to_scale(std::size_t index, ByteSpan stream) {
   const std::size_t end = state_->head.scales.at(index).blocks;
   while (state_->block < end) {
     const SplitBlock& b = state_->head.blocks[state_->block];

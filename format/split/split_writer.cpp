@@ -3,6 +3,7 @@
 #include <map>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
@@ -12,7 +13,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kNone = SplitMesh::kNone;
+constexpr std::uint32_t kNone = kNoIndex;
 constexpr std::uint32_t kFacesPerBlock = 512;  // of patches but the first
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {

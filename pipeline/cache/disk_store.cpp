@@ -83,7 +83,7 @@ class DiskStore : public Store {
     return std::move(record->outputs);
   }
 
-  Bytes load(const StoredBlob& blob) override {
+  SharedBytes load(const StoredBlob& blob) override {
     const std::string path = place("cas", blob.digest);
     const auto stamp = stamp_of(path);
     auto bytes = read_whole(path);
@@ -92,7 +92,7 @@ class DiskStore : public Store {
     return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
   }
 
-  bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+  bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
     if (!writes_) return false;
     const FileLock gate = pass_gate();
     CacheRecord record{key.preimage(), {}};

@@ -49,15 +49,15 @@ class LayeredStore : public Store {
     return std::nullopt;
   }
 
-  Bytes load(const StoredBlob& blob) override {
-    if (Bytes bytes = local_->load(blob)) return bytes;
+  SharedBytes load(const StoredBlob& blob) override {
+    if (SharedBytes bytes = local_->load(blob)) return bytes;
     for (Layer& layer : layers_)
       if (auto bytes = get(layer, "cas", blob.digest, blob.bytes); bytes && is(blob, *bytes))
         return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
     return nullptr;
   }
 
-  bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+  bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
     const bool kept = local_->put(key, outputs);
     if (use_ != LayerUse::kUpload) return kept;
     CacheRecord record{key.preimage(), {}};
@@ -167,7 +167,7 @@ class LayeredStore : public Store {
     if (!bytes) return std::nullopt;
     const auto record = read_record(*bytes, key);
     if (!record) return tell_damaged(layer, "what is no record of its key");
-    std::vector<std::pair<std::string, Bytes>> outputs;
+    std::vector<std::pair<std::string, SharedBytes>> outputs;
     for (const StoredBlob& blob : record->outputs) {
       if (blob.bytes > kMaxBlobBytes) return std::nullopt;
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);

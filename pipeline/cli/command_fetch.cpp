@@ -11,6 +11,7 @@
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/transfer/package_transport.h"
+#include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/delivery_options.h"
@@ -23,7 +24,6 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Bytes = std::vector<std::uint8_t>;
 using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 

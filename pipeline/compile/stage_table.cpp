@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "format/base/no_index.h"
 #include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
 #include "stages/ladder/lossless_top.h"
@@ -52,12 +53,12 @@ StageOutputs run_ssf(const StageInputs& in) {
   const RangeGrid& range = in.get<ImportedMesh>("import.mesh").range;
   if (range.columns == 0) return with_notes(filter_scale_space(conditioned, in.options.ssf, in.context));
   std::vector<std::uint32_t> conditioned_position(in.get<ImportedMesh>("import.mesh").mesh.positions.size(),
-                                                  0xffffffffu);
+                                                  kNoIndex);
   for (std::size_t i = conditioned.position_source.size(); i-- > 0;)
     conditioned_position.at(conditioned.position_source[i]) = static_cast<std::uint32_t>(i);
   RangeGrid grid = range;
   for (std::uint32_t& p : grid.position)
-    if (p != 0xffffffffu) p = conditioned_position.at(p);
+    if (p != kNoIndex) p = conditioned_position.at(p);
   return with_notes(filter_range_scan(grid, conditioned.mesh.positions.size(), in.options.ssf, in.context));
 }
 

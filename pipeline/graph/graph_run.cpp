@@ -171,7 +171,7 @@ struct GraphRun::State {
       blobs = node.blobs;
     }
     if (!node.stage->stored || blobs.empty()) return nullptr;
-    const Bytes bytes = store.load(blobs.at(output));
+    const SharedBytes bytes = store.load(blobs.at(output));
     if (!bytes) return nullptr;
     try {
       return node.stage->outputs[output].decode(*bytes);
@@ -235,7 +235,7 @@ struct GraphRun::State {
       store.reject(key.digest(), *blobs, std::to_string(blobs->size()) + " results");
       return false;
     }
-    const Bytes bytes = store.load(blobs->back());
+    const SharedBytes bytes = store.load(blobs->back());
     if (!bytes) return false;
     Notes notes;
     try {
@@ -278,7 +278,7 @@ struct GraphRun::State {
     const Stage& stage = *node.stage;
     StageOutputs outputs = execute(node);
     const Key key = key_of(stage);  // an input that turned out to be none has another digest now
-    std::vector<std::pair<std::string, Bytes>> encoded;
+    std::vector<std::pair<std::string, SharedBytes>> encoded;
     for (std::size_t k = 0; k < stage.outputs.size(); ++k)
       encoded.emplace_back(stage.outputs[k].name, std::make_shared<const std::vector<std::uint8_t>>(
                                                       stage.outputs[k].encode(outputs.objects[k].get())));

@@ -8,12 +8,12 @@ std::optional<std::vector<StoredBlob>> MemoryStore::find(const Sha256& key) {
   if (it == runs_.end()) return std::nullopt;
   return it->second;
 }
-Bytes MemoryStore::load(const StoredBlob& blob) {
+SharedBytes MemoryStore::load(const StoredBlob& blob) {
   const std::lock_guard lock(mutex_);
   const auto it = blobs_.find(blob.digest);
   return it == blobs_.end() ? nullptr : it->second;
 }
-bool MemoryStore::put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) {
+bool MemoryStore::put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) {
   std::vector<StoredBlob> run;
   for (const auto& [name, bytes] : outputs) run.push_back({name, sha256(*bytes), bytes->size()});
   const std::lock_guard lock(mutex_);

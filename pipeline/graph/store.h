@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "pipeline/graph/key.h"
 #include "stages/base/run_context.h"
@@ -20,7 +21,7 @@ struct StoredBlob {
   std::uint64_t bytes = 0;
   friend bool operator==(const StoredBlob&, const StoredBlob&) = default;
 };
-using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
+using SharedBytes = std::shared_ptr<const Bytes>;
 
 /// Held while a key is computed, so that processes that share a store compute it once. Ends with the object,
 /// and with the process however that ends.
@@ -45,8 +46,8 @@ class Store {
   /// The blobs of a run, every one present and verified; nothing otherwise.
   virtual std::optional<std::vector<StoredBlob>> find(const Sha256& key) = 0;
   /// The bytes of a blob; null when it is gone or does not have this digest.
-  virtual Bytes load(const StoredBlob& blob) = 0;
-  virtual bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) = 0;
+  virtual SharedBytes load(const StoredBlob& blob) = 0;
+  virtual bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) = 0;
   /// The parts of a key that was put once (Key::preimage), whether its blobs are still there or not.
   virtual std::optional<std::string> preimage(const Sha256& key) = 0;
   /// What find() gave for the key is sound by its digests, but no result of this stage (`reason`): whoever
@@ -68,8 +69,8 @@ class Store {
 class NullStore : public Store {
  public:
   std::optional<std::vector<StoredBlob>> find(const Sha256&) override { return std::nullopt; }
-  Bytes load(const StoredBlob&) override { return nullptr; }
-  bool put(const Key&, const std::vector<std::pair<std::string, Bytes>>&) override { return true; }
+  SharedBytes load(const StoredBlob&) override { return nullptr; }
+  bool put(const Key&, const std::vector<std::pair<std::string, SharedBytes>>&) override { return true; }
   std::optional<std::string> preimage(const Sha256&) override { return std::nullopt; }
   std::optional<std::string> find_note(const Sha256&) override { return std::nullopt; }
   bool put_note(const Sha256&, const std::string&) override { return true; }
@@ -79,8 +80,8 @@ class NullStore : public Store {
 class MemoryStore : public Store {
  public:
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override;
-  Bytes load(const StoredBlob& blob) override;
-  bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override;
+  SharedBytes load(const StoredBlob& blob) override;
+  bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override;
   std::optional<std::string> preimage(const Sha256& key) override;
   void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override;
   std::optional<std::string> find_note(const Sha256& key) override;
@@ -89,7 +90,7 @@ class MemoryStore : public Store {
  private:
   std::mutex mutex_;
   std::map<Sha256, std::vector<StoredBlob>> runs_;
-  std::map<Sha256, Bytes> blobs_;
+  std::map<Sha256, SharedBytes> blobs_;
   std::map<Sha256, std::string> notes_, preimages_;
 };
 

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/near_uvs.h"
 #include "pipeline/import/text_scan.h"
@@ -12,8 +13,6 @@
 
 namespace texmesh {
 namespace {
-
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 bool finite(Vec2f a) { return std::isfinite(a.x) && std::isfinite(a.y); }
 bool finite(Vec3f a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
@@ -231,22 +230,22 @@ void keep_marked(std::vector<T>& values, const std::vector<std::uint32_t>& new_i
   if (values.empty()) return;
   // new_index[i] <= i; moving a string or a vector onto itself would empty it.
   for (std::size_t i = 0; i < values.size(); ++i)
-    if (new_index[i] != kNone && new_index[i] != i) values[new_index[i]] = std::move(values[i]);
+    if (new_index[i] != kNoIndex && new_index[i] != i) values[new_index[i]] = std::move(values[i]);
   values.resize(static_cast<std::size_t>(
-      std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNone; })));
+      std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNoIndex; })));
 }
 
-// Marks become consecutive indices in the old order; kNone stays.
+// Marks become consecutive indices in the old order; kNoIndex stays.
 std::uint32_t number_marked(std::vector<std::uint32_t>& marks) {
   std::uint32_t next = 0;
   for (std::uint32_t& m : marks)
-    if (m != kNone) m = next++;
+    if (m != kNoIndex) m = next++;
   return next;
 }
 
 void drop_unused_vertices(Model& model) {
   Mesh& mesh = model.mesh;
-  std::vector<std::uint32_t> wedge(mesh.wedge_count(), kNone), position(mesh.positions.size(), kNone);
+  std::vector<std::uint32_t> wedge(mesh.wedge_count(), kNoIndex), position(mesh.positions.size(), kNoIndex);
   for (const Triangle& t : mesh.triangles)
     for (std::uint32_t w : t) {
       wedge[w] = 0;
@@ -268,11 +267,11 @@ void drop_unused_vertices(Model& model) {
   for (Triangle& t : mesh.triangles)
     for (std::uint32_t& w : t) w = wedge[w];
   for (std::uint32_t& p : model.range.position)
-    if (p != kNone) p = position[p];
+    if (p != kNoIndex) p = position[p];
 }
 
 void drop_unused_materials(Model& model) {
-  std::vector<std::uint32_t> material(model.materials.size(), kNone);
+  std::vector<std::uint32_t> material(model.materials.size(), kNoIndex);
   for (std::uint16_t m : model.mesh.triangle_material) material[m] = 0;
   number_marked(material);
   keep_marked(model.materials, material);
@@ -280,7 +279,7 @@ void drop_unused_materials(Model& model) {
 }
 
 void drop_unused_parts(Mesh& mesh) {
-  std::vector<std::uint32_t> part(mesh.part_names.size(), kNone);
+  std::vector<std::uint32_t> part(mesh.part_names.size(), kNoIndex);
   for (std::uint16_t p : mesh.triangle_part) part[p] = 0;
   number_marked(part);
   keep_marked(mesh.part_names, part);
@@ -288,7 +287,7 @@ void drop_unused_parts(Mesh& mesh) {
 }
 
 void drop_unused_images(Model& model, const std::string& file_name) {
-  std::vector<std::uint32_t> image(model.images.size(), kNone);
+  std::vector<std::uint32_t> image(model.images.size(), kNoIndex);
   auto mark = [&](TextureRef& ref) {
     if (!ref.used()) return;
     if (static_cast<std::size_t>(ref.image) >= image.size())

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/obj_material.h"
@@ -25,10 +26,9 @@ namespace {
 
 constexpr std::int64_t kMaxIndex = 2'000'000'000;
 constexpr std::size_t kMaxNames = 65535;  // parts, materials
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 struct Reference {
-  std::uint32_t position = 0, uv = kNone, normal = kNone;
+  std::uint32_t position = 0, uv = kNoIndex, normal = kNoIndex;
 };
 
 struct Face {
@@ -221,8 +221,9 @@ class ObjReader {
     }
     if (data_.faces.size() >= static_cast<std::size_t>(options_.max_triangles))
       fail("at most " + std::to_string(options_.max_triangles) + " triangles", "more");
-    data_.faces.push_back(
-        {begin, static_cast<std::uint32_t>(std::min<std::size_t>(lines_.number(), kNone)), material_, part_});
+    data_.faces.push_back({begin,
+                           static_cast<std::uint32_t>(std::min<std::size_t>(lines_.number(), kNoIndex)),
+                           material_, part_});
   }
 
   void use_material(const std::string& name) {
@@ -242,7 +243,7 @@ class ObjReader {
 
   void check_references() const {
     auto check = [this](std::uint32_t i, std::size_t count, const char* what, std::size_t f) {
-      if (i != kNone && i >= count)
+      if (i != kNoIndex && i >= count)
         throw InputError(file_, "line " + std::to_string(data_.faces[f].line),
                          std::string(what) + " index up to " + std::to_string(count),
                          std::to_string(std::uint64_t{i} + 1));
@@ -398,8 +399,8 @@ bool choose_colours(const ObjData& data, Model& model, const ImportOptions& opti
 Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options, const RunContext& context) {
   bool any_uv = false, any_normal = false;
   for (const Reference& r : data.corners) {
-    any_uv = any_uv || r.uv != kNone;
-    any_normal = any_normal || r.normal != kNone;
+    any_uv = any_uv || r.uv != kNoIndex;
+    any_normal = any_normal || r.normal != kNoIndex;
   }
   const bool any_colour = choose_colours(data, model, options);
   const double scale = colour_scale(data);
@@ -415,11 +416,11 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
     for (const Reference& r : data.corners_of(f)) {
       Corner c;
       c.position = r.position;
-      if (r.uv != kNone)
+      if (r.uv != kNoIndex)
         c.uv = data.uvs[r.uv];
       else
         lacks_uv = true;
-      if (r.normal != kNone) c.normal = data.normals[r.normal];
+      if (r.normal != kNoIndex) c.normal = data.normals[r.normal];
       if (any_colour && !face_textured && has_colour(data, r.position)) {
         const Vec3d rgb = to_double(data.colours[r.position]) * scale;
         c.colour = {linear_from_srgb(rgb.x), linear_from_srgb(rgb.y), linear_from_srgb(rgb.z), 1};

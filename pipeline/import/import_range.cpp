@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
@@ -14,8 +15,6 @@
 
 namespace texmesh {
 namespace {
-
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 // --- the grid's values
 // ------------------------------------------------------------------------------------------
@@ -164,7 +163,7 @@ class GridMesher {
   }
 
   void add_positions() {
-    position_.assign(scan_.radius.size(), kNone);
+    position_.assign(scan_.radius.size(), kNoIndex);
     std::vector<double> sine(scan_.columns), cosine(scan_.columns);
     for (std::uint32_t i = 0; i < scan_.columns; ++i) {
       const double turned = scan_.alpha_step_rad * i,
@@ -187,12 +186,12 @@ class GridMesher {
   // whole picture.
   void add_wedges() {
     Mesh& mesh = model_.mesh;
-    seam_.assign(scan_.rows, kNone);
+    seam_.assign(scan_.rows, kNoIndex);
     for (std::uint32_t j = 0; j < scan_.rows; ++j)
       for (std::uint32_t i = 0; i < scan_.columns; ++i)
-        if (position_[sample(i, j)] != kNone) add_wedge(position_[sample(i, j)], i, j);
+        if (position_[sample(i, j)] != kNoIndex) add_wedge(position_[sample(i, j)], i, j);
     for (std::uint32_t j = 0; scan_.full_turn && j < scan_.rows; ++j) {
-      if (position_[sample(0, j)] == kNone) continue;
+      if (position_[sample(0, j)] == kNoIndex) continue;
       seam_[j] = static_cast<std::uint32_t>(mesh.wedge_count());
       add_wedge(position_[sample(0, j)], scan_.columns, j);
     }
@@ -216,7 +215,7 @@ class GridMesher {
     float lo = INFINITY, hi = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       t[k] = wedge(corners[k][0], corners[k][1]);
-      if (t[k] == kNone) return;
+      if (t[k] == kNoIndex) return;
       const float r = scan_.radius[sample(corners[k][0], corners[k][1])];
       lo = std::min(lo, r);
       hi = std::max(hi, r);
@@ -242,8 +241,8 @@ class GridMesher {
   bool falling_diagonal(std::array<std::uint32_t, 2> a, std::array<std::uint32_t, 2> b,
                         std::array<std::uint32_t, 2> c, std::array<std::uint32_t, 2> d) const {
     const auto at = [this](const std::array<std::uint32_t, 2>& s) { return position_[sample(s[0], s[1])]; };
-    if (at(b) == kNone || at(d) == kNone) return true;
-    if (at(a) == kNone || at(c) == kNone) return false;
+    if (at(b) == kNoIndex || at(d) == kNoIndex) return true;
+    if (at(a) == kNoIndex || at(c) == kNoIndex) return false;
     const Vec3d ac = points_[at(c)] - points_[at(a)], bd = points_[at(d)] - points_[at(b)];
     return dot(ac, ac) <= dot(bd, bd);
   }

@@ -5,6 +5,7 @@
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/bounded_json.h"
+#include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 
@@ -12,8 +13,6 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr const char* kNoFile = "0000000000000000";
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {

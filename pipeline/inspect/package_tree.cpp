@@ -13,6 +13,7 @@
 #include <set>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "pipeline/inspect/fragment_files.h"
@@ -21,8 +22,6 @@
 namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 [[noreturn]] void fail_output(const fs::path& path, const char* expected) {
   throw InputError(path.string(), "", expected, std::strerror(errno));

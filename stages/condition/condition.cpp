@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "format/base/no_index.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/manifold.h"
 #include "stages/geometry/mesh_topology.h"

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <tuple>
 
+#include "format/base/no_index.h"
 #include "stages/geometry/weld.h"
 
 namespace texmesh {

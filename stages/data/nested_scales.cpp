@@ -1,23 +1,23 @@
 #include "stages/data/nested_scales.h"
+#include "format/base/no_index.h"
 
 namespace texmesh {
 
 Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
   const Mesh& in = scales.mesh;
-  constexpr std::uint32_t kNone = 0xffffffffu;
-  std::vector<std::uint32_t> wedge(in.wedge_count(), kNone), position(in.positions.size(), kNone);
+  std::vector<std::uint32_t> wedge(in.wedge_count(), kNoIndex), position(in.positions.size(), kNoIndex);
   for (const Triangle& t : scale.triangles)
     for (std::uint32_t w : t) wedge[w] = position[in.wedge_position[w]] = 0;
   Mesh out;
   out.origin = in.origin;
   out.part_names = in.part_names;
   for (std::size_t p = 0; p < position.size(); ++p) {
-    if (position[p] == kNone) continue;
+    if (position[p] == kNoIndex) continue;
     position[p] = static_cast<std::uint32_t>(out.positions.size());
     out.positions.push_back(in.positions[p]);
   }
   for (std::size_t w = 0; w < wedge.size(); ++w) {
-    if (wedge[w] == kNone) continue;
+    if (wedge[w] == kNoIndex) continue;
     wedge[w] = static_cast<std::uint32_t>(out.wedge_position.size());
     out.wedge_position.push_back(position[in.wedge_position[w]]);
     auto keep = [w](const auto& from, auto& to) {

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "format/base/no_index.h"
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"
 #include "stages/fragmentation/fragment_grid.h"
@@ -227,8 +228,8 @@ void measure_fragments(const ConditionedMesh& conditioned, const ScaleMap& scale
   out.surface.resize(fragments);
   AreaSpreader spreader(out.grid);
   std::vector<std::uint64_t> corners;
-  std::vector<std::uint32_t> last_fragment(mesh.positions.size(), 0xffffffff);  // spares most of the sorting
-  Measure again;                                                                // faults are counted already
+  std::vector<std::uint32_t> last_fragment(mesh.positions.size(), kNoIndex);  // spares most of the sorting
+  Measure again;                                                              // faults are counted already
   for_each_triangle(
       mesh, job, again, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
         if (first) spreader.add(texels, use.ref.wrap_s, use.ref.wrap_t, area_in_space(mesh, t), out.surface);

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "format/base/vec.h"
 #include "format/model/model.h"
 
@@ -27,7 +28,7 @@ class SurfaceDistance {
 
   /// A triangle to begin with: where one near the point is known, the search is several times shorter.
   struct Hint {
-    std::uint32_t leaf = 0xffffffffu;  // of the last answer; none at first
+    std::uint32_t leaf = kNoIndex;  // of the last answer; none at first
   };
   /// As operator(), beginning with the triangle of the hint, which becomes the closest one found. With the
   /// same chain of points and hints the same bits; another chain may differ in the last one.

@@ -1,4 +1,5 @@
 #include "stages/geometry/weld.h"
+#include "format/base/no_index.h"
 
 #include <algorithm>
 #include <array>

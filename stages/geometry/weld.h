@@ -2,11 +2,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "format/model/model.h"
 
 namespace texmesh {
-
-inline constexpr std::uint32_t kNoIndex = 0xffffffffu;
 
 /// Per position: the lowest index of the positions that it is welded with, itself included; kNoIndex for
 /// positions that are not finite. Bit-equal positions are welded (-0 equals +0), and, for distance > 0,

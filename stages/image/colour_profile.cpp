@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
@@ -13,7 +14,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
 using Matrix = std::array<std::array<double, 3>, 3>;
 
 /// Columns: X, Y, Z (D50, as all profiles speak) of sRGB's red, green and blue at full light.
@@ -45,7 +45,7 @@ double power(double base, double exponent) { return base > 0 ? portable::pow(bas
 /// The profile's tags, every offset checked.
 class IccReader {
  public:
-  IccReader(const std::string& name, Bytes bytes, std::size_t codes)
+  IccReader(const std::string& name, ByteSpan bytes, std::size_t codes)
       : name_(name), bytes_(bytes), codes_(codes) {
     if (bytes.size() < 132 || text(36) != "acsp") fail("an ICC profile", "other bytes");
     if (u32(128) > 200) fail("at most 200 tags", std::to_string(u32(128)));
@@ -55,7 +55,7 @@ class IccReader {
     throw InputError(name_, "colour profile", expected, found);
   }
   std::string text(std::size_t at) const {
-    const Bytes b = part(at, 4);
+    const ByteSpan b = part(at, 4);
     std::string s(b.begin(), b.end());
     for (char& c : s)
       if (c < ' ' || c > '~') c = '?';
@@ -65,7 +65,7 @@ class IccReader {
 
   /// Light per code.
   std::vector<double> curve(std::string_view tag) const {
-    const Bytes data = tag_data(tag);
+    const ByteSpan data = tag_data(tag);
     std::vector<double> out(codes_);
     const std::string kind = text_of(data);
     if (kind == "curv") {
@@ -80,24 +80,26 @@ class IccReader {
   }
 
   std::array<double, 3> xyz(std::string_view tag) const {
-    const Bytes data = tag_data(tag);
+    const ByteSpan data = tag_data(tag);
     if (text_of(data) != "XYZ " || data.size() < 20) fail("X, Y, Z for " + std::string(tag), text_of(data));
     return {fixed(data, 8), fixed(data, 12), fixed(data, 16)};
   }
 
  private:
-  Bytes part(std::size_t at, std::size_t count) const {
+  ByteSpan part(std::size_t at, std::size_t count) const {
     if (at > bytes_.size() || count > bytes_.size() - at)
       fail("a whole ICC profile", "one that ends after " + std::to_string(bytes_.size()) + " bytes");
     return bytes_.subspan(at, count);
   }
   std::uint32_t u32(std::size_t at) const { return u32_of(part(at, 4), 0); }
-  static std::uint32_t u32_of(Bytes b, std::size_t at) {
+  static std::uint32_t u32_of(ByteSpan b, std::size_t at) {
     return static_cast<std::uint32_t>(b[at]) << 24 | static_cast<std::uint32_t>(b[at + 1]) << 16 |
            static_cast<std::uint32_t>(b[at + 2]) << 8 | b[at + 3];
   }
-  static double fixed(Bytes b, std::size_t at) { return static_cast<std::int32_t>(u32_of(b, at)) / 65536.0; }
-  static std::string text_of(Bytes b) { return b.size() < 4 ? "" : std::string(b.begin(), b.begin() + 4); }
+  static double fixed(ByteSpan b, std::size_t at) {
+    return static_cast<std::int32_t>(u32_of(b, at)) / 65536.0;
+  }
+  static std::string text_of(ByteSpan b) { return b.size() < 4 ? "" : std::string(b.begin(), b.begin() + 4); }
   std::size_t find(std::string_view tag) const {
     for (std::uint32_t i = 0, n = u32(128); i < n; ++i) {
       const std::size_t at = 132 + std::size_t{12} * i;
@@ -105,15 +107,15 @@ class IccReader {
     }
     return 0;
   }
-  Bytes tag_data(std::string_view tag) const {
+  ByteSpan tag_data(std::string_view tag) const {
     const std::size_t at = find(tag);
     if (at == 0) fail("the tag " + std::string(tag), "none");
-    const Bytes data = part(u32(at + 4), u32(at + 8));
+    const ByteSpan data = part(u32(at + 4), u32(at + 8));
     if (data.size() < 12) fail("12 bytes of " + std::string(tag), std::to_string(data.size()));
     return data;
   }
 
-  void fill(std::vector<double>& out, Bytes data) const {
+  void fill(std::vector<double>& out, ByteSpan data) const {
     const std::size_t count = u32_of(data, 8);
     if (count > (data.size() - 12) / 2) fail("a curve that fits its tag", std::to_string(count) + " points");
     const auto point = [&](std::size_t i) { return (data[12 + 2 * i] << 8 | data[13 + 2 * i]) / 65535.0; };
@@ -132,7 +134,7 @@ class IccReader {
   }
 
   /// Five forms: (a x + b) ^ g + e from d on, c x + f below; those that say less leave e, f, c or more out.
-  void fill_parametric(std::vector<double>& out, Bytes data) const {
+  void fill_parametric(std::vector<double>& out, ByteSpan data) const {
     constexpr std::size_t kParameters[] = {1, 3, 4, 5, 7};
     const std::size_t form = static_cast<std::size_t>(data[8] << 8 | data[9]);
     if (form > 4 || data.size() < 12 + 4 * kParameters[form])
@@ -154,7 +156,7 @@ class IccReader {
   }
 
   const std::string& name_;
-  Bytes bytes_;
+  ByteSpan bytes_;
   std::size_t codes_;
 };
 

@@ -10,6 +10,7 @@
 #include <OpenImageIO/imageio.h>
 #include <webp/decode.h>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "stages/image/colour_profile.h"
@@ -19,8 +20,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::span<const std::uint8_t>;
 
 const char* reader_name(ImageFormat format) {
   switch (format) {
@@ -38,7 +37,7 @@ const char* reader_name(ImageFormat format) {
   return "";
 }
 
-std::string first_bytes(Bytes bytes) {
+std::string first_bytes(ByteSpan bytes) {
   if (bytes.empty()) return "no bytes";
   static constexpr char kHex[] = "0123456789abcdef";
   std::string s = "bytes";
@@ -59,7 +58,7 @@ void check_size(const std::string& name, std::uint64_t width, std::uint64_t heig
 }
 
 // WebP by libwebp itself: OpenImageIO 2.4 multiplies alpha into the colours whatever it is asked.
-WebPBitstreamFeatures read_webp_header(const std::string& name, Bytes bytes) {
+WebPBitstreamFeatures read_webp_header(const std::string& name, ByteSpan bytes) {
   WebPBitstreamFeatures features;
   if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
     throw InputError(name, "WebP header", "a readable one", "a damaged or truncated one");
@@ -116,7 +115,7 @@ std::string reader_error(OIIO::ImageInput& input) {
   return s.empty() ? "an error without a message" : s;
 }
 
-OpenImage open_image(const std::string& name, ImageFormat format, Bytes bytes) {
+OpenImage open_image(const std::string& name, ImageFormat format, ByteSpan bytes) {
   static std::once_flag once;
   std::call_once(once, [] {
     // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add

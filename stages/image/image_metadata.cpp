@@ -1,4 +1,5 @@
 #include "stages/image/image_metadata.h"
+#include "format/base/bytes.h"
 
 #include <zlib.h>
 
@@ -13,33 +14,32 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
 constexpr std::size_t kMaxProfile = 16u << 20;
 
-/// Bytes from `at`, `count` of them or none.
-Bytes part(Bytes bytes, std::size_t at, std::size_t count) {
+/// ByteSpan from `at`, `count` of them or none.
+ByteSpan part(ByteSpan bytes, std::size_t at, std::size_t count) {
   if (at > bytes.size() || count > bytes.size() - at) return {};
   return bytes.subspan(at, count);
 }
 
-std::uint32_t big(Bytes b) {
+std::uint32_t big(ByteSpan b) {
   std::uint32_t x = 0;
   for (std::uint8_t byte : b) x = x << 8 | byte;
   return x;
 }
 
-std::uint32_t little(Bytes b) {
+std::uint32_t little(ByteSpan b) {
   std::uint32_t x = 0;
   for (std::size_t i = b.size(); i-- > 0;) x = x << 8 | b[i];
   return x;
 }
 
-bool begins(Bytes bytes, std::string_view magic) {
+bool begins(ByteSpan bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && !std::memcmp(bytes.data(), magic.data(), magic.size());
 }
 
 /// Nothing, or too much, where one should be is a damaged one.
-void take_profile(Bytes profile, ImageMetadata& out) {
+void take_profile(ByteSpan profile, ImageMetadata& out) {
   if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
   out.damaged_profile = out.icc_profile.empty();
 }
@@ -49,7 +49,7 @@ void take_profile(Bytes profile, ImageMetadata& out) {
 /// The first directory; of BigTIFF too, whose counts and offsets have eight bytes.
 class Tiff {
  public:
-  explicit Tiff(Bytes bytes) : bytes_(bytes), little_(begins(bytes, "II")) {
+  explicit Tiff(ByteSpan bytes) : bytes_(bytes), little_(begins(bytes, "II")) {
     constexpr std::uint64_t kClassic = 42, kBig = 43;
     if (bytes.size() < 16 || !(little_ || begins(bytes, "MM"))) return;
     const std::uint64_t magic = number(2, 2);
@@ -80,25 +80,25 @@ class Tiff {
     return static_cast<std::uint32_t>(number(entry + (big_ ? 12 : 8), 2));
   }
   /// Of an entry with so many bytes that they stand elsewhere.
-  Bytes far_value(std::size_t entry) const {
+  ByteSpan far_value(std::size_t entry) const {
     return big_ ? part(bytes_, number(entry + 12, 8), number(entry + 4, 8))
                 : part(bytes_, number(entry + 8, 4), number(entry + 4, 4));
   }
 
  private:
   std::uint64_t number(std::size_t at, std::size_t count) const {
-    const Bytes b = part(bytes_, at, count);
+    const ByteSpan b = part(bytes_, at, count);
     std::uint64_t x = 0;
     for (std::size_t i = 0; i < b.size(); ++i) x = x << 8 | b[little_ ? b.size() - 1 - i : i];
     return x;
   }
 
-  Bytes bytes_;
+  ByteSpan bytes_;
   bool little_, big_ = false;
   std::size_t directory_ = 0;
 };
 
-void read_orientation(Bytes tiff_bytes, ImageMetadata& out) {
+void read_orientation(ByteSpan tiff_bytes, ImageMetadata& out) {
   constexpr std::uint32_t kOrientation = 0x112;
   const Tiff tiff(tiff_bytes);
   const std::size_t at = tiff.entry(kOrientation);
@@ -107,7 +107,7 @@ void read_orientation(Bytes tiff_bytes, ImageMetadata& out) {
   if (value >= 1 && value <= 8) out.orientation = static_cast<int>(value);
 }
 
-void read_exif(Bytes exif, ImageMetadata& out) {
+void read_exif(ByteSpan exif, ImageMetadata& out) {
   constexpr std::string_view kHeader("Exif\0\0", 6);
   read_orientation(begins(exif, kHeader) ? exif.subspan(kHeader.size()) : exif, out);
 }
@@ -138,7 +138,7 @@ std::string foreign_name(std::uint32_t photometric) {
   }
 }
 
-void read_tiff(Bytes bytes, ImageMetadata& out) {
+void read_tiff(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::uint32_t kProfile = 34675, kPhotometric = 262, kSeparated = 5;
   read_orientation(bytes, out);
   const Tiff tiff(bytes);
@@ -155,9 +155,9 @@ void read_tiff(Bytes bytes, ImageMetadata& out) {
 
 // --- JPEG ----------------------------------------------------------------------------------------------
 
-void read_jpeg(Bytes bytes, ImageMetadata& out) {
+void read_jpeg(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::string_view kIcc("ICC_PROFILE\0", 12);
-  std::map<std::uint8_t, Bytes> profile;  // its pieces by number, from 1
+  std::map<std::uint8_t, ByteSpan> profile;  // its pieces by number, from 1
   std::uint8_t pieces = 0;
   for (std::size_t at = 2; at + 4 <= bytes.size() && bytes[at] == 0xff;) {
     const std::uint8_t marker = bytes[at + 1];
@@ -168,7 +168,7 @@ void read_jpeg(Bytes bytes, ImageMetadata& out) {
     if (marker == 0xda) break;  // the pixels
     const std::size_t length = big(bytes.subspan(at + 2, 2));
     if (length < 2) break;
-    const Bytes body = part(bytes, at + 4, length - 2);
+    const ByteSpan body = part(bytes, at + 4, length - 2);
     if (marker == 0xe1 && begins(body, "Exif")) read_exif(body, out);
     if (marker == 0xe2 && begins(body, kIcc)) {
       out.damaged_profile = true;  // until all pieces are there
@@ -191,7 +191,7 @@ void read_jpeg(Bytes bytes, ImageMetadata& out) {
 
 // --- PNG -----------------------------------------------------------------------------------------------
 
-std::vector<std::uint8_t> inflate_profile(Bytes body) {
+std::vector<std::uint8_t> inflate_profile(ByteSpan body) {
   const auto name_end = std::find(body.begin(), body.end(), std::uint8_t{0});
   const std::size_t begin = static_cast<std::size_t>(name_end - body.begin()) + 2;  // and the method
   if (begin >= body.size()) return {};
@@ -208,19 +208,19 @@ std::vector<std::uint8_t> inflate_profile(Bytes body) {
   return {};
 }
 
-bool srgb_primaries(Bytes chrm) {
+bool srgb_primaries(ByteSpan chrm) {
   constexpr double kSrgb[8] = {0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
   for (std::size_t i = 0; i < 8; ++i)
     if (std::fabs(big(chrm.subspan(4 * i, 4)) / 1e5 - kSrgb[i]) > 0.005) return false;
   return true;
 }
 
-void read_png(Bytes bytes, ImageMetadata& out) {
+void read_png(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::uint32_t kSrgbGamma = 45455, kNear = 1000;
   bool srgb = false;
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
     const std::size_t length = big(bytes.subspan(at, 4));
-    const Bytes type = bytes.subspan(at + 4, 4), body = part(bytes, at + 8, length);
+    const ByteSpan type = bytes.subspan(at + 4, 4), body = part(bytes, at + 8, length);
     if (body.size() != length && begins(type, "iCCP")) out.damaged_profile = true;
     if (body.size() != length || begins(type, "IDAT") || begins(type, "IEND")) break;
     if (begins(type, "sRGB")) srgb = true;
@@ -240,10 +240,10 @@ void read_png(Bytes bytes, ImageMetadata& out) {
 
 // --- WebP ----------------------------------------------------------------------------------------------
 
-void read_webp(Bytes bytes, ImageMetadata& out) {
+void read_webp(ByteSpan bytes, ImageMetadata& out) {
   for (std::size_t at = 12; at + 8 <= bytes.size();) {
     const std::size_t length = little(bytes.subspan(at + 4, 4));
-    const Bytes type = bytes.subspan(at, 4), body = part(bytes, at + 8, length);
+    const ByteSpan type = bytes.subspan(at, 4), body = part(bytes, at + 8, length);
     if (begins(type, "ICCP")) take_profile(body, out);
     if (body.size() != length) break;
     if (begins(type, "EXIF")) read_exif(body, out);
@@ -254,7 +254,7 @@ void read_webp(Bytes bytes, ImageMetadata& out) {
 // --- EXR -----------------------------------------------------------------------------------------------
 
 /// Text up to a zero byte, which `at` is then behind; nothing where there is none within EXR's 255.
-std::string_view exr_text(Bytes bytes, std::size_t& at) {
+std::string_view exr_text(ByteSpan bytes, std::size_t& at) {
   const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
   const auto end = std::find(begin, begin + std::min<std::ptrdiff_t>(256, bytes.end() - begin), 0);
   if (end == bytes.end() || *end != 0) return {};
@@ -263,7 +263,7 @@ std::string_view exr_text(Bytes bytes, std::size_t& at) {
           static_cast<std::size_t>(end - begin)};
 }
 
-bool rec709_primaries(Bytes chromaticities) {
+bool rec709_primaries(ByteSpan chromaticities) {
   constexpr float kRec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
   for (std::size_t i = 0; i < 8; ++i)
     if (!(std::fabs(std::bit_cast<float>(little(chromaticities.subspan(4 * i, 4))) - kRec709[i]) <= 0.005f))
@@ -271,14 +271,14 @@ bool rec709_primaries(Bytes chromaticities) {
   return true;
 }
 
-void read_exr(Bytes bytes, ImageMetadata& out) {
+void read_exr(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::uint32_t kParts = 0x1000;
   out.more_pictures = little(part(bytes, 4, 4)) & kParts;
   for (std::size_t at = 8;;) {
     const std::string_view name = exr_text(bytes, at), type = exr_text(bytes, at);
-    const Bytes size = part(bytes, at, 4);
+    const ByteSpan size = part(bytes, at, 4);
     if (name.empty() || type.empty() || size.empty()) return;
-    const Bytes value = part(bytes, at + 4, little(size));
+    const ByteSpan value = part(bytes, at + 4, little(size));
     if (name == "chromaticities" && type == name && value.size() == 32)
       out.other_primaries = !rec709_primaries(value);
     at += 4 + std::size_t{little(size)};

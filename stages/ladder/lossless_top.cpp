@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "format/base/bytes.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
@@ -15,7 +16,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
 using Component = JpegCoefficients::Component;
 
 constexpr unsigned kMostDcBits = 11, kMostAcBits = 10;  // of baseline JPEG (ISO/IEC 10918-1, F.1.2)

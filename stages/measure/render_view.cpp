@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffff;
 constexpr int kOversampling = 2;
 constexpr float kBackground = 0.2f;  // linear: a mid grey, so that neither bright nor dark rims are favoured
 constexpr double kAmbient = 0.3;
@@ -26,7 +26,7 @@ double edge(const Projected& a, const Projected& b, double x, double y) {
 // them.
 std::vector<std::uint32_t> rasterise(const std::vector<Projected>& points, const Mesh& mesh,
                                      const std::vector<Triangle>& triangles, std::uint32_t side) {
-  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(side) * side, kNone);
+  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(side) * side, kNoIndex);
   std::vector<double> depth(nearest.size(), -1e300);
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const Projected &a = points[mesh.wedge_position[triangles[t][0]]],
@@ -229,11 +229,11 @@ ViewBuffer look_at(const ViewScene& scene, const ViewCamera& camera, std::uint32
   out.side_px = side_px;
   out.hits.assign(static_cast<std::size_t>(side_px) * side_px, 0);
   TriangleShade shade;
-  std::uint32_t shaded = kNone;
+  std::uint32_t shaded = kNoIndex;
   for (std::uint32_t y = 0; y < side; ++y)
     for (std::uint32_t x = 0; x < side; ++x) {
       const std::uint32_t t = nearest[static_cast<std::size_t>(y) * side + x];
-      if (t == kNone) continue;
+      if (t == kNoIndex) continue;
       const Triangle& triangle = (*scene.triangles)[t];
       const Projected &a = points[scene.mesh->wedge_position[triangle[0]]],
                       &b = points[scene.mesh->wedge_position[triangle[1]]],

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
 #include "format/documents/viewing.h"
@@ -11,8 +12,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
   throw StageError("package", place, expected, found);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
@@ -75,13 +76,12 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
-constexpr std::uint32_t kNoTriangle = 0xffffffffu;
 /// A chain of hints begins anew with every so many samples, wherever the threads' pieces begin.
 constexpr std::size_t kHintChain = 64;
 
 /// Per triangle of S_0: the triangle of this scale that it has become.
 std::vector<std::uint32_t> triangle_of_source(const NestedScale& scale, std::size_t source_count) {
-  std::vector<std::uint32_t> of(source_count, kNoTriangle);
+  std::vector<std::uint32_t> of(source_count, kNoIndex);
   for (std::size_t t = 0; t < scale.triangles.size(); ++t)
     of[scale.triangle_source[t]] = static_cast<std::uint32_t>(t);
   return of;
@@ -101,7 +101,7 @@ class ScaleComparison {
     for (std::size_t s = 0; s < distance.size(); ++s) {
       if (s % kHintChain == 0) hint = {};
       const std::uint32_t own = of_source_[sampled.source[s]];
-      if (own != kNoTriangle) hint = surface_.hint_of(own);
+      if (own != kNoIndex) hint = surface_.hint_of(own);
       distance[s] = surface_(sampled.points[s], hint);
     }
     return distance;

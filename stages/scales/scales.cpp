@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "format/base/no_index.h"
 #include "format/split/split_stream.h"
 #include "stages/base/parallel.h"
 #include "stages/scales/scale_codecs.h"
@@ -82,22 +83,21 @@ bool parts_merged(const Mesh& mesh) { return mesh.part_names.size() > kMostNodes
 /// two.
 void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
                    std::vector<std::uint32_t>& index) {
-  constexpr std::uint32_t kNone = 0xffffffffu;
   std::map<std::pair<std::uint32_t, std::uint16_t>, std::uint32_t> shared;
   for (std::size_t i = 0; i < p.indices.size(); ++i) {
     const std::uint32_t wedge = p.indices[i];
     const std::uint16_t of = part.empty() ? std::uint16_t{0} : part[i / 3];
     std::uint32_t* at = &index[wedge];
-    if (*at != kNone && !part.empty() && p.wedge_part[*at] != of)
-      at = &shared.try_emplace({wedge, of}, kNone).first->second;
-    if (*at == kNone) {
+    if (*at != kNoIndex && !part.empty() && p.wedge_part[*at] != of)
+      at = &shared.try_emplace({wedge, of}, kNoIndex).first->second;
+    if (*at == kNoIndex) {
       *at = static_cast<std::uint32_t>(p.wedges.size());
       p.wedges.push_back(wedge);
       if (!part.empty()) p.wedge_part.push_back(of);
     }
     p.indices[i] = *at;
   }
-  for (std::uint32_t w : p.wedges) index[w] = kNone;
+  for (std::uint32_t w : p.wedges) index[w] = kNoIndex;
 }
 
 /// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
@@ -122,7 +122,7 @@ std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale
     if (merged) parts.push_back(part);
   }
   std::vector<ScalePrimitive> out;
-  std::vector<std::uint32_t> index(mesh.wedge_count(), 0xffffffffu);
+  std::vector<std::uint32_t> index(mesh.wedge_count(), kNoIndex);
   for (auto& [key, value] : primitives) {
     number_wedges(value.first, value.second, index);
     out.push_back(std::move(value.first));

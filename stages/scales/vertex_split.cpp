@@ -6,11 +6,10 @@
 #include <numeric>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 
 namespace texmesh {
 namespace {
-
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 [[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
   throw StageError("scales", place, expected, found);
@@ -138,8 +137,8 @@ class RoundedMesh {
 /// Who has used a point since, for the order of splits: a collapse uses its two points alone, the points
 /// around shared.
 struct PointUse {
-  std::uint32_t alone = kNone;   // last collapse that had it alone
-  std::uint32_t shared = kNone;  // head of a list of those that shared it since
+  std::uint32_t alone = kNoIndex;   // last collapse that had it alone
+  std::uint32_t shared = kNoIndex;  // head of a list of those that shared it since
 };
 
 /// Replays the collapses from fine to coarse on faces of wedges, recording what each did.
@@ -148,7 +147,7 @@ class CollapseReplay {
   CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
       : scales_(scales),
         rounded_(rounded),
-        head_(rounded.points(), kNone),
+        head_(rounded.points(), kNoIndex),
         use_(rounded.points()),
         mark_(rounded.points(), 0) {
     const auto& triangles = scales.mesh.triangles;
@@ -176,9 +175,9 @@ class CollapseReplay {
     note_final(coarse);
     for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
       const Collapse& collapse = scales_.collapses.at(c);
-      if (collapse.to == kNone || collapse.from == collapse.to) continue;
+      if (collapse.to == kNoIndex || collapse.from == collapse.to) continue;
       const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
-      if (u != v && head_[u] != kNone) replay(u, v);
+      if (u != v && head_[u] != kNoIndex) replay(u, v);
     }
     take_leftovers();
     reverse(chapter);
@@ -210,7 +209,7 @@ class CollapseReplay {
 
   /// Wedges of the faces that the coarse scale has.
   void note_final(const NestedScale& coarse) {
-    std::fill(final_.begin(), final_.end(), std::array{kNone, kNone, kNone});
+    std::fill(final_.begin(), final_.end(), std::array{kNoIndex, kNoIndex, kNoIndex});
     for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
         final_[coarse.triangle_source[i]][k] = rounded_.wedge(coarse.triangles[i][k]);
@@ -227,7 +226,7 @@ class CollapseReplay {
     ring_.clear();
     corners_.clear();
     map_.clear();
-    for (std::uint32_t c = head_[u]; c != kNone; c = next_[c]) corners_.push_back(c);
+    for (std::uint32_t c = head_[u]; c != kNoIndex; c = next_[c]) corners_.push_back(c);
     for (std::uint32_t c : corners_) {
       const std::uint32_t f = c / 3, k = c % 3, a = point(f, k + 1), b = point(f, k + 2);
       ring_.push_back(a);
@@ -245,11 +244,11 @@ class CollapseReplay {
       } else {
         chapter_->moves.push_back({f, faces_[f][k]});
         const std::uint32_t last = final_[f][k];
-        const bool stays = last != kNone && rounded_.point_of(last) == v;
+        const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
         faces_[f][k] = stays ? last : target(faces_[f][k], group(f), v);
       }
     }
-    head_[u] = kNone;
+    head_[u] = kNoIndex;
     for (std::uint32_t i = split.move_begin; i < chapter_->moves.size(); ++i) {
       const std::uint32_t f = chapter_->moves[i].face;
       for (std::uint32_t k = 0; k < 3; ++k)
@@ -277,12 +276,12 @@ class CollapseReplay {
   /// Notes which earlier collapses this one comes after.
   void order(std::uint32_t number, std::uint32_t u, std::uint32_t v) {
     auto after = [&](std::uint32_t earlier) {
-      if (earlier != kNone) chapter_->before.push_back({number, earlier});
+      if (earlier != kNoIndex) chapter_->before.push_back({number, earlier});
     };
     for (std::uint32_t p : {u, v}) {
       after(use_[p].alone);
-      for (std::uint32_t s = use_[p].shared; s != kNone; s = shares_[s].next) after(shares_[s].collapse);
-      use_[p] = {number, kNone};
+      for (std::uint32_t s = use_[p].shared; s != kNoIndex; s = shares_[s].next) after(shares_[s].collapse);
+      use_[p] = {number, kNoIndex};
     }
     ++now_;
     mark_[u] = mark_[v] = now_;
@@ -299,7 +298,7 @@ class CollapseReplay {
   void take_leftovers() {
     for (std::uint32_t f = 0; f < faces_.size(); ++f) {
       if (!alive_[f]) continue;
-      if (final_[f][0] == kNone) {
+      if (final_[f][0] == kNoIndex) {
         chapter_->patch.push_back({f, faces_[f]});
         for (std::uint32_t k = 0; k < 3; ++k) unlink(3 * f + k);
         alive_[f] = false;

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "stages/base/run_context.h"
 #include "stages/simplification/collapse_components.h"
 #include "stages/simplification/collapse_cost.h"
@@ -35,7 +36,7 @@ class CollapseEngine {
   const std::vector<Collapse>& collapses() const { return collapses_; }
 
  private:
-  static constexpr std::uint32_t kNone = CollapseMesh::kNone;
+  static constexpr std::uint32_t kNone = kNoIndex;
   using Neighbour = CollapseRing::Neighbour;
   /// What a look at a point's ring found.
   struct Choice {

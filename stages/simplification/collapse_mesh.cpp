@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 
+#include "format/base/no_index.h"
 #include "stages/geometry/morton.h"
 
 namespace texmesh {
@@ -47,7 +48,7 @@ void CollapseMesh::number_points(const ConditionedMesh& input,
     if (input.twin[p] == p) order.emplace_back(curve_code(local(p)), static_cast<std::uint32_t>(p));
   std::sort(order.begin(), order.end());
 
-  point_of_position.assign(n, kNone);
+  point_of_position.assign(n, kNoIndex);
   points_.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     points_[i] = local(order[i].second);
@@ -92,7 +93,7 @@ void CollapseMesh::add_faces(const Mesh& mesh, const std::vector<std::uint32_t>&
 
 void CollapseMesh::number_wedges(const Mesh& mesh) {
   input_wedges_ = static_cast<std::uint32_t>(mesh.wedge_count());
-  std::vector<std::uint32_t> first(input_wedges_, kNone), group(input_wedges_, 0);
+  std::vector<std::uint32_t> first(input_wedges_, kNoIndex), group(input_wedges_, 0);
   std::map<std::array<std::uint32_t, 2>, std::uint32_t>
       others;  // wedges that more than one material or part uses
   for (std::size_t f = 0; f < faces_.size(); ++f) {
@@ -100,8 +101,8 @@ void CollapseMesh::number_wedges(const Mesh& mesh) {
     const std::uint32_t use = std::uint32_t{mesh.triangle_material[t]} << 16 | mesh.triangle_part[t];
     for (std::uint32_t& wedge : faces_[f].wedge) {
       const std::uint32_t real = wedge;
-      std::uint32_t id = kNone;
-      if (first[real] == kNone) {
+      std::uint32_t id = kNoIndex;
+      if (first[real] == kNoIndex) {
         id = first[real] = wedge_count();
         group[real] = use;
       } else if (group[real] == use) {
@@ -171,7 +172,7 @@ std::uint32_t CollapseMesh::add_wedge(std::uint32_t wedge, std::uint32_t positio
 }
 
 void CollapseMesh::remove_face(std::uint32_t face, std::uint32_t except_point) {
-  faces_[face].wedge[0] = kNone;
+  faces_[face].wedge[0] = kNoIndex;
   --alive_faces_;
   for (std::uint32_t k = 0; k < 3; ++k) {
     const std::uint32_t p = faces_[face].point[k];
@@ -203,7 +204,7 @@ void CollapseMesh::remove(std::span<const std::uint32_t> points) {
     for (std::uint32_t i = 0; i < list.count; ++i) {
       Face& face = faces_[pool_[list.begin + i] / 4];
       if (!face.alive()) continue;
-      face.wedge[0] = kNone;
+      face.wedge[0] = kNoIndex;
       --alive_faces_;
     }
   }

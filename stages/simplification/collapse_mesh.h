@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "format/base/vec.h"
 #include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
@@ -16,10 +17,9 @@ namespace texmesh {
 /// fast than in file order.
 class CollapseMesh {
  public:
-  static constexpr std::uint32_t kNone = 0xffffffffu;
   struct Face {
     std::uint32_t wedge[3], point[3];
-    bool alive() const { return wedge[0] != kNone; }
+    bool alive() const { return wedge[0] != kNoIndex; }
   };
   /// A wedge record that did not exist in the input: a relaxed junction's chart wedge at another position.
   struct NewWedge {

@@ -1,4 +1,5 @@
 #include "stages/simplification/collapse_queue.h"
+#include "format/base/no_index.h"
 
 #include <algorithm>
 
@@ -16,7 +17,7 @@ void CollapseQueue::order() {
 
 void CollapseQueue::set(std::uint32_t item, double key) {
   const std::uint32_t i = at_[item];
-  if (i == kOut) {
+  if (i == kNoIndex) {
     append(item, key);
     sift_up(heap_.size() - 1);
     return;
@@ -31,8 +32,8 @@ void CollapseQueue::set(std::uint32_t item, double key) {
 
 void CollapseQueue::erase(std::uint32_t item) {
   const std::uint32_t i = at_[item];
-  if (i == kOut) return;
-  at_[item] = kOut;
+  if (i == kNoIndex) return;
+  at_[item] = kNoIndex;
   const Entry last = heap_.back();
   heap_.pop_back();
   if (last.item == item) return;

@@ -3,19 +3,21 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
+
 namespace texmesh {
 
 /// 4-ary heap of items with changeable keys; equal keys come out by rising item number. The keys stand in the
 /// heap itself, so that a sift touches no other memory but the places it writes.
 class CollapseQueue {
  public:
-  explicit CollapseQueue(std::size_t items) : at_(items, kOut) {}
+  explicit CollapseQueue(std::size_t items) : at_(items, kNoIndex) {}
   bool empty() const { return heap_.empty(); }
   std::uint32_t top() const { return heap_[0].item; }
   /// The heap itself: what comes out after top() is among items 1 to 4, what comes next among 1 to 20.
   std::size_t size() const { return heap_.size(); }
   std::uint32_t item(std::size_t i) const { return heap_[i].item; }
-  bool contains(std::uint32_t item) const { return at_[item] != kOut; }
+  bool contains(std::uint32_t item) const { return at_[item] != kNoIndex; }
   double key(std::uint32_t item) const { return heap_[at_[item]].key; }  // of one that it contains
   bool less(std::size_t i, std::size_t j) const { return heap_[i] < heap_[j]; }
   /// For an empty queue: all items at once, in linear time; call order() behind the last.
@@ -25,7 +27,6 @@ class CollapseQueue {
   void erase(std::uint32_t item);
 
  private:
-  static constexpr std::uint32_t kOut = 0xffffffffu;
   struct Entry {
     double key;
     std::uint32_t item;

@@ -1,4 +1,5 @@
 #include "stages/simplification/collapse_ring.h"
+#include "format/base/no_index.h"
 
 #include <algorithm>
 
@@ -44,10 +45,10 @@ void CollapseRing::gather(std::uint32_t u) {
     meet(a, face.wedge[next]);
     meet(b, face.wedge[last]);
   }
-  usual_valence_ = 0xffffffffu;
+  usual_valence_ = kNoIndex;
   for (const Neighbour& n : neighbours_)
     if (n.valence % 2 == 0) usual_valence_ = std::min(usual_valence_, n.valence);
-  if (usual_valence_ == 0xffffffffu) usual_valence_ = 2;
+  if (usual_valence_ == kNoIndex) usual_valence_ = 2;
   odd_edges_ = odd_valence_ = 0;
   odd_mixed_ = false;
   for (const Neighbour& n : neighbours_)

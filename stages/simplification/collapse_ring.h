@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "stages/simplification/collapse_mesh.h"
 
 namespace texmesh {
@@ -12,7 +13,7 @@ namespace texmesh {
 /// every point; one per thread.
 class CollapseRing {
  public:
-  static constexpr std::uint32_t kNone = CollapseMesh::kNone;
+  static constexpr std::uint32_t kNone = kNoIndex;
   static constexpr std::uint32_t kMaxValence = 4;  // faces at an edge; an edge with more locks
   struct Pair {
     std::uint32_t from = 0, to = 0;

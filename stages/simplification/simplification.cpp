@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/simplification/collapse_engine.h"
 #include "stages/simplification/scale_error.h"
@@ -83,13 +84,13 @@ NestedScale take_scale(CollapseEngine& engine, int scale, std::string reason) {
 /// triangles.
 void append_new_wedges(const CollapseMesh& engine, Mesh& mesh, std::vector<NestedScale>& scales) {
   const auto old_count = static_cast<std::uint32_t>(mesh.wedge_count());
-  std::vector<std::uint32_t> index(engine.new_wedges().size(), 0xffffffffu);
+  std::vector<std::uint32_t> index(engine.new_wedges().size(), kNoIndex);
   for (NestedScale& scale : scales)
     for (Triangle& t : scale.triangles)
       for (std::uint32_t& w : t) {
         if (w < old_count) continue;
         std::uint32_t& id = index[w - old_count];
-        if (id == 0xffffffffu) {
+        if (id == kNoIndex) {
           const CollapseMesh::NewWedge& wedge = engine.new_wedges()[w - old_count];
           id = static_cast<std::uint32_t>(mesh.wedge_count());
           mesh.wedge_position.push_back(wedge.position);

@@ -17,6 +17,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "format/base/no_index.h"
 #include "stages/geometry/triangle_tree.h"
 
 namespace texmesh {
@@ -129,13 +130,13 @@ void decimate(SurfaceMesh& wrap, std::size_t max_faces) {
 std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
   const PartMap part = wrap.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part", 0).first;
   std::vector<TriangleSoup> parts(CGAL::Polygon_mesh_processing::connected_components(wrap, part));
-  std::vector<std::uint32_t> number(wrap.number_of_vertices(), 0xffffffffu);
+  std::vector<std::uint32_t> number(wrap.number_of_vertices(), kNoIndex);
   for (const auto face : wrap.faces()) {
     TriangleSoup& to = parts[part[face]];
     Triangle triangle{};
     std::size_t k = 0;
     for (const auto v : wrap.vertices_around_face(wrap.halfedge(face))) {
-      if (number[v] == 0xffffffffu) {
+      if (number[v] == kNoIndex) {
         number[v] = static_cast<std::uint32_t>(to.points.size());
         to.points.push_back({wrap.point(v).x(), wrap.point(v).y(), wrap.point(v).z()});
       }

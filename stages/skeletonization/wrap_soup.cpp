@@ -1,4 +1,5 @@
 #include "stages/skeletonization/wrap_soup.h"
+#include "format/base/no_index.h"
 
 #include <meshoptimizer.h>
 
@@ -11,7 +12,6 @@ namespace {
 
 constexpr std::size_t kMaxSoup = 100000;
 constexpr double kMaxCap = 0.25;  // area of a fan that closes a hole, of its component's area
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 /// Points and triangles that are still being gathered.
 struct Gathered {
@@ -24,8 +24,8 @@ double twice_area(const Gathered& g, std::size_t i) {
   return length(cross(g.points[g.indices[i + 1]] - a, g.points[g.indices[i + 2]] - a));
 }
 
-/// Per position: the next one along the border that leaves it, kNone inside. A conditioned position has one
-/// fan of triangles, so at most one border edge leaves it.
+/// Per position: the next one along the border that leaves it, kNoIndex inside. A conditioned position has
+/// one fan of triangles, so at most one border edge leaves it.
 std::vector<std::uint32_t> border_of(const Mesh& mesh) {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> edges;  // undirected key, directed key
   edges.reserve(3 * mesh.triangles.size());
@@ -35,7 +35,7 @@ std::vector<std::uint32_t> border_of(const Mesh& mesh) {
       edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), a << 32 | b);
     }
   std::sort(edges.begin(), edges.end());
-  std::vector<std::uint32_t> next(mesh.positions.size(), kNone);
+  std::vector<std::uint32_t> next(mesh.positions.size(), kNoIndex);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const bool alone = (i == 0 || edges[i - 1].first != edges[i].first) &&
                        (i + 1 == edges.size() || edges[i + 1].first != edges[i].first);
@@ -67,9 +67,9 @@ void close_holes(const ConditionedMesh& mesh, Gathered& g) {
     area[mesh.component[g.indices[i]]] += twice_area(g, i);
   for (std::uint32_t start = 0; start < next.size(); ++start) {
     std::vector<std::uint32_t> loop;
-    for (std::uint32_t p = start; next[p] != kNone;) {
+    for (std::uint32_t p = start; next[p] != kNoIndex;) {
       loop.push_back(p);
-      p = std::exchange(next[p], kNone);
+      p = std::exchange(next[p], kNoIndex);
     }
     if (loop.size() > 2) close_hole(loop, area[mesh.component[start]], g);
   }
@@ -91,13 +91,13 @@ void thin_out(Gathered& g) {
 /// Points that no triangle uses are left out: the wrap's search tree would take them in.
 TriangleSoup used_part(const Gathered& g) {
   TriangleSoup soup;
-  std::vector<std::uint32_t> number(g.points.size(), kNone);
+  std::vector<std::uint32_t> number(g.points.size(), kNoIndex);
   for (std::size_t i = 0; i + 2 < g.indices.size(); i += 3) {
     if (!(twice_area(g, i) > 0)) continue;
     Triangle t{};
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& n = number[g.indices[i + k]];
-      if (n == kNone) {
+      if (n == kNoIndex) {
         n = static_cast<std::uint32_t>(soup.points.size());
         soup.points.push_back(g.points[g.indices[i + k]]);
       }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/ssf/heat_levels.h"
@@ -99,7 +100,7 @@ class FeatureFinder {
   /// In the order of the vertices, each keeps what is near from counting.
   void thin_out(std::vector<std::uint8_t>& found, std::uint8_t kind, double apart) const {
     const HeatOperator& graph = level_.laplacian;
-    std::vector<std::uint32_t> seen_from(found.size(), 0xffffffffu), near;
+    std::vector<std::uint32_t> seen_from(found.size(), kNoIndex), near;
     for (std::uint32_t v = 0; v < found.size(); ++v) {
       if (!(found[v] & kind)) continue;
       near.assign(1, v);

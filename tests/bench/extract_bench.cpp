@@ -19,6 +19,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "format/base/bytes.h"
 #include "pipeline/extract/budget/picture_meter.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/import/import.h"
@@ -29,8 +30,6 @@ namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-using Bytes = std::vector<std::uint8_t>;
-
 Bytes read_bytes(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};

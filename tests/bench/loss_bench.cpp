@@ -8,13 +8,12 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "delivery/cpp/simulate/simulation.h"
+#include "format/base/bytes.h"
 #include "format/container/layout.h"
 
 namespace {
 
 using namespace texmesh;  // NOLINT: a program's main file
-using Bytes = std::vector<std::uint8_t>;
-
 enum class Way { kNeighbours, kTexture, kTextureAgain };
 
 /// Distances in places of the grid.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 #include "tests/format/documents/manifest_fixture.h"
@@ -15,7 +16,6 @@
 namespace texmesh::fuzz {
 namespace detail {
 
-using Bytes = std::vector<std::uint8_t>;
 using Input = std::span<const std::uint8_t>;
 using texmesh::testing::as_bytes;
 

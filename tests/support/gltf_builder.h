@@ -7,12 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh::testing {
-
-using Bytes = std::vector<std::uint8_t>;
 
 template <class T>
 void append(Bytes& out, const T& value) {

@@ -3,12 +3,11 @@
 #include <string>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
 
 namespace texmesh::testing {
-
-using Bytes = std::vector<std::uint8_t>;
 
 inline Bytes bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
 

@@ -5,13 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "format/documents/manifest.h"
 #include "format/documents/tables.h"
 #include "format/model/model.h"
 
 namespace texmesh::testing {
-
-using Bytes = std::vector<std::uint8_t>;
 
 /// A GLB file in its two parts, so that tests can break either.
 struct GlbParts {

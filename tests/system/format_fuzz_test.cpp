@@ -4,12 +4,11 @@
 
 #include <algorithm>
 
+#include "format/base/bytes.h"
 #include "tests/fuzz/format_fuzz.h"
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 struct Random {
   std::uint64_t state;

@@ -1,4 +1,5 @@
 #include "delivery/cpp/client/texture_loader.h"
+#include "format/base/bytes.h"
 
 #include <algorithm>
 #include <map>
@@ -6,8 +7,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 // As delivery/web/src/groups.ts.
 constexpr double kLeastRequest_s = 0.006;  // a request is worth at least so much of the link

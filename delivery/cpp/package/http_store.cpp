@@ -5,13 +5,12 @@
 #include <map>
 #include <thread>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr int kConnections = 6;                 // as browsers have
 constexpr double kHeadStart_s = 0.5;            // of a mirror before the next is asked

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <numeric>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 std::string plane_place(std::size_t plane) { return "texture plane " + std::to_string(plane); }
 

@@ -10,6 +10,7 @@
 
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 
@@ -17,8 +18,6 @@ namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr std::uint64_t kManifestOffset = 64;  // of its data: the header always has the same length (SPEC.md)
 
 void require_range(const std::string& file, const EntryRef& entry, std::uint64_t offset,

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/import/import.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr int kViews = 5;
 constexpr double kDefaultDisplayPx = 512;

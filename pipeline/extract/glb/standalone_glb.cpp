@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "format/base/bounded_json.h"
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/glb_writer.h"
@@ -13,8 +14,6 @@ namespace texmesh {
 namespace {
 
 using Json = StandaloneGlb::Json;
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
 constexpr const char* kWebp = "EXT_texture_webp";

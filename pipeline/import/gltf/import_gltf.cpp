@@ -284,7 +284,7 @@ class PrimitiveCache {
 
 class Reader {
  public:
-  Reader(const Source& source, Bytes bytes, Model& model)
+  Reader(const Source& source, ByteSpan bytes, Model& model)
       : source_(source),
         container_(split_container(source, bytes)),
         document_(checked(source, container_)),

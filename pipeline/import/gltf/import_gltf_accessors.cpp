@@ -54,7 +54,7 @@ float load_float(const std::uint8_t* at, int type, bool normalized) {
 }
 
 /// Checks that `count` elements of `element_bytes`, `stride` apart, lie within a view.
-void check_extent(const Source& source, const std::string& place, Bytes view, std::uint64_t offset,
+void check_extent(const Source& source, const std::string& place, ByteSpan view, std::uint64_t offset,
                   std::uint64_t count, std::uint64_t stride, std::uint64_t element_bytes) {
   if (count == 0) return;
   const std::uint64_t room = view.size() < offset ? 0 : view.size() - offset;
@@ -85,7 +85,7 @@ AccessorReader::AccessorReader(const Source& source, const tinygltf::Model& mode
   stride_ = element_bytes;
   if (a.bufferView >= 0) {
     const auto view_index = static_cast<std::size_t>(a.bufferView);
-    const Bytes view = buffers.view(view_index, place);
+    const ByteSpan view = buffers.view(view_index, place);
     const std::size_t declared = model.bufferViews[view_index].byteStride;
     if (declared != 0 && declared < element_bytes) {
       source.fail("/bufferViews/" + std::to_string(view_index) + "/byteStride",
@@ -101,8 +101,8 @@ AccessorReader::AccessorReader(const Source& source, const tinygltf::Model& mode
   const auto n = static_cast<std::size_t>(a.sparse.count);
   if (n > count_)
     source.fail(sparse_place + "/count", "at most " + std::to_string(count_), std::to_string(n));
-  const Bytes indices = buffers.view(static_cast<std::size_t>(a.sparse.indices.bufferView), sparse_place);
-  const Bytes values = buffers.view(static_cast<std::size_t>(a.sparse.values.bufferView), sparse_place);
+  const ByteSpan indices = buffers.view(static_cast<std::size_t>(a.sparse.indices.bufferView), sparse_place);
+  const ByteSpan values = buffers.view(static_cast<std::size_t>(a.sparse.values.bufferView), sparse_place);
   const int type = a.sparse.indices.componentType;
   const auto index_bytes =
       static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type)));

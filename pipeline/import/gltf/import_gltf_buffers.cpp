@@ -36,18 +36,18 @@ MeshoptFilter filter_of(const std::string& name) {
 
 }  // namespace
 
-Buffers::Buffers(const Source& source, const Json& document, std::optional<Bytes> bin)
+Buffers::Buffers(const Source& source, const Json& document, std::optional<ByteSpan> bin)
     : source_(source), document_(document), bin_(bin) {
   if (const auto it = document_.find("buffers"); it != document_.end()) buffers_.resize(it->size());
   if (const auto it = document_.find("bufferViews"); it != document_.end()) views_.resize(it->size());
 }
 
-Bytes Buffers::buffer(std::size_t index) {
+ByteSpan Buffers::buffer(std::size_t index) {
   const Json& declared = document_["buffers"][index];
   const std::uint64_t length = size_of(declared, "byteLength");
   const std::string place = "/buffers/" + std::to_string(index);
   const auto max_bytes = static_cast<std::uint64_t>(source_.options.max_file_bytes);
-  Bytes bytes;
+  ByteSpan bytes;
   if (!declared.contains("uri")) {
     if (index != 0 || !bin_) source_.fail(place, "a \"uri\" or the BIN chunk of a GLB", "neither");
     bytes = *bin_;
@@ -74,9 +74,9 @@ Bytes Buffers::buffer(std::size_t index) {
   return bytes.first(length);
 }
 
-Bytes Buffers::range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length,
-                     const std::string& place) {
-  const Bytes bytes = buffer(buffer_index);
+ByteSpan Buffers::range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length,
+                        const std::string& place) {
+  const ByteSpan bytes = buffer(buffer_index);
   if (offset > bytes.size() || length > bytes.size() - offset) {
     source_.fail(place, "a range within the " + std::to_string(bytes.size()) + " bytes of its buffer",
                  std::to_string(length) + " bytes at " + std::to_string(offset));
@@ -93,13 +93,13 @@ std::vector<std::uint8_t> Buffers::decompressed(const Json& extension, const std
                  std::to_string(count) + " elements of " + std::to_string(stride) + " bytes");
   }
   decompressed_bytes_ += count * stride;
-  const Bytes data = range(extension["buffer"].get<std::size_t>(), size_of(extension, "byteOffset"),
-                           size_of(extension, "byteLength"), place);
+  const ByteSpan data = range(extension["buffer"].get<std::size_t>(), size_of(extension, "byteOffset"),
+                              size_of(extension, "byteLength"), place);
   return decode_meshopt(source_, place, data, count, stride, mode_of(string_of(extension, "mode")),
                         filter_of(string_of(extension, "filter")));
 }
 
-Bytes Buffers::view(std::size_t index, const std::string& place) {
+ByteSpan Buffers::view(std::size_t index, const std::string& place) {
   if (index >= views_.size()) source_.fail(place, "an element of /bufferViews", std::to_string(index));
   const Json& declared = document_["bufferViews"][index];
   const std::string view_place = "/bufferViews/" + std::to_string(index);

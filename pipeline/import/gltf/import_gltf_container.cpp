@@ -12,13 +12,15 @@ constexpr int kMaxDepth = 64;
 // A value costs at most a few hundred bytes in the parsers; real scans have some thousands.
 constexpr std::uint64_t kMaxValues = 8'000'000;
 
-std::uint32_t u32(Bytes bytes, std::size_t at) {
+std::uint32_t u32(ByteSpan bytes, std::size_t at) {
   std::uint32_t v = 0;
   std::memcpy(&v, bytes.data() + at, sizeof v);
   return v;
 }
 
-std::string_view text_of(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
+std::string_view text_of(ByteSpan bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 void check_brackets(const Source& source, std::string_view text) {
   std::uint64_t values = 0;
@@ -65,7 +67,7 @@ void Source::note_once(Severity severity, const std::string& code, const std::st
   notes.push_back({severity, code, place, text});
 }
 
-Container split_container(const Source& source, Bytes bytes) {
+Container split_container(const Source& source, ByteSpan bytes) {
   Container c;
   if (bytes.size() < 4 || text_of(bytes.first(4)) != "glTF") {
     c.json = text_of(bytes);
@@ -93,7 +95,7 @@ Container split_container(const Source& source, Bytes bytes) {
     if (chunk_bytes > length - at) {
       source.fail(place, "at most " + std::to_string(length - at) + " bytes", std::to_string(chunk_bytes));
     }
-    const Bytes chunk = bytes.subspan(at, chunk_bytes);
+    const ByteSpan chunk = bytes.subspan(at, chunk_bytes);
     if (!has_json) {
       if (type != kJsonChunk) source.fail(place, "a JSON chunk first", "another type");
       c.json = text_of(chunk);

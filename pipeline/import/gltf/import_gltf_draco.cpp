@@ -18,7 +18,7 @@ constexpr int kMaxMetadataDepth = 16;
 /// Reads the header of a Draco stream; past its end everything is 0 and ok() is false.
 class HeaderReader {
  public:
-  explicit HeaderReader(Bytes bytes) : bytes_(bytes) {}
+  explicit HeaderReader(ByteSpan bytes) : bytes_(bytes) {}
   bool ok() const { return ok_; }
   std::uint8_t u8() {
     if (at_ >= bytes_.size()) ok_ = false;
@@ -44,7 +44,7 @@ class HeaderReader {
   }
 
  private:
-  Bytes bytes_;
+  ByteSpan bytes_;
   std::size_t at_ = 0;
   bool ok_ = true;
 };
@@ -72,7 +72,7 @@ void skip_metadata(HeaderReader& in) {
   skip_metadata_element(in, 0);
 }
 
-void check_header(const Source& source, const std::string& place, Bytes data) {
+void check_header(const Source& source, const std::string& place, ByteSpan data) {
   HeaderReader in(data);
   for (const char c : std::string_view("DRACO")) {
     if (in.u8() != static_cast<std::uint8_t>(c)) source.fail(place, "a Draco stream", "other bytes");
@@ -100,7 +100,8 @@ void check_header(const Source& source, const std::string& place, Bytes data) {
   }
 }
 
-std::shared_ptr<const draco::Mesh> decode_mesh(const Source& source, const std::string& place, Bytes data) {
+std::shared_ptr<const draco::Mesh> decode_mesh(const Source& source, const std::string& place,
+                                               ByteSpan data) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
   try {
@@ -167,7 +168,7 @@ ReadFloats reader(std::shared_ptr<const draco::Mesh> mesh, const draco::PointAtt
 
 }  // namespace
 
-VertexData decode_draco(const Source& source, const std::string& place, Bytes data, const Json& attributes,
+VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
                         const std::function<bool(const std::string& name)>& normalized) {
   check_header(source, place, data);
   const std::shared_ptr<const draco::Mesh> mesh = decode_mesh(source, place, data);

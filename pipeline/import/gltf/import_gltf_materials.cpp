@@ -69,7 +69,7 @@ std::int32_t MaterialReader::read_image(std::size_t index) {
   std::string name = name_value && name_value->is_string() ? name_value->get<std::string>() : "";
   if (name.empty()) name = "image " + std::to_string(index);
   if (const Json* view = member(declared, "bufferView")) {
-    const Bytes bytes = buffers_.view(view->get<std::size_t>(), place);
+    const ByteSpan bytes = buffers_.view(view->get<std::size_t>(), place);
     return add_image_bytes(model_, name, {bytes.begin(), bytes.end()}, source_.file, place, source_.options);
   }
   const std::string uri = declared["uri"].get<std::string>();

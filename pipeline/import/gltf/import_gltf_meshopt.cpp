@@ -112,7 +112,7 @@ void apply_filter(std::vector<std::uint8_t>& bytes, std::uint64_t stride, Meshop
 
 }  // namespace
 
-std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, Bytes data,
+std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
                                          std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
                                          MeshoptFilter filter) {
   check_layout(source, place, count, stride, mode, filter);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "pipeline/import/import.h"
 
 namespace tinygltf {
@@ -20,8 +21,6 @@ class Model;
 namespace texmesh::gltf {
 
 using Json = nlohmann::json;
-using Bytes = std::span<const std::uint8_t>;
-
 /// What every part is given. Places in messages are JSON pointers: "/accessors/3/count".
 struct Source {
   const std::string& file;
@@ -40,11 +39,11 @@ struct Source {
 
 struct Container {
   std::string_view json;
-  std::optional<Bytes> bin;  // of a GLB
+  std::optional<ByteSpan> bin;  // of a GLB
   bool is_glb = false;
 };
 /// Header and chunk lengths of a GLB checked against the file; anything else is taken for JSON.
-Container split_container(const Source& source, Bytes bytes);
+Container split_container(const Source& source, ByteSpan bytes);
 
 /// Parses after a look at the brackets alone: at most 64 levels deep (parsers recurse) and 8 million values.
 Json parse_json(const Source& source, std::string_view text);
@@ -68,18 +67,19 @@ tinygltf::Model parse_structure(const Source& source, const Json& document);
 /// EXT_meshopt_compression undone.
 class Buffers {
  public:
-  Buffers(const Source& source, const Json& document, std::optional<Bytes> bin);
+  Buffers(const Source& source, const Json& document, std::optional<ByteSpan> bin);
   /// `place` is who asks, for messages.
-  Bytes view(std::size_t index, const std::string& place);
+  ByteSpan view(std::size_t index, const std::string& place);
 
  private:
-  Bytes buffer(std::size_t index);
-  Bytes range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length, const std::string& place);
+  ByteSpan buffer(std::size_t index);
+  ByteSpan range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length,
+                 const std::string& place);
   std::vector<std::uint8_t> decompressed(const Json& extension, const std::string& place);
 
   const Source& source_;
   const Json& document_;
-  std::optional<Bytes> bin_;
+  std::optional<ByteSpan> bin_;
   std::uint64_t decompressed_bytes_ = 0;
   std::vector<std::optional<std::vector<std::uint8_t>>> buffers_, views_;
 };
@@ -89,7 +89,7 @@ class Buffers {
 enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
 enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential };
 /// count * stride bytes. Throws InputError; allocates at most in proportion to `data`.
-std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, Bytes data,
+std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
                                          std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
                                          MeshoptFilter filter);
 
@@ -138,7 +138,7 @@ struct VertexData {
 /// KHR_draco_mesh_compression. Its counts are read from the stream's header and checked before the decoder,
 /// which allocates what a header asks for, sees it. `attributes` maps names to the stream's attribute ids;
 /// `normalized` says what the accessor of a name says.
-VertexData decode_draco(const Source& source, const std::string& place, Bytes data, const Json& attributes,
+VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
                         const std::function<bool(const std::string& name)>& normalized);
 
 // import_gltf_primitives.cpp

@@ -4,13 +4,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "format/base/no_index.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
 namespace texmesh::gltf {
 namespace {
 
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
-constexpr std::uint32_t kUnused = 0xffffffffu;
 
 struct Place {
   std::size_t mesh, primitive;
@@ -196,12 +196,12 @@ std::vector<Triangle> PrimitiveReader::triangles(const VertexData& data, int mod
 std::vector<std::uint32_t> keep_used(std::vector<Triangle>& triangles, std::size_t count) {
   std::vector<std::uint32_t> used;
   if (count <= 12 * triangles.size() + 1024) {
-    std::vector<std::uint32_t> to(count, kUnused);
+    std::vector<std::uint32_t> to(count, kNoIndex);
     for (const Triangle& t : triangles) {
       for (const std::uint32_t v : t) to[v] = 0;
     }
     for (std::uint32_t v = 0; v < count; ++v) {
-      if (to[v] == kUnused) continue;
+      if (to[v] == kNoIndex) continue;
       to[v] = static_cast<std::uint32_t>(used.size());
       used.push_back(v);
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "pipeline/io/text_table.h"
@@ -125,7 +126,7 @@ std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap&
   const std::vector<double> diagonal = component_diagonals(mesh);
   const SsfOptions usual;
   std::vector<double> value(map.persistence.begin(), map.persistence.end());
-  std::vector<std::uint32_t> seen_from(value.size(), 0xffffffffu), near;
+  std::vector<std::uint32_t> seen_from(value.size(), kNoIndex), near;
   for (std::uint32_t feature = 0; feature < value.size(); ++feature) {
     const std::uint8_t scale = map.persistence[feature];
     const double sigma =

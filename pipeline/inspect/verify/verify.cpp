@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -48,8 +49,6 @@ class Verifier {
   }
 
  private:
-  using Bytes = std::vector<std::uint8_t>;
-
   /// Runs `body`, turning what it throws about the package into a finding.
   template <class F>
   bool guarded(const char* check, const std::string& entry, F&& body) {

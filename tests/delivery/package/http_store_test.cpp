@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"
@@ -13,8 +14,6 @@ namespace texmesh {
 namespace {
 
 using namespace testing;  // the server
-using Bytes = std::vector<std::uint8_t>;
-
 const std::string& package() {
   static const std::string bytes = text_of(make_package(2, 40000));
   return bytes;

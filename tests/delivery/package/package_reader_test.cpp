@@ -9,6 +9,7 @@
 #include <fstream>
 #include <utility>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 
@@ -19,8 +20,6 @@ namespace fs = std::filesystem;
 using testing::fake_fragment;
 using testing::fake_jpeg;
 using testing::make_package;
-using Bytes = std::vector<std::uint8_t>;
-
 PackageReader open_memory(Bytes package) {
   return PackageReader(open_container(memory_source(std::move(package))));
 }

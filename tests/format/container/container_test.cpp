@@ -1,4 +1,5 @@
 #include "format/container/container.h"
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 
 #include <gtest/gtest.h>
@@ -13,8 +14,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 Bytes write(const std::vector<std::pair<std::string, Bytes>>& files) {
   Bytes out;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/half.h"
 #include "tests/format/documents/tables_fixture.h"
@@ -14,8 +15,6 @@ namespace texmesh {
 namespace {
 
 using testing::make_tables;
-using Bytes = std::vector<std::uint8_t>;
-
 PackageTables small() { return {{make_tables(3, 2, 2, 1), make_tables(1, 1, 1, 0)}}; }
 
 Bytes flat(const PackageTables& t) { return write_tables(t); }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "tests/format/split/split_fixture.h"
 
@@ -14,8 +15,6 @@ namespace {
 using testing::corners_of;
 using testing::split_fixture;
 using testing::SplitFixture;
-using Bytes = std::vector<std::uint8_t>;
-
 std::span<const std::uint8_t> block_of(const SplitStreamHead& head, const Bytes& stream, std::size_t i) {
   return std::span(stream).subspan(head.blocks[i].offset, head.blocks[i].bytes());
 }

@@ -18,7 +18,7 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::json;
-using testing::Bytes;
+
 using testing::GltfBuilder;
 
 struct Package {

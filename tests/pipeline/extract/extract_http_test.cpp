@@ -14,8 +14,8 @@ namespace {
 TEST(HttpExtract, GivesTheSameBytesAsTheFile) {
   testing::PackageParts parts = testing::make_package_parts();
   // The library does not cut the first range, of 16 KiB, where a file is shorter.
-  parts.streams["later/unknown.bin"] = testing::Bytes(20000, 7);
-  const testing::Bytes package = parts.build();
+  parts.streams["later/unknown.bin"] = Bytes(20000, 7);
+  const Bytes package = parts.build();
   const std::string body(package.begin(), package.end());
   httplib::Server server;
   server.Get("/a.texmesh", [&](const httplib::Request&, httplib::Response& response) {
@@ -26,7 +26,7 @@ TEST(HttpExtract, GivesTheSameBytesAsTheFile) {
   ExtractRequest request;
   request.bytes = 8000;
   request.display_px = 64;
-  testing::Bytes over_http;
+  Bytes over_http;
   try {
     PackageReader reader(open_url("http://127.0.0.1:" + std::to_string(port) + "/a.texmesh"));
     over_http = extract_model(reader, request, {}).glb;

@@ -12,7 +12,6 @@
 namespace texmesh {
 namespace {
 
-using testing::Bytes;
 using testing::make_package_parts;
 
 PackageReader open(const Bytes& package) { return PackageReader(open_container(memory_source(package))); }

@@ -97,8 +97,8 @@ using Ran = std::multiset<std::string>;
 struct Unclaimed : Store {
   explicit Unclaimed(MemoryStore& s) : store(s) {}
   std::optional<std::vector<StoredBlob>> find(const Sha256& k) override { return store.MemoryStore::find(k); }
-  Bytes load(const StoredBlob& b) override { return store.MemoryStore::load(b); }
-  bool put(const Key& k, const std::vector<std::pair<std::string, Bytes>>& o) override {
+  SharedBytes load(const StoredBlob& b) override { return store.MemoryStore::load(b); }
+  bool put(const Key& k, const std::vector<std::pair<std::string, SharedBytes>>& o) override {
     return store.MemoryStore::put(k, o);
   }
   std::optional<std::string> preimage(const Sha256& k) override { return store.MemoryStore::preimage(k); }
@@ -180,7 +180,7 @@ TEST(GraphRun, AResultThatDoesNotDecodeIsComputedAgainAndReplaced) {
   struct Poisoned : MemoryStore {
     std::string victim, notes_of;
     std::multiset<std::string> rejected;
-    bool put(const Key& key, const std::vector<std::pair<std::string, Bytes>>& outputs) override {
+    bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
       auto wrong = outputs;
       const auto garbage = std::make_shared<const std::vector<std::uint8_t>>(300, 0x67);
       if (outputs.front().first == victim) wrong.front().second = garbage;

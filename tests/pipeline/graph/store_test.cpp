@@ -28,7 +28,7 @@ struct Folder {
   ~Folder() { fs::remove_all(path); }
 };
 
-Bytes bytes_of(const std::string& s) {
+SharedBytes bytes_of(const std::string& s) {
   return std::make_shared<const std::vector<std::uint8_t>>(s.begin(), s.end());
 }
 Key key_of(const std::string& option) { return Key("ladder", 3).add("option ladder.rungs", option); }

@@ -15,7 +15,6 @@
 namespace texmesh {
 namespace {
 
-using testing::Bytes;
 using testing::count_notes;
 
 std::filesystem::path data_folder() {

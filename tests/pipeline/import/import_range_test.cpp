@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "pipeline/import/import.h"
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
@@ -11,14 +12,11 @@
 namespace texmesh {
 namespace {
 
-using testing::Bytes;
 using testing::bytes_of;
 using testing::count_notes;
 using testing::encode_image;
 using testing::input_error;
 using testing::MemoryResolver;
-
-constexpr std::uint32_t kNone = 0xffffffffu;
 
 std::string description(const std::string& more = "", const std::string& grid = "r.pgm") {
   return R"({"version":1,"type":"cylindrical-range-scan","y_step":0.5,"grid":")" + grid + "\"" + more + "}";
@@ -114,13 +112,13 @@ TEST(ImportRange, MissingSamplesAreHoles) {
   resolver.files["r.pgm"] = pgm16(6, 4, values, "# a comment\n");
   const ImportedModel m = import(description(R"(,"valid_max":50000)"), resolver);
   EXPECT_EQ(m.model.mesh.positions.size(), 22u);
-  EXPECT_EQ(m.model.range.position[1 * 6 + 2], kNone);
+  EXPECT_EQ(m.model.range.position[1 * 6 + 2], kNoIndex);
   EXPECT_EQ(m.model.range.radius[2 * 6 + 5], 0);
   // Each missing sample touches four cells, which keep one triangle of two.
   EXPECT_EQ(m.model.mesh.triangles.size(), 6u * 3 * 2 - 8);
   for (std::size_t i = 0; i < m.model.range.position.size(); ++i) {
     const std::uint32_t p = m.model.range.position[i];
-    if (p != kNone)
+    if (p != kNoIndex)
       EXPECT_NEAR(std::hypot(m.model.mesh.positions[p].x, m.model.mesh.positions[p].z),
                   m.model.range.radius[i], 1e-3);
   }
@@ -134,7 +132,7 @@ TEST(ImportRange, ALonelySampleHasNoPosition) {
   resolver.files["r.pgm"] = pgm16(8, 6, values);
   const ImportedModel m = import(description(), resolver);
   EXPECT_EQ(m.model.mesh.positions.size(), 4u);
-  EXPECT_EQ(m.model.range.position[3 * 8 + 5], kNone);
+  EXPECT_EQ(m.model.range.position[3 * 8 + 5], kNoIndex);
   EXPECT_EQ(count_notes(m.model, "unused-vertices"), 1);
   EXPECT_EQ(m.model.range.position[9], 3u);
 }

@@ -10,7 +10,6 @@
 namespace texmesh {
 namespace {
 
-using testing::Bytes;
 using testing::bytes_of;
 using testing::count_notes;
 using testing::input_error;

@@ -9,13 +9,14 @@
 
 #include <gtest/gtest.h>
 
+#include "format/base/bytes.h"
 #include "tests/support/meshes.h"
 
 namespace {
 
-using texmesh::testing::Random;
-using Bytes = std::vector<std::uint8_t>;
+using texmesh::Bytes;
 
+using texmesh::testing::Random;
 Bytes sentence(Random& random, const std::vector<std::string>& words, int length) {
   std::string s;
   for (int i = 0; i < length; ++i) {

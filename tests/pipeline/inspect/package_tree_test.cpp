@@ -16,7 +16,7 @@ namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Bytes;
+
 using testing::files_beneath;
 using testing::read_text;
 using testing::TemporaryFolder;

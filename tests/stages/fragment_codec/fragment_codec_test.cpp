@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg_coder.h"
@@ -15,7 +16,6 @@
 namespace texmesh {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
 using Streams = std::vector<Bytes>;
 
 /// Shades, edges and grain.

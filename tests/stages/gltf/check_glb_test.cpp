@@ -14,7 +14,7 @@ namespace texmesh {
 namespace {
 
 using nlohmann::json;
-using testing::Bytes;
+
 using testing::GlbParts;
 
 Bytes small_jpeg() {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <set>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
@@ -14,8 +15,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 void put16(Bytes& out, std::uint32_t x) {
   out.push_back(static_cast<std::uint8_t>(x >> 8));

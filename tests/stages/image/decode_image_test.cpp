@@ -10,6 +10,7 @@
 #include <webp/encode.h>
 #include <zlib.h>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/image/image_metadata.h"
 #include "tests/support/images.h"
@@ -21,8 +22,6 @@ using testing::encode_image;
 using testing::jpeg_bytes;
 using testing::png_bytes;
 using testing::test_picture;
-using Bytes = std::vector<std::uint8_t>;
-
 Image probe(Bytes bytes) { return probe_image("test image", std::move(bytes), {}); }
 
 // The error of `f`, or "" when there is none.

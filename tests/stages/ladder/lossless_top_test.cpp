@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/image/decode_image.h"
@@ -13,8 +14,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 struct Kind {
   const char* name;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
@@ -14,8 +15,6 @@
 
 namespace texmesh {
 namespace {
-
-using Bytes = std::vector<std::uint8_t>;
 
 Bytes fake_jpeg(std::size_t bytes, std::uint8_t value) {
   Bytes b(bytes, value);

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
+#include "format/base/bytes.h"
 #include "format/split/split_stream.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
@@ -17,8 +18,6 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::json;
-using Bytes = std::vector<std::uint8_t>;
-
 /// One corner as a file's reader and a stream's reader get it: to the bit but for normals.
 struct Corner {
   std::vector<float> exact;  // position, texture coordinates, colour

@@ -40,7 +40,7 @@ TEST(QualityFor, EndsAtTheEndsOfTheScale) {
 }
 
 /// S_0 as compile writes it: Draco on a grid of 14 bits.
-testing::Bytes stored_scale() {
+Bytes stored_scale() {
   NestedScales scales;
   scales.mesh = condition_mesh(testing::bumpy_sphere(24, 36), false, {}, {}).mesh;
   NestedScale& all = scales.scales.emplace_back();
@@ -49,8 +49,7 @@ testing::Bytes stored_scale() {
   return write_scales(scales, {}, {Material{}}, {}, {}, {}, {.stream = false}, {}).files.at(0).glb;
 }
 
-Mesh recoded(const testing::Bytes& glb, const DracoSteps& steps, const NormalSamples* lit_as,
-             std::size_t& bytes) {
+Mesh recoded(const Bytes& glb, const DracoSteps& steps, const NormalSamples* lit_as, std::size_t& bytes) {
   StandaloneGlb file(glb, "s00.glb");
   file.recode(steps, lit_as, {});
   bytes = file.finish().size();
@@ -68,7 +67,7 @@ double farthest(const Mesh& mesh, const Mesh& from) {
 }
 
 TEST(Recode, LeanerStepsAreSmallerAndKeepTheirBound) {
-  const testing::Bytes glb = stored_scale();
+  const Bytes glb = stored_scale();
   const Mesh stored = read_model({glb, "s00.glb"}, "s00.glb", {}).mesh;
   std::size_t before = glb.size();
   for (const int bits : {13, 12, 10, 8}) {
@@ -83,7 +82,7 @@ TEST(Recode, LeanerStepsAreSmallerAndKeepTheirBound) {
 }
 
 TEST(Recode, NormalsAreFittedToTheLightAskedFor) {
-  const testing::Bytes glb = stored_scale();
+  const Bytes glb = stored_scale();
   const Mesh stored = read_model({glb, "s00.glb"}, "s00.glb", {}).mesh;
   NormalSamples up = normal_samples(stored);
   for (Vec3f& n : up.normals) n = normalized(n + Vec3f{0, 0.5f, 0});

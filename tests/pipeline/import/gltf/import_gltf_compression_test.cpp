@@ -37,7 +37,7 @@ struct DracoIds {
   int position, uv, normal, colour;
 };
 
-testing::Bytes draco_of(const Mesh& mesh, draco::MeshEncoderMethod method, bool metadata, DracoIds& ids) {
+Bytes draco_of(const Mesh& mesh, draco::MeshEncoderMethod method, bool metadata, DracoIds& ids) {
   draco::TriangleSoupMeshBuilder soup;
   soup.Start(static_cast<int>(mesh.triangles.size()));
   ids.position = soup.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
@@ -71,7 +71,7 @@ testing::Bytes draco_of(const Mesh& mesh, draco::MeshEncoderMethod method, bool 
   return {out.data(), out.data() + out.size()};
 }
 
-GltfBuilder draco_model(const testing::Bytes& stream, const DracoIds& ids, std::size_t triangles) {
+GltfBuilder draco_model(const Bytes& stream, const DracoIds& ids, std::size_t triangles) {
   GltfBuilder b;
   const json bounds = {{"min", {0, 0, 0}}, {"max", {1, 1, 1}}};
   const int position = b.accessor(-1, "VEC3", 5126, 3, bounds), uv = b.accessor(-1, "VEC2", 5126, 3),
@@ -137,8 +137,8 @@ TEST(ImportGltfDraco, AttributesOutsideTheStreamComeFromAccessors) {
 TEST(ImportGltfDraco, RefusesWhatItsHeaderPromisesTooMuch) {
   const Mesh source = testing::sphere(4, 6);
   DracoIds ids{};
-  const testing::Bytes good = draco_of(source, draco::MESH_EDGEBREAKER_ENCODING, false, ids);
-  const auto with = [&](const testing::Bytes& stream) {
+  const Bytes good = draco_of(source, draco::MESH_EDGEBREAKER_ENCODING, false, ids);
+  const auto with = [&](const Bytes& stream) {
     return refusal(draco_model(stream, ids, source.triangles.size()));
   };
   EXPECT_EQ(with(good), "");
@@ -147,7 +147,7 @@ TEST(ImportGltfDraco, RefusesWhatItsHeaderPromisesTooMuch) {
                      "RFJBQ08BAAEBXQEBAAB9AAAzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMzMAAA=="))
                 .find("Draco bitstream 2.2"),
             std::string::npos);
-  testing::Bytes many(good.begin(), good.begin() + 12);  // up to the kind of traversal
+  Bytes many(good.begin(), good.begin() + 12);  // up to the kind of traversal
   for (const int n : {0x40, 0xff, 0xff, 0xff, 0xff, 0x0f, 0, 0, 0, 0})
     many.push_back(static_cast<std::uint8_t>(n));
   EXPECT_NE(with(many).find("triangles, found 4294967295"), std::string::npos) << with(many);
@@ -155,10 +155,10 @@ TEST(ImportGltfDraco, RefusesWhatItsHeaderPromisesTooMuch) {
   for (const int n : {0xff, 0xff, 0xff, 0xff, 0x0f, 0x40, 0, 0, 0, 0})
     many.push_back(static_cast<std::uint8_t>(n));
   EXPECT_NE(with(many).find("vertices, found 4294967295"), std::string::npos) << with(many);
-  testing::Bytes cloud = good;
+  Bytes cloud = good;
   cloud[7] = 0;
   EXPECT_NE(with(cloud).find("a Draco mesh"), std::string::npos);
-  testing::Bytes metadata = good;
+  Bytes metadata = good;
   metadata[10] |= 0x80;
   EXPECT_NE(with(metadata), "");
 }
@@ -166,7 +166,7 @@ TEST(ImportGltfDraco, RefusesWhatItsHeaderPromisesTooMuch) {
 TEST(ImportGltfDraco, RefusesEveryTruncationAndWrongIds) {
   const Mesh source = testing::sphere(4, 6);
   DracoIds ids{};
-  const testing::Bytes good = draco_of(source, draco::MESH_EDGEBREAKER_ENCODING, false, ids);
+  const Bytes good = draco_of(source, draco::MESH_EDGEBREAKER_ENCODING, false, ids);
   for (std::size_t n = 0; n < good.size(); ++n) {
     EXPECT_NE(refusal(draco_model({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(n)}, ids, 1)), "")
         << n;
@@ -186,11 +186,11 @@ TEST(ImportGltfDraco, SurvivesEveryFlippedByte) {
   const Mesh source = testing::sphere(4, 6);
   for (const auto method : {draco::MESH_EDGEBREAKER_ENCODING, draco::MESH_SEQUENTIAL_ENCODING}) {
     DracoIds ids{};
-    const testing::Bytes good = draco_of(source, method, false, ids);
+    const Bytes good = draco_of(source, method, false, ids);
     std::size_t refused = 0;
     for (std::size_t i = 0; i < good.size(); ++i) {
       for (const int flip : {0x01, 0x80, 0xff}) {
-        testing::Bytes damaged = good;
+        Bytes damaged = good;
         damaged[i] = static_cast<std::uint8_t>(damaged[i] ^ flip);
         refused += !refusal(draco_model(damaged, ids, source.triangles.size())).empty();
       }
@@ -201,24 +201,24 @@ TEST(ImportGltfDraco, SurvivesEveryFlippedByte) {
 
 // --- meshopt ---
 
-testing::Bytes encode_vertices(const void* data, std::size_t count, std::size_t stride) {
-  testing::Bytes out(meshopt_encodeVertexBufferBound(count, stride));
+Bytes encode_vertices(const void* data, std::size_t count, std::size_t stride) {
+  Bytes out(meshopt_encodeVertexBufferBound(count, stride));
   out.resize(meshopt_encodeVertexBuffer(out.data(), out.size(), data, count, stride));
   return out;
 }
-testing::Bytes encode_triangles(const std::vector<unsigned>& indices, std::size_t vertices) {
-  testing::Bytes out(meshopt_encodeIndexBufferBound(indices.size(), vertices));
+Bytes encode_triangles(const std::vector<unsigned>& indices, std::size_t vertices) {
+  Bytes out(meshopt_encodeIndexBufferBound(indices.size(), vertices));
   out.resize(meshopt_encodeIndexBuffer(out.data(), out.size(), indices.data(), indices.size()));
   return out;
 }
-testing::Bytes encode_sequence(const std::vector<unsigned>& indices, std::size_t vertices) {
-  testing::Bytes out(meshopt_encodeIndexSequenceBound(indices.size(), vertices));
+Bytes encode_sequence(const std::vector<unsigned>& indices, std::size_t vertices) {
+  Bytes out(meshopt_encodeIndexSequenceBound(indices.size(), vertices));
   out.resize(meshopt_encodeIndexSequence(out.data(), out.size(), indices.data(), indices.size()));
   return out;
 }
 
 /// Replaces a bufferView by its compressed form; the plain one refers to a fallback buffer without bytes.
-void compress(GltfBuilder& b, int view, const testing::Bytes& data, std::size_t count, std::size_t stride,
+void compress(GltfBuilder& b, int view, const Bytes& data, std::size_t count, std::size_t stride,
               const char* mode, const char* filter = nullptr) {
   const json encoded = b.json["bufferViews"][static_cast<std::size_t>(b.view_of(data))];
   json& v = b.json["bufferViews"][static_cast<std::size_t>(view)];
@@ -283,9 +283,9 @@ TEST(ImportGltfMeshopt, UndoesTheOctahedralFilter) {
   for (std::size_t i = 0; i < 4; ++i) std::memcpy(data + 4 * i, &n[i], 12);
   for (const std::size_t stride : {4, 8}) {
     GltfBuilder b = quad();
-    testing::Bytes filtered(4 * stride);
+    Bytes filtered(4 * stride);
     meshopt_encodeFilterOct(filtered.data(), 4, stride, stride == 4 ? 8 : 14, data);
-    const int view = b.view_of(testing::Bytes{0});
+    const int view = b.view_of(Bytes{0});
     compress(b, view, encode_vertices(filtered.data(), 4, stride), 4, stride, "ATTRIBUTES", "OCTAHEDRAL");
     b.json["bufferViews"][static_cast<std::size_t>(view)]["byteStride"] = stride;
     b.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] =
@@ -300,7 +300,7 @@ TEST(ImportGltfMeshopt, UndoesTheOctahedralFilter) {
 TEST(ImportGltfMeshopt, UndoesTheExponentialFilter) {
   const std::vector<float> positions{0, 0, 0, 1, 0, 0, 1, 1, 1e-3f, -1000, 1, 0};
   GltfBuilder b = quad();
-  testing::Bytes filtered(48);
+  Bytes filtered(48);
   meshopt_encodeFilterExp(filtered.data(), 4, 12, 24, positions.data());
   compress(b, 0, encode_vertices(filtered.data(), 4, 12), 4, 12, "ATTRIBUTES", "EXPONENTIAL");
   close(b);
@@ -330,13 +330,13 @@ TEST(ImportGltfMeshopt, FiltersAgreeWithMeshoptimizer) {
     }
     for (std::size_t k = 0; k < 4; ++k) unit[4 * i + k] /= static_cast<float>(std::sqrt(l));
   }
-  testing::Bytes bytes(64 * 8);
+  Bytes bytes(64 * 8);
   const auto decoded = [&](gltf::MeshoptFilter filter) {
     return gltf::decode_meshopt(source, "", encode_vertices(bytes.data(), 64, 8), 64, 8,
                                 gltf::MeshoptMode::kAttributes, filter);
   };
   meshopt_encodeFilterQuat(bytes.data(), 64, 8, 12, unit);
-  testing::Bytes ours = decoded(gltf::MeshoptFilter::kQuaternion), theirs = bytes;
+  Bytes ours = decoded(gltf::MeshoptFilter::kQuaternion), theirs = bytes;
   meshopt_decodeFilterQuat(theirs.data(), 64, 8);
   for (std::size_t i = 0; i < 64 * 4; ++i) {
     std::int16_t a = 0, b = 0;

@@ -11,7 +11,7 @@ namespace texmesh {
 namespace {
 
 using nlohmann::json;
-using testing::Bytes;
+
 using testing::GltfBuilder;
 using testing::Random;
 

@@ -296,7 +296,7 @@ TEST(ImportGltfMaterials, NotesWhatIsLostWithAnUnknownExtensionOnce) {
 }
 
 TEST(ImportGltfMaterials, RefusesImagesOfForeignContentAndForeignPlaces) {
-  const auto refused = [](const char* uri, testing::Bytes bytes) {
+  const auto refused = [](const char* uri, Bytes bytes) {
     GltfBuilder b = textured(base_colour());
     b.json["images"][0]["uri"] = uri;
     MemoryResolver resolver;

@@ -13,11 +13,10 @@ using testing::GltfBuilder;
 using testing::MemoryResolver;
 using testing::quad;
 
-ImportedModel import(const testing::Bytes& bytes, MemoryResolver& resolver,
-                     const ImportOptions& options = {}) {
+ImportedModel import(const Bytes& bytes, MemoryResolver& resolver, const ImportOptions& options = {}) {
   return import_gltf("m.glb", bytes, resolver, options, {});
 }
-Model import(const testing::Bytes& bytes) {
+Model import(const Bytes& bytes) {
   MemoryResolver resolver;
   return import(bytes, resolver).model;
 }
@@ -339,7 +338,7 @@ TEST(ImportGltf, SoftFaultsAreWarnings) {
   EXPECT_EQ(m.mesh.triangles.size(), 1u);
   EXPECT_TRUE(has_note(m, "non-finite-position", Severity::kWarning));
 
-  testing::Bytes longer = quad().glb();
+  Bytes longer = quad().glb();
   longer.resize(longer.size() + 4);
   EXPECT_TRUE(has_note(import(longer), "trailing-bytes", Severity::kWarning));
 }
@@ -370,7 +369,7 @@ TEST(ImportGltf, TakesWholeFloatsAsIntegersAndNullAsAbsent) {
 
 TEST(ImportGltf, WorksOnTheSameBytesAtAnyNumberOfThreads) {
   MemoryResolver resolver;
-  const testing::Bytes bytes = quad().glb();
+  const Bytes bytes = quad().glb();
   RunContext eight;
   eight.threads = 8;
   EXPECT_EQ(import_gltf("m", bytes, resolver, {}, {}).model,

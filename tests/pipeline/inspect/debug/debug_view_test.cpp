@@ -18,7 +18,6 @@ namespace texmesh {
 namespace {
 
 using nlohmann::json;
-using testing::Bytes;
 
 const RunContext kOneThread{};
 

@@ -13,7 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Dump : ::testing::Test {
-  testing::Bytes bytes = testing::make_package_parts().build();
+  Bytes bytes = testing::make_package_parts().build();
   PackageReader package{open_container(memory_source(bytes))};
 
   std::string text(DumpPart part) { return dump_text(package, part); }
@@ -154,7 +154,7 @@ TEST(DumpUntextured, SaysSo) {
   p.textures.clear(), p.streams.clear(), p.tables.planes.clear();
   p.manifest.plane_count = 0;
   p.quality = {{0, 5}, {100}, {1, 0.9f}, {0, 0.1f}, 2, 64};
-  const testing::Bytes bytes = p.build();
+  const Bytes bytes = p.build();
   PackageReader package(open_container(memory_source(bytes)));
   EXPECT_NE(dump_text(package, DumpPart::kSummary).find("textures: none\n"), std::string::npos);
   EXPECT_EQ(dump_text(package, DumpPart::kFragments), "no textures\n");
@@ -165,7 +165,7 @@ TEST(DumpUntextured, SaysSo) {
 TEST(DumpTitle, CannotCommandATerminal) {
   testing::PackageParts p = testing::make_package_parts();
   p.provenance["tool"] = "texmesh \x1b[2J";
-  const testing::Bytes bytes = p.build();
+  const Bytes bytes = p.build();
   PackageReader package(open_container(memory_source(bytes)));
   EXPECT_EQ(dump_text(package, DumpPart::kAll).find('\x1b'), std::string::npos);
 }

@@ -13,7 +13,6 @@
 namespace texmesh {
 namespace {
 
-using testing::Bytes;
 using testing::GlbParts;
 using testing::make_package_parts;
 using testing::PackageParts;
