@@ -26,11 +26,11 @@ const most = { first: 11.2 * 1024, all: 24.9 * 1024, fallback: 13.0 * 1024, texm
 /** TypeScript as it stands; the parts of an application's first minutes joined to one. */
 const typescript = (joined) => ({
   name: 'typescript',
-  resolveId: (id, importer) => (importer && id.startsWith('./') && !id.endsWith('.js') ? join(dirname(importer), `${id}.ts`) : null),
+  resolveId: (id, importer) => (importer && /^\.\.?\//.test(id) && !id.endsWith('.js') ? join(dirname(importer), `${id}.ts`) : null),
   resolveDynamicImport: (id, importer) => {
     if (typeof id !== 'string') return null;
     const later = joined && /^\.\/(split_shape|texture_load)$/.test(id);
-    return later ? source('later') : join(dirname(importer), `${id}.ts`);
+    return later ? source('scene/later') : join(dirname(importer), `${id}.ts`);
   },
   load: async (id) => {
     if (!id.endsWith('.ts')) return null;
@@ -95,7 +95,7 @@ async function sizesOf(entry) {
   const { output: chunks } = await bundle.generate(output);
   await bundle.close();
   const sizes = { first: 0, later: 0, fallback: 0 };
-  const isFallback = (name) => /store_files|sha256_js|enlarge|documents|package_more|entry_paths|codec/.test(name);
+  const isFallback = (name) => /tree_store|sha256_js|enlarge|documents|rare_reads|entry_paths|codec/.test(name);
   for (const c of chunks.filter((chunk) => chunk.type === 'chunk')) {
     const kind = c.isEntry ? 'first' : isFallback(c.name) ? 'fallback' : 'later';
     // What is imported is loaded, whatever it is counted as.
@@ -124,9 +124,9 @@ if (process.argv.includes('--check-size')) {
 
 if (process.argv.includes('--types')) {
   const types = join(dist, 'types');
-  for (const name of readdirSync(types).filter((n) => n.endsWith('.d.ts'))) {
+  for (const name of readdirSync(types, { recursive: true }).filter((n) => n.endsWith('.d.ts'))) {
     const text = readFileSync(join(types, name), 'utf8');
-    writeFileSync(join(types, name), text.replace(/((?:from|import\() ?|^import )(['"])(\.\/[\w/]+)\2/gm, '$1$2$3.js$2'));
+    writeFileSync(join(types, name), text.replace(/((?:from|import\() ?|^import )(['"])(\.\.?\/[\w/.]+)\2/gm, '$1$2$3.js$2'));
   }
   process.exit(0);
 }

@@ -1,4 +1,4 @@
-// Every export and every member of api.d.ts has a comment: fails and names those without. After a build; part of check-types.
+// Every export and every member of scene/api.d.ts has a comment: fails and names those without. After a build; part of check-types.
 //   node docs.mjs [DIST/TYPES]
 import { join } from 'node:path';
 import ts from 'typescript';
@@ -19,7 +19,7 @@ for (const entry of entries)
     const own = e.flags & ts.SymbolFlags.Alias ? checker.getAliasedSymbol(e) : e;
     if (!whole && !said(own)) bare.add(e.name);
   }
-ts.forEachChild(program.getSourceFile(file('api')), (d) => {
+ts.forEachChild(program.getSourceFile(file('scene/api')), (d) => {
   for (const m of ts.isInterfaceDeclaration(d) ? d.members : []) {
     ++seen;
     if (ts.getJSDocCommentsAndTags(m).length === 0) bare.add(`${d.name.text}.${m.name?.getText()}`);

@@ -3,4 +3,4 @@
 
 export * from './reader';
 export { TexmeshPackage, open } from './open';
-export type * from './api';
+export type * from './scene/api';

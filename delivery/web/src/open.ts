@@ -1,14 +1,14 @@
 import type { Object3D } from 'three';
-import type { LoadOptions, LoadedModel } from './api';
-import { InputError } from './errors';
-import { nowS } from './http';
-import { loadModel } from './load';
-import { OpenOptions, PackageReader } from './package_reader';
-import { PoolOptions, WorkerPool, workerPool } from './worker_pool';
+import type { LoadOptions, LoadedModel } from './scene/api';
+import { InputError } from './format/errors';
+import { nowS } from './http/client';
+import { loadModel } from './scene/load';
+import { OpenOptions, PackageReader } from './http/package_reader';
+import { PoolOptions, WorkerPool, workerPool } from './worker/pool';
 
-export { FormatError, InputError, TexmeshError } from './errors';
+export { FormatError, InputError, TexmeshError } from './format/errors';
 export type * from './reader';
-export type * from './api';
+export type * from './scene/api';
 
 /** Options with names; what is left out is chosen by the library. */
 const names = {

@@ -1,13 +1,13 @@
-import { samePrefix } from './bytes';
-import { codecTraits } from './codec';
-import * as documents from './documents';
-import { FormatError, TexmeshError } from './errors';
-import { imageSize } from './image_size';
-import { joinFragment } from './join_fragment';
-import { sha256 } from './sha256';
-import { SplitStreamReader } from './split_stream';
-import { splitInfo, splitUpdate } from './split_update';
-import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest } from './worker_protocol';
+import { samePrefix } from './format/bytes';
+import { codecTraits } from './format/codec';
+import * as documents from './format/documents';
+import { FormatError, TexmeshError } from './format/errors';
+import { imageSize } from './format/image_size';
+import { joinFragment } from './format/join_fragment';
+import { sha256 } from './format/sha256';
+import { SplitStreamReader } from './format/splits/split_stream';
+import { splitInfo, splitUpdate } from './worker/split_update';
+import type { DecodeRequest, EnlargeRequest, Levels, WorkerAnswer, WorkerRequest } from './worker/protocol';
 
 // What happens off the main thread: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no
 // worker can be had.

@@ -1,16 +1,16 @@
 import { Scene } from 'three';
 import { describe, expect, it } from 'vitest';
-import type { LoadOptions } from '../src/api';
-import { HttpClient, absolute } from '../src/http';
-import { imageSize } from '../src/image_size';
+import type { LoadOptions } from '../src/scene/api';
+import { HttpClient, absolute } from '../src/http/client';
+import { imageSize } from '../src/format/image_size';
 import { TexmeshPackage } from '../src/open';
-import { requireOwnBytes } from '../src/own_bytes';
+import { requireOwnBytes } from '../src/format/self_contained_glb';
 import { FormatError, InputError, OpenOptions, PackageReader } from '../src/reader';
-import { openStore } from '../src/store';
-import { TreeStore } from '../src/store_files';
+import { openStore } from '../src/http/store';
+import { TreeStore } from '../src/http/tree_store';
 import { handle } from '../src/worker';
-import { WorkerPool, workerPool } from '../src/worker_pool';
-import type { WorkerRequest } from '../src/worker_protocol';
+import { WorkerPool, workerPool } from '../src/worker/pool';
+import type { WorkerRequest } from '../src/worker/protocol';
 import { Fault, FakeServer, fakeServer } from './fake_server';
 import { golden } from './support';
 

@@ -1,12 +1,12 @@
 import { describe, expect, it } from 'vitest';
-import { FormatError } from '../src/errors';
+import { FormatError } from '../src/format/errors';
 import { open } from '../src/open';
-import { PackageReader } from '../src/package_reader';
-import type { TextureInfo } from '../src/textures';
-import { Transfers, Wish } from '../src/transfers';
-import { workerPool } from '../src/worker_pool';
+import { PackageReader } from '../src/http/package_reader';
+import type { TextureInfo } from '../src/format/textures';
+import { Transfers, Wish } from '../src/scene/transfers';
+import { workerPool } from '../src/worker/pool';
 import { handle } from '../src/worker';
-import type { WorkerRequest } from '../src/worker_protocol';
+import type { WorkerRequest } from '../src/worker/protocol';
 import { fakeServer } from './fake_server';
 import { loading, until } from './loading';
 import { golden } from './support';

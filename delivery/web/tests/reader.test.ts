@@ -1,10 +1,10 @@
 import { describe, expect, it } from 'vitest';
-import { readFragmentFiles } from '../src/fragment_files';
+import { readFragmentFiles } from '../src/format/fragment_files';
 import {
   FormatError, InputError, PackageReader, TexmeshError, joinFragment, readIndex, readManifest, readQuality,
   readTablesHead, readTablesSection, readTextures, sha256, sha256Js, toHex,
 } from '../src/reader';
-import { readSplitHead } from '../src/split_stream';
+import { readSplitHead } from '../src/format/splits/split_stream';
 import { golden, goldenNames } from './support';
 
 async function entryOf(name: string, path: string): Promise<Uint8Array> {

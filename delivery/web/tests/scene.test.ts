@@ -3,15 +3,15 @@ import {
   Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { describe, expect, it } from 'vitest';
-import { displayOf } from '../src/camera';
-import { Emitter } from '../src/events';
+import { displayOf } from '../src/scene/camera';
+import { Emitter } from '../src/scene/events';
 import { Manifest, PackageReader, displayedHeightPx, selectScale } from '../src/reader';
-import { MaterialSet, ParsedGltf } from '../src/scale_parts';
-import { splitShapes } from '../src/split_shape';
-import type { TextureInfo } from '../src/textures';
-import { seenShares } from '../src/visibility';
+import { MaterialSet, ParsedGltf } from '../src/scene/scale_parts';
+import { splitShapes } from '../src/scene/split_shape';
+import type { TextureInfo } from '../src/format/textures';
+import { seenShares } from '../src/scene/visibility';
 import { handle } from '../src/worker';
-import { workerPool } from '../src/worker_pool';
+import { workerPool } from '../src/worker/pool';
 import { Fault, fakeServer } from './fake_server';
 import { golden } from './support';
 

@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
-import { toHex } from '../src/bytes';
-import { fragmentFilePath } from '../src/entry_paths';
+import { toHex } from '../src/format/bytes';
+import { fragmentFilePath } from '../src/format/entry_paths';
 import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
-import { sha256 } from '../src/sha256';
-import { treeUrl } from '../src/store_files';
+import { sha256 } from '../src/format/sha256';
+import { treeUrl } from '../src/http/tree_store';
 import { Fault, FakeServer, FaultKind, bytesAskedTwice, fakeServer, treeFiles } from './fake_server';
 import { golden } from './support';
 

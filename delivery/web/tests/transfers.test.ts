@@ -2,18 +2,18 @@ import { afterEach, describe, expect, it, vi } from 'vitest';
 import {
   FormatError, FragmentList, HtcStep, PackageReader, defaultHtcOptions, fragmentList, fullSize, planOptions,
 } from '../src/reader';
-import { finerWhereSeen } from '../src/scale_choice';
-import { defaultDeliveryRequest, planDelivery } from '../src/delivery_plan';
-import { groupBytes, groupedList, throughputOf } from '../src/groups';
-import { timePlan } from '../src/time_plan';
-import { timedFetch } from '../src/timed_fetch';
-import { Transfers, Wish } from '../src/transfers';
-import { workerPool } from '../src/worker_pool';
+import { finerWhereSeen } from '../src/decide/scale_choice';
+import { defaultDeliveryRequest, planDelivery } from '../src/decide/delivery_plan';
+import { groupBytes, groupedList, throughputOf } from '../src/decide/request_groups';
+import { timePlan } from '../src/decide/unchecked_plan';
+import { timedFetch } from '../src/scene/timed_fetch';
+import { Transfers, Wish } from '../src/scene/transfers';
+import { workerPool } from '../src/worker/pool';
 import { packError } from '../src/worker';
-import { samePrefix } from '../src/bytes';
-import { sha256 } from '../src/sha256';
-import type { WorkerRequest } from '../src/worker_protocol';
-import { HttpClient } from '../src/http';
+import { samePrefix } from '../src/format/bytes';
+import { sha256 } from '../src/format/sha256';
+import type { WorkerRequest } from '../src/worker/protocol';
+import { HttpClient } from '../src/http/client';
 import { Fault, bytesAskedTwice, fakeServer } from './fake_server';
 import { golden } from './support';
 

@@ -2,7 +2,7 @@ import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
 import * as t from '../src/reader';
-import { SplitStreamReader } from '../src/split_stream';
+import { SplitStreamReader } from '../src/format/splits/split_stream';
 import { readBytes, readText, root, sameBits } from './support';
 
 // Every decision that delivery/cpp takes, to the same bits (delivery/vectors/README.md).

@@ -1,8 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { open } from '../src/open';
 import { handle } from '../src/worker';
-import { workerPool } from '../src/worker_pool';
-import type { WorkerRequest } from '../src/worker_protocol';
+import { workerPool } from '../src/worker/pool';
+import type { WorkerRequest } from '../src/worker/protocol';
 import { fakeServer } from './fake_server';
 import { golden } from './support';
 

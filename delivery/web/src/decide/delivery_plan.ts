@@ -1,0 +1,98 @@
+import type { PackageData } from './fragment_list';
+import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
+import { LinkOptions, fetchedS } from './simulation';
+import { bootstrapBytes } from '../format/layout';
+import type { Manifest } from '../format/manifest';
+import type { QualityTable } from '../format/quality_table';
+import { InTime, choiceInTime, finerWhereSeen } from './scale_choice';
+import { StepRule, selectScale } from './viewing';
+
+/** How somebody looks at the object, and over what. */
+export interface DeliveryRequest {
+  /** Device px. */
+  displayedPx: number;
+  rule: StepRule;
+  /** Of the default rule: finer than that where finerWhereSeen says so. */
+  measured: boolean;
+  /** -1: by the rule. */
+  scale: number;
+  /** From the first request on. */
+  timeLimitS: number;
+  /** 0: what the mesh's transfer has shown. */
+  beta0BytesS: number;
+  /** Its time limit, round trip and first throughput are set from the others. */
+  htc: HtcOptions;
+  link: LinkOptions;
+}
+/** 1000 px, 5 s, 100 kB/s. */
+export function defaultDeliveryRequest(): DeliveryRequest {
+  const link = { bytesS: 1e5, rttS: 0, connections: 6 };
+  return { displayedPx: 1000, rule: 'default', measured: true, scale: -1, timeLimitS: 5, beta0BytesS: 0, htc: defaultHtcOptions(), link };
+}
+
+/** What a viewer will get. */
+export interface DeliveryPlan extends InTime {
+  /** Besides fragments. */
+  fixedBytes: number;
+  firstPictureS: number;
+  /** The chosen scale and all tables are there. */
+  meshS: number;
+  completeS: number;
+}
+
+/** The scale that the request asks for: its own, or the rule's, or a finer one by measurement. */
+export function wantedScale(manifest: Manifest, quality: QualityTable, request: DeliveryRequest): number {
+  if (request.scale >= 0) return request.scale;
+  const scale = selectScale(manifest, request.displayedPx, undefined, request.rule);
+  return request.measured && request.rule === 'default' ? finerWhereSeen(quality, scale, request.displayedPx) : scale;
+}
+
+/** Bytes of a range that the first request has not brought yet. */
+function beyondBootstrap({ offset, bytes }: { offset: number; bytes: number }): number {
+  return offset >= bootstrapBytes ? bytes : bytes - Math.min(bytes, bootstrapBytes - offset);
+}
+
+/** The table streams behind the previews, which the coarsest mesh has as its images. */
+function tableStreamBytes({ firstPicture, scales, previews }: Manifest): number {
+  let before = scales[scales.length - 1].glb.bytes;
+  for (const preview of previews) before += preview.bytes;
+  return firstPicture.bytes - Math.min(before, firstPicture.bytes);
+}
+
+/** When the fixed parts are there. */
+function timesOf(m: Manifest, link: LinkOptions, scale: number) {
+  const coarsest = m.scales[m.scales.length - 1];
+  const firstPictureBytes = beyondBootstrap(coarsest.glb);
+  const mesh = scale === coarsest.scale ? undefined : m.scales.find((s) => s.scale === scale);
+  const tableBytes = tableStreamBytes(m) + beyondBootstrap(m.index) + beyondBootstrap(m.tables) + beyondBootstrap(m.textures);
+  const moved = firstPictureBytes + (mesh?.glb.bytes ?? 0) + tableBytes;
+  const manifestS = fetchedS(link, 0, bootstrapBytes);
+  const firstPictureS = fetchedS(link, manifestS, firstPictureBytes);
+  return { moved, manifestS, firstPictureS, meshS: fetchedS(link, manifestS, moved) };
+}
+
+/**
+ * What delivery/cpp's plan_delivery decides over a link of constant rate, to the same bits; undefined when the package
+ * has no such scale. Needs the tables of all planes.
+ */
+export function planDelivery(data: PackageData, quality: QualityTable, request: DeliveryRequest): DeliveryPlan | undefined {
+  const { manifest } = data;
+  const { link, displayedPx } = request;
+  const wanted = wantedScale(manifest, quality, request);
+  const steps = choiceInTime(data, quality, {
+    displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
+    afterMesh: (scale) => {
+      const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
+      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : moved / Math.max(1e-9, meshS - manifestS - link.rttS);
+      const throughput = { ...request.htc.throughput, initialBytesS };
+      const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
+      return { plan: planOptions(htc), linkBytesS: link.bytesS };
+    },
+  });
+  let at = steps.next();
+  while (!at.done) at = steps.next();
+  const best = at.value;
+  if (!best) return undefined;
+  const { moved, firstPictureS, meshS } = timesOf(manifest, link, best.scale);
+  return { ...best, fixedBytes: bootstrapBytes + moved, firstPictureS, meshS, completeS: meshS + best.endS };
+}

@@ -1,0 +1,153 @@
+import { anyDisplayPx } from '../format/layout';
+import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
+import { cos, pi, sin } from './portable_math';
+
+// From how an object is looked at to the scale that is enough: format/viewing.h. Lengths on screen are device px;
+// "displayed height" is the length on screen of the object's largest extent.
+
+/** A perspective camera: vertical field of view, and the picture's height in device px. */
+export interface CameraView {
+  fovDegrees: number;
+  viewportPx: number;
+}
+
+const belowAny = 0.999 * anyDisplayPx;
+const apart = 1.0001;
+
+const halfTangent = (degrees: number): number => {
+  const half = degrees * (pi / 360);
+  return sin(half) / cos(half);
+};
+
+/** Displayed height of the object at a viewing distance (camera to object, > 0). */
+export function displayedHeightPx(objectHeight: number, distance: number, camera: CameraView): number {
+  return (objectHeight / (2 * distance * halfTangent(camera.fovDegrees))) * camera.viewportPx;
+}
+
+/** The distance at which the object is displayed that high; infinite for 0 px, 0 for "any". */
+export function viewingDistance(objectHeight: number, heightPx: number, camera: CameraView): number {
+  if (heightPx >= anyDisplayPx) return 0;
+  if (!(heightPx > 0)) return Infinity;
+  return (objectHeight / (2 * heightPx * halfTangent(camera.fovDegrees))) * camera.viewportPx;
+}
+
+/**
+ * What decides about the scale: the just-noticeable difference; an error of one pixel; the O_V / E_S that matches the
+ * displayed height best; or (default) the finer of jnd and error, which is what Manifest.steps holds.
+ */
+export type StepRule = 'default' | 'jnd' | 'error' | 'edge';
+
+function edgeLimit(scales: readonly ManifestScale[], k: number): number {
+  if (k > 1) return Math.sqrt(scales[k].displayPxEdge * scales[k - 1].displayPxEdge);
+  // S_0's is not in the manifest: edges per length grow with the root of the number of triangles.
+  const ratio = Math.sqrt(scales[0].triangles / Math.max(scales[1].triangles, 1));
+  return scales[1].displayPxEdge * Math.sqrt(Math.max(ratio, 1));
+}
+
+function limitOf(scales: readonly ManifestScale[], k: number, rule: StepRule): number {
+  if (rule === 'edge') return edgeLimit(scales, k);
+  const { displayPxJnd, displayPxError } = scales[k];
+  return Math.min(rule === 'error' ? Infinity : displayPxJnd, rule === 'jnd' ? Infinity : displayPxError);
+}
+
+/** The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's. */
+export function stepFunction(scales: readonly ManifestScale[], rule: StepRule): ManifestStep[] {
+  const steps: ManifestStep[] = [];
+  let reached = 0;
+  for (let k = scales.length - 1; k >= 0; --k) {
+    const limit = k === 0 ? anyDisplayPx : Math.min(limitOf(scales, k, rule), belowAny);
+    if (limit <= reached * apart) continue;
+    steps.push({ upToPx: limit, scale: scales[k].scale });
+    reached = limit;
+  }
+  return steps;
+}
+
+/** The scale of the first step that reaches this height. */
+export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): number {
+  for (const step of steps) if (displayedPx <= step.upToPx) return step.scale;
+  return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
+}
+
+/**
+ * How far a scale's surface is from S_0's on screen, px at most; `max` is the largest of some thousand sampled
+ * distances, never less than `p95`, which comes from samples of its own.
+ */
+export function pixelError(
+  manifest: Manifest,
+  scale: ManifestScale,
+  displayedPx: number,
+): { p95: number; rms: number; max: number } {
+  if (scale.scale === 0 || !(manifest.objectHeight > 0)) return { p95: 0, rms: 0, max: 0 };
+  const pxPerUnit = displayedPx / manifest.objectHeight;
+  const p95 = scale.displayPxError >= anyDisplayPx ? 0 : displayedPx / scale.displayPxError;
+  return { p95, rms: scale.errorRms * pxPerUnit, max: Math.max(p95, scale.errorMax * pxPerUnit) };
+}
+
+/** In px, y downwards. */
+export interface ScreenRect {
+  x0: number;
+  y0: number;
+  x1: number;
+  y1: number;
+}
+/** The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5). */
+export interface VisiblePart {
+  /** Both 0: nothing of the object is to be seen. */
+  widthPx: number;
+  heightPx: number;
+  /** false: all of it. */
+  clipped: boolean;
+}
+/** Nothing is cut off. */
+export const wholeObject: VisiblePart = { widthPx: 0, heightPx: 0, clipped: false };
+
+/** What of an object that `object` bounds on the screen the border of the view leaves. */
+export function clipTo(object: ScreenRect, view: ScreenRect): VisiblePart {
+  const x0 = Math.max(object.x0, view.x0);
+  const x1 = Math.min(object.x1, view.x1);
+  const y0 = Math.max(object.y0, view.y0);
+  const y1 = Math.min(object.y1, view.y1);
+  if (!(x1 > x0) || !(y1 > y0)) return { widthPx: 0, heightPx: 0, clipped: true };
+  const whole = x0 <= object.x0 && x1 >= object.x1 && y0 <= object.y0 && y1 >= object.y1;
+  return { widthPx: x1 - x0, heightPx: y1 - y0, clipped: !whole };
+}
+
+/** By how much a relative distance grows when R can be no more than half the part's shorter side. */
+function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart): number {
+  if (!(s.p95 > 0) || s.displayPxError >= anyDisplayPx) return 1;
+  const halfWidthPx = Math.min(part.widthPx, part.heightPx) / 2;
+  const value = displayedPx / s.displayPxError / halfWidthPx;
+  return Math.max(1, value / s.p95);
+}
+
+function accepts(
+  scales: readonly ManifestScale[],
+  k: number,
+  displayedPx: number,
+  part: VisiblePart,
+  rule: StepRule,
+): boolean {
+  if (rule === 'edge') return displayedPx <= limitOf(scales, k, rule);
+  const s = scales[k];
+  const seen = Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
+  return (seen || rule === 'error') && (displayedPx <= s.displayPxError || rule === 'jnd');
+}
+
+/**
+ * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is visible
+ * (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
+ */
+export function selectScale(
+  manifest: Manifest,
+  displayedPx: number,
+  part: VisiblePart = wholeObject,
+  rule: StepRule = 'default',
+): number {
+  const { scales } = manifest;
+  if (!part.clipped) return scaleAt(stepFunction(scales, rule), displayedPx);
+  if (!(part.widthPx > 0 && part.heightPx > 0)) return scales[scales.length - 1].scale;
+  for (let k = scales.length - 1; k >= 1; --k)
+    if (accepts(scales, k, displayedPx, part, rule)) return scales[k].scale;
+  return scales[0].scale;
+}

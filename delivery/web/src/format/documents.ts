@@ -1,0 +1,131 @@
+import { toHex } from './bytes';
+import { codecTraits } from './codec';
+import * as paths from './entry_paths';
+import { FormatError } from './errors';
+import { parseIndexPage, readIndexHead } from './index_table';
+import * as layout from './layout';
+import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
+import { parseTablesSection, readTablesHead } from './read_tables';
+import { missingFeature, readTextures } from './read_textures';
+import { sha256 } from './sha256';
+import { PlaneTables, fragmentCount, rungCount } from './tables';
+import { TextureInfo, fullSizePlanes } from './textures';
+
+// What is decoded and checked, meshes by themselves, documents against the manifest and against each other: in workers, or here where there are none. Digests
+// have been checked before.
+
+export { readIndex } from './index_table';
+export { requireOwnBytes } from './self_contained_glb';
+export { readQuality as quality } from './quality_table';
+
+const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
+
+function require(good: boolean, file: string, place: string, expected: string, found: unknown): asserts good {
+  if (!good) throw new FormatError(file, place, expected, String(found));
+}
+
+/** manifest.json and its SHA-256; of the first bytes of a container where that has a name. */
+export async function manifest(bytes: Uint8Array, container = ''): Promise<{ parsed: Manifest; id: string }> {
+  const json = container ? manifestOfContainer(bytes, container) : bytes;
+  return { parsed: readManifest(json), id: toHex(await sha256(json)) };
+}
+
+/** A page of index.bin. */
+export interface PageRef extends EntryRef {
+  /** -1: of what belongs to none. */
+  plane: number;
+  entries: number;
+  minor: number;
+}
+/** The pages of index.bin, from its head or more. */
+export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
+  const { bytes: headBytes, pages, minor } = readIndexHead(bytes);
+  require(headBytes === index.headBytes, paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
+  return pages.map((p) => ({ ...p, minor, path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
+}
+
+/** The entries of a page of index.bin by their paths; those of the page without a plane are what the manifest says of them. */
+export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
+  const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
+  if (plane >= 0) return entries;
+  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+    const e = entries.get(ref.path);
+    const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
+    require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+  }
+  return entries;
+}
+
+/** textures.json. */
+export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
+  const planes = readTextures(bytes);
+  require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
+  const feature = missingFeature(planes, requiredFeatures);
+  require(feature === '', paths.manifestPath, '/requiredFeatures', feature, 'a codec without it');
+  const full = fullSizePlanes(planes);
+  const mips = requiredFeatures.includes('mips');
+  const mipCount = planes.length - full;
+  require(mips === mipCount > 0, paths.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
+  const said = previews.length === Math.min(full, mostManifestPreviews);
+  require(said, paths.manifestPath, '', 'previews of the full-size planes', previews.length);
+  return planes;
+}
+
+/** A plane's section of tables.bin. */
+export interface SectionRef extends EntryRef {
+  minor: number;
+}
+/** The sections of tables.bin by plane, from its head or more. */
+export function tableSections(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): SectionRef[] {
+  const head = readTablesHead(bytes);
+  require(head.bytes === ref.headBytes, paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
+  require(head.planes.length === planeCount, paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
+  const last = head.planes[planeCount - 1];
+  const end = last ? last.offset + last.bytes : head.bytes;
+  require(end === ref.bytes, paths.tablesPath, '', `${end} bytes`, ref.bytes);
+  return head.planes.map((s, p) => ({ ...s, minor: head.minor, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
+}
+
+/** Tables of one plane, and where its fragments are. */
+export interface PlaneDocument {
+  tables: PlaneTables;
+  /** What the fragments of its rungs have in common. */
+  tableStreams: EntryRef;
+  /** By rung. */
+  packs: EntryRef[];
+  /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
+  offsets: Float64Array;
+}
+
+/** A section of tables.bin; textures.json and the index speak of the same fragments and bytes. */
+export function planeTables(
+  bytes: Uint8Array,
+  { minor }: SectionRef,
+  plane: number,
+  info: TextureInfo,
+  entries: Map<string, EntryRef>,
+): PlaneDocument {
+  const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
+  const requireHere = (good: boolean, expected: string, found: unknown): void =>
+    require(good, paths.tablesPath, `texture plane ${plane}`, expected, found);
+  const { columns, rows, rungQuality, order, sizeBytes } = tables;
+  const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
+  requireHere(columns === info.columns && rows === info.rows && sameRungs, 'the grid and rungs of textures.json', 'others');
+  requireHere(tables.incremental === codecTraits(info.codec).incremental, 'tables of the codec in textures.json', 'others');
+  const requireSum = (path: string, total: number): void =>
+    requireHere(entries.get(path)?.bytes === total, `${path} of ${total} bytes in the index`, entries.get(path)?.bytes ?? 'none');
+  requireSum(paths.tableStreamsPath(plane), sum(tables.tableBytes));
+  const n = fragmentCount(tables);
+  const offsets = new Float64Array(n * rungCount(tables));
+  for (let r = 0; r < rungCount(tables); ++r) {
+    requireSum(layout.rungPath(plane, r), sum(sizeBytes.subarray(r * n, (r + 1) * n)));
+    let at = 0;
+    for (const f of order) {
+      offsets[r * n + f] = at;
+      at += sizeBytes[r * n + f];
+    }
+  }
+  const entry = (path: string): EntryRef => entries.get(path)!;
+  const packs = Array.from(tables.rungQuality, (_, r) => entry(layout.rungPath(plane, r)));
+  return { tables, tableStreams: entry(paths.tableStreamsPath(plane)), packs, offsets };
+}

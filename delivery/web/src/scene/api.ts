@@ -1,0 +1,212 @@
+import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
+import type { HtcOrder, Policy } from '../decide/unchecked_plan';
+import type { RequestRecord } from '../http/client';
+import type { StepRule, VisiblePart } from '../decide/viewing';
+import type { DecodeHere } from '../worker/pool';
+
+/** How the object is looked at; lengths in device pixels. */
+export interface Display {
+  /** Height on screen of the object's largest extent, the whole of it, seen or not. */
+  heightPx: number;
+  /** What of it is seen (Fig. 7.5); left out: all. */
+  part?: VisiblePart;
+}
+
+/** What GLTFLoader (three/addons) offers and this library uses. */
+export interface GltfLoaderLike {
+  /** Adds an extension of the loader. */
+  register(callback: (parser: any) => any): unknown;
+  /** Reads a GLB. */
+  parseAsync(data: ArrayBuffer, path: string): Promise<unknown>;
+}
+
+/** Options of TexmeshPackage.load. */
+export interface LoadOptions {
+  /** The renderer that shows the scene: textures are composed in its context. */
+  renderer: WebGLRenderer;
+  /**
+   * Makes a GLTFLoader with whatever decoders the package's meshes need: `() => new GLTFLoader().setDRACOLoader(...)`.
+   * Called once for every mesh.
+   */
+  gltfLoader: () => GltfLoaderLike;
+  /** Camera that looks at the object; with it scale and textures follow the display, see LoadedModel.update. */
+  camera?: Camera;
+  /** Without a camera (or instead of it): displayed height in device px, or a function that says. Default 1000. */
+  display?: number | Display | (() => number | Display);
+  /**
+   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
+   * Infinity: no limit, everything that the display can show. Default 5.
+   */
+  time?: number;
+  /** How the time is spent; htca is another name of htc. Default guard. */
+  policy?: Policy | 'htca';
+  /** Which fragment of the plan is fetched next. Default credit. */
+  order?: HtcOrder;
+  /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
+  beta0BytesS?: number;
+  /**
+   * Which rule says what scale is enough: one of the step function's, or (default) measured: its default, and finer as
+   * long as the package's own measurements say that it is seen.
+   */
+  rule?: StepRule | 'measured';
+  /** This scale (or the nearest one that the package has) instead of what the display asks for. */
+  scale?: number;
+  /** This rung of every fragment (clipped to those there are) instead of what fits the time. */
+  rung?: number;
+  /** Full-size textures, whatever the display can show. */
+  fullSize?: boolean;
+  /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default auto. */
+  meshes?: 'glb' | 'stream' | 'auto';
+  /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
+  autoRefine?: boolean;
+  /** Refining ends where a fragment's 1 - SSIM is no more than this: what is beyond cannot be told apart. Default 0.003. */
+  refineTo?: number;
+  /** Where worker.js is, when not beside the library. */
+  workerUrl?: string | URL;
+  /** Where pages may have no workers: `handle` of texmesh/worker, which then works on the main thread. */
+  decode?: DecodeHere;
+  /** Workers that decode images. Default: 2 to 4 by the number of cores. */
+  workers?: number;
+  /** Cancels the load, as LoadedModel.cancel does. */
+  signal?: AbortSignal;
+}
+
+/** Phases of a load, in their order. */
+export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
+
+/** A decision of the plan for a fragment or some neighbours; sent when it is taken and again when its transfer has ended. */
+export interface DecisionEvent {
+  /** k = 1 .. n */
+  position: number;
+  /** Texture plane of the fragments. */
+  plane: number;
+  /** The first. */
+  fragment: number;
+  /** All: neighbours of one rung are fetched together where a request takes longer than its bytes. */
+  fragments: number[];
+  /** Importance. */
+  eta: number;
+  /** -1: skipped */
+  rung: number;
+  /** What is fetched. */
+  bytes: number;
+  /** theta_k: it may take so long. */
+  plannedSeconds: number;
+  /** gamma_k: it took so long; undefined until it has ended. */
+  actualSeconds?: number;
+  /** Time that earlier ones have saved, or, below 0, lost. */
+  creditSeconds: number;
+  /** Throughput that the decision supposes. */
+  bytesPerSecond: number;
+  /** When it was asked for, seconds after the first request for a fragment. */
+  issued: number;
+  /** When it had come, on the same clock; undefined until then. */
+  done?: number;
+  /** Nothing is fetched: the preview stays. */
+  skipped: boolean;
+}
+
+/** Events of a load; every one has the time `at`, milliseconds of performance.now(). */
+export interface LoadEvents {
+  /** A request of the package has ended. */
+  request: RequestRecord & { at: number };
+  /** The coarsest mesh with its previews stands in the scene. */
+  'first-picture': { at: number; scale: number; bytes: number };
+  /** Another scale stands in the scene. */
+  scale: { at: number; scale: number; triangles: number };
+  /** A plane was chosen, or a finer one, to show a texture. */
+  plane: { at: number; base: number; plane: number; widthPx: number; heightPx: number };
+  /** A fragment is in its texture. */
+  fragment: { at: number; plane: number; fragment: number; rung: number };
+  /** The plan has decided about fragments, or their transfer has ended. */
+  decision: DecisionEvent & { at: number };
+  /** More bytes, or another phase. */
+  progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
+  /** The timed part is over: limit and what it took, seconds from the same start. */
+  deadline: { at: number; limit: number; actual: number; skipped: number };
+  /**
+   * The renderer's context was lost, or is there again: then textures begin with their previews, and what they had is fetched again; `done`
+   * tells the end of it.
+   */
+  context: { at: number; lost: boolean };
+  /** Something went wrong; fatal: the load has ended. */
+  error: { at: number; fatal: boolean; message: string; what: string; error: unknown };
+  /** Nothing is left to fetch for what the display can show now. */
+  done: { at: number };
+}
+
+/** A texture as it is composed. */
+export interface ComposedPlane {
+  /** Full-size plane. */
+  base: number;
+  /** The plane that is shown: it or a mip of it. */
+  plane: number;
+  /** Image of the package that it holds. */
+  image: number;
+  /** What the image says of the surface: base-colour, normal and so on. */
+  role: string;
+  /** Texels of the shown plane across. */
+  widthPx: number;
+  /** And down. */
+  heightPx: number;
+  /** Rung of each fragment in the texture; -1: the preview. */
+  rungs: Int16Array;
+  /** As used by materials; the same GPU texture for all of them. */
+  textures: readonly Texture[];
+}
+
+/** State of a load, for panels and tests. */
+export interface LoadState {
+  /** Where the load stands. */
+  phase: LoadPhase;
+  /** Scale in the scene; -1: none yet. */
+  scale: number;
+  /** Scale that the display asks for. */
+  wantedScale: number;
+  /** Displayed height that decides, device px. */
+  displayedPx: number;
+  /** Textures that are being composed, in no order. */
+  planes: readonly ComposedPlane[];
+  /** Bytes received by this package so far. */
+  bytes: number;
+  /** Throughput as it is estimated now; 0: nothing is known yet. */
+  throughputBytesS: number;
+  /** Round trip, seconds. */
+  rttS: number;
+  /** Fragments whose transfer, decoding or upload is under way. */
+  pending: number;
+}
+
+/** A package in a scene. */
+export interface LoadedModel {
+  /** What was added to the scene; in the frame of the package's meshes (Manifest.origin). */
+  readonly object: Object3D;
+  /** How it stands now; a new object each time. */
+  readonly state: LoadState;
+  /** When the first picture stands in the scene. */
+  readonly firstPicture: Promise<void>;
+  /** When the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
+  readonly done: Promise<void>;
+  /** Calls the listener at every such event; what it returns ends that. */
+  on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
+  /**
+   * The view may have changed: call it for every frame, or when the camera moves. Picks the scale (with hysteresis),
+   * finer planes, and what to refine first. Cheap when nothing has changed.
+   */
+  update(camera?: Camera): void;
+  /** Fetches what the display can show but the time did not allow; resolves when nothing is left to fetch. */
+  refine(): Promise<void>;
+  /**
+   * Changes what was chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place of
+   * higher ones, too. undefined: by the display again. InputError: a rung that is none.
+   */
+  setOverride(override: { scale?: number; rung?: number }): void;
+  /** Stops all transfers; what is shown stays. */
+  cancel(): void;
+  /** Stops, takes the object out of the scene and frees geometries, materials, textures and workers. */
+  dispose(): void;
+  /** RGBA bytes of a composed plane, row 0 at the top: reads back from the GPU, for tests. */
+  readPlane(base: number): Uint8Array;
+  /** Materials in use, for effects of the application's own. */
+  readonly materials: readonly Material[];
+}

@@ -1,0 +1,72 @@
+import { type PlaneComposer, ownLevels } from './composer';
+import type { WorkerPool } from '../worker/pool';
+
+// Where the processor draws for want of a GPU, and for previews of their own; loaded when it is needed.
+
+/** Of a piece of an enlarged preview, which is uploaded in one go; and pieces under way. */
+const stripPx = 1 << 18;
+const mostPieces = 4;
+
+/** Puts off what gives some pixels to the GPU; resolves when it has been done, or nobody wants it any more. */
+export type Enqueue = (pixels: number, run: () => void) => Promise<void>;
+/** The texture set that asks. */
+export interface Enlarging {
+  pool: WorkerPool;
+  enqueue: Enqueue;
+  ended(): boolean;
+}
+interface Piece {
+  x0: number;
+  x1: number;
+  y0: number;
+  y1: number;
+}
+
+/**
+ * A preview enlarged off the main thread, piece by piece: GPUs that are none take seconds for a large texture. Fragments that have
+ * come meanwhile need none.
+ */
+export async function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, how: Enlarging): Promise<void> {
+  const running = new Set<Promise<void>>();
+  for (const piece of pieces(next)) {
+    const done = enlargePiece(next, image, piece, how).finally(() => running.delete(done));
+    done.catch(() => undefined); // the first to fail is told
+    running.add(done);
+    if (running.size >= mostPieces) await Promise.race(running);
+    if (how.ended()) break;
+  }
+  await Promise.all(running);
+}
+
+/** Runs of neighbours that have not come when it is their turn. */
+function* pieces(next: PlaneComposer): Generator<Piece> {
+  const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
+  const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));
+  const most = Math.max(1, Math.floor(stripPx / (width * rise)));
+  for (let row = 0; row < rows; ++row)
+    for (let y = row * height; y < Math.min((row + 1) * height, next.heightPx); y += rise)
+      for (let from = 0, to = 0; from < columns; from = to) {
+        const lacks = (column: number): boolean => column < columns && !next.come.has(row * columns + column);
+        to = from + 1;
+        if (!lacks(from)) continue;
+        while (to - from < most && lacks(to)) ++to;
+        const [x1, y1] = [Math.min(to * width, next.widthPx), Math.min(y + rise, (row + 1) * height, next.heightPx)];
+        yield { x0: from * width, x1, y0: y, y1 };
+      }
+}
+
+async function enlargePiece(
+  next: PlaneComposer,
+  image: ImageBitmap | HTMLImageElement,
+  piece: Piece,
+  how: Enlarging,
+): Promise<void> {
+  const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
+  const { widthPx: width, heightPx: height } = next;
+  const bitmaps = await how.pool
+    .enlarge({ picture, width, height, ...piece, levels: ownLevels })
+    .finally(() => picture.close()); // workers have a copy of their own
+  const { x0, x1, y0, y1 } = piece;
+  await how.enqueue((x1 - x0) * (y1 - y0), () => next.upload(bitmaps, x0, y0));
+  bitmaps.forEach((b) => b.close());
+}

@@ -1,0 +1,62 @@
+import type { GroupedList } from '../decide/request_groups';
+import { nowS, throwIfAborted } from '../http/client';
+import type { HtcStep, TimePlan } from '../decide/unchecked_plan';
+import type { Transfers, Wish } from './transfers';
+
+/** Who hears of it. */
+export interface TimedFetchHooks {
+  /** A decision was taken, or its transfer has ended. */
+  decided(step: HtcStep): void;
+  lost(wish: Wish, error: unknown): void;
+}
+
+/**
+ * Plays a plan over the network: asks for what it says, tells it what has come. Until everything has come or was given up; what has not
+ * come after `mostS` seconds is.
+ */
+export async function timedFetch(
+  plan: TimePlan,
+  { groups }: GroupedList,
+  transfers: Transfers,
+  signal: AbortSignal,
+  mostS: number,
+  hooks: TimedFetchHooks,
+): Promise<void> {
+  const startS = nowS();
+  const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
+  const abort = new AbortController();
+  const stop = (): void => abort.abort();
+  signal.addEventListener('abort', stop);
+  const timer = setTimeout(stop, mostS * 1000);
+  let told = 0;
+  const pump = (end: () => void): void => {
+    const wishes: Wish[] = [];
+    for (let step; !signal.aborted && (step = plan.next(nowS() - startS)); ) {
+      const { offer, rung } = step;
+      underWay.set(offer, { step, left: groups[offer].length });
+      for (const f of groups[offer]) wishes.push({ ...f, rung, offer });
+    }
+    while (told < plan.steps.length) hooks.decided(plan.steps[told++]);
+    const ended = ({ offer }: Wish, well: boolean): void => {
+      const group = underWay.get(offer)!;
+      if (--group.left > 0) return;
+      underWay.delete(offer);
+      plan.ended(group.step, nowS() - startS, well);
+      hooks.decided(group.step);
+      queueMicrotask(() => pump(end));
+    };
+    const lost = (wish: Wish, error: unknown): void => {
+      hooks.lost(wish, error);
+      ended(wish, false);
+    };
+    if (wishes.length > 0) void transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
+    if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
+  };
+  try {
+    await new Promise<void>(pump);
+    throwIfAborted(signal);
+  } finally {
+    clearTimeout(timer);
+    signal.removeEventListener('abort', stop);
+  }
+}

@@ -1,0 +1,38 @@
+import { BackSide, Camera, DoubleSide, Frustum, Matrix4, Mesh, Object3D, Triangle, Vector3 } from 'three';
+import { sampleTriangles } from './scale_parts';
+import type { TextureInfo } from '../format/textures';
+
+/** Triangles looked at per model: enough to tell which fragments are seen. */
+const mostSamples = 6000;
+
+/**
+ * Share of each fragment's surface that the camera sees, from a sample of the triangles: in its frustum and turned to it, by the
+ * material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. [fragments]
+ */
+export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera, shows: (mesh: Mesh) => boolean): Float32Array {
+  const { columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx } = plane;
+  const seen = new Float32Array(columns * rows);
+  const all = new Float32Array(columns * rows);
+  object.updateWorldMatrix(true, true);
+  const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const frustum = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
+  const [at, uv, middle] = [new Triangle(), new Triangle(), new Vector3()];
+  const cell = (part: number, px: number, whole: number, count: number): number =>
+    Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
+  sampleTriangles(object, mostSamples, (mesh, places) => {
+    const { geometry: { attributes }, matrixWorld } = mesh;
+    if (!attributes.uv || !shows(mesh)) return;
+    uv.setFromAttributeAndIndices(attributes.uv, ...places).getMidpoint(middle);
+    const f = cell(middle.y, fragmentHeightPx, heightPx, rows) * columns + cell(middle.x, fragmentWidthPx, widthPx, columns);
+    at.setFromAttributeAndIndices(attributes.position, ...places);
+    const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(matrixWorld));
+    const area = at.getArea();
+    all[f] += area;
+    const sides = [mesh.material].flat().map((m) => m.side);
+    const front = sides.includes(BackSide) === matrixWorld.determinant() < 0; // mirrored: three.js takes the other side for the front
+    const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
+    if (turned && corners.some((p) => frustum.containsPoint(p))) seen[f] += area;
+  });
+  // What no sample fell into may be seen.
+  return seen.map((area, f) => (all[f] > 0 ? area / all[f] : 0.5));
+}

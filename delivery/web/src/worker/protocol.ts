@@ -1,0 +1,104 @@
+import type { CodecId } from '../format/codec';
+
+/** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
+export interface DecodeRequest {
+  op: 'decode';
+  codec: CodecId;
+  tables: Uint8Array;
+  streams: Uint8Array[];
+  /** First bytes of each stream's SHA-256; empty = not to be checked. */
+  digests: Uint8Array[];
+  /** The stream is a complete file. */
+  complete: boolean;
+  /** Mip levels to make, itself included. */
+  levels: number;
+  /** Width and height that it may have, at most. */
+  most: [number, number];
+}
+/** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
+export interface EnlargeRequest {
+  op: 'enlarge';
+  picture: ImageBitmap;
+  width: number;
+  height: number;
+  x0: number;
+  x1: number;
+  y0: number;
+  y1: number;
+  levels: number;
+}
+/** A picture and its halves, one after the other. */
+export type Levels = ImageBitmap[];
+/** Start a vertex-split stream under a number of the caller's. Gives SplitInfo. */
+export interface SplitOpenRequest {
+  op: 'split-open';
+  key: number;
+  head: Uint8Array;
+}
+/** Decode the next blocks of a stream, which stand one after the other. */
+export interface SplitAddRequest {
+  op: 'split-add';
+  key: number;
+  blocks: Uint8Array;
+}
+/** Check the digests of the whole blocks among bytes of a stream. */
+export interface SplitCheckRequest {
+  op: 'split-check';
+  key: number;
+  /** Where the bytes stand in the stream. */
+  from: number;
+  blocks: Uint8Array;
+}
+/** Forget a stream. */
+export interface SplitCloseRequest {
+  op: 'split-close';
+  key: number;
+}
+/** What documents.ts decodes. */
+export type Documents = typeof import('../format/documents');
+/** Decodes a document by the name of a function there. */
+export type DocumentDecoder = <K extends keyof Documents>(
+  name: K,
+  ...args: Parameters<Documents[K]>
+) => Promise<Awaited<ReturnType<Documents[K]>>>;
+/** Decode a document by a function of documents.ts. Gives what that gives. */
+export interface DocumentRequest {
+  op: 'document';
+  name: keyof Documents;
+  args: unknown[];
+}
+/** Anything that a worker is asked. */
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
+
+/** What the head of a stream says of it. */
+export interface SplitInfo {
+  /** Of the head; blocks follow. */
+  headBytes: number;
+  /** Coarsest first; complete with the byte before `end`. */
+  scales: { scale: number; blocks: number; wedges: number; end: number }[];
+}
+
+/** What has been added to a split mesh, and its triangles now. */
+export interface SplitUpdate {
+  /** Wedges before and now; arrays hold those between. */
+  from: number;
+  to: number;
+  /** Blocks decoded so far. */
+  blocks: number;
+  /** Positions, UV, normals, colours, by three.js's names. */
+  attributes: { name: string; components: number; values: Float32Array }[];
+  /** Wedges of all visible triangles, sorted by group. */
+  index: Uint32Array;
+  /** What of the index is drawn by which material. */
+  draws: { material: number; start: number; count: number }[];
+}
+
+/** What a worker answers. */
+export interface WorkerAnswer {
+  id: number;
+  /** Levels of decode and enlarge, SplitUpdate of split-add, what a document says. */
+  result?: unknown;
+  /** The error itself, where no thread lies between. */
+  failed?: unknown;
+  error?: { name: string; message: string; parts?: [string, string, string, string] };
+}
