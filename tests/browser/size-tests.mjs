@@ -66,7 +66,7 @@ test('ordinary loads fetch no more of the library than its build counts', async 
     }
     const {files, sum} = counted();
     console.log(`         the library: ${(sum / 1024).toFixed(2)} KB gzip of ${limit}: ${files}`);
-    check(/open\.js/.test(files) && /open-later\.js/.test(files), files);
+    check(/open\.js/.test(files) && /open-texture_load\.js/.test(files), files);
     check(sum <= limit * 1024, `${sum} bytes, more than ${limit} KB: ${files}`);
     check(server.requests.some((q) => q.path === '/texmesh/worker.js'), 'no worker came');
   } finally {
