@@ -1,9 +1,9 @@
 import type { Object3D } from 'three';
-import type { LoadOptions, LoadedModel } from './scene/api';
 import { InputError } from './format/errors';
-import { nowS } from './http/client';
-import { loadModel } from './scene/load';
+import { nowS } from './http/clock';
 import { OpenOptions, PackageReader } from './http/package_reader';
+import type { LoadOptions, LoadedModel } from './scene/api';
+import { loadModel } from './scene/load';
 import { PoolOptions, WorkerPool, workerPool } from './worker/pool';
 
 export { FormatError, InputError, TexmeshError } from './format/errors';

@@ -1,17 +1,17 @@
 import { Scene } from 'three';
 import { describe, expect, it } from 'vitest';
-import type { LoadOptions } from '../src/scene/api';
-import { HttpClient, absolute } from '../src/http/client';
 import { imageSize } from '../src/format/image_size';
-import { TexmeshPackage } from '../src/open';
-import { requireOwnBytes } from '../src/format/self_contained_glb';
-import { FormatError, InputError, OpenOptions, PackageReader } from '../src/reader';
-import { openStore } from '../src/http/store';
+import { requireSelfContained } from '../src/format/self_contained_glb';
+import { HttpClient, absolute } from '../src/http/client';
+import { openStore } from '../src/http/open_store';
 import { TreeStore } from '../src/http/tree_store';
+import { TexmeshPackage } from '../src/open';
+import { FormatError, InputError, OpenOptions, PackageReader } from '../src/reader';
+import type { LoadOptions } from '../src/scene/api';
 import { handle } from '../src/worker';
 import { WorkerPool, workerPool } from '../src/worker/pool';
 import type { WorkerRequest } from '../src/worker/protocol';
-import { Fault, FakeServer, fakeServer } from './fake_server';
+import { FakeServer, Fault, fakeServer } from './fake_server';
 import { golden } from './support';
 
 const container = golden('v1.1-scan');
@@ -221,16 +221,16 @@ describe('hostile answers', () => {
   it('a GLB whose JSON loaders may read otherwise is refused', () => {
     const nice = '{"buffers":[{"byteLength":1}]}';
     const evil = '{"buffers":[{"uri":"http://evil.example/"}]}';
-    requireOwnBytes(glb(nice, [binChunk, 'bytes']));
+    requireSelfContained(glb(nice, [binChunk, 'bytes']));
     for (const chunks of [[nice, evil], [[1, nice], evil], [nice, [binChunk, 'a'], evil], [nice, [1, 'a']], [[binChunk, 'a'], nice]])
-      expect(() => requireOwnBytes(glb(...(chunks as string[])))).toThrow(FormatError);
+      expect(() => requireSelfContained(glb(...(chunks as string[])))).toThrow(FormatError);
     for (const name of ['buffers', 'images'])
       for (const list of [{ 0: { uri: 'http://evil.example/' } }, [null], 'http://evil.example/', [{ uri: ['data:'] }], [{ uri: null }]])
-        expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: list })))).toThrow(FormatError);
+        expect(() => requireSelfContained(glb(JSON.stringify({ [name]: list })))).toThrow(FormatError);
     const [longer, shorter] = [glb(nice), glb(nice)]; // than the file says it is
     new DataView(longer.buffer).setUint32(8, longer.length + 4, true);
     new DataView(shorter.buffer).setUint32(8, shorter.length - 4, true);
-    for (const bad of [longer, shorter]) expect(() => requireOwnBytes(bad)).toThrow(FormatError);
+    for (const bad of [longer, shorter]) expect(() => requireSelfContained(bad)).toThrow(FormatError);
   });
   it('a GLB with pictures larger than previews is refused', () => {
     const withPicture = (side: number, view: object = {}, image: object = {}): Uint8Array => {
@@ -239,7 +239,7 @@ describe('hostile answers', () => {
       out.set([0xff, 0xd8, 0xff, 0xc0, 0, 17, 8, side >> 8, side & 255, side >> 8, side & 255, 3], out.length - 12);
       return out;
     };
-    requireOwnBytes(withPicture(4096));
+    requireSelfContained(withPicture(4096));
     // Previews with coverage are PNG.
     const withPng = (width: number, height: number): Uint8Array => {
       const bufferViews = [{ buffer: 0, byteLength: 24 }];
@@ -249,25 +249,25 @@ describe('hostile answers', () => {
       new DataView(out.buffer).setUint32(out.length - 4, height);
       return out;
     };
-    requireOwnBytes(withPng(4096, 1));
-    for (const [w, h] of [[4097, 1], [1, 4097], [0, 8], [8, 0], [0x80000001, 8], [65536 * 4, 8]]) expect(() => requireOwnBytes(withPng(w, h))).toThrow(FormatError);
+    requireSelfContained(withPng(4096, 1));
+    for (const [w, h] of [[4097, 1], [1, 4097], [0, 8], [8, 0], [0x80000001, 8], [65536 * 4, 8]]) expect(() => requireSelfContained(withPng(w, h))).toThrow(FormatError);
     for (const bad of [
       withPicture(4097), withPicture(0), withPicture(65535), withPicture(64, { byteLength: 6 }), withPicture(64, { byteOffset: 1 }), withPicture(64, { buffer: 1 }),
       withPicture(64, { byteOffset: -12 }), withPicture(64, { extensions: {} }), withPicture(64, {}, { bufferView: 1 }), withPicture(64, {}, { bufferView: undefined }),
     ])
-      expect(() => requireOwnBytes(bad)).toThrow(FormatError);
+      expect(() => requireSelfContained(bad)).toThrow(FormatError);
   });
   it('a GLB that names other hosts is refused', async () => {
     for (const uri of ['http://evil.example/x.png', '//evil.example/x', 'x.bin', 'blob:y', 'data:image/png;base64,']) {
       for (const name of ['images', 'buffers'])
-        expect(() => requireOwnBytes(glb(JSON.stringify({ [name]: [{}, { uri }] })))).toThrow(FormatError);
+        expect(() => requireSelfContained(glb(JSON.stringify({ [name]: [{}, { uri }] })))).toThrow(FormatError);
     }
-    requireOwnBytes(glb(JSON.stringify({ images: [], buffers: [{ byteLength: 3 }] })));
+    requireSelfContained(glb(JSON.stringify({ images: [], buffers: [{ byteLength: 3 }] })));
     const whole = glb('{}');
-    for (let n = 0; n < whole.length; ++n) expect(() => requireOwnBytes(whole.subarray(0, n))).toThrow(FormatError);
-    expect(() => requireOwnBytes(glb('{"images":'))).toThrow(FormatError);
+    for (let n = 0; n < whole.length; ++n) expect(() => requireSelfContained(whole.subarray(0, n))).toThrow(FormatError);
+    expect(() => requireSelfContained(glb('{"images":'))).toThrow(FormatError);
     const reader = await PackageReader.openBytes(container, 'golden');
-    for (const { scale } of reader.manifest.scales) requireOwnBytes(await reader.scaleGlb(scale));
+    for (const { scale } of reader.manifest.scales) requireSelfContained(await reader.scaleGlb(scale));
   });
 });
 

@@ -5,7 +5,7 @@ import { golden } from './support';
 
 // Pages whose server does not give the part for servers without ranges, perhaps because it is what fails.
 let asked = 0;
-vi.mock('../src/http/tree_store', () => {
+vi.mock('../src/http/without_ranges', () => {
   ++asked;
   throw new Error('not there');
 });

@@ -1,10 +1,10 @@
 import { describe, expect, it } from 'vitest';
 import { toHex } from '../src/format/bytes';
 import { fragmentFilePath } from '../src/format/entry_paths';
-import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
 import { sha256 } from '../src/format/sha256';
-import { treeUrl } from '../src/http/tree_store';
-import { Fault, FakeServer, FaultKind, bytesAskedTwice, fakeServer, treeFiles } from './fake_server';
+import { treeUrl } from '../src/http/without_ranges';
+import { InputError, OpenOptions, PackageReader, TexmeshError } from '../src/reader';
+import { FakeServer, Fault, FaultKind, bytesAskedTwice, fakeServer, treeFiles } from './fake_server';
 import { golden } from './support';
 
 const container = golden('v1.1-scan');

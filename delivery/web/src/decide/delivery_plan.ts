@@ -1,9 +1,9 @@
-import type { PackageData } from './fragment_list';
-import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
-import { LinkOptions, fetchedS } from './simulation';
 import { bootstrapBytes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
+import type { PackageData } from '../format/package_data';
 import type { QualityTable } from '../format/quality_table';
+import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
+import { LinkOptions, fetchedS } from './network_model';
 import { InTime, choiceInTime, finerWhereSeen } from './scale_choice';
 import { StepRule, selectScale } from './viewing';
 

@@ -1,18 +1,15 @@
-import { bytesToShow, etaOf, interpolatedBytes, meanEta, qualityOf, spendBytes, surfaceWeights } from './allocation';
 import { InputError } from '../format/errors';
-import { FragmentOffer, bytesAtRung } from './unchecked_plan';
 import type { Manifest } from '../format/manifest';
+import type { PackageData } from '../format/package_data';
+import { PlaneTables, bytesToShow, fragmentCount } from '../format/tables';
+import { TextureInfo, fullSizePlanes } from '../format/textures';
+import { etaOf, meanEta, qualityOf } from './allocation';
 import { clamp, sumOf } from './numbers';
 import { log, pow } from './portable_math';
-import { PlaneTables, fragmentCount } from '../format/tables';
-import { TextureInfo, fullSizePlanes } from '../format/textures';
+import { spendBytes, surfaceWeights } from './rate_distortion';
+import { interpolatedBytes } from './size_curve';
+import { FragmentOffer, bytesAtRung } from './unchecked_plan';
 
-/** What decisions about textures are made from. Tables may lack planes that nobody asks about. */
-export interface PackageData {
-  manifest: Manifest;
-  textures: readonly TextureInfo[];
-  tables: readonly (PlaneTables | undefined)[];
-}
 /** Which plane shows each texture: the full-size one or a mip of it. */
 export interface PlaneChoice {
   base: number;

@@ -1,8 +1,10 @@
-import { logQuantiser, surfaceWeights } from './allocation';
-import { PackageData, PlaneChoice, roleWeight } from './fragment_list';
-import { clamp } from './numbers';
+import { PackageData } from '../format/package_data';
 import type { QualityTable } from '../format/quality_table';
 import { fragmentCount } from '../format/tables';
+import { logQuantiser } from './allocation';
+import { PlaneChoice, roleWeight } from './fragment_list';
+import { clamp } from './numbers';
+import { surfaceWeights } from './rate_distortion';
 
 const belowLowest = 2; // the line through the two lowest rungs goes on for so many of their steps
 

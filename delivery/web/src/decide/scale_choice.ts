@@ -1,7 +1,8 @@
-import { FragmentList, PackageData, PlaneChoice, TextureSpending, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
-import { Simulated, simulate } from './simulation';
-import { equivalentQuality, predictedSsim } from './prediction';
+import { PackageData } from '../format/package_data';
 import type { QualityTable } from '../format/quality_table';
+import { FragmentList, PlaneChoice, TextureSpending, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
+import { equivalentQuality, predictedSsim } from './prediction';
+import { Simulated, simulate } from './simulation';
 import type { TimePlanOptions } from './unchecked_plan';
 
 /** A coarser scale has to look better by this much of SSIM. */

@@ -11,3 +11,15 @@ export function samePrefix(a: Uint8Array, b: Uint8Array): boolean {
   for (let i = 0; i < n; ++i) if (a[i] !== b[i]) return false;
   return true;
 }
+
+/** Pieces as one; a single piece is that piece itself, not a copy. */
+export function concat(pieces: readonly Uint8Array[]): Uint8Array {
+  if (pieces.length === 1) return pieces[0];
+  const whole = new Uint8Array(pieces.reduce((bytes, piece) => bytes + piece.length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    whole.set(piece, at);
+    at += piece.length;
+  }
+  return whole;
+}

@@ -1,21 +1,20 @@
 import { toHex } from './bytes';
 import { codecTraits } from './codec';
-import * as paths from './entry_paths';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
-import * as layout from './layout';
 import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
-import { missingFeature, readTextures } from './read_textures';
 import { sha256 } from './sha256';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
-import { TextureInfo, fullSizePlanes } from './textures';
+import { TextureInfo, fullSizePlanes, missingFeature, readTextures } from './textures';
+import * as paths from './entry_paths';
+import * as layout from './layout';
 
 // What is decoded and checked, meshes by themselves, documents against the manifest and against each other: in workers, or here where there are none. Digests
 // have been checked before.
 
 export { readIndex } from './index_table';
-export { requireOwnBytes } from './self_contained_glb';
+export { requireSelfContained } from './self_contained_glb';
 export { readQuality as quality } from './quality_table';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);

@@ -23,3 +23,16 @@ export class InputError extends TexmeshError {
 export class FormatError extends TexmeshError {
   override readonly name = 'FormatError';
 }
+
+/** What a cancelled call throws. */
+export function abortError(): Error {
+  return new DOMException('The load was cancelled', 'AbortError');
+}
+/** Whether an error says that somebody cancelled. */
+export function isAbort(error: unknown): boolean {
+  return (error as Partial<Error>)?.name === 'AbortError';
+}
+/** Throws an AbortError where a signal says so. */
+export function throwIfAborted(signal?: AbortSignal): void {
+  if (signal?.aborted) throw abortError();
+}

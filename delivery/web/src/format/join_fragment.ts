@@ -1,3 +1,4 @@
+import { concat } from './bytes';
 import { CodecId, codecTraits } from './codec';
 import { FormatError } from './errors';
 
@@ -8,16 +9,6 @@ function withoutEnd(tables: Uint8Array): Uint8Array {
   if (!beginsAndEnds(tables))
     throw new FormatError('JPEG', 'table stream', 'SOI ... EOI', `${tables.length} other bytes`);
   return tables.subarray(0, tables.length - 2);
-}
-
-function joined(parts: Uint8Array[]): Uint8Array {
-  const out = new Uint8Array(parts.reduce((sum, p) => sum + p.length, 0));
-  let at = 0;
-  for (const p of parts) {
-    out.set(p, at);
-    at += p.length;
-  }
-  return out;
 }
 
 /**
@@ -32,12 +23,12 @@ export function joinFragment(codec: CodecId, tables: Uint8Array, streams: readon
   const first = streams[0];
   if (codec === 'jpeg') {
     if (!beginsAndEnds(first)) fail('SOI ... EOI');
-    return joined([withoutEnd(tables), first.subarray(2)]);
+    return concat([withoutEnd(tables), first.subarray(2)]);
   }
   if (codec === 'jpeg-progressive') {
     const last = streams[streams.length - 1];
     if (first.length === 0 || last[last.length - 1] === 0xff) fail('scans');
-    return joined([withoutEnd(tables), ...streams, new Uint8Array([0xff, 0xd9])]);
+    return concat([withoutEnd(tables), ...streams, new Uint8Array([0xff, 0xd9])]);
   }
   const text = (at: number): string => String.fromCharCode(...first.subarray(at, at + 4));
   if (first.length <= 12 || text(0) !== 'RIFF' || text(8) !== 'WEBP') fail('RIFF ... WEBP');

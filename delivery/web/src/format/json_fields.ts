@@ -54,11 +54,11 @@ export class JsonAt {
     if (/[\u0000-\u001f\u007f]/.test(v)) this.fail('a text without control characters', 'one');
     return v;
   }
-  /** A SHA-256 as 64 lower-case hexadecimal digits. */
-  digest(): Uint8Array {
-    const v = this.text(64);
-    if (!/^[0-9a-f]{64}$/.test(v)) this.fail('64 hexadecimal digits', this.shown_());
-    return Uint8Array.from({ length: 32 }, (_, i) => parseInt(v.slice(2 * i, 2 * i + 2), 16));
+  /** A SHA-256 (or its first bytes) as lower-case hexadecimal digits. */
+  digest(bytes = 32): Uint8Array {
+    const v = this.text(2 * bytes);
+    if (v.length !== 2 * bytes || /[^0-9a-f]/.test(v)) this.fail(`${2 * bytes} hexadecimal digits`, this.shown_());
+    return Uint8Array.from({ length: bytes }, (_, i) => parseInt(v.slice(2 * i, 2 * i + 2), 16));
   }
 }
 

@@ -34,7 +34,7 @@ function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
  * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. Its pictures, which loaders decode, are no
  * larger than previews. FormatError otherwise.
  */
-export function requireOwnBytes(glb: Uint8Array): void {
+export function requireSelfContained(glb: Uint8Array): void {
   const { json, bytes } = partsOfGlb(glb);
   for (const list of [json.buffers ?? [], json.images ?? []])
     require(Array.isArray(list) && list.every((item) => item && item.uri === undefined), 'buffers and images within the file');

@@ -65,6 +65,14 @@ export const fragmentCount = (t: PlaneTables): number => t.columns * t.rows;
 /** R */
 export const rungCount = (t: PlaneTables): number => t.rungQuality.length;
 
+/** What a client must have of a fragment to show it at a rung; 0 when it is not stored there. */
+export function bytesToShow(t: PlaneTables, rung: number, fragment: number): number {
+  const own = (r: number): number => t.sizeBytes[r * fragmentCount(t) + fragment];
+  let bytes = own(rung);
+  if (t.incremental && bytes > 0) for (let r = 0; r < rung; ++r) bytes += own(r);
+  return bytes;
+}
+
 /** Where a plane's section stands within tables.bin, and its digest. */
 export interface TablesSection {
   offset: number;

@@ -1,146 +1,14 @@
-import { FormatError, InputError } from '../format/errors';
-
-/** What bytes are for; of request events and of the bytes counted by kind. */
-export type RequestKind =
-  | 'manifest'
-  | 'index'
-  | 'tables'
-  | 'textures'
-  | 'quality'
-  | 'first-picture'
-  | 'mesh'
-  | 'preview'
-  | 'texture'
-  | 'stream'
-  | 'other';
-
-/** One finished request; times in seconds of performance.now(). */
-export interface RequestRecord {
-  url: string;
-  /** First byte and number of bytes asked for; 0 and -1 for whole files. */
-  offset: number;
-  bytes: number;
-  /** Bytes of the body that came. */
-  received: number;
-  kind: RequestKind;
-  started: number;
-  /** When the answer's head came; -1 when none did. */
-  firstByte: number;
-  ended: number;
-  status: number;
-  ok: boolean;
-}
-
-/** Limits of what a server may do to us. */
-export interface HttpOptions {
-  /** Instead of the browser's; gets a URL and a RequestInit. */
-  fetch?: typeof fetch;
-  /** Of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
-  retries: number;
-  /** Before the first retry, doubled for each further one. */
-  retryDelayS: number;
-  /** Without a byte, or without a worker's answer about a document. */
-  stallTimeoutS: number;
-  /**
-   * The browser's cache, for ranges. Default no-store: Chromium answers ranges of one URL that may be cached one after
-   * the other, however many were asked for at once, and with a round trip for each a slow link stands idle.
-   */
-  rangeCache: RequestCache;
-  /** Requests at once while the server speaks HTTP/1.1. */
-  connections: number;
-  /** Requests at once over HTTP/2 and HTTP/3. */
-  streams: number;
-  /** Of a container from a server that knows no ranges. */
-  maxWholeBytes: number;
-  /** Bytes per second at most, for trying slow links; 0 = no limit. */
-  capBytesS: number;
-}
-/** Where the caller says nothing. */
-export const defaultHttpOptions: HttpOptions = {
-  retries: 3,
-  retryDelayS: 0.2,
-  stallTimeoutS: 10,
-  rangeCache: 'no-store',
-  connections: 6,
-  streams: 32,
-  maxWholeBytes: 1 << 30,
-  capBytesS: 0,
-};
-
-/** What came back; the body holds at most what was asked for. */
-export interface Answer {
-  /** 0: no answer at all, see problem. */
-  status: number;
-  problem: string;
-  body: Uint8Array;
-  /** Where it came from: behind redirections. */
-  url: string;
-  /** Strong ones only. */
-  etag: string;
-  /** Of Content-Range, when it may be read: first and last byte, bytes of the file. */
-  range?: number[];
-  /** The body ended as it should. */
-  complete: boolean;
-  tooLong: boolean;
-}
-
-/** Of one GET. */
-export interface GetOptions {
-  range?: { offset: number; bytes: number };
-  ifRange?: string;
-  maxBytes: number;
-  kind: RequestKind;
-  signal?: AbortSignal;
-  stallTimeoutS?: number;
-  /** Called with the bytes that have come so far. */
-  onBytes?: (received: number) => void;
-  reload?: boolean;
-}
+import { concat } from '../format/bytes';
+import { abortError, throwIfAborted } from '../format/errors';
+import { nowS, sleepS } from './clock';
+import { HttpOptions, defaultHttpOptions } from './options';
+import { Answer, GetOptions, RequestRecord, contentRange } from './requests';
 
 /** Answers that latency is the median of. */
 const latencySamples = 7;
 
-/** Seconds of performance.now(). */
-export const nowS = (): number => performance.now() / 1000;
-/** Resolves after so many seconds, or when a signal says so. */
-export const sleepS = (seconds: number, signal?: AbortSignal): Promise<void> =>
-  new Promise((done) => {
-    const end = (): void => {
-      clearTimeout(timer);
-      signal?.removeEventListener('abort', end);
-      done();
-    };
-    const timer = setTimeout(end, seconds * 1000);
-    signal?.addEventListener('abort', end);
-  });
-
-/** https://host/path without user, password and query, for messages. */
-export function shownUrl(url: string): string {
-  return url.replace(/^(\w+:\/\/)[^/@]*@/, '$1').replace(/[?#].*$/, '');
-}
-
-/** Whether an error says that somebody cancelled. */
-export function isAbort(error: unknown): boolean {
-  return (error as Partial<Error>)?.name === 'AbortError';
-}
-
 /** As the browser names it; a URL that somebody has answered at. */
 export const absolute = (url: string): string => new URL(url, globalThis.location?.href).href;
-
-/** What cancelled calls throw. */
-export function abortError(): Error {
-  return new DOMException('The load was cancelled', 'AbortError');
-}
-/** Throws an AbortError where a signal says so. */
-export function throwIfAborted(signal?: AbortSignal): void {
-  if (signal?.aborted) throw abortError();
-}
-
-/** First and last byte, bytes of the file; undefined where it does not say so. */
-function contentRange(text: string): Answer['range'] {
-  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
-  return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
-}
 
 /** Requests to one or more servers: a window of connections, stalls, a cap; one try each. */
 export class HttpClient {
@@ -184,7 +52,7 @@ export class HttpClient {
     };
     const chunks: Uint8Array[] = [];
     let timer: ReturnType<typeof setTimeout> | undefined;
-    const alive = (): void => {
+    const restartStallTimer = (): void => {
       clearTimeout(timer);
       timer = setTimeout(() => {
         answer.problem = `no byte for ${stallTimeoutS.toFixed(1)} s`;
@@ -194,13 +62,13 @@ export class HttpClient {
     signal?.addEventListener('abort', cancel);
     try {
       throwIfAborted(signal);
-      alive();
+      restartStallTimer();
       const headers: Record<string, string> = {};
       if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
       if (ifRange) headers['If-Range'] = ifRange;
       const cache = reload ? 'reload' : range ? options.rangeCache : 'default';
       const response = await (options.fetch ?? globalThis.fetch)(url, { headers, signal: abort.signal, cache });
-      alive();
+      restartStallTimer();
       record.firstByte = nowS();
       const { status, body } = response;
       record.ok = status === (range ? 206 : 200);
@@ -210,12 +78,12 @@ export class HttpClient {
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();
-        alive();
+        restartStallTimer();
         if (done) break;
         if (options.capBytesS > 0) {
           clearTimeout(timer);
           await this.holdBack_(value.length, signal); // nobody may know of it before
-          alive();
+          restartStallTimer();
         }
         chunks.push(value);
         record.received += value.length;
@@ -234,11 +102,11 @@ export class HttpClient {
       signal?.removeEventListener('abort', cancel);
       if (!answer.complete || !record.ok) cancel(); // what nobody reads
       (this.waiting_.shift() ?? (() => --this.active_))();
-      answer.body = concat(chunks, record.received); // what came before a cut is worth keeping
+      answer.body = concat(chunks); // what came before a cut is worth keeping
       record.ok &&= answer.complete;
       record.status = answer.status;
       record.ended = nowS();
-      this.note_(record);
+      this.record_(record);
     }
     return answer;
   }
@@ -250,7 +118,7 @@ export class HttpClient {
     throwIfAborted(signal);
   }
 
-  private note_(record: RequestRecord): void {
+  private record_(record: RequestRecord): void {
     const { url, ok, firstByte, started, status } = record;
     if (ok && this.records.length > 0) {
       const wait = firstByte - started;
@@ -263,26 +131,4 @@ export class HttpClient {
     }
     for (const listener of this.listeners) listener(record);
   }
-}
-
-/** Pieces of `total` bytes as one. */
-export function concat(chunks: readonly Uint8Array[], total: number): Uint8Array {
-  if (chunks.length === 1) return chunks[0];
-  const out = new Uint8Array(total);
-  let at = 0;
-  for (const c of chunks) {
-    out.set(c, at);
-    at += c.length;
-  }
-  return out;
-}
-
-/** Whether what could not be had will not be there later on, either. */
-export function isForGood(error: unknown): boolean {
-  return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
-}
-
-/** For messages. */
-export function whatCame(a: Answer): string {
-  return a.problem || (a.status > 0 ? `status ${a.status}` : 'no answer');
 }

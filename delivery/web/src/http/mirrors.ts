@@ -1,5 +1,6 @@
 import { FormatError, TexmeshError } from '../format/errors';
-import { HttpClient, nowS } from './client';
+import { HttpClient } from './client';
+import { nowS } from './clock';
 import { TransferRate, transferRate } from './throughput';
 
 const silenceFactor = 4;

@@ -1,49 +1,15 @@
-import { codecTraits } from '../format/codec';
-import { requireDigest } from '../format/digests';
-import { fragmentFilePath, isValidEntryPath, manifestPath } from '../format/entry_paths';
-import { FormatError, InputError } from '../format/errors';
-import { FragmentFiles, readFragmentFiles } from '../format/fragment_files';
-import { GetOptions, HttpClient, isAbort, shownUrl, whatCame } from './client';
+import { isValidEntryPath, manifestPath } from '../format/entry_paths';
+import { FormatError, InputError, isAbort } from '../format/errors';
 import { bootstrapBytes } from '../format/layout';
-import { ByteRange, manifestOfContainer } from '../format/manifest';
+import type { ByteRange } from '../format/manifest';
+import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors } from './mirrors';
-import type { PackageReader } from './package_reader';
-import { OpenedStore, PackageStore, Place, ReadOptions, retriesOf } from './store';
-
-// For servers that know no ranges; loaded when one is met.
-
-const fragmentFilesPath = 'fragments.json';
-
-/** See PackageReader.fragmentFiles. */
-export async function fragmentFiles(store: PackageStore, signal?: AbortSignal): Promise<FragmentFiles | undefined> {
-  // Packs do, too.
-  const bytes = await store.extraFile?.(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
-    if (!(error instanceof InputError)) throw error;
-    return undefined;
-  });
-  return bytes && readFragmentFiles(bytes);
-}
-/** See PackageReader.fragmentFile. */
-export async function fragmentFile(
-  reader: PackageReader,
-  plane: number,
-  rung: number,
-  fragment: number,
-  signal?: AbortSignal,
-): Promise<Uint8Array> {
-  const { store } = reader;
-  const { extension } = codecTraits((await reader.textures(signal))[plane].codec);
-  const path = fragmentFilePath(plane, rung, fragment, extension);
-  const file = (await reader.planeFiles(plane, signal)).complete?.[rung]?.get(fragment);
-  if (!file || !store.extraFile) throw new FormatError(store.name, path, 'a file', 'none');
-  const verify = (bytes: Uint8Array): Promise<void> => requireDigest(bytes, file.sha256, store.name, path);
-  const got = await store.extraFile(path, file.bytes, { kind: 'texture', signal, once: true, verify });
-  if (!got) throw new FormatError(store.name, path, 'a file', 'none');
-  return got;
-}
+import { GetOptions, shownUrl, whatCame } from './requests';
+import { retriesOf } from './retries';
+import type { PackageStore, Place, ReadOptions } from './store';
 
 /** A whole file; with retries, unless somebody else has it. */
-async function getWhole(client: HttpClient, url: string, how: GetOptions, elsewhere: boolean): Promise<Uint8Array> {
+export async function getWhole(client: HttpClient, url: string, how: GetOptions, elsewhere: boolean): Promise<Uint8Array> {
   const again = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
@@ -130,69 +96,4 @@ export class TreeStore implements PackageStore {
 function joinUrl(root: string, path: string): string {
   const end = root.search(/[?#]/);
   return end < 0 ? root + path : root.slice(0, end) + path + root.slice(end);
-}
-
-/** A container in memory. */
-class WholeStore implements PackageStore {
-  readonly form = 'whole';
-  constructor(
-    private bytes_: Uint8Array,
-    readonly name: string,
-  ) {}
-  manifest(): Promise<Uint8Array> {
-    return Promise.resolve(manifestOfContainer(this.bytes_.subarray(0, bootstrapBytes), this.name));
-  }
-  async read(place: Place, { offset, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
-    if (offset + bytes > this.bytes_.length)
-      throw new FormatError(this.name, place.path, `${offset + bytes} bytes`, `${this.bytes_.length}`);
-    const part = this.bytes_.subarray(offset, offset + bytes);
-    await how.verify?.(part);
-    return part;
-  }
-  dispose(): void {
-    this.bytes_ = new Uint8Array(0);
-  }
-}
-
-/** A container that is in memory already. */
-export function openBytes(bytes: Uint8Array, name: string): PackageStore {
-  return new WholeStore(bytes, name);
-}
-
-/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
-export function treeUrl(url: string): string {
-  const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
-  return m ? `${m[1]}/${m[2] ?? ''}` : '';
-}
-
-async function opened(store: PackageStore, signal?: AbortSignal): Promise<OpenedStore> {
-  return { store, manifest: await store.manifest(signal) };
-}
-const treesOf = (urls: readonly string[]): string[] => urls.map(treeUrl).filter((root) => root !== '');
-
-/** A tree, by its own URL or that of the container beside it. */
-export function openTree(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
-  const isTree = urls[0].replace(/[?#].*$/, '').endsWith('/');
-  const roots = isTree ? urls : treesOf(urls);
-  if (roots.length === 0)
-    throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
-  return opened(new TreeStore(roots, client), signal);
-}
-
-/** The tree beside a container, or the whole container. */
-export async function openWithoutRanges(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
-  const roots = treesOf(urls);
-  if (roots.length > 0) {
-    try {
-      const found = await opened(new TreeStore(roots, client), signal);
-      if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
-    } catch (error) {
-      if (!(error instanceof InputError)) throw error;
-    }
-  }
-  return new Mirrors(urls, client).ask(bootstrapBytes, async (m, { elsewhere, ...asking }) => {
-    const how = { kind: 'other', signal, maxBytes: client.options.maxWholeBytes, ...asking } as const;
-    const bytes = await getWhole(client, m.url, how, elsewhere);
-    return opened(openBytes(bytes, shownUrl(m.url)), signal);
-  });
 }

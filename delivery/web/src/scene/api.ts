@@ -1,7 +1,7 @@
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
 import type { HtcOrder, Policy } from '../decide/unchecked_plan';
-import type { RequestRecord } from '../http/client';
 import type { StepRule, VisiblePart } from '../decide/viewing';
+import type { RequestRecord } from '../http/requests';
 import type { DecodeHere } from '../worker/pool';
 
 /** How the object is looked at; lengths in device pixels. */

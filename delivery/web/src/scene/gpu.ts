@@ -1,5 +1,5 @@
 import type { WebGLProgram, WebGLRenderer } from 'three';
-import { nowS, sleepS } from '../http/client';
+import { nowS, sleepS } from '../http/clock';
 
 /** Resolves when the GPU has done all that it was asked for, or after `mostS`: what asks it for an answer then does not hold the page up. */
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {

@@ -1,16 +1,16 @@
 import { Camera, Group, Object3D, Scene } from 'three';
+import { InputError, isAbort, throwIfAborted } from '../format/errors';
+import { nowS, sleepS } from '../http/clock';
+import type { PackageReader } from '../http/package_reader';
+import type { WorkerPool } from '../worker/pool';
 import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadedModel } from './api';
 import { displayOf } from './camera';
-import { InputError } from '../format/errors';
 import { Emitter } from './events';
 import { gpuIdle, programsReady } from './gpu';
-import { isAbort, nowS, sleepS, throwIfAborted } from '../http/client';
 import { LoadContext, hysteresis } from './load_context';
-import type { PackageReader } from '../http/package_reader';
 import { MaterialSet, texturesOf } from './scale_parts';
 import { scaleSource } from './scale_source';
 import type { TextureLoad } from './texture_load';
-import type { WorkerPool } from '../worker/pool';
 
 /** A picture that waits for its programs no longer than this. */
 const mostCompileS = 0.5;

@@ -1,10 +1,10 @@
 import type { Mesh, Object3D } from 'three';
-import type { LoadOptions } from './api';
-import { isAbort } from '../http/client';
+import { isAbort } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
+import type { WorkerPool } from '../worker/pool';
+import type { LoadOptions } from './api';
 import { MaterialSet, ParsedGltf, Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
 import type { SplitShapes } from './split_shape';
-import type { WorkerPool } from '../worker/pool';
 
 /** A scale on its way. */
 export interface ScaleLoad {
@@ -54,7 +54,7 @@ export function scaleSource(
       }
     const glb = await reader.scaleGlb(scale, { signal });
     arrived();
-    await reader.decoded(signal, 'requireOwnBytes', glb);
+    await reader.decoded(signal, 'requireSelfContained', glb);
     const gltf = await parseScale(options.gltfLoader(), glb, first !== undefined);
     first ??= gltf;
     materials.adopt(gltf, meshesOf(gltf.scene), added);

@@ -1,10 +1,10 @@
 import { BufferAttribute, BufferGeometry, Material, Mesh } from 'three';
+import { concat } from '../format/bytes';
 import { FormatError } from '../format/errors';
-import { concat } from '../http/client';
 import type { PackageReader } from '../http/package_reader';
-import { MaterialSet, ParsedGltf, Slot, meshesOf } from './scale_parts';
 import type { WorkerPool } from '../worker/pool';
 import type { SplitInfo, SplitUpdate } from '../worker/protocol';
+import { MaterialSet, ParsedGltf, Slot, meshesOf } from './scale_parts';
 
 /** Bytes behind the head that its request brings along. */
 const withHeadBytes = 12 << 10;
@@ -39,7 +39,7 @@ export async function splitShapes(
     const rest = to - from - first.length;
     if (first.length > 0)
       try {
-        const all = rest > 0 ? concat([first, await reader.splitStream(to - rest, rest, { signal })], to - from) : first;
+        const all = rest > 0 ? concat([first, await reader.splitStream(to - rest, rest, { signal })]) : first;
         await verify(all);
         return all;
       } catch (error) {

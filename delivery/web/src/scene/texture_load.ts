@@ -1,20 +1,22 @@
 import type { Mesh } from 'three';
-import { spendBytes } from '../decide/allocation';
-import type { PlaneComposer } from './composer';
-import { InputError } from '../format/errors';
-import { FragmentList, PackageData, PlaneChoice, fragmentList, fullSize, planesForDisplay } from '../decide/fragment_list';
-import { groupBytes, groupedList, throughputOf } from '../decide/request_groups';
-import { isAbort, isForGood, sleepS, throwIfAborted } from '../http/client';
-import { mostPreviewPx } from '../format/layout';
-import { LoadContext, hysteresis } from './load_context';
+import { FragmentList, PlaneChoice, fragmentList, fullSize, planesForDisplay } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
+import { spendBytes } from '../decide/rate_distortion';
+import { groupBytes, groupedList, throughputOf } from '../decide/request_groups';
 import { choiceInTime, finerWhereSeen } from '../decide/scale_choice';
-import { textureSet } from './texture_set';
-import { TextureInfo, fullSizePlanes } from '../format/textures';
 import { HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from '../decide/unchecked_plan';
+import { VisiblePart, selectScale } from '../decide/viewing';
+import { InputError, isAbort, throwIfAborted } from '../format/errors';
+import { mostPreviewPx } from '../format/layout';
+import { PackageData } from '../format/package_data';
+import { TextureInfo, fullSizePlanes } from '../format/textures';
+import { sleepS } from '../http/clock';
+import { isForGood } from '../http/requests';
+import type { PlaneComposer } from './composer';
+import { LoadContext, hysteresis } from './load_context';
+import { textureSet } from './texture_set';
 import { timedFetch } from './timed_fetch';
 import { Transfers, Wish } from './transfers';
-import { VisiblePart, selectScale } from '../decide/viewing';
 import { seenShares } from './visibility';
 
 /** What decoding and uploading take after the last byte: 4 ms, or 11, on a machine whose GPU is its processor. */

@@ -1,13 +1,13 @@
 import { Texture, WebGLRenderer } from 'three';
-import { PlaneComposer, planeComposer } from './composer';
-import type { Enqueue } from './enlarge';
 import type { PlaneChoice } from '../decide/fragment_list';
-import { gpuIdle } from './gpu';
-import { sleepS } from '../http/client';
-import { MaterialSet, Slot, disposeTexture, texturesIn } from './scale_parts';
 import type { TextureInfo } from '../format/textures';
+import { sleepS } from '../http/clock';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
+import { PlaneComposer, planeComposer } from './composer';
+import type { Enqueue } from './enlarge';
+import { gpuIdle } from './gpu';
+import { MaterialSet, Slot, disposeTexture, texturesIn } from './scale_parts';
 
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 5;

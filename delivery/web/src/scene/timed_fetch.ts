@@ -1,6 +1,7 @@
 import type { GroupedList } from '../decide/request_groups';
-import { nowS, throwIfAborted } from '../http/client';
 import type { HtcStep, TimePlan } from '../decide/unchecked_plan';
+import { throwIfAborted } from '../format/errors';
+import { nowS } from '../http/clock';
 import type { Transfers, Wish } from './transfers';
 
 /** Who hears of it. */

@@ -1,11 +1,11 @@
 import { FormatError } from '../format/errors';
-import { PackageReader, PlaneFiles } from '../http/package_reader';
-import { bytesToShow } from '../decide/allocation';
-import { fragmentCount } from '../format/tables';
+import { bytesToShow, fragmentCount } from '../format/tables';
 import type { TextureInfo } from '../format/textures';
-import { ownLevels } from './composer';
+import { PlaneFiles } from '../http/package_documents';
+import { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
+import { ownLevels } from './composer';
 
 /** A fragment to be had at a rung. */
 export interface Wish {

@@ -1,8 +1,6 @@
-import { FormatError } from '../format/errors';
-import { abortError } from '../http/client';
-import type {
-  DecodeRequest, DocumentDecoder, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
-} from './protocol';
+import type { DocumentDecoder } from '../format/document_decoder';
+import { FormatError, abortError } from '../format/errors';
+import type { DecodeRequest, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest } from './protocol';
 
 /** Images decoded at once, over all workers and loads of a page. */
 const mostAtOnce = 8;

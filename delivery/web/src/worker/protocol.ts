@@ -1,4 +1,5 @@
 import type { CodecId } from '../format/codec';
+import type { Documents } from '../format/document_decoder';
 
 /** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
 export interface DecodeRequest {
@@ -54,13 +55,6 @@ export interface SplitCloseRequest {
   op: 'split-close';
   key: number;
 }
-/** What documents.ts decodes. */
-export type Documents = typeof import('../format/documents');
-/** Decodes a document by the name of a function there. */
-export type DocumentDecoder = <K extends keyof Documents>(
-  name: K,
-  ...args: Parameters<Documents[K]>
-) => Promise<Awaited<ReturnType<Documents[K]>>>;
 /** Decode a document by a function of documents.ts. Gives what that gives. */
 export interface DocumentRequest {
   op: 'document';

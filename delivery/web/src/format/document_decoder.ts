@@ -1,0 +1,10 @@
+/** What documents.ts decodes. */
+export type Documents = typeof import('./documents');
+/** Decodes a document by the name of a function there. */
+export type DocumentDecoder = <K extends keyof Documents>(
+  name: K,
+  ...args: Parameters<Documents[K]>
+) => Promise<Awaited<ReturnType<Documents[K]>>>;
+/** Decodes documents on this thread. */
+export const decodeHere = (async (name, ...args: unknown[]) =>
+  ((await import('./documents'))[name] as (...of: unknown[]) => unknown)(...args)) as DocumentDecoder;

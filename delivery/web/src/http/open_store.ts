@@ -1,0 +1,33 @@
+import { isAbort } from '../format/errors';
+import type { HttpClient } from './client';
+import { RangeStore } from './range_store';
+import type { OpenedStore, StoreMode } from './store';
+
+/**
+ * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside it where it
+ * answers 200 to a range; the whole container where there is no tree.
+ */
+export async function openStore(
+  url: string,
+  mirrors: readonly string[],
+  mode: StoreMode,
+  client: HttpClient,
+  signal?: AbortSignal,
+): Promise<OpenedStore> {
+  const urls = [url, ...mirrors.filter((m) => m !== url)];
+  const files = () => import('./without_ranges');
+  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
+  const store = new RangeStore(urls, client);
+  try {
+    return { store, manifest: await store.manifest(signal) };
+  } catch (error) {
+    const { noRanges } = store;
+    // Whole files are better than nothing, whatever the other mirrors said.
+    if (!noRanges || isAbort(error)) throw error;
+    if (mode === 'range') throw noRanges;
+    const { openWithoutRanges } = await files().catch(() => {
+      throw noRanges;
+    });
+    return openWithoutRanges(urls, client, signal);
+  }
+}

@@ -1,0 +1,35 @@
+/** Limits of what a server may do to us. */
+export interface HttpOptions {
+  /** Instead of the browser's; gets a URL and a RequestInit. */
+  fetch?: typeof fetch;
+  /** Of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
+  retries: number;
+  /** Before the first retry, doubled for each further one. */
+  retryDelayS: number;
+  /** Without a byte, or without a worker's answer about a document. */
+  stallTimeoutS: number;
+  /**
+   * The browser's cache, for ranges. Default no-store: Chromium answers ranges of one URL that may be cached one after
+   * the other, however many were asked for at once, and with a round trip for each a slow link stands idle.
+   */
+  rangeCache: RequestCache;
+  /** Requests at once while the server speaks HTTP/1.1. */
+  connections: number;
+  /** Requests at once over HTTP/2 and HTTP/3. */
+  streams: number;
+  /** Of a container from a server that knows no ranges. */
+  maxWholeBytes: number;
+  /** Bytes per second at most, for trying slow links; 0 = no limit. */
+  capBytesS: number;
+}
+/** Where the caller says nothing. */
+export const defaultHttpOptions: HttpOptions = {
+  retries: 3,
+  retryDelayS: 0.2,
+  stallTimeoutS: 10,
+  rangeCache: 'no-store',
+  connections: 6,
+  streams: 32,
+  maxWholeBytes: 1 << 30,
+  capBytesS: 0,
+};

@@ -1,0 +1,114 @@
+import { concat } from '../format/bytes';
+import { FormatError, InputError } from '../format/errors';
+import { bootstrapBytes } from '../format/layout';
+import type { ByteRange } from '../format/manifest';
+import type { HttpClient } from './client';
+import { Asking, Mirror, Mirrors } from './mirrors';
+import { Answer, shownUrl, whatCame } from './requests';
+import { retriesOf } from './retries';
+import type { PackageStore, ReadOptions } from './store';
+
+/** Whether an answer from there is read without asking the server first (CORS). */
+function sameOrigin(url: string): boolean {
+  const here = globalThis.location;
+  return !here || new URL(url, here.href).origin === here.origin;
+}
+
+/** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
+export class RangeStore implements PackageStore {
+  readonly form = 'range';
+  /** What a server said that knows no ranges. */
+  noRanges?: InputError;
+  private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last one first
+  private readonly mirrors_: Mirrors;
+
+  constructor(urls: readonly string[], client: HttpClient) {
+    this.mirrors_ = new Mirrors(urls, client);
+  }
+  get name(): string {
+    return shownUrl(this.mirrors_.all[0].url);
+  }
+
+  manifest(signal?: AbortSignal): Promise<Uint8Array> {
+    return this.read(undefined, { offset: 0, bytes: bootstrapBytes }, { kind: 'manifest', signal });
+  }
+
+  async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
+    if (bytes === 0) return new Uint8Array(0); // as WebP's tables are; no range says that
+    const end = begin + bytes;
+    const part = this.parts_.find((p) => p.begin <= begin && p.begin + p.bytes.length > begin);
+    let got: Uint8Array | undefined;
+    if (part)
+      try {
+        const known = part.bytes.subarray(begin - part.begin, end - part.begin);
+        const have = known.length;
+        got = have < bytes ? concat([known, await this.fetch_(begin + have, bytes - have, { ...how, verify: undefined })]) : known;
+        await how.verify?.(got);
+        if (have === bytes) return got;
+      } catch (error) {
+        if (!(error instanceof FormatError) || !how.verify) throw error;
+        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
+        got = undefined;
+      }
+    got ??= await this.fetch_(begin, bytes, how);
+    if (!how.once) this.parts_ = [{ begin, bytes: got }, ...this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end)];
+    return got;
+  }
+
+  private fetch_(offset: number, bytes: number, how: ReadOptions): Promise<Uint8Array> {
+    return this.mirrors_.ask(bytes, async (m, asking) => {
+      const got = await this.fetchFrom_(m, asking, offset, bytes, how);
+      await how.verify?.(got);
+      return got;
+    });
+  }
+  /** A cut transfer goes on where it broke. */
+  private async fetchFrom_(m: Mirror, asking: Asking, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): Promise<Uint8Array> {
+    const { client } = this.mirrors_;
+    const again = retriesOf(client, signal);
+    const chunks: Uint8Array[] = [];
+    for (let have = 0; ; ) {
+      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before room is made
+      const before = have;
+      const range = { offset: offset + have, bytes: bytes - have };
+      const a = await client.get(m.url, {
+        range, kind, signal, maxBytes: range.bytes, ...asking,
+        ifRange: sameOrigin(m.at) ? m.etag : '', // from another origin it would cost a preflight request
+        onBytes: (n) => onBytes?.(before + n),
+      });
+      m.at = a.url;
+      if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
+      this.require_(m, a.status !== 200, offset, 'the file that reading began with', 'status 200: it was replaced, or the server no longer answers ranges');
+      if (a.status === 206) {
+        this.checkRange_(m, a, range);
+        chunks.push(a.body);
+        have += a.body.length;
+        if (a.complete) return concat(chunks);
+      }
+      if ((asking.elsewhere && have === before) || !(await again(a)))
+        throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206', whatCame(a));
+    }
+  }
+  private require_({ url }: Mirror, good: boolean, offset: number, expected: string, found: unknown): void {
+    if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
+  }
+
+  /** Whether it is of the file that reading began with, and what was asked for. */
+  private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
+    this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');
+    m.etag ||= etag;
+    // Another origin may keep the header to itself; then only the length tells.
+    if (!range) {
+      this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
+      return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`, body.length);
+    }
+    const [first, last, total] = range;
+    this.require_(m, m.total < 0 || total === m.total, offset, `a file of ${m.total} bytes`, total);
+    this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset, 'the range that was asked for', `${first}-${last}`);
+    m.total = total;
+  }
+
+  dispose(): void {
+    this.parts_ = [];
+  }
+}

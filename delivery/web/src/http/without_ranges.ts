@@ -1,0 +1,63 @@
+import { InputError } from '../format/errors';
+import { FragmentFiles, readFragmentFiles } from '../format/fragment_files';
+import { bootstrapBytes } from '../format/layout';
+import type { HttpClient } from './client';
+import { Mirrors } from './mirrors';
+import { shownUrl } from './requests';
+import type { OpenedStore, PackageStore } from './store';
+import { TreeStore, getWhole } from './tree_store';
+import { openBytes } from './whole_store';
+
+// For servers that know no ranges, and for containers in memory; loaded with the first of them.
+
+export { openBytes };
+
+/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+export function treeUrl(url: string): string {
+  const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
+  return m ? `${m[1]}/${m[2] ?? ''}` : '';
+}
+
+async function opened(store: PackageStore, signal?: AbortSignal): Promise<OpenedStore> {
+  return { store, manifest: await store.manifest(signal) };
+}
+const treesOf = (urls: readonly string[]): string[] => urls.map(treeUrl).filter((root) => root !== '');
+
+/** A tree, by its own URL or that of the container beside it. */
+export function openTree(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+  const isTree = urls[0].replace(/[?#].*$/, '').endsWith('/');
+  const roots = isTree ? urls : treesOf(urls);
+  if (roots.length === 0)
+    throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
+  return opened(new TreeStore(roots, client), signal);
+}
+
+/** The tree beside a container, or the whole container. */
+export async function openWithoutRanges(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+  const roots = treesOf(urls);
+  if (roots.length > 0) {
+    try {
+      const found = await opened(new TreeStore(roots, client), signal);
+      if (found.manifest[0] === 0x7b) return found; // a brace: no page of the server's own
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+    }
+  }
+  return new Mirrors(urls, client).ask(bootstrapBytes, async (m, { elsewhere, ...asking }) => {
+    const how = { kind: 'other', signal, maxBytes: client.options.maxWholeBytes, ...asking } as const;
+    const bytes = await getWhole(client, m.url, how, elsewhere);
+    return opened(openBytes(bytes, shownUrl(m.url)), signal);
+  });
+}
+
+const fragmentFilesPath = 'fragments.json';
+
+/** See PackageReader.fragmentFiles. */
+export async function readFragmentList(store: PackageStore, signal?: AbortSignal): Promise<FragmentFiles | undefined> {
+  // A tree without the list has packs.
+  const bytes = await store.extraFile?.(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
+    if (!(error instanceof InputError)) throw error;
+    return undefined;
+  });
+  return bytes && readFragmentFiles(bytes);
+}
