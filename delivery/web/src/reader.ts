@@ -17,6 +17,7 @@ export * from './decide/size_curve';
 export * from './decide/viewing';
 export * from './http/throughput';
 export * from './decide/harmonic_time';
+export * from './decide/htc_theorem';
 export * from './decide/upgrades';
 export * from './decide/fragment_list';
 export type { PackageData } from './format/package_data';

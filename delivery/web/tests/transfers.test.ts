@@ -5,7 +5,7 @@ import {
 import { finerWhereSeen } from '../src/decide/scale_choice';
 import { defaultDeliveryRequest, planDelivery } from '../src/decide/delivery_plan';
 import { groupBytes, groupedList, throughputOf } from '../src/decide/request_groups';
-import { timePlan } from '../src/decide/unchecked_plan';
+import { UncheckedPlan } from '../src/decide/unchecked_plan';
 import { timedFetch } from '../src/scene/timed_fetch';
 import { Transfers, Wish } from '../src/scene/transfers';
 import { workerPool } from '../src/worker/pool';
@@ -166,7 +166,7 @@ describe('a timed fetch', () => {
   async function fetchInTime(fault: Fault | undefined, mostS: number, signal = new AbortController().signal) {
     const s = await setUp(fault);
     const list = groupedList(s.list, 2000, 60000);
-    const plan = timePlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
+    const plan = new UncheckedPlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
     const ended: HtcStep[] = [];
     const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
     const run = timedFetch(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });

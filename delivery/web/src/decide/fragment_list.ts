@@ -5,10 +5,11 @@ import { PlaneTables, bytesToShow, fragmentCount } from '../format/tables';
 import { TextureInfo, fullSizePlanes } from '../format/textures';
 import { etaOf, meanEta, qualityOf } from './allocation';
 import { clamp, sumOf } from './numbers';
+import { FragmentOffer } from './plan_types';
 import { log, pow } from './portable_math';
 import { spendBytes, surfaceWeights } from './rate_distortion';
+import { bytesAtRung } from './rung_choice';
 import { interpolatedBytes } from './size_curve';
-import { FragmentOffer, bytesAtRung } from './unchecked_plan';
 
 /** Which plane shows each texture: the full-size one or a mip of it. */
 export interface PlaneChoice {

@@ -1,9 +1,9 @@
-import { log } from './portable_math';
 import { Throughput, ThroughputOptions } from '../http/throughput';
-import { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from './unchecked_plan';
+import { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlanOptions } from './plan_types';
+import { UncheckedPlan } from './unchecked_plan';
 
-// The plan of Harmonic Time Compensation as it is offered to others: checked, and with the variants of the thesis that
-// load() does not use.
+// UncheckedPlan as it is offered to others (delivery/cpp/harmonic_time.h): arguments are checked, and there are the variants of the
+// thesis that load() does not use.
 
 export type { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlanOptions };
 
@@ -90,7 +90,7 @@ export function planOptions(o: HtcOptions): TimePlanOptions {
 export class HarmonicTimePlan {
   /** Decisions so far, skipped fragments included. */
   readonly steps: readonly HtcStep[];
-  private readonly plan_: TimePlan;
+  private readonly plan_: UncheckedPlan;
   private lastDoneS_ = 0;
   private unspentS_ = 0;
 
@@ -101,7 +101,7 @@ export class HarmonicTimePlan {
   ) {
     require(options_.timeLimitS > 0, 'HarmonicTimePlan: time limit in (0, 1e6] s');
     checkOffers(offers);
-    this.plan_ = timePlan(offers, planOptions(options_));
+    this.plan_ = new UncheckedPlan(offers, planOptions(options_));
     this.steps = this.plan_.steps;
   }
 
@@ -160,33 +160,4 @@ export class HarmonicTimePlan {
     this.lastDoneS_ = nowS;
     if (this.allIssued) this.unspentS_ += step.residualS;
   }
-}
-
-/** The bounds of the thesis for a finished serial run, and what really holds (Appendix A). */
-export interface HtcTheorem {
-  surplusS: number;
-  lastResidualS: number;
-  correctedBoundS: number;
-  publishedBoundS: number;
-}
-/** For plans with one request at a time in which nothing failed. */
-export function theoremOf(plan: HarmonicTimePlan): HtcTheorem {
-  const { steps } = plan;
-  const n = steps.length;
-  if (n === 0) return { surplusS: 0, lastResidualS: 0, correctedBoundS: 0, publishedBoundS: 0 };
-  const last = steps[n - 1];
-  let correctedBoundS = Math.abs(last.thetaS);
-  if (last.bytes > 0) {
-    const betaN = last.bytes / last.spacingS;
-    correctedBoundS =
-      Math.abs(last.thetaS) * Math.abs(last.throughputBytesS / betaN - 1) +
-      Math.abs(last.targetBytes - last.bytes) / betaN;
-  }
-  let sum = 0;
-  for (let k = 0; k + 1 < n; ++k) sum += steps[k].residualS;
-  const mean = n > 1 ? sum / (n - 1) : 0;
-  const logN = log(Math.max(n, 3));
-  const publishedBoundS =
-    last.residualS + (n > 1 ? steps[n - 2].residualS / 2 : 0) + (1.088 + log(logN)) * mean;
-  return { surplusS: plan.surplusS, lastResidualS: last.residualS, correctedBoundS, publishedBoundS };
 }

@@ -1,9 +1,9 @@
 import { PackageData } from '../format/package_data';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, PlaneChoice, TextureSpending, budgetSteps, mipLoss, planesForDisplay } from './fragment_list';
+import type { TimePlanOptions } from './plan_types';
 import { equivalentQuality, predictedSsim } from './prediction';
 import { Simulated, simulate } from './simulation';
-import type { TimePlanOptions } from './unchecked_plan';
 
 /** A coarser scale has to look better by this much of SSIM. */
 const worthwhile = 1e-4;

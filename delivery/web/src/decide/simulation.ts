@@ -1,6 +1,8 @@
 import { LinkOptions, linkModel } from './network_model';
 import { sumOf } from './numbers';
-import { FragmentOffer, HtcStep, TimePlanOptions, bytesAtRung, timePlan } from './unchecked_plan';
+import { FragmentOffer, HtcStep, TimePlanOptions } from './plan_types';
+import { bytesAtRung } from './rung_choice';
+import { UncheckedPlan } from './unchecked_plan';
 
 // delivery/cpp/simulation for one server on a link of constant rate: the same arithmetic, the same bits.
 
@@ -19,7 +21,7 @@ export function simulate(offers: readonly FragmentOffer[], options: TimePlanOpti
   const rungs = offers.map(() => -1);
   let endS = 0;
   if (options.timeLimitS > 0) {
-    const plan = timePlan(offers, options);
+    const plan = new UncheckedPlan(offers, options);
     const model = linkModel<HtcStep>(link);
     for (;;) {
       for (let s = plan.next(model.nowS); s; s = plan.next(model.nowS)) model.request(s, s.bytes);

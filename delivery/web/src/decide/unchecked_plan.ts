@@ -1,100 +1,13 @@
+import { transferRate } from '../http/throughput';
 import { clamp, sumOf } from './numbers';
+import { PlannedBytes, type PricedBytes, pricedBytes } from './plan_bytes';
+import type { FragmentOffer, HtcStep, TimePlanOptions } from './plan_types';
 import { exp, log } from './portable_math';
-import { TransferRate, transferRate } from '../http/throughput';
+import { bytesAtRung, cheapestRung, costAt, lowestShown, meanOffer } from './rung_choice';
 
 // Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred so that
 // the whole ends at the time limit T_0, though throughput moves. The same decisions, bit for bit, as
-// delivery/cpp/harmonic_time: it does no I/O and knows no clock. What is offered to others is HarmonicTimePlan.
-
-/** One fragment as the plan sees it. */
-export interface FragmentOffer {
-  /** By rung, lowest first; at least one, all > 0. */
-  bytes: number[];
-  /** [rungs + 1] what is lost when it is skipped, then by rung; any unit, >= 0. */
-  loss: number[];
-  /** Feature density times weights; orders the list. */
-  eta: number;
-  /** d_g > 0: what it gets by Eq. 3.2. */
-  plannedBytes: number;
-  /** Limits of quality, see HtcOptions.hardLimits. */
-  lowRung: number;
-  highRung: number;
-}
-
-/**
- * How rungs are chosen. htc: the method. guard: the method over the plan of least loss instead of Eq. 3.2's, with
- * sizes kept within a factor of that plan's share of what the link gives in the time left. price: one price of bytes in
- * units of loss that rises when the plan is late. proportional: sizes scaled by what is left of time over what is left
- * to send. static: the planned sizes, whatever happens.
- */
-export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static';
-/** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
-export type HtcOrder = 'credit' | 'beta0' | 'finest';
-
-/** A decision and what became of it. */
-export interface HtcStep {
-  /** k = 1 .. n in the order of decisions. */
-  position: number;
-  offer: number;
-  /** -1 = skipped */
-  rung: number;
-  bytes: number;
-  /** credit_k and theta_k = theta_g + credit_k. */
-  creditS: number;
-  thetaS: number;
-  /** d_k asked for. */
-  targetBytes: number;
-  /** beta_{k-1} it was asked with. */
-  throughputBytesS: number;
-  issuedS: number;
-  /** -1: in flight */
-  doneS: number;
-  /** gamma_k: since the completion before. */
-  spacingS: number;
-  /** dT_k = theta_k - gamma_k */
-  residualS: number;
-}
-
-/** What a plan is made for; from `guard` on what only studies choose otherwise, see HtcOptions. */
-export interface TimePlanOptions {
-  policy: Policy;
-  order: HtcOrder;
-  timeLimitS: number;
-  initialBytesS: number;
-  rttS: number;
-  guard?: number;
-  priceKappa?: number;
-  /** Requests in flight: so many always, as many as the link needs, and never more. */
-  leastInFlight?: number;
-  mostInFlight?: number;
-  /** At the start, in which nothing can arrive; and of every transfer by itself. */
-  latencyS?: number;
-  waitS?: number;
-  lowestRung?: (f: FragmentOffer, limits: boolean) => number;
-  skips?: boolean;
-  rate?: TransferRate;
-  estimate?: () => number;
-}
-
-/** Decides fragment by fragment what to ask for. */
-export interface TimePlan {
-  /** Decisions so far, skipped fragments included. */
-  readonly steps: readonly HtcStep[];
-  /**
-   * The next request, while the window has room; skipped fragments are decided on the way. undefined: nothing more to
-   * issue now (wait for a completion) or at all. `nowS` >= 0 counts from the first request.
-   */
-  next(nowS: number): HtcStep | undefined;
-  /**
-   * A request has ended, in any order; times must not fall. Not `well`: it was given up, its time is spent, its fragment counts as
-   * skipped.
-   */
-  ended(step: HtcStep, nowS: number, well: boolean): void;
-  /** All decided, and nothing in flight. */
-  finished(): boolean;
-  /** As it is estimated now. */
-  throughputBytesS(): number;
-}
+// delivery/cpp/harmonic_time. The plan does no I/O and knows no clock. HarmonicTimePlan is this plan with checked arguments.
 
 const windowFactor = 1.5;
 const tripSamples = 64; // a window that follows every swing makes them worse
@@ -105,206 +18,214 @@ const elasticity = 2.5; // of the price by bytes, on ladders of photographs
 const spareExponent = 1;
 const lateFactor = 1.2;
 
-/** The lowest rung worth asking for: one that shows more than the preview does. */
-function lowestShown(f: FragmentOffer, limits: boolean): number {
-  const low = limits ? Math.min(f.lowRung, f.bytes.length - 1) : 0;
-  for (let r = low; r < f.bytes.length && !(r > f.highRung); ++r) if (f.loss[r + 1] < f.loss[0]) return r;
-  return low;
-}
-
-/** What showing a fragment costs, and what it then loses. */
-type Cost = (bytes: number, loss: number) => number;
-
-/** The rung from `low` on that costs least (ties: the first), of those that have so few bytes; -1: skipping does. */
-function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number, cost: Cost): number {
-  let best = skip ? -1 : low;
-  let least = skip ? cost(0, loss[0]) : cost(bytes[low], loss[low + 1]);
-  for (let r = low; r < bytes.length && !(r > highRung); ++r) {
-    const now = bytes[r] <= mostBytes ? cost(bytes[r], loss[r + 1]) : Infinity;
-    if (now >= least) continue;
-    least = now;
-    best = r;
-  }
-  return best;
-}
-
-/** 0 where it is skipped. */
-export const bytesAtRung = (f: FragmentOffer, rung: number): number => (rung < 0 ? 0 : f.bytes[rung]);
-
-/** The fragment with eta nearest the mean (ties: the first). */
-function meanOffer(offers: readonly FragmentOffer[]): number {
-  const mean = sumOf(offers.map((f) => f.eta)) / offers.length;
-  const away = (i: number): number => Math.abs(offers[i].eta - mean);
-  return offers.reduce((best, _, i) => (away(i) < away(best) ? i : best), 0);
-}
-
-/** Bytes of a kind: of each offer, of all, and of those that are not issued yet. */
-interface Counted {
-  each: number[];
-  total: number;
-  left: number;
-}
-function counted(each: number[]): Counted {
-  const total = sumOf(each);
-  return { each, total, left: total };
-}
-
-/** The list is taken by falling eta (ties: index). Nothing is checked. */
-export function timePlan(offers: readonly FragmentOffer[], options: TimePlanOptions): TimePlan {
+/** Options with those that were left out. */
+function completed(options: TimePlanOptions): Required<TimePlanOptions> {
   const {
-    policy, order, timeLimitS: limitS, initialBytesS, rttS, guard = 1.5, priceKappa = 10, leastInFlight = 2, mostInFlight = 64,
+    timeLimitS, initialBytesS, rttS, guard = 1.5, priceKappa = 10, leastInFlight = 2, mostInFlight = 64,
     // Counted as a delay it would starve the fragments that come next.
-    latencyS = Math.min(rttS, limitS / 2), waitS = 0, lowestRung = lowestShown, skips = true,
+    latencyS = Math.min(rttS, timeLimitS / 2), waitS = 0, lowestRung = lowestShown, skips = true,
     rate = transferRate(initialBytesS),
     // With several requests in flight completions come in bunches: only sums over some of them say anything.
     estimate = () => rate.recentBytesS(),
   } = options;
-  const byPrice = policy === 'price';
-  const byGuard = policy === 'guard';
-  const steps: HtcStep[] = [];
-  const waiting: HtcStep[] = []; // in flight, as they were issued
-  const remaining = [...offers.keys()].sort((a, b) => offers[b].eta - offers[a].eta);
-  const credits: { value: number; issued: number }[] = [];
-  const harmonic = [0];
-  for (let i = 1; i < offers.length + 2; ++i) harmonic.push(harmonic[i - 1] + 1 / i);
-  let [nowS, lastDoneS] = [0, 0];
+  return { ...options, guard, priceKappa, leastInFlight, mostInFlight, latencyS, waitS, lowestRung, skips, rate, estimate };
+}
 
-  const [lowest, lowestLimited] = [false, true].map((limits) => offers.map((f) => lowestRung(f, limits)));
-  const smallest = counted(offers.map((f, i) => f.bytes[lowest[i]]));
-  const limited = counted(offers.map((f, i) => f.bytes[lowestLimited[i]]));
+/** Decides fragment by fragment what to ask for. The list is taken by falling eta (ties: index). Nothing is checked. */
+export class UncheckedPlan {
+  /** Decisions so far, skipped fragments included. */
+  readonly steps: HtcStep[] = [];
+  private readonly options_: Required<TimePlanOptions>;
+  private readonly inFlight_: HtcStep[] = []; // as they were issued
+  private readonly remaining_: number[]; // offers, by falling eta
+  private readonly credits_: { value: number; issued: number }[] = [];
+  private readonly harmonic_ = [0]; // H_0 .. H_{n+1}
+  private readonly lowest_: number[]; // rungs by offer
+  private readonly lowestLimited_: number[];
+  private readonly smallest_: PlannedBytes; // of the lowest rungs
+  private readonly limited_: PlannedBytes;
+  private readonly priced_?: PricedBytes;
+  private readonly planned_: PlannedBytes; // d_g by the policy's plan
+  private nowS_ = 0;
+  private lastDoneS_ = 0;
 
-  const budget = limitS * initialBytesS;
-  const costAt = (price: number): Cost => (bytes, loss) => loss + price * bytes;
-  const bytesAt = (price: number): number[] => {
-    const cost = costAt(price);
-    return offers.map((f, i) => bytesAtRung(f, cheapestRung(f, lowest[i], true, budget, cost)));
-  };
-  // The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
-  let [low, high] = [-60, 60];
-  for (let i = 0; i < 60 && (byPrice || byGuard); ++i) {
-    const middle = (low + high) / 2;
-    if (sumOf(bytesAt(exp(middle))) > budget) low = middle;
-    else high = middle;
+  constructor(
+    private readonly offers_: readonly FragmentOffer[],
+    options: TimePlanOptions,
+  ) {
+    this.options_ = completed(options);
+    const { policy, timeLimitS, initialBytesS, lowestRung } = this.options_;
+    this.remaining_ = [...offers_.keys()].sort((a, b) => offers_[b].eta - offers_[a].eta);
+    for (let i = 1; i < offers_.length + 2; ++i) this.harmonic_.push(this.harmonic_[i - 1] + 1 / i);
+    this.lowest_ = offers_.map((f) => lowestRung(f, false));
+    this.lowestLimited_ = offers_.map((f) => lowestRung(f, true));
+    this.smallest_ = new PlannedBytes(offers_.map((f, i) => f.bytes[this.lowest_[i]]));
+    this.limited_ = new PlannedBytes(offers_.map((f, i) => f.bytes[this.lowestLimited_[i]]));
+    if (policy === 'price' || policy === 'guard') this.priced_ = pricedBytes(offers_, this.lowest_, timeLimitS * initialBytesS);
+    const leastLoss = policy === 'guard' ? this.priced_?.bytes.each : undefined;
+    this.planned_ = new PlannedBytes(offers_.map((f, i) => (leastLoss ? Math.max(leastLoss[i], this.smallest_.each[i]) : f.plannedBytes)));
   }
-  const price = exp(high);
-  const priced = counted(bytesAt(price));
-  // d_g by the policy's plan
-  const planned = counted(offers.map((f, i) => (byGuard ? Math.max(priced.each[i], smallest.each[i]) : f.plannedBytes)));
 
-  const inFlightBytes = (): number => sumOf(waiting.map((s) => s.bytes));
+  /** All decided, and nothing in flight. */
+  finished(): boolean {
+    return this.remaining_.length + this.inFlight_.length === 0;
+  }
+  /** As it is estimated now. */
+  throughputBytesS(): number {
+    return this.options_.estimate();
+  }
+
+  /**
+   * The next request, while the window has room; skipped fragments are decided on the way. undefined: nothing more to
+   * issue now (wait for a completion) or at all. `nowS` >= 0 counts from the first request.
+   */
+  next(nowS: number): HtcStep | undefined {
+    this.nowS_ = nowS;
+    while (this.remaining_.length > 0 && this.windowOpen_()) {
+      const step = this.decideNext_();
+      if (step.rung >= 0) {
+        this.inFlight_.push(step);
+        return step;
+      }
+      // No transfer: it takes no time and says nothing of the link.
+      step.doneS = nowS;
+      this.spread_((step.residualS = step.thetaS));
+    }
+    return undefined;
+  }
+  /**
+   * A request has ended, in any order; times must not fall. Not `well`: it was given up, its time is spent, its fragment counts as
+   * skipped.
+   */
+  ended(step: HtcStep, nowS: number, well: boolean): void {
+    const { latencyS, rttS, rate } = this.options_;
+    step.doneS = nowS;
+    step.spacingS = Math.max(0, nowS - Math.max(this.lastDoneS_, latencyS));
+    // The link was idle only while nothing that was asked for could have been on its way.
+    if (well) rate.add(step.bytes, nowS - Math.max(this.lastDoneS_, this.inFlight_[0].issuedS + rttS));
+    else step.rung = -1;
+    this.inFlight_.splice(this.inFlight_.indexOf(step), 1);
+    this.lastDoneS_ = nowS;
+    this.spread_((step.residualS = step.thetaS - step.spacingS));
+  }
+
+  /** Decides about one more fragment. */
+  private decideNext_(): HtcStep {
+    const creditS = this.creditS_();
+    const offer = this.chooseOffer_(creditS);
+    const thetaS = this.thetaOf_(offer) + creditS;
+    const throughputBytesS = this.throughputBytesS();
+    const targetBytes = this.targetOf_(offer, thetaS);
+    const rung = this.rungOf_(offer, targetBytes);
+    const step: HtcStep = {
+      position: this.steps.length + 1, offer, rung, bytes: bytesAtRung(this.offers_[offer], rung), creditS, thetaS, targetBytes, throughputBytesS,
+      issuedS: this.nowS_, doneS: -1, spacingS: 0, residualS: 0,
+    };
+    this.remaining_.splice(this.remaining_.indexOf(offer), 1);
+    for (const bytes of [this.smallest_, this.limited_, this.priced_?.bytes, this.planned_]) bytes?.issue(offer);
+    this.steps.push(step);
+    return step;
+  }
+  private chooseOffer_(creditS: number): number {
+    const { policy, order, initialBytesS } = this.options_;
+    const byPrice = policy === 'price';
+    if (this.steps.length === 0 && !byPrice) return meanOffer(this.offers_);
+    const finest = byPrice || order === 'finest' || (order === 'credit' ? creditS <= 0 : this.throughputBytesS() <= initialBytesS);
+    return this.remaining_.at(finest ? 0 : -1)!;
+  }
+
+  // ---- time
+
+  /** theta_g */
+  private thetaOf_(offer: number): number {
+    const { timeLimitS, latencyS } = this.options_;
+    return (timeLimitS - latencyS) * (this.planned_.each[offer] / this.planned_.total);
+  }
+  /** What the position after the last issued one gets of the residuals so far. */
+  private creditS_(): number {
+    return this.credits_.reduce((sum, c) => sum + c.value / (this.steps.length - c.issued + 2), 0);
+  }
+  /** dT is spread over what is to come, the share 1 / (chi zeta) for each, chi = 2 for the position after the last issued one. */
+  private spread_(residualS: number): void {
+    const left = this.remaining_.length;
+    if (left > 0) this.credits_.push({ value: residualS / (this.harmonic_[left + 1] - 1), issued: this.steps.length }); // 1/2 + ... + 1/(left + 1)
+  }
+
+  // ---- the link
+
+  private inFlightBytes_(): number {
+    return sumOf(this.inFlight_.map((s) => s.bytes));
+  }
   /**
    * Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip later, whether
    * or not enough is in flight until then.
    */
-  const room = (beta = rate.recentBytesS(), leftS = limitS - nowS): number =>
-    Math.max(0, Math.min(beta * leftS - inFlightBytes(), beta * (leftS - latencyS)));
-
-  const windowOpen = (): boolean => {
-    const n = waiting.length;
+  private roomBytes_(beta = this.options_.rate.recentBytesS(), leftS = this.options_.timeLimitS - this.nowS_): number {
+    return Math.max(0, Math.min(beta * leftS - this.inFlightBytes_(), beta * (leftS - this.options_.latencyS)));
+  }
+  private windowOpen_(): boolean {
+    const { leastInFlight, mostInFlight, timeLimitS, latencyS, rttS, rate } = this.options_;
+    const n = this.inFlight_.length;
     if (n < leastInFlight || n >= mostInFlight) return n < leastInFlight;
     // What is in flight takes all the time that is left: what is asked for now could only be late.
-    if (limitS - nowS > latencyS && room() <= 0) return false;
+    if (timeLimitS - this.nowS_ > latencyS && this.roomBytes_() <= 0) return false;
     // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there is little
     // time, and those are received side by side and late.
-    const fragmentBytes = planned.total / offers.length;
+    const fragmentBytes = this.planned_.total / this.offers_.length;
     return n < leastInFlight + (windowFactor * (rate.recentBytesS(tripSamples) * rttS)) / fragmentBytes;
-  };
-
-  const chosenOffer = (creditS: number): number => {
-    if (steps.length === 0 && !byPrice) return meanOffer(offers);
-    const finest = byPrice || order === 'finest' || (order === 'credit' ? creditS <= 0 : estimate() <= initialBytesS);
-    return remaining.at(finest ? 0 : -1)!;
-  };
-
+  }
   /**
    * What the link will give in the time left: its mean over as long a time until now, so that bursts shorter than that do
    * not count; but a link that stalls, falls or comes back by more than breakFactor does not return to its mean.
    */
-  const lastingBytesS = (): number => {
+  private lastingBytesS_(): number {
+    const { rate, timeLimitS } = this.options_;
     const recent = rate.recentBytesS(guardSamples);
-    const mean = nowS < limitS ? rate.meanBytesS(limitS - nowS) : recent;
+    const mean = this.nowS_ < timeLimitS ? rate.meanBytesS(timeLimitS - this.nowS_) : recent;
     return recent * breakFactor > mean && recent < breakFactor * mean ? mean : recent;
-  };
+  }
 
-  const targetOf = (offer: number, thetaS: number): number => {
-    const bytes = planned.each[offer];
-    const inProportion = (beta: number): number => bytes * (room(beta) / Math.max(planned.left, 1));
-    if (policy === 'proportional') return inProportion(estimate());
-    if (policy === 'static' || byPrice || steps.length === 0) return bytes; // F-bar has the quality Q_i
-    const target = estimate() * (thetaS - waitS);
+  // ---- bytes and rungs
+
+  /** An offer's part of what can still arrive, as its planned bytes are a part of what is not issued. */
+  private proportionalShare_(offer: number, beta: number): number {
+    return this.planned_.each[offer] * (this.roomBytes_(beta) / Math.max(this.planned_.left, 1));
+  }
+  /** d_k */
+  private targetOf_(offer: number, thetaS: number): number {
+    const { policy, waitS, guard } = this.options_;
+    if (policy === 'proportional') return this.proportionalShare_(offer, this.throughputBytesS());
+    if (policy === 'static' || policy === 'price' || this.steps.length === 0) return this.planned_.each[offer]; // F-bar has the quality Q_i
+    const target = this.throughputBytesS() * (thetaS - waitS);
     if (policy === 'htc') return target;
-    const even = inProportion(lastingBytesS());
+    const even = this.proportionalShare_(offer, this.lastingBytesS_());
     return clamp(target, even / guard, even * guard);
-  };
-
-  const priceNow = (): number => {
-    const plannedS = priced.total > 0 ? limitS * ((priced.total - priced.left) / priced.total) : 0;
+  }
+  private priceNow_({ price, bytes }: PricedBytes): number {
+    const { timeLimitS, priceKappa } = this.options_;
+    const plannedS = bytes.total > 0 ? timeLimitS * ((bytes.total - bytes.left) / bytes.total) : 0;
     // What is in flight has been issued but not paid for yet.
-    const lag = nowS - (plannedS - inFlightBytes() / estimate());
-    const leftS = Math.max(limitS - nowS, 1e-3 * limitS);
+    const lag = this.nowS_ - (plannedS - this.inFlightBytes_() / this.throughputBytesS());
+    const leftS = Math.max(timeLimitS - this.nowS_, 1e-3 * timeLimitS);
     // A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
-    const ratio = priced.left / Math.max(room(undefined, limitS - (limitS - leftS)), 1);
+    const ratio = bytes.left / Math.max(this.roomBytes_(undefined, timeLimitS - (timeLimitS - leftS)), 1);
     const enough = spareExponent + elasticity * log(Math.max(ratio, 1));
     return price * exp(clamp((priceKappa * lag) / leftS, -largestExponent, Math.min(enough, largestExponent)));
-  };
-
-  const rungOf = (offer: number, target: number): number => {
-    const f = offers[offer];
-    const bytes = room();
+  }
+  private maySkip_(roomBytes: number): boolean {
+    const { policy, skips, timeLimitS, latencyS } = this.options_;
     // A stall that is over looks like a slow link until something has been transferred: what is skipped on such evidence is
     // lost for good, so never two in a row; but of what could not arrive in time all.
-    const careless = policy === 'htc' || policy === 'static' || smallest.left > bytes;
-    const skip = skips && (limitS - nowS <= latencyS || (careless && steps.at(-1)?.bytes !== 0));
-    if (byPrice) return cheapestRung(f, lowest[offer], skip, lateFactor * bytes, costAt(priceNow()));
-    const limits = limited.left <= bytes;
-    return cheapestRung(f, (limits ? lowestLimited : lowest)[offer], skip && !limits, Infinity, (b) => Math.abs(target - b));
-  };
-
-  // dT is spread over what is to come, the share 1 / (chi zeta) for each, chi = 2 for the position after the last issued one.
-  const spread = (residualS: number): void => {
-    const left = remaining.length;
-    if (left > 0) credits.push({ value: residualS / (harmonic[left + 1] - 1), issued: steps.length }); // 1/2 + ... + 1/(left + 1)
-  };
-
-  return {
-    steps,
-    next(atS) {
-      nowS = atS;
-      while (remaining.length > 0 && windowOpen()) {
-        const creditS = credits.reduce((sum, c) => sum + c.value / (steps.length - c.issued + 2), 0);
-        const offer = chosenOffer(creditS);
-        const thetaS = (limitS - latencyS) * (planned.each[offer] / planned.total) + creditS;
-        const throughputBytesS = estimate();
-        const targetBytes = targetOf(offer, thetaS);
-        const rung = rungOf(offer, targetBytes);
-        const step: HtcStep = {
-          position: steps.length + 1, offer, rung, bytes: bytesAtRung(offers[offer], rung), creditS, thetaS, targetBytes, throughputBytesS,
-          issuedS: nowS, doneS: -1, spacingS: 0, residualS: 0,
-        };
-        remaining.splice(remaining.indexOf(offer), 1);
-        for (const c of [smallest, limited, priced, planned]) c.left -= c.each[offer];
-        steps.push(step);
-        if (rung >= 0) {
-          waiting.push(step);
-          return step;
-        }
-        // No transfer: it takes no time and says nothing of the link.
-        step.doneS = nowS;
-        spread((step.residualS = thetaS));
-      }
-      return undefined;
-    },
-    ended(step, atS, well) {
-      step.doneS = atS;
-      step.spacingS = Math.max(0, atS - Math.max(lastDoneS, latencyS));
-      // The link was idle only while nothing that was asked for could have been on its way.
-      if (well) rate.add(step.bytes, atS - Math.max(lastDoneS, waiting[0].issuedS + rttS));
-      else step.rung = -1;
-      waiting.splice(waiting.indexOf(step), 1);
-      lastDoneS = atS;
-      spread((step.residualS = step.thetaS - step.spacingS));
-    },
-    finished: () => remaining.length + waiting.length === 0,
-    throughputBytesS: estimate,
-  };
+    const careless = policy === 'htc' || policy === 'static' || this.smallest_.left > roomBytes;
+    return skips && (timeLimitS - this.nowS_ <= latencyS || (careless && this.steps.at(-1)?.bytes !== 0));
+  }
+  private rungOf_(offer: number, target: number): number {
+    const f = this.offers_[offer];
+    const roomBytes = this.roomBytes_();
+    const skip = this.maySkip_(roomBytes);
+    if (this.options_.policy === 'price')
+      return cheapestRung(f, this.lowest_[offer], skip, lateFactor * roomBytes, costAt(this.priceNow_(this.priced_!)));
+    const limits = this.limited_.left <= roomBytes;
+    return cheapestRung(f, (limits ? this.lowestLimited_ : this.lowest_)[offer], skip && !limits, Infinity, (b) => Math.abs(target - b));
+  }
 }

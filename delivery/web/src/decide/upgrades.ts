@@ -1,4 +1,4 @@
-import type { FragmentOffer } from './unchecked_plan';
+import type { FragmentOffer } from './plan_types';
 
 /** What may be fetched after the deadline: an upgrade of a fragment to a higher rung. */
 export interface Upgrade {

@@ -1,5 +1,5 @@
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
-import type { HtcOrder, Policy } from '../decide/unchecked_plan';
+import type { HtcOrder, Policy } from '../decide/plan_types';
 import type { StepRule, VisiblePart } from '../decide/viewing';
 import type { RequestRecord } from '../http/requests';
 import type { DecodeHere } from '../worker/pool';

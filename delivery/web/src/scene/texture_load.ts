@@ -1,10 +1,11 @@
 import type { Mesh } from 'three';
 import { FragmentList, PlaneChoice, fragmentList, fullSize, planesForDisplay } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
+import { HtcStep, Policy, TimePlanOptions } from '../decide/plan_types';
 import { spendBytes } from '../decide/rate_distortion';
 import { groupBytes, groupedList, throughputOf } from '../decide/request_groups';
 import { choiceInTime, finerWhereSeen } from '../decide/scale_choice';
-import { HtcStep, Policy, TimePlan, TimePlanOptions, timePlan } from '../decide/unchecked_plan';
+import { UncheckedPlan } from '../decide/unchecked_plan';
 import { VisiblePart, selectScale } from '../decide/viewing';
 import { InputError, isAbort, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';
@@ -62,7 +63,7 @@ export async function textureLoad(load: LoadContext) {
   const fates = new Map<string, Fate>(); // by keyOf
   let losses = 0;
   let barren = 0; // rounds of refining that brought nothing, one after the other
-  let plan: TimePlan | undefined;
+  let plan: UncheckedPlan | undefined;
   const newSet = () => textureSet(options.renderer, textures, load.materials, pool);
   let set = newSet();
   const transfers = new Transfers(reader, textures, pool, {
@@ -324,7 +325,7 @@ export async function textureLoad(load: LoadContext) {
   async function fetchInTime(fragments: FragmentList, timeLimitS: number): Promise<void> {
     const bytesEach = wholeRungs() ? Infinity : groupBytes(load.beta0, client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    plan = timePlan(list.offers, planOptions(timeLimitS));
+    plan = new UncheckedPlan(list.offers, planOptions(timeLimitS));
     const decided = (s: HtcStep): void => {
       const group = list.groups[s.offer];
       if (s.doneS < 0) for (const f of group) fates.set(keyOf(f, s.rung), 'comes');

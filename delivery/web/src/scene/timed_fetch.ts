@@ -1,5 +1,6 @@
+import type { HtcStep } from '../decide/plan_types';
 import type { GroupedList } from '../decide/request_groups';
-import type { HtcStep, TimePlan } from '../decide/unchecked_plan';
+import type { UncheckedPlan } from '../decide/unchecked_plan';
 import { throwIfAborted } from '../format/errors';
 import { nowS } from '../http/clock';
 import type { Transfers, Wish } from './transfers';
@@ -16,7 +17,7 @@ export interface TimedFetchHooks {
  * come after `mostS` seconds is.
  */
 export async function timedFetch(
-  plan: TimePlan,
+  plan: UncheckedPlan,
   { groups }: GroupedList,
   transfers: Transfers,
   signal: AbortSignal,
