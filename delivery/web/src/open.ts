@@ -4,7 +4,7 @@ import { nowS } from './http/clock';
 import { OpenOptions, PackageReader } from './http/package_reader';
 import type { LoadOptions, LoadedModel } from './scene/api';
 import { loadModel } from './scene/load';
-import { PoolOptions, WorkerPool, workerPool } from './worker/pool';
+import { PoolOptions, WorkerPool } from './worker/pool';
 
 export { FormatError, InputError, TexmeshError } from './format/errors';
 export type * from './reader';
@@ -41,7 +41,7 @@ export class TexmeshPackage extends PackageReader {
     let { pool } = this;
     if (!pool || pool.none || options.workerUrl || options.decode) {
       pool?.dispose();
-      pool = workerPool(options);
+      pool = new WorkerPool(options);
     } else pool.grow(options.workers);
     this.pool = pool; // until a load has it: options may be refused
     this.decodeDocument = pool.decodeDocument;
@@ -67,7 +67,7 @@ export class TexmeshPackage extends PackageReader {
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
 export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {
-  const pool = workerPool({ ...options, workers: 1 }); // it comes while the manifest does
+  const pool = new WorkerPool({ ...options, workers: 1 }); // it comes while the manifest does
   try {
     const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);
     opened.pool = pool;

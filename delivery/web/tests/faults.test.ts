@@ -9,7 +9,7 @@ import { TexmeshPackage } from '../src/open';
 import { FormatError, InputError, OpenOptions, PackageReader } from '../src/reader';
 import type { LoadOptions } from '../src/scene/api';
 import { handle } from '../src/worker';
-import { WorkerPool, workerPool } from '../src/worker/pool';
+import { WorkerPool } from '../src/worker/pool';
 import type { WorkerRequest } from '../src/worker/protocol';
 import { FakeServer, Fault, fakeServer } from './fake_server';
 import { golden } from './support';
@@ -331,7 +331,7 @@ it('a cap does not hold back who cancels', async () => {
 it('pictures that nobody waits for are closed, and streams are told of their end', async () => {
   let closed = 0;
   const heard: WorkerRequest['op'][] = [];
-  const pool = workerPool({
+  const pool = new WorkerPool({
     decode: async (request) => {
       heard.push(request.op);
       await new Promise((go) => setTimeout(go, 5));
@@ -404,7 +404,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
   const before = Object.getOwnPropertyDescriptor(globalThis, 'Worker');
   Object.defineProperty(globalThis, 'Worker', { value: Broken, configurable: true });
   try {
-    const pool = workerPool({ workers: 1 });
+    const pool = new WorkerPool({ workers: 1 });
     const job = rejection(pool.openSplits(1, new Uint8Array(4)));
     started[0].onerror!({ preventDefault: () => undefined });
     expect(started.map((w) => w.posted)).toEqual([1, 1]);
@@ -412,7 +412,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
     expect((await job).message).toContain('decode');
     expect(started.length).toBe(2);
     // One that has worked does not make all useless: what it broke on fails, and another takes its place.
-    const other = workerPool({ workers: 1 });
+    const other = new WorkerPool({ workers: 1 });
     const fine = other.openSplits(1, new Uint8Array(4));
     started[2].onmessage!({ data: { id: 1, result: 7 } });
     expect(await fine).toBe(7);
@@ -429,7 +429,7 @@ it('a worker that breaks is replaced once, then there are none', async () => {
 describe('documents', () => {
   /** As a worker would: what is asked and answered is copied. */
   const elsewhere = (heard: WorkerRequest['op'][]): WorkerPool =>
-    workerPool({
+    new WorkerPool({
       decode: async (request) => {
         heard.push(request.op);
         const [result, transfer] = await handle(structuredClone(request));
@@ -447,7 +447,7 @@ describe('documents', () => {
     expect(new Set(heard)).toEqual(new Set(['document']));
   });
   it('are decoded here where workers cannot, or have ended', async () => {
-    const pools = [workerPool({ decode: () => Promise.reject(new Error('broken')) }), workerPool({ decode: handle }), workerPool()];
+    const pools = [new WorkerPool({ decode: () => Promise.reject(new Error('broken')) }), new WorkerPool({ decode: handle }), new WorkerPool()];
     pools[1].dispose();
     for (const pool of pools) {
       const reader = await openAt(range());
@@ -456,7 +456,7 @@ describe('documents', () => {
     }
   });
   it('are decoded here where workers do not answer, from the manifest on', async () => {
-    const silent = workerPool({ decode: () => new Promise(() => undefined) });
+    const silent = new WorkerPool({ decode: () => new Promise(() => undefined) });
     const reader = await PackageReader.openUrl(url, { fetch: range().fetch, ...quick }, silent.decodeDocument);
     expect((await reader.data()).tables.length).toBe(reader.manifest.planeCount);
     silent.dispose();
@@ -487,7 +487,7 @@ describe('documents', () => {
       return [[], []];
     };
     const none = new Uint8Array(0);
-    const pools = [0, 1, 2].map(() => workerPool({ decode }));
+    const pools = [0, 1, 2].map(() => new WorkerPool({ decode }));
     const ended = [0, 0, 0];
     const jobs = pools.map((pool, p) => Array.from({ length: 10 }, () =>
       pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).then(() => ++ended[p], () => -1)));
@@ -509,7 +509,7 @@ describe('documents', () => {
   });
   it('do not wait behind pictures', async () => {
     const posted: WorkerRequest['op'][] = [];
-    const pool = workerPool({
+    const pool = new WorkerPool({
       decode: (request) => {
         posted.push(request.op);
         return new Promise(() => undefined);

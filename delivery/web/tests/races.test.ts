@@ -4,7 +4,7 @@ import { open } from '../src/open';
 import { PackageReader } from '../src/http/package_reader';
 import type { TextureInfo } from '../src/format/textures';
 import { Transfers, Wish } from '../src/scene/transfers';
-import { workerPool } from '../src/worker/pool';
+import { WorkerPool } from '../src/worker/pool';
 import { handle } from '../src/worker';
 import type { WorkerRequest } from '../src/worker/protocol';
 import { fakeServer } from './fake_server';
@@ -37,7 +37,7 @@ describe('streams of several rungs', () => {
     };
     const heard: string[] = [];
     const info = { codec: 'jpeg-progressive', fragmentWidthPx: 16, fragmentHeightPx: 16, widthPx: 16, heightPx: 16 } as unknown as TextureInfo;
-    const transfers = new Transfers(reader, [info], workerPool({ decode }), {
+    const transfers = new Transfers(reader, [info], new WorkerPool({ decode }), {
       decoded: () => void heard.push('decoded'),
       lost: () => void heard.push('lost'),
     });

@@ -11,7 +11,7 @@ import { splitShapes } from '../src/scene/split_shape';
 import type { TextureInfo } from '../src/format/textures';
 import { seenShares } from '../src/scene/visibility';
 import { handle } from '../src/worker';
-import { workerPool } from '../src/worker/pool';
+import { WorkerPool } from '../src/worker/pool';
 import { Fault, fakeServer } from './fake_server';
 import { golden } from './support';
 
@@ -161,7 +161,7 @@ describe('scales out of the vertex-split stream', () => {
   async function shapes() {
     const fromMemory = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
     const { signal } = new AbortController();
-    const splits = await splitShapes(fromMemory, workerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
+    const splits = await splitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
     return { splits, signal };
   }
   it('have the triangles and bounds of the manifest', async () => {
@@ -189,7 +189,7 @@ describe('scales out of the vertex-split stream', () => {
       const server = fakeServer({ '/a.texmesh': golden('v1.1-scan') }, { fault });
       const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
       const { signal } = new AbortController();
-      const splits = await splitShapes(remote, workerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
+      const splits = await splitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
       const mesh = await splits.load(0, gltf, signal, () => undefined, () => undefined);
       expect(mesh.geometry.index!.count / 3).toBe(manifest.scales[0].triangles);
       expect(damaged).toBeGreaterThan(0);

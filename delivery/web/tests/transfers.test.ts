@@ -8,7 +8,7 @@ import { groupBytes, groupedList, throughputOf } from '../src/decide/request_gro
 import { UncheckedPlan } from '../src/decide/unchecked_plan';
 import { timedFetch } from '../src/scene/timed_fetch';
 import { Transfers, Wish } from '../src/scene/transfers';
-import { workerPool } from '../src/worker/pool';
+import { WorkerPool } from '../src/worker/pool';
 import { packError } from '../src/worker';
 import { samePrefix } from '../src/format/bytes';
 import { sha256 } from '../src/format/sha256';
@@ -34,7 +34,7 @@ async function setUp(fault?: Fault) {
   const data = await reader.data();
   const decoded: Wish[] = [];
   const lost: Wish[] = [];
-  const transfers = new Transfers(reader, data.textures, workerPool({ decode }), {
+  const transfers = new Transfers(reader, data.textures, new WorkerPool({ decode }), {
     decoded: (wish) => decoded.push(wish),
     lost: (wish) => lost.push(wish),
   });
@@ -113,7 +113,7 @@ describe('transfers', () => {
       return decode(request);
     };
     const textures = s.data.textures.map((t) => ({ ...t, fragmentWidthPx: 1 << 20, fragmentHeightPx: 1 << 20 }));
-    const transfers = new Transfers(s.reader, textures, workerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
+    const transfers = new Transfers(s.reader, textures, new WorkerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
     await transfers.prepare([0]);
     await transfers.fetch(wishesOf(s.list, 0).slice(0, 1), { gapBytes: 0, mostBytes: Infinity }, () => undefined, () => undefined);
     while (transfers.pending > 0) await new Promise((go) => setTimeout(go, 1));
@@ -225,7 +225,7 @@ it('a finer scale is taken while it was measured to be seen', () => {
 
 it('workers are sent the bytes that they need, not the package that they lie in', async () => {
   const sent: WorkerRequest[] = [];
-  const pool = workerPool({ decode: async (request) => (sent.push(request), [[], []]) });
+  const pool = new WorkerPool({ decode: async (request) => (sent.push(request), [[], []]) });
   const whole = Uint8Array.from({ length: 1000 }, (_, i) => i & 255);
   const [tables, stream] = [whole.subarray(0, 10), whole.subarray(500, 540)];
   await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1, most: [9, 9] });

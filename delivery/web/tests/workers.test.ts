@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { open } from '../src/open';
 import { handle } from '../src/worker';
-import { workerPool } from '../src/worker/pool';
+import { WorkerPool } from '../src/worker/pool';
 import type { WorkerRequest } from '../src/worker/protocol';
 import { fakeServer } from './fake_server';
 import { golden } from './support';
@@ -63,7 +63,7 @@ describe('workers that break', () => {
   const picture = { codec: 'jpeg', tables: new Uint8Array(0), streams: [], digests: [], complete: true, levels: 1, most: [9, 9] } as const;
   const asked = () => ({ ...picture, streams: [], digests: [], most: [9, 9] as [number, number] });
   it('cost what they had under way, not what waited for its turn', () => withWorkers(worker, async (all) => {
-    const pool = workerPool({ workers: 1 });
+    const pool = new WorkerPool({ workers: 1 });
     const ends = Array.from({ length: 20 }, () => pool.decode(asked()).then(() => 'done', (error: Error) => error.message));
     expect(all[0].posted.length).toBe(8);
     all[0].onmessage!({ data: { id: all[0].posted[0], result: [] } }); // it works
@@ -82,7 +82,7 @@ describe('workers that break', () => {
     pool.dispose();
   }));
   it('one after the other, before any has worked: there are none', () => withWorkers(worker, async (all) => {
-    const pool = workerPool({ workers: 2 });
+    const pool = new WorkerPool({ workers: 2 });
     const told: string[] = [];
     pool.onNone = (error) => told.push(error.message);
     const ends = [0, 1].map(() => pool.decode(asked()).then(() => 'done', (error: Error) => error.message));
