@@ -7,7 +7,7 @@ import { displayOf } from '../src/scene/camera';
 import { Emitter } from '../src/scene/events';
 import { Manifest, PackageReader, displayedHeightPx, selectScale } from '../src/reader';
 import { MaterialSet, ParsedGltf } from '../src/scene/scale_parts';
-import { splitShapes } from '../src/scene/split_shape';
+import { openSplitShapes } from '../src/scene/split_shape';
 import type { TextureInfo } from '../src/format/textures';
 import { seenShares } from '../src/scene/visibility';
 import { handle } from '../src/worker';
@@ -161,7 +161,7 @@ describe('scales out of the vertex-split stream', () => {
   async function shapes() {
     const fromMemory = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
     const { signal } = new AbortController();
-    const splits = await splitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
+    const splits = await openSplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
     return { splits, signal };
   }
   it('have the triangles and bounds of the manifest', async () => {
@@ -189,7 +189,7 @@ describe('scales out of the vertex-split stream', () => {
       const server = fakeServer({ '/a.texmesh': golden('v1.1-scan') }, { fault });
       const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
       const { signal } = new AbortController();
-      const splits = await splitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
+      const splits = await openSplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
       const mesh = await splits.load(0, gltf, signal, () => undefined, () => undefined);
       expect(mesh.geometry.index!.count / 3).toBe(manifest.scales[0].triangles);
       expect(damaged).toBeGreaterThan(0);

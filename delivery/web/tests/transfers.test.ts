@@ -6,7 +6,7 @@ import { finerWhereSeen } from '../src/decide/scale_choice';
 import { defaultDeliveryRequest, planDelivery } from '../src/decide/delivery_plan';
 import { groupBytes, groupedList, throughputOf } from '../src/decide/request_groups';
 import { UncheckedPlan } from '../src/decide/unchecked_plan';
-import { timedFetch } from '../src/scene/timed_fetch';
+import { playPlan } from '../src/scene/play_plan';
 import { Transfers, Wish } from '../src/scene/transfers';
 import { WorkerPool } from '../src/worker/pool';
 import { packError } from '../src/worker';
@@ -169,7 +169,7 @@ describe('a timed fetch', () => {
     const plan = new UncheckedPlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
     const ended: HtcStep[] = [];
     const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
-    const run = timedFetch(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });
+    const run = playPlan(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });
     return { ...s, list, plan, ended, run };
   }
   it('ends when every offer was decided and has come', async () => {

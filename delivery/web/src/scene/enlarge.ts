@@ -1,4 +1,6 @@
-import { type PlaneComposer, ownLevels } from './composer';
+import type { PlaneComposer } from './composer';
+import { ownLevels } from './plane_storage';
+import type { UploadQueue } from './upload_queue';
 import type { WorkerPool } from '../worker/pool';
 
 // Where the processor draws for want of a GPU, and for previews of their own; loaded when it is needed.
@@ -7,14 +9,6 @@ import type { WorkerPool } from '../worker/pool';
 const stripPx = 1 << 18;
 const mostPieces = 4;
 
-/** Puts off what gives some pixels to the GPU; resolves when it has been done, or nobody wants it any more. */
-export type Enqueue = (pixels: number, run: () => void) => Promise<void>;
-/** The texture set that asks. */
-export interface Enlarging {
-  pool: WorkerPool;
-  enqueue: Enqueue;
-  ended(): boolean;
-}
 interface Piece {
   x0: number;
   x1: number;
@@ -26,14 +20,19 @@ interface Piece {
  * A preview enlarged off the main thread, piece by piece: GPUs that are none take seconds for a large texture. Fragments that have
  * come meanwhile need none.
  */
-export async function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, how: Enlarging): Promise<void> {
+export async function enlarge(
+  next: PlaneComposer,
+  image: ImageBitmap | HTMLImageElement,
+  pool: WorkerPool,
+  uploads: UploadQueue,
+): Promise<void> {
   const running = new Set<Promise<void>>();
   for (const piece of pieces(next)) {
-    const done = enlargePiece(next, image, piece, how).finally(() => running.delete(done));
+    const done = enlargePiece(next, image, piece, pool, uploads).finally(() => running.delete(done));
     done.catch(() => undefined); // the first to fail is told
     running.add(done);
     if (running.size >= mostPieces) await Promise.race(running);
-    if (how.ended()) break;
+    if (uploads.disposed) break;
   }
   await Promise.all(running);
 }
@@ -59,14 +58,15 @@ async function enlargePiece(
   next: PlaneComposer,
   image: ImageBitmap | HTMLImageElement,
   piece: Piece,
-  how: Enlarging,
+  pool: WorkerPool,
+  uploads: UploadQueue,
 ): Promise<void> {
   const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
   const { widthPx: width, heightPx: height } = next;
-  const bitmaps = await how.pool
+  const bitmaps = await pool
     .enlarge({ picture, width, height, ...piece, levels: ownLevels })
     .finally(() => picture.close()); // workers have a copy of their own
   const { x0, x1, y0, y1 } = piece;
-  await how.enqueue((x1 - x0) * (y1 - y0), () => next.upload(bitmaps, x0, y0));
+  await uploads.enqueue((x1 - x0) * (y1 - y0), () => next.upload(bitmaps, x0, y0));
   bitmaps.forEach((b) => b.close());
 }

@@ -1,5 +1,11 @@
-import type { WebGLProgram, WebGLRenderer } from 'three';
+import { Camera, type Object3D, type Scene, type WebGLProgram, type WebGLRenderer } from 'three';
+import { throwIfAborted } from '../format/errors';
 import { nowS, sleepS } from '../http/clock';
+import type { LoadContext } from './load_context';
+import { texturesOf } from './scale_parts';
+
+/** A picture that waits for its programs no longer than this. */
+const mostCompileS = 0.5;
 
 /** Resolves when the GPU has done all that it was asked for, or after `mostS`: what asks it for an answer then does not hold the page up. */
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
@@ -11,7 +17,7 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
 }
 
 /** Each program once ready and asked for what it holds, in a turn of its own: in the first frame with it the page would wait for the linker. */
-export async function programsReady(renderer: WebGLRenderer, mostS: number, goOn: () => void): Promise<void> {
+async function programsReady(renderer: WebGLRenderer, mostS: number, goOn: () => void): Promise<void> {
   const end = nowS() + mostS;
   for (const program of [...(renderer.info?.programs ?? [])] as (WebGLProgram & { isReady?(): boolean })[]) {
     do {
@@ -20,4 +26,32 @@ export async function programsReady(renderer: WebGLRenderer, mostS: number, goOn
     } while (program.isReady?.() === false && nowS() < end);
     program.getUniforms();
   }
+}
+
+/** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
+export async function readyToDraw(load: LoadContext, scene: Object3D, shape: Object3D): Promise<void> {
+  const { signal, options: { renderer }, materials } = load;
+  const goOn = (): void => throwIfAborted(signal);
+  let root = scene;
+  while (root.parent) root = root.parent;
+  await sleepS(0);
+  goOn();
+  renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
+  await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
+  await programsReady(renderer, mostCompileS, goOn);
+  for (const [, texture] of materials.all.flatMap(texturesOf)) {
+    await sleepS(0);
+    goOn();
+    renderer.initTexture(texture);
+  }
+  await gpuIdle(renderer, mostCompileS);
+}
+
+/** Nothing but the processor draws: what a GPU does at once takes it seconds, and workers less. */
+export async function isSoftware(renderer: WebGLRenderer): Promise<boolean> {
+  await gpuIdle(renderer);
+  const gl = renderer.getContext();
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }

@@ -1,28 +1,12 @@
-import { Camera, Group, Object3D, Scene } from 'three';
-import { InputError, isAbort, throwIfAborted } from '../format/errors';
-import { nowS, sleepS } from '../http/clock';
+import type { Object3D } from 'three';
+import { isAbort, throwIfAborted } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
-import type { Display, LoadEvents, LoadOptions, LoadPhase, LoadedModel } from './api';
-import { displayOf } from './camera';
-import { Emitter } from './events';
-import { gpuIdle, programsReady } from './gpu';
-import { LoadContext, hysteresis } from './load_context';
-import { MaterialSet, texturesOf } from './scale_parts';
-import { scaleSource } from './scale_source';
+import type { LoadOptions, LoadState, LoadedModel } from './api';
+import { LoadContext } from './load_context';
+import { ScaleSource } from './scale_source';
+import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
-
-/** A picture that waits for its programs no longer than this. */
-const mostCompileS = 0.5;
-/** A scale that could not be had is asked for again after so long, and twice as long each time. */
-const retryScaleS = { first: 2, most: 60 };
-/** Limits beyond are none: timers and plans end there. */
-const longestS = 1e5;
-
-interface Override {
-  scale?: number;
-  rung?: number;
-}
 
 /** Everything about one package in one scene, from `startS` on; `forget` is called at its end. */
 export function loadModel(
@@ -33,301 +17,204 @@ export function loadModel(
   startS: number,
   forget: () => void,
 ): LoadedModel {
-  const { manifest, client } = reader;
-  const { renderer, autoRefine = true, time = 5 } = options;
-  const events = new Emitter<LoadEvents>();
-  const abort = new AbortController();
-  const disposed = new AbortController();
-  const { signal } = abort;
-  const materials = new MaterialSet();
-  const object = new Group();
-  object.name = manifest.title || 'texmesh';
-  pool.onNone = (error) => fail(error, 'workers');
-  let phase: LoadPhase = 'first-picture';
-  let coming: Promise<TextureLoad>;
-  let textures: TextureLoad | undefined;
-  let lastView = '';
-  let retryScale = -1;
-  let retryTimer: ReturnType<typeof setTimeout> | undefined;
-  let retryS = retryScaleS.first;
-  let refining: Promise<void> | undefined;
-  let refineAgain = false;
-  let restoring: Promise<void> | undefined;
-  const scales = scaleSource(reader, options, materials, pool, signal, () => textures?.adopt(), fail);
-  const load: LoadContext = {
-    reader, options, pool, materials, object, scales, signal, fail, enter, lostScale,
-    limitS: time > longestS ? Infinity : time,
-    override: snapped(options),
-    view: { display: readDisplay(options.camera), camera: options.camera },
-    shownScale: -1,
-    wantedScale: -1,
-    beta0: 0,
-    expectedBytes: 0,
-    elapsedS: () => nowS() - startS,
-    emit: (name, event) => events.emit(name, event),
-    showScale: loadScale,
+  const load = new ModelLoad(new LoadContext(reader, options, pool, startS), scene, forget);
+  const { context } = load;
+  return {
+    object: context.object,
+    firstPicture: load.firstPicture,
+    done: load.done,
+    on: (name, listener) => context.events.on(name, listener),
+    get state() {
+      return load.state;
+    },
+    get materials() {
+      return context.materials.all;
+    },
+    update: (camera = options.camera) => load.update(camera),
+    refine: () => load.refine(),
+    setOverride: (override) => load.setOverride(override),
+    cancel: () => load.cancel(),
+    dispose: () => load.dispose(),
+    readPlane: (base) => load.textures?.readPlane(base) ?? new Uint8Array(0),
   };
+}
 
-  function fail(error: unknown, what: string, fatal = false): void {
-    if (isAbort(error) || disposed.signal.aborted) return;
-    events.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
+/** The course of a load: first picture, documents, the timed part, refining. */
+class ModelLoad {
+  readonly firstPicture: Promise<void>;
+  readonly done: Promise<void>;
+  textures?: TextureLoad;
+  private readonly source_: ScaleSource;
+  private readonly scale_: ShownScale;
+  private coming_?: Promise<TextureLoad>;
+  private refining_?: Promise<void>;
+  private refineAgain_ = false;
+  private restoring_?: Promise<void>;
+  private readonly endRequests_: () => void;
+
+  constructor(
+    readonly context: LoadContext,
+    scene: Object3D,
+    private readonly forget_: () => void,
+  ) {
+    const { reader, options, materials, pool, signal, disposal } = context;
+    pool.onNone = (error) => context.fail(error, 'workers');
+    this.source_ = new ScaleSource({
+      reader, options, materials, pool, signal,
+      added: () => this.textures?.showInNewMaterials(),
+      problem: (error, what) => context.fail(error, what),
+    });
+    this.scale_ = new ShownScale(context, scene, this.source_);
+    this.firstPicture = this.showFirst_();
+    this.done = this.firstPicture.then(() => this.showInTime_()).catch((error: unknown) => this.end_(error));
+    this.done.catch(() => undefined);
+    const whileThere = { signal: disposal };
+    options.signal?.addEventListener('abort', () => this.cancel(), whileThere);
+    if (options.signal?.aborted) this.cancel();
+    const { domElement } = options.renderer;
+    domElement?.addEventListener('webglcontextlost', () => context.emit('context', { lost: true }), whileThere);
+    domElement?.addEventListener('webglcontextrestored', () => this.restore_(), whileThere);
+    this.endRequests_ = reader.onRequest((record) => {
+      context.emit('request', record);
+      context.progress();
+    });
   }
-  function progress(): void {
-    events.emit('progress', { phase, bytes: client.received, bytesExpected: Math.max(client.received, load.expectedBytes) });
-  }
-  function enter(next: LoadPhase): void {
-    throwIfAborted(signal);
-    phase = next;
-    progress();
-  }
-  const resting = (): boolean => phase === 'refining' || phase === 'done';
-  /** Nothing is left to fetch. */
-  function finish(): void {
-    phase = 'done';
-    events.emit('done', {});
-    progress();
+
+  get state(): LoadState {
+    const { phase, view, beta0, reader: { client } } = this.context;
+    return {
+      phase,
+      scale: this.scale_.shown,
+      wantedScale: this.scale_.wanted,
+      displayedPx: view.display.heightPx,
+      planes: this.textures?.planes() ?? [],
+      bytes: client.received,
+      throughputBytesS: this.textures?.throughputBytesS() ?? beta0,
+      rttS: client.rttS,
+      pending: this.textures?.pending() ?? 0,
+    };
   }
 
   // ---- the course of a load
 
-  async function showFirst(): Promise<void> {
+  private async showFirst_(): Promise<void> {
+    const { context } = this;
+    const { reader: { manifest, client }, signal } = context;
     await null; // listeners are added when the caller has the model
     throwIfAborted(signal);
     const { scale, glb } = manifest.scales.at(-1)!;
-    load.expectedBytes = client.received + glb.bytes;
-    enter('first-picture');
+    context.expectedBytes = client.received + glb.bytes;
+    context.enter('first-picture');
     // On a slow link nothing shares it with the first picture. What comes next is asked for while the GPU
     // prepares for it.
-    const { shape, shown } = loadScale(scale);
-    coming = Promise.all([import('./texture_load'), shape]).then(([part]) => part.textureLoad(load));
-    coming.catch(() => undefined);
+    const { shape, shown } = this.scale_.load(scale);
+    this.coming_ = Promise.all([import('./texture_load'), shape]).then(([part]) => part.openTextureLoad(context, this.scale_, this.source_));
+    this.coming_.catch(() => undefined);
     await shown;
-    model.update(load.view.camera); // by what is there, not by its bounds alone
-    events.emit('first-picture', { scale, bytes: client.received });
+    this.update(context.view.camera ?? context.options.camera); // by what is there, not by its bounds alone
+    context.emit('first-picture', { scale, bytes: client.received });
   }
-  async function showInTime(): Promise<void> {
-    enter('tables');
-    textures = await coming;
-    throwIfAborted(signal);
-    await textures.timedPart();
-    phase = 'refining';
-    if (autoRefine) void model.refine();
+  private async showInTime_(): Promise<void> {
+    const { context } = this;
+    context.enter('tables');
+    this.textures = await this.coming_!;
+    throwIfAborted(context.signal);
+    await this.textures.timedPart();
+    context.phase = 'refining';
+    if (context.options.autoRefine ?? true) void this.refine();
   }
-
-  // ---- scales
-
-  /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
-  function loadScale(scale: number): { arrived: Promise<void>; shape: Promise<Object3D>; shown: Promise<void> } {
-    load.wantedScale = scale;
-    const show = (k: number): void => {
-      // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
-      if (load.wantedScale === scale && (k === scale || k < load.shownScale)) showScale(k);
-    };
-    const { arrived, shape } = scales.load(scale, show);
-    const shown = shape.then(async (its) => {
-      if (load.shownScale < 0) await compiled(its);
-      show(scale);
-    });
-    return { arrived, shape, shown };
+  private end_(error: unknown): never {
+    const { context } = this;
+    const cancelled = isAbort(error) || context.signal.aborted;
+    if (!cancelled) context.fail(error, 'load', true);
+    this.cancel();
+    context.phase = cancelled ? 'cancelled' : 'failed';
+    context.pool.dispose();
+    throw error;
   }
-  /** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
-  async function compiled(shape: Object3D): Promise<void> {
-    const goOn = (): void => throwIfAborted(signal);
-    let root = scene;
-    while (root.parent) root = root.parent;
-    await sleepS(0);
-    goOn();
-    renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
-    await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
-    await programsReady(renderer, mostCompileS, goOn);
-    for (const [, texture] of materials.all.flatMap(texturesOf)) {
-      await sleepS(0);
-      goOn();
-      renderer.initTexture(texture);
-    }
-    await gpuIdle(renderer, mostCompileS);
+  cancel(): void {
+    this.context.cancel();
+    this.scale_.endRetry();
+    if (this.context.phase !== 'failed') this.context.phase = 'cancelled';
   }
-  /** In one turn of the page: what is drawn next is the new scale, whole. */
-  function showScale(scale: number): void {
-    throwIfAborted(signal);
-    const shape = scales.shape(scale)!;
-    if (object.children[0] !== shape) object.clear().add(shape);
-    if (!object.parent) scene.add(object);
-    load.shownScale = scale;
-    events.emit('scale', { scale, triangles: manifest.scales.find((s) => s.scale === scale)!.triangles });
+  dispose(): void {
+    const { context } = this;
+    if (context.disposal.aborted) return;
+    this.cancel();
+    context.dispose();
+    this.endRequests_();
+    this.forget_();
+    context.object.removeFromParent().clear();
+    this.source_.dispose();
+    this.textures?.dispose();
+    context.materials.dispose();
+    context.pool.dispose();
+    context.events.clear();
   }
 
   // ---- following the view
 
-  function readDisplay(camera?: Camera): Display {
-    const { display } = options;
-    const said = (typeof display === 'function' ? display() : display) ?? (camera ? displayOf(manifest, object, camera, renderer) : 1000);
-    return typeof said === 'number' ? { heightPx: said } : said;
+  update(camera: LoadContext['view']['camera']): void {
+    const { context } = this;
+    if (!context.signal.aborted && context.lookFrom(camera) && context.resting) this.follow_();
   }
-  /** A scale that the package has, as near as possible. InputError: no numbers of scale or rung. */
-  function snapped({ scale, rung }: Override): Override {
-    for (const [name, v] of Object.entries({ scale, rung }))
-      if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
-    const away = (k: number): number => Math.abs(k - scale!);
-    const near = manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
-    return { scale: scale === undefined ? scale : near, rung };
+  setOverride(override: { scale?: number; rung?: number }): void {
+    this.context.override = this.context.snapped(override);
+    this.scale_.endRetry();
+    this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
   }
-  function follow(always = autoRefine): void {
-    void followScale();
-    if (always) void model.refine();
+  private follow_(always = this.context.options.autoRefine ?? true): void {
+    void this.scale_.follow();
+    if (always) void this.refine();
   }
-  /** Loads the scale that the view asks for, if it is another one. */
-  async function followScale(scale = scaleForView()): Promise<void> {
-    if (scale === load.wantedScale || scale === retryScale) return;
+
+  // ---- refining
+
+  refine(): Promise<void> {
+    this.refineAgain_ = true;
+    return this.refineUntilDone_();
+  }
+  private refineUntilDone_(): Promise<void> {
+    return (this.refining_ ??= this.refineRounds_());
+  }
+  /** Until all that is wanted is there. */
+  private async refineRounds_(): Promise<void> {
+    const { context } = this;
     try {
-      await loadScale(scale).shown;
-      retryS = retryScaleS.first;
-    } catch (error) {
-      lostScale(error, scale);
-    }
-  }
-  /** What is shown stays; the scale, or what is wanted by then, is asked for again a little later. */
-  function lostScale(error: unknown, scale: number): void {
-    fail(error, `scale ${scale}`);
-    if (load.wantedScale === scale) load.wantedScale = load.shownScale;
-    endRetry();
-    if (signal.aborted) return;
-    retryScale = scale;
-    retryTimer = setTimeout(() => {
-      retryScale = -1;
-      void followScale(resting() ? undefined : scale);
-    }, 1000 * retryS);
-    retryS = Math.min(2 * retryS, retryScaleS.most);
-  }
-  function endRetry(): void {
-    clearTimeout(retryTimer);
-    retryScale = -1;
-  }
-  /** The scale that the view asks for, by a little more than the last time. */
-  function scaleForView(): number {
-    const { override, wantedScale, view: { display } } = load;
-    const at = (factor: number): number => override.scale ?? textures!.scaleFor(display.heightPx * factor, display.part);
-    if (override.scale !== undefined || at(1 / hysteresis) < wantedScale) return at(1);
-    return Math.max(at(hysteresis), wantedScale);
-  }
-  /** All that is wanted is there. */
-  async function settle(): Promise<void> {
-    try {
-      if (!resting()) await done;
+      if (!context.resting) await this.done;
       do {
-        await restoring;
-        if (!signal.aborted) await refineOnce(textures!);
-      } while (refineAgain && !signal.aborted);
+        await this.restoring_;
+        if (!context.signal.aborted) await this.refineOnce_(this.textures!);
+      } while (this.refineAgain_ && !context.signal.aborted);
     } finally {
-      refining = undefined; // what is asked for from now on, by listeners too, is a turn of its own
+      this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own
     }
-    if (!signal.aborted) finish();
+    if (context.signal.aborted) return;
+    context.phase = 'done';
+    context.emit('done', {});
+    context.progress();
   }
-  async function refineOnce({ refine }: TextureLoad): Promise<void> {
-    phase = 'refining';
-    const scale = followScale(); // the time may have allowed a coarser one only
-    const asked = refineAgain;
-    refineAgain = false;
+  private async refineOnce_(textures: TextureLoad): Promise<void> {
+    this.context.phase = 'refining';
+    const scale = this.scale_.follow(); // the time may have allowed a coarser one only
+    const asked = this.refineAgain_;
+    this.refineAgain_ = false;
     try {
-      if (asked) await refine(() => refineAgain);
+      if (asked) await textures.refine(() => this.refineAgain_);
       await scale; // the view may have changed meanwhile
     } catch (error) {
-      fail(error, 'refining');
+      this.context.fail(error, 'refining');
     }
   }
   /** three.js makes geometries and pictures of its own anew; what was composed is gone. */
-  function restore(): void {
-    events.emit('context', { lost: false });
-    if (signal.aborted) return;
-    restoring = textures?.restore().catch((error) => fail(error, 'textures after a lost context'));
-    if (!resting()) return;
-    enter('refining');
-    refineAgain ||= autoRefine;
-    refining ??= settle();
+  private restore_(): void {
+    const { context } = this;
+    context.emit('context', { lost: false });
+    if (context.signal.aborted) return;
+    this.restoring_ = this.textures?.restore().catch((error) => context.fail(error, 'textures after a lost context'));
+    if (!context.resting) return;
+    context.enter('refining');
+    this.refineAgain_ ||= context.options.autoRefine ?? true;
+    void this.refineUntilDone_();
   }
-
-  const firstPicture = showFirst();
-  const done = firstPicture.then(showInTime).catch((error: unknown) => {
-    const cancelled = isAbort(error) || signal.aborted;
-    if (!cancelled) fail(error, 'load', true);
-    model.cancel();
-    phase = cancelled ? 'cancelled' : 'failed';
-    pool.dispose();
-    throw error;
-  });
-  done.catch(() => undefined);
-  const model: LoadedModel = {
-    object,
-    firstPicture,
-    done,
-    on: (name, listener) => events.on(name, listener),
-    get state() {
-      return {
-        phase,
-        scale: load.shownScale,
-        wantedScale: load.wantedScale,
-        displayedPx: load.view.display.heightPx,
-        planes: textures?.planes() ?? [],
-        bytes: client.received,
-        throughputBytesS: textures?.throughputBytesS() ?? load.beta0,
-        rttS: client.rttS,
-        pending: textures?.pending() ?? 0,
-      };
-    },
-    get materials() {
-      return materials.all;
-    },
-    update(camera = options.camera) {
-      if (signal.aborted) return;
-      camera?.updateMatrixWorld();
-      object.updateWorldMatrix(true, false);
-      const display = readDisplay(camera);
-      const { heightPx, part } = display;
-      const seen = camera ? [camera.matrixWorld, camera.projectionMatrix, object.matrixWorld] : [];
-      const numbers = [heightPx, part?.widthPx ?? 0, part?.heightPx ?? 0, ...seen.flatMap((m) => m.elements)];
-      const view = numbers.map((v) => v.toPrecision(4)).join();
-      if (view === lastView) return;
-      lastView = view;
-      load.view = { display, camera };
-      if (resting()) follow();
-    },
-    refine() {
-      refineAgain = true;
-      return (refining ??= settle());
-    },
-    setOverride(override) {
-      load.override = snapped(override);
-      endRetry();
-      done.then(() => follow(true), () => undefined); // once the timed part is over
-    },
-    cancel() {
-      abort.abort();
-      endRetry();
-      if (phase !== 'failed') phase = 'cancelled';
-    },
-    dispose() {
-      if (disposed.signal.aborted) return;
-      model.cancel();
-      disposed.abort();
-      offRequest();
-      forget();
-      object.removeFromParent().clear();
-      scales.dispose();
-      textures?.dispose();
-      materials.dispose();
-      pool.dispose();
-      events.clear();
-    },
-    readPlane: (base) => textures?.readPlane(base) ?? new Uint8Array(0),
-  };
-  const whileThere = { signal: disposed.signal };
-  options.signal?.addEventListener('abort', model.cancel, whileThere);
-  if (options.signal?.aborted) model.cancel();
-  renderer.domElement?.addEventListener('webglcontextlost', () => events.emit('context', { lost: true }), whileThere);
-  renderer.domElement?.addEventListener('webglcontextrestored', restore, whileThere);
-  const offRequest = reader.onRequest((record) => {
-    events.emit('request', record);
-    progress();
-  });
-  return model;
 }

@@ -1,38 +1,126 @@
-import type { Camera, Group } from 'three';
-import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';
+import { type Camera, Group } from 'three';
+import { InputError, isAbort, throwIfAborted } from '../format/errors';
+import { nowS } from '../http/clock';
 import type { PackageReader } from '../http/package_reader';
-import type { MaterialSet } from './scale_parts';
-import type { ScaleLoad, ScaleSource } from './scale_source';
 import type { WorkerPool } from '../worker/pool';
+import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';
+import { displayOf } from './camera';
+import { Emitter } from './events';
+import { MaterialSet } from './scale_parts';
 
 /** A change of scale or plane has to be wanted by this factor of displayed height. */
 export const hysteresis = 1.1;
+/** Limits beyond are none: timers and plans end there. */
+const longestS = 1e5;
+/** Displayed height where nobody says one, device px. */
+const defaultHeightPx = 1000;
 
-/** What the parts of one load share. */
-export interface LoadContext {
-  readonly reader: PackageReader;
-  readonly options: LoadOptions;
-  readonly pool: WorkerPool;
-  readonly materials: MaterialSet;
-  readonly scales: ScaleSource;
-  readonly object: Group;
-  readonly signal: AbortSignal;
+/** What was chosen instead of what display and time ask for. */
+export interface Override {
+  scale?: number;
+  rung?: number;
+}
+
+/** What the parts of one load share: its options, its state, and who hears of it. */
+export class LoadContext {
+  readonly materials = new MaterialSet();
+  /** What stands in the scene. */
+  readonly object = new Group();
+  readonly events = new Emitter<LoadEvents>();
   readonly limitS: number;
-  override: { scale?: number; rung?: number };
+  phase: LoadPhase = 'first-picture';
+  override: Override;
   view: { display: Display; camera?: Camera };
-  /** In the scene; -1: none yet. */
-  shownScale: number;
-  wantedScale: number;
   /** Throughput that the first transfers have shown. */
-  beta0: number;
-  expectedBytes: number;
+  beta0 = 0;
+  expectedBytes = 0;
+  private lastView_ = '';
+  private readonly abort_ = new AbortController();
+  private readonly disposed_ = new AbortController();
+
+  constructor(
+    readonly reader: PackageReader,
+    readonly options: LoadOptions,
+    readonly pool: WorkerPool,
+    private readonly startS_: number,
+  ) {
+    const { time = 5, camera } = options;
+    this.object.name = reader.manifest.title || 'texmesh';
+    this.limitS = time > longestS ? Infinity : time;
+    this.override = this.snapped(options);
+    this.view = { display: this.displayFrom_(camera), camera };
+  }
+
+  /** Aborted when the load is cancelled, fails, or is disposed of. */
+  get signal(): AbortSignal {
+    return this.abort_.signal;
+  }
+  /** Aborted when the load is disposed of. */
+  get disposal(): AbortSignal {
+    return this.disposed_.signal;
+  }
+  /** The timed part is over, and nothing is wrong. */
+  get resting(): boolean {
+    return this.phase === 'refining' || this.phase === 'done';
+  }
   /** Since the load's start. */
-  elapsedS(): number;
-  emit<K extends keyof LoadEvents>(name: K, event: Omit<LoadEvents[K], 'at'>): void;
-  fail(error: unknown, what: string): void;
-  enter(phase: LoadPhase): void;
-  /** A scale cannot be had for now. */
-  lostScale(error: unknown, scale: number): void;
-  /** Loads a scale and shows it. */
-  showScale(scale: number): { arrived: ScaleLoad['arrived']; shown: Promise<void> };
+  elapsedS(): number {
+    return nowS() - this.startS_;
+  }
+
+  // ---- who hears of it
+
+  emit<K extends keyof LoadEvents>(name: K, event: Omit<LoadEvents[K], 'at'>): void {
+    this.events.emit(name, event);
+  }
+  fail(error: unknown, what: string, fatal = false): void {
+    if (isAbort(error) || this.disposal.aborted) return;
+    this.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
+  }
+  progress(): void {
+    const { received } = this.reader.client;
+    this.emit('progress', { phase: this.phase, bytes: received, bytesExpected: Math.max(received, this.expectedBytes) });
+  }
+  enter(next: LoadPhase): void {
+    throwIfAborted(this.signal);
+    this.phase = next;
+    this.progress();
+  }
+  cancel(): void {
+    this.abort_.abort();
+  }
+  dispose(): void {
+    this.disposed_.abort();
+  }
+
+  // ---- what is wanted
+
+  /** A scale that the package has, as near as possible. InputError: no numbers of scale or rung. */
+  snapped({ scale, rung }: Override): Override {
+    for (const [name, v] of Object.entries({ scale, rung }))
+      if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
+    const away = (k: number): number => Math.abs(k - scale!);
+    const near = this.reader.manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
+    return { scale: scale === undefined ? scale : near, rung };
+  }
+  /** The view as this camera sees it is what counts from now on; false where it has not changed. */
+  lookFrom(camera?: Camera): boolean {
+    camera?.updateMatrixWorld();
+    this.object.updateWorldMatrix(true, false);
+    const display = this.displayFrom_(camera);
+    const { heightPx, part } = display;
+    const seen = camera ? [camera.matrixWorld, camera.projectionMatrix, this.object.matrixWorld] : [];
+    const numbers = [heightPx, part?.widthPx ?? 0, part?.heightPx ?? 0, ...seen.flatMap((m) => m.elements)];
+    const view = numbers.map((v) => v.toPrecision(4)).join();
+    if (view === this.lastView_) return false;
+    this.lastView_ = view;
+    this.view = { display, camera };
+    return true;
+  }
+  private displayFrom_(camera?: Camera): Display {
+    const { options: { display, renderer }, object } = this;
+    const said = typeof display === 'function' ? display() : display;
+    const shown = said ?? (camera ? displayOf(this.reader.manifest, object, camera, renderer) : defaultHeightPx);
+    return typeof shown === 'number' ? { heightPx: shown } : shown;
+  }
 }

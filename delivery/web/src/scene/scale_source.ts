@@ -3,7 +3,7 @@ import { isAbort } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions } from './api';
-import { MaterialSet, ParsedGltf, Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
+import { type MaterialSet, type ParsedGltf, type Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
 import type { SplitShapes } from './split_shape';
 
 /** A scale on its way. */
@@ -12,97 +12,119 @@ export interface ScaleLoad {
   arrived: Promise<void>;
   shape: Promise<Object3D>;
 }
-/** See scaleSource. */
-export type ScaleSource = ReturnType<typeof scaleSource>;
+
+/** What a ScaleSource works with. */
+export interface ScaleSourceParts {
+  reader: PackageReader;
+  options: LoadOptions;
+  materials: MaterialSet;
+  pool: WorkerPool;
+  signal: AbortSignal;
+  /** Hears of every slot of a material that has a texture of the package. */
+  added: (slot: Slot) => void;
+  /** Hears of what went wrong and has another way. */
+  problem: (error: unknown, what: string) => void;
+}
 
 /** The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. */
-export function scaleSource(
-  reader: PackageReader,
-  options: LoadOptions,
-  materials: MaterialSet,
-  pool: WorkerPool,
-  signal: AbortSignal,
-  added: (slot: Slot) => void,
-  problem: (error: unknown, what: string) => void,
-) {
-  const { manifest, form } = reader;
-  const shapes = new Map<number, Object3D>();
-  const underWay = new Map<number, ScaleLoad>();
-  let splits: SplitShapes | undefined;
-  let usable = false; // the stream
-  /** That of the coarsest scale: it has the materials and their textures. */
-  let first: ParsedGltf | undefined;
+export class ScaleSource {
+  private readonly shapes_ = new Map<number, Object3D>();
+  private readonly underWay_ = new Map<number, ScaleLoad>();
+  private splits_?: SplitShapes;
+  private streamUsable_ = false;
+  /** The GLB of the coarsest scale: it has the materials and their textures. */
+  private first_?: ParsedGltf;
 
-  const glbBytes = (scale: number): number => manifest.scales.find((s) => s.scale === scale)?.glb.bytes ?? 0;
-  const streamBytes = (scale: number): number => (usable ? splits!.bytesOf(scale) : Infinity);
-  const usesStream = (scale: number): boolean => streamBytes(scale) <= (options.meshes === 'stream' ? Number.MAX_VALUE : glbBytes(scale));
+  constructor(private readonly parts_: ScaleSourceParts) {}
 
-  async function read(scale: number, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
-    const known = shapes.get(scale);
+  /** Reads the head of the vertex-split stream, where it is to be used. */
+  async openStream(): Promise<void> {
+    const { reader, options, pool, materials, added, signal, problem } = this.parts_;
+    const { meshes } = options;
+    // A tree's stream comes as a whole file.
+    const cheap = meshes === 'stream' || (meshes !== 'glb' && reader.form !== 'files');
+    if (!reader.manifest.stream || reader.manifest.scales.length < 2 || !cheap) return;
+    try {
+      const { openSplitShapes } = await import('./split_shape');
+      this.splits_ = await openSplitShapes(reader, pool, materials, added, signal);
+      this.streamUsable_ = true;
+    } catch (error) {
+      if (isAbort(error)) throw error;
+      if (!pool.none) problem(error, 'vertex splits'); // GLB files do, too
+    }
+  }
+  /** Bytes that a scale still costs. */
+  bytesOf(scale: number): number {
+    if (this.shapes_.has(scale)) return 0;
+    return this.usesStream_(scale) ? this.streamBytes_(scale) : this.glbBytes_(scale);
+  }
+  /** Loads a scale; `passed` hears of coarser ones that are complete on the way. */
+  load(scale: number, passed: (scale: number) => void): ScaleLoad {
+    const asked = this.underWay_.get(scale);
+    if (asked) return asked;
+    let tellArrived = (): void => undefined;
+    const arrived = new Promise<void>((done) => (tellArrived = done));
+    const load = { arrived, shape: this.read_(scale, tellArrived, passed) };
+    this.underWay_.set(scale, load);
+    const end = (): void => {
+      this.underWay_.delete(scale);
+      tellArrived();
+    };
+    load.shape.then(end, end);
+    return load;
+  }
+  /** A scale that is there. */
+  shape(scale: number): Object3D | undefined {
+    return this.shapes_.get(scale);
+  }
+  dispose(): void {
+    this.shapes_.forEach(disposeGeometries);
+    if (this.first_) disposeGeometries(this.first_.scene);
+    this.splits_?.dispose();
+    this.shapes_.clear();
+    this.first_ = undefined;
+  }
+
+  private glbBytes_(scale: number): number {
+    return this.parts_.reader.manifest.scales.find((s) => s.scale === scale)?.glb.bytes ?? 0;
+  }
+  private streamBytes_(scale: number): number {
+    return this.streamUsable_ ? this.splits_!.bytesOf(scale) : Infinity;
+  }
+  private usesStream_(scale: number): boolean {
+    const most = this.parts_.options.meshes === 'stream' ? Number.MAX_VALUE : this.glbBytes_(scale);
+    return this.streamBytes_(scale) <= most;
+  }
+  private async read_(scale: number, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
+    const known = this.shapes_.get(scale);
     if (known) return known;
-    if (first && usesStream(scale))
+    if (this.first_ && this.usesStream_(scale))
       try {
-        return await splits!.load(scale, first, signal, arrived, (s, mesh: Mesh) => {
-          if (shapes.has(s) && s !== manifest.scales.at(-1)!.scale) return;
-          shapes.set(s, mesh);
-          if (s !== scale) passed(s);
-        });
+        return await this.readSplits_(scale, this.first_, arrived, passed);
       } catch (error) {
         if (isAbort(error)) throw error;
-        usable = false;
-        problem(error, 'vertex splits');
+        this.streamUsable_ = false;
+        this.parts_.problem(error, 'vertex splits');
       }
+    return this.readGlb_(scale, arrived);
+  }
+  private readSplits_(scale: number, first: ParsedGltf, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
+    const coarsest = this.parts_.reader.manifest.scales.at(-1)!.scale;
+    return this.splits_!.load(scale, first, this.parts_.signal, arrived, (s, mesh: Mesh) => {
+      if (this.shapes_.has(s) && s !== coarsest) return;
+      this.shapes_.set(s, mesh);
+      if (s !== scale) passed(s);
+    });
+  }
+  private async readGlb_(scale: number, arrived: () => void): Promise<Object3D> {
+    const { reader, options, materials, signal, added } = this.parts_;
     const glb = await reader.scaleGlb(scale, { signal });
     arrived();
     await reader.decoded(signal, 'requireSelfContained', glb);
-    const gltf = await parseScale(options.gltfLoader(), glb, first !== undefined);
-    first ??= gltf;
+    const gltf = await parseScale(options.gltfLoader(), glb, this.first_ !== undefined);
+    this.first_ ??= gltf;
     materials.adopt(gltf, meshesOf(gltf.scene), added);
-    shapes.set(scale, gltf.scene);
+    this.shapes_.set(scale, gltf.scene);
     return gltf.scene;
   }
-
-  return {
-    /** Reads the head of the vertex-split stream, where it is to be used. */
-    async openStream(): Promise<void> {
-      const { meshes } = options;
-      // A tree's stream comes as a whole file.
-      const cheap = meshes === 'stream' || (meshes !== 'glb' && form !== 'files');
-      if (!manifest.stream || manifest.scales.length < 2 || !cheap) return;
-      try {
-        const { splitShapes } = await import('./split_shape');
-        splits = await splitShapes(reader, pool, materials, added, signal);
-        usable = true;
-      } catch (error) {
-        if (isAbort(error)) throw error;
-        if (!pool.none) problem(error, 'vertex splits'); // GLB files do, too
-      }
-    },
-    /** Bytes that a scale still costs. */
-    bytesOf: (scale: number): number => (shapes.has(scale) ? 0 : usesStream(scale) ? streamBytes(scale) : glbBytes(scale)),
-    /** Loads a scale; `passed` hears of coarser ones that are complete on the way. */
-    load(scale: number, passed: (scale: number) => void): ScaleLoad {
-      const asked = underWay.get(scale);
-      if (asked) return asked;
-      let tellArrived = (): void => undefined;
-      const arrived = new Promise<void>((done) => (tellArrived = done));
-      const load = { arrived, shape: read(scale, tellArrived, passed) };
-      underWay.set(scale, load);
-      const end = (): void => {
-        underWay.delete(scale);
-        tellArrived();
-      };
-      load.shape.then(end, end);
-      return load;
-    },
-    /** A scale that is there. */
-    shape: (scale: number): Object3D | undefined => shapes.get(scale),
-    dispose(): void {
-      shapes.forEach(disposeGeometries);
-      if (first) disposeGeometries(first.scene);
-      splits?.dispose();
-      shapes.clear();
-      first = undefined;
-    },
-  };
 }

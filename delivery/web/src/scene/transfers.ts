@@ -5,7 +5,7 @@ import { PlaneFiles } from '../http/package_documents';
 import { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
-import { ownLevels } from './composer';
+import { ownLevels } from './plane_storage';
 
 /** A fragment to be had at a rung. */
 export interface Wish {

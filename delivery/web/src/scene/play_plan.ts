@@ -6,7 +6,7 @@ import { nowS } from '../http/clock';
 import type { Transfers, Wish } from './transfers';
 
 /** Who hears of it. */
-export interface TimedFetchHooks {
+export interface PlayedPlanHooks {
   /** A decision was taken, or its transfer has ended. */
   decided(step: HtcStep): void;
   lost(wish: Wish, error: unknown): void;
@@ -16,13 +16,13 @@ export interface TimedFetchHooks {
  * Plays a plan over the network: asks for what it says, tells it what has come. Until everything has come or was given up; what has not
  * come after `mostS` seconds is.
  */
-export async function timedFetch(
+export async function playPlan(
   plan: UncheckedPlan,
   { groups }: GroupedList,
   transfers: Transfers,
   signal: AbortSignal,
   mostS: number,
-  hooks: TimedFetchHooks,
+  hooks: PlayedPlanHooks,
 ): Promise<void> {
   const startS = nowS();
   const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended

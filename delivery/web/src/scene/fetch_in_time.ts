@@ -1,0 +1,88 @@
+import type { FragmentList } from '../decide/fragment_list';
+import type { HtcStep, Policy, TimePlanOptions } from '../decide/plan_types';
+import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
+import { UncheckedPlan } from '../decide/unchecked_plan';
+import type { FragmentFetch } from './fragment_fetch';
+import { upgradeWishes } from './fragment_wishes';
+import type { LoadContext } from './load_context';
+import { playPlan } from './play_plan';
+import type { Wish } from './transfers';
+
+/** What decoding and uploading take after the last byte: 4 ms, or 11, on a machine whose GPU is its processor. */
+export const composeS = 0.015;
+/** Fragments that are this late, of the limit, are given up. */
+const mostLate = 0.02;
+/** Less of the limit than this, beside a round trip, is not worth another request. */
+const leastRest = 0.004;
+/** Of the bytes that throughput promises. */
+const certain = 0.85;
+
+/** Of the plan for fragments in so many seconds. */
+export function timePlanOptions({ options, reader, beta0 }: LoadContext, timeLimitS: number): TimePlanOptions {
+  const { policy, order = 'credit' } = options;
+  return { policy: policy as Policy, order, timeLimitS, rttS: reader.client.latencyS, initialBytesS: Math.max(1, beta0) };
+}
+
+/** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
+export class FetchInTime {
+  private plan_?: UncheckedPlan;
+
+  constructor(
+    private readonly load_: LoadContext,
+    private readonly fetching_: FragmentFetch,
+  ) {}
+
+  /** As the plan estimates it now. */
+  throughputBytesS(): number | undefined {
+    return this.plan_?.throughputBytesS();
+  }
+  leftS(): number {
+    return this.load_.limitS - this.load_.elapsedS();
+  }
+
+  async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
+    const { load_: load, fetching_: fetching } = this;
+    const whole = fetching.wholeRungs();
+    const bytesEach = whole ? Infinity : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
+    const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
+    const plan = (this.plan_ = new UncheckedPlan(list.offers, timePlanOptions(load, timeLimitS)));
+    const hooks = {
+      decided: (step: HtcStep): void => this.decided_(step, list),
+      lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
+    };
+    await playPlan(plan, list, fetching.transfers, load.signal, timeLimitS + mostLate * load.limitS, hooks);
+    if (!fetching.wholeRungs()) await this.spendRest_(fragments, plan);
+  }
+  private decided_(s: HtcStep, { groups, offers }: GroupedList): void {
+    const group = groups[s.offer];
+    if (s.doneS < 0) for (const f of group) this.fetching_.fates.asked(f, s.rung);
+    this.load_.emit('decision', {
+      position: s.position,
+      ...group[0],
+      fragments: group.map((f) => f.fragment),
+      eta: offers[s.offer].eta,
+      rung: s.rung,
+      bytes: s.bytes,
+      plannedSeconds: s.thetaS,
+      ...(s.doneS >= 0 && s.rung >= 0 && { actualSeconds: s.spacingS, done: s.doneS }),
+      creditSeconds: s.creditS,
+      bytesPerSecond: s.throughputBytesS,
+      issued: s.issuedS,
+      skipped: s.rung < 0,
+    });
+  }
+  /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */
+  private async spendRest_(list: FragmentList, plan: UncheckedPlan): Promise<void> {
+    const { limitS, signal, reader: { client } } = this.load_;
+    for (;;) {
+      const restS = this.leftS() - composeS;
+      const afterS = restS - client.rttS; // nothing else is on its way
+      if (afterS < leastRest * limitS) return;
+      // More requests at once would wait for connections.
+      const most = 2 * client.options.connections;
+      const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0, most);
+      const late = AbortSignal.timeout(Math.ceil(1000 * (restS + mostLate * limitS)));
+      if (wishes.length === 0 || (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
+    }
+  }
+}

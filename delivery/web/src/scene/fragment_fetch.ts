@@ -1,0 +1,103 @@
+import type { Mesh } from 'three';
+import { type FragmentList, fragmentList } from '../decide/fragment_list';
+import { isAbort, throwIfAborted } from '../format/errors';
+import { sleepS } from '../http/clock';
+import type { Levels } from '../worker/protocol';
+import { FragmentFates } from './fragment_fates';
+import type { LoadContext } from './load_context';
+import type { ShownPlanes } from './shown_planes';
+import { Transfers, type Wish } from './transfers';
+import { seenShares } from './visibility';
+
+/** Bytes of a request. */
+export const requestBytes = 256 << 10;
+const gapBytes = 1024;
+
+/** The fragments of a load: what may be fetched, fetching it, and what became of it. */
+export class FragmentFetch {
+  readonly fates = new FragmentFates();
+  readonly transfers: Transfers;
+
+  constructor(
+    private readonly load_: LoadContext,
+    readonly planes: ShownPlanes,
+  ) {
+    this.transfers = new Transfers(load_.reader, planes.textures, load_.pool, {
+      decoded: (wish, levels) => void this.show_(wish, levels),
+      lost: (wish, error) => this.lost(wish, error),
+    });
+  }
+
+  /** Fragments whose transfer, decoding or upload is under way. */
+  pending(): number {
+    return this.transfers.pending + this.planes.pending;
+  }
+  /** Waits until all that has come (but so many) is in its texture. */
+  async composed(but = 0): Promise<void> {
+    for (; this.pending() > but; await sleepS(0.004)) throwIfAborted(this.load_.signal);
+    if (but === 0) this.planes.finishMips();
+  }
+  /** A rung comes as a whole, whatever is asked for: a tree without files of fragments. */
+  wholeRungs(): boolean {
+    const [first] = this.planes.all();
+    return this.load_.reader.form === 'files' && !!first && !this.transfers.filesOf(first.plane).complete;
+  }
+
+  /**
+   * The list of what may be fetched of the planes shown, with the bytes that fetching takes. Losses count by what the camera sees of a
+   * fragment, the rest of it by `unseen`.
+   */
+  async listOf(scale: number, unseen: number): Promise<FragmentList> {
+    const { planes, transfers } = this;
+    const seen = new Map<number, Float32Array | undefined>();
+    for (const { plane } of planes.all()) {
+      await sleepS(0); // the page goes on in between
+      seen.set(plane, this.shares_(plane));
+    }
+    const list = fragmentList(planes.data, planes.all(), { scale });
+    list.offers.forEach((offer, i) => {
+      const { plane, fragment } = list.fragments[i];
+      offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);
+      offer.loss = offer.loss.map((l) => l * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1));
+    });
+    return list;
+  }
+  /** Share of each fragment that the camera sees; undefined without a camera. */
+  private shares_(plane: number): Float32Array | undefined {
+    const { materials, view, object } = this.load_;
+    const info = this.planes.textures[plane];
+    const slots = materials.slots.filter((s) => s.image === info.image);
+    const shows = (mesh: Mesh): boolean => [mesh.material].flat().some((m) => slots.some((s) => s.material === m));
+    return view.camera && seenShares(info, object, view.camera, shows);
+  }
+
+  /** How many have come. */
+  async fetch(wishes: readonly Wish[], until = this.load_.signal): Promise<number> {
+    for (const w of wishes) this.fates.asked(w, w.rung);
+    let arrived = 0;
+    const lost = (wish: Wish, error: unknown): void => this.lost(wish, error);
+    await this.transfers.fetch(wishes, { gapBytes, mostBytes: requestBytes, signal: until }, () => ++arrived, lost);
+    throwIfAborted(this.load_.signal);
+    return arrived;
+  }
+  lost(wish: Wish, error: unknown): void {
+    this.fates.ended(wish, wish.rung);
+    if (isAbort(error) || this.load_.pool.none) return;
+    this.fates.failed(wish, wish.rung, error);
+    this.load_.fail(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
+  }
+  private async show_(wish: Wish, levels: Levels): Promise<void> {
+    const { plane, fragment, rung, replaces } = wish;
+    const load = this.load_;
+    const to = this.planes.showing(wish);
+    const better = (there: number): boolean => rung > there || (!!replaces && load.override.rung !== undefined);
+    const shown = to && !load.signal.aborted && (await this.planes.upload(to, levels, fragment, rung, better));
+    levels.forEach((b) => b.close());
+    this.fates.ended(wish, rung);
+    if (shown) load.emit('fragment', { plane, fragment, rung });
+  }
+  dispose(): void {
+    this.planes.dispose();
+    this.transfers.dispose();
+  }
+}

@@ -1,0 +1,156 @@
+import { type PlaneChoice, fullSize, planesForDisplay } from '../decide/fragment_list';
+import { InputError, throwIfAborted } from '../format/errors';
+import { mostPreviewPx } from '../format/layout';
+import type { PackageData } from '../format/package_data';
+import { type TextureInfo, fullSizePlanes } from '../format/textures';
+import type { Levels } from '../worker/protocol';
+import type { PlaneComposer } from './composer';
+import type { FragmentPlace } from './fragment_fates';
+import { type LoadContext, hysteresis } from './load_context';
+import type { ScaleSource } from './scale_source';
+import { TextureSet } from './texture_set';
+
+/** The planes for the display, or all at full size where options say so. */
+function planesFor({ options, view }: LoadContext, data: PackageData, displayedPx = view.display.heightPx): PlaneChoice[] {
+  return options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
+}
+
+/** What decisions about textures are made from, with the tables of the planes that this display may need; all where they are small. */
+export async function readPlaneData(load: LoadContext, scales: ScaleSource): Promise<PackageData> {
+  const { reader, pool, signal } = load;
+  pool.start();
+  const [whole] = await Promise.all([reader.prefetchDocuments(signal), scales.openStream()]);
+  if (whole) return reader.data(undefined, signal);
+  const all = await reader.textures(signal);
+  const base = [...Array(fullSizePlanes(all)).keys()];
+  const shown = planesFor(load, await reader.data(base, signal));
+  // With the mips below, which a short time may ask for.
+  const among = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= all[c.plane].mip);
+  return reader.data([...base, ...all.flatMap((t, p) => (among(t) ? [p] : []))], signal);
+}
+
+/** Which planes show the textures of a load: choosing them, and showing them. */
+export class ShownPlanes {
+  private set_: TextureSet;
+
+  constructor(
+    private readonly load_: LoadContext,
+    /** With the tables of the planes that are shown, at least. */
+    public data: PackageData,
+  ) {
+    this.set_ = this.newSet_();
+  }
+  private newSet_(): TextureSet {
+    const { options, materials, pool } = this.load_;
+    return new TextureSet(options.renderer, this.textures, materials, pool);
+  }
+
+  get textures(): readonly TextureInfo[] {
+    return this.data.textures;
+  }
+  /** Textures that are being composed. */
+  all(): PlaneComposer[] {
+    return [...this.set_.planes.values()];
+  }
+  showing(f: { plane: number }): PlaneComposer | undefined {
+    return this.all().find((p) => p.plane === f.plane);
+  }
+  /** The rung of a fragment in its texture; -1: the preview. */
+  rungOf(f: FragmentPlace): number {
+    return this.showing(f)?.rungs[f.fragment] ?? -1;
+  }
+  /** Fragments that wait to be uploaded. */
+  get pending(): number {
+    return this.set_.pending;
+  }
+  isUsed(base: number): boolean {
+    return this.set_.isUsed(base);
+  }
+  readPlane(base: number): Uint8Array | undefined {
+    return this.set_.planes.get(base)?.read();
+  }
+  showInNewMaterials(): void {
+    this.set_.showInNewMaterials();
+  }
+  finishMips(): void {
+    this.set_.finishMips();
+  }
+  upload(to: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
+    return this.set_.upload(to, levels, fragment, rung, better);
+  }
+  dispose(): void {
+    this.set_.dispose();
+  }
+
+  // ---- choosing
+
+  /** The planes for the display as it is now. */
+  forDisplay(): PlaneChoice[] {
+    return planesFor(this.load_, this.data);
+  }
+  /** Planes that the GPU can hold: a mip where it cannot; where there is none, what the mesh brought along stays. */
+  fitting(choices: readonly PlaneChoice[]): PlaneChoice[] {
+    const most = this.load_.options.renderer.capabilities.maxTextureSize;
+    const fits = (t: TextureInfo): boolean => Math.max(t.widthPx, t.heightPx) <= most;
+    return choices.flatMap(({ base, plane }) => {
+      // Mips stand in falling order of their size.
+      const taken = fits(this.textures[plane]) ? plane : this.textures.findIndex((t) => t.mip > 0 && t.base === base && fits(t));
+      if (taken >= 0) return [{ base, plane: taken }];
+      this.load_.fail(new InputError('GPU', `texture plane ${plane}`, `at most ${most} px`, 'more'), 'textures');
+      return [];
+    });
+  }
+  /** Planes with more texels where the view has come nearer; never back, as what is there is there. */
+  finer(): PlaneChoice[] {
+    const { planes } = this.set_;
+    const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis).filter((c) => planes.has(c.base));
+    return this.fitting(wanted).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
+  }
+  /** Reads the tables of these planes, too. */
+  async readTables(planes: readonly number[]): Promise<void> {
+    const { reader, signal } = this.load_;
+    this.data = await reader.data([...this.all().map((p) => p.plane), ...planes], signal);
+  }
+
+  // ---- showing
+
+  /**
+   * Shows textures by these planes; those that the first GLB does not show begin with the package's preview. Fragments may come from
+   * then on; `shown` resolves when the scene has changed.
+   */
+  async show(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
+    const { signal } = this.load_;
+    const shown: Promise<void>[] = [];
+    for (const choice of choices) {
+      const { base, plane } = choice;
+      const { role, widthPx, heightPx } = this.textures[plane];
+      // A plane that cannot be shown leaves what the mesh brought along.
+      const lostPlane = (error: unknown): void => this.load_.fail(error, `texture plane ${plane}`);
+      try {
+        const needed = !this.set_.planes.has(base) && (anew || role === 'alpha' || !this.isUsed(base));
+        const preview = needed ? await this.previewOf_(base) : undefined;
+        throwIfAborted(signal); // what is shown from now on nobody would dispose of
+        const planeShown = (): void => this.load_.emit('plane', { base, plane, widthPx, heightPx });
+        shown.push(this.set_.show(choice, preview).then(planeShown, lostPlane).finally(() => preview?.close()));
+      } catch (error) {
+        lostPlane(error);
+      }
+      throwIfAborted(signal);
+    }
+    return { shown: Promise.all(shown) };
+  }
+  private async previewOf_(base: number): Promise<ImageBitmap> {
+    const { reader, pool, signal } = this.load_;
+    const streams = [await reader.preview(base, signal)];
+    const most: [number, number] = [mostPreviewPx, mostPreviewPx];
+    return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [], complete: true, levels: 1, most }))[0];
+  }
+  /** The GPU has lost everything: the same planes begin with their previews. Gives the planes as they were. */
+  async showAnew(): Promise<PlaneComposer[]> {
+    const before = this.all();
+    this.set_.dispose();
+    this.set_ = this.newSet_();
+    await (await this.show(before, true)).shown;
+    return before;
+  }
+}

@@ -1,0 +1,89 @@
+import type { Object3D } from 'three';
+import type { VisiblePart } from '../decide/viewing';
+import { throwIfAborted } from '../format/errors';
+import { readyToDraw } from './gpu';
+import { type LoadContext, hysteresis } from './load_context';
+import type { ScaleSource } from './scale_source';
+
+/** A scale that could not be had is asked for again after so long, and twice as long each time. */
+const retryScaleS = { first: 2, most: 60 };
+/** No scale: none is shown, or none is retried. */
+const noScale = -1;
+
+/** The scale in the scene, and how it follows the view. */
+export class ShownScale {
+  /** In the scene; -1: none yet. */
+  shown = noScale;
+  wanted = noScale;
+  /** The scale that is enough at a displayed height; there once the documents are. */
+  scaleFor?: (heightPx: number, part: VisiblePart | undefined) => number;
+  private retryScale_ = noScale;
+  private retryTimer_: ReturnType<typeof setTimeout> | undefined;
+  private retryS_ = retryScaleS.first;
+
+  constructor(
+    private readonly load_: LoadContext,
+    private readonly scene_: Object3D,
+    private readonly source_: ScaleSource,
+  ) {}
+
+  /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
+  load(scale: number): { arrived: Promise<void>; shape: Promise<Object3D>; shown: Promise<void> } {
+    this.wanted = scale;
+    const show = (k: number): void => {
+      // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
+      if (this.wanted === scale && (k === scale || k < this.shown)) this.show_(k);
+    };
+    const { arrived, shape } = this.source_.load(scale, show);
+    const shown = shape.then(async (its) => {
+      if (this.shown < 0) await readyToDraw(this.load_, this.scene_, its);
+      show(scale);
+    });
+    return { arrived, shape, shown };
+  }
+  /** Loads the scale that the view asks for, if it is another one. */
+  async follow(scale = this.scaleForView_()): Promise<void> {
+    if (scale === this.wanted || scale === this.retryScale_) return;
+    try {
+      await this.load(scale).shown;
+      this.retryS_ = retryScaleS.first;
+    } catch (error) {
+      this.lost(error, scale);
+    }
+  }
+  /** What is shown stays; the scale, or what is wanted by then, is asked for again a little later. */
+  lost(error: unknown, scale: number): void {
+    this.load_.fail(error, `scale ${scale}`);
+    if (this.wanted === scale) this.wanted = this.shown;
+    this.endRetry();
+    if (this.load_.signal.aborted) return;
+    this.retryScale_ = scale;
+    this.retryTimer_ = setTimeout(() => {
+      this.retryScale_ = noScale;
+      void this.follow(this.load_.resting ? undefined : scale);
+    }, 1000 * this.retryS_);
+    this.retryS_ = Math.min(2 * this.retryS_, retryScaleS.most);
+  }
+  endRetry(): void {
+    clearTimeout(this.retryTimer_);
+    this.retryScale_ = noScale;
+  }
+
+  /** In one turn of the page: what is drawn next is the new scale, whole. */
+  private show_(scale: number): void {
+    const { signal, object, reader } = this.load_;
+    throwIfAborted(signal);
+    const shape = this.source_.shape(scale)!;
+    if (object.children[0] !== shape) object.clear().add(shape);
+    if (!object.parent) this.scene_.add(object);
+    this.shown = scale;
+    this.load_.emit('scale', { scale, triangles: reader.manifest.scales.find((s) => s.scale === scale)!.triangles });
+  }
+  /** The scale that the view asks for, by a little more than the last time. */
+  private scaleForView_(): number {
+    const { override, view: { display } } = this.load_;
+    const at = (factor: number): number => override.scale ?? this.scaleFor!(display.heightPx * factor, display.part);
+    if (override.scale !== undefined || at(1 / hysteresis) < this.wanted) return at(1);
+    return Math.max(at(hysteresis), this.wanted);
+  }
+}

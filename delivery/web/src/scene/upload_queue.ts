@@ -1,0 +1,64 @@
+import type { WebGLRenderer } from 'three';
+import { sleepS } from '../http/clock';
+import { gpuIdle } from './gpu';
+
+/** Milliseconds and pixels of uploads between two turns of the page. */
+const sliceMs = 5;
+const slicePx = 1 << 19;
+/**
+ * Slices that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn. It is not
+ * waited for longer than longestFenceS.
+ */
+const mostBehind = 3;
+const longestFenceS = 0.25;
+/** The smallest mip levels follow this often while fragments come. */
+const mipsEveryMs = 200;
+
+/** Uploads that wait for their turn: a few between two turns of the page, and never more than the GPU has done. */
+export class UploadQueue {
+  /** What still waits is left out from now on. */
+  disposed = false;
+  private readonly uploads_: { pixels: number; run(): void; ended(): void }[] = [];
+  private uploading_ = false;
+  private mipsAt_ = 0;
+  private pixels_ = 0; // since the last of the fences that the GPU may not have passed
+  private readonly fences_: Promise<void>[] = [];
+
+  /** `updateMips` makes the smallest levels of all textures. */
+  constructor(
+    private readonly renderer_: WebGLRenderer,
+    private readonly updateMips_: () => void,
+  ) {}
+
+  /** Puts off what gives some pixels to the GPU; resolves when it has been done, or nobody wants it any more. */
+  enqueue(pixels: number, run: () => void): Promise<void> {
+    return new Promise((ended) => {
+      this.uploads_.push({ pixels, run, ended });
+      if (!this.uploading_) void this.uploadWaiting_();
+    });
+  }
+  /** All mip levels of everything, at once. */
+  finishMips(): void {
+    this.mipsAt_ = performance.now();
+    this.updateMips_();
+  }
+
+  private async uploadWaiting_(): Promise<void> {
+    this.uploading_ = true;
+    for (await sleepS(0); this.uploads_.length > 0; await sleepS(0)) {
+      const start = performance.now();
+      while (this.uploads_.length > 0 && this.pixels_ < slicePx && performance.now() - start < sliceMs) {
+        const upload = this.uploads_.shift()!;
+        this.pixels_ += upload.pixels;
+        if (!this.disposed) upload.run();
+        upload.ended();
+      }
+      if (start - this.mipsAt_ > mipsEveryMs || this.uploads_.length === 0) this.finishMips();
+      if (this.pixels_ < slicePx) continue;
+      this.pixels_ = 0;
+      this.fences_.push(gpuIdle(this.renderer_, longestFenceS));
+      if (this.fences_.length > mostBehind) await this.fences_.shift();
+    }
+    this.uploading_ = false;
+  }
+}
