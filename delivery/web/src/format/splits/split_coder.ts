@@ -26,7 +26,7 @@ export class BitDecoder {
   private next_(): number {
     return this.at_ < this.bytes_.length ? this.bytes_[this.at_++] : 0;
   }
-  private take_(odds: number): boolean {
+  private decodeBit_(odds: number): boolean {
     const bound = (this.range_ >>> 12) * odds;
     const bit = this.code_ < bound;
     if (bit) this.range_ = bound;
@@ -43,7 +43,7 @@ export class BitDecoder {
   bit(models: BitModels, i: number): boolean {
     const p = models.p[i];
     const odds = p >> 4;
-    const bit = this.take_(odds < 1 ? 1 : odds);
+    const bit = this.decodeBit_(odds < 1 ? 1 : odds);
     const seen = models.seen[i];
     const weight = weights[seen];
     models.p[i] = bit ? p + (((65535 - p) * weight) >>> 16) : p - ((p * weight) >>> 16);
@@ -53,7 +53,7 @@ export class BitDecoder {
   /** `count` bits at even odds, highest first. */
   raw(count: number): number {
     let value = 0;
-    for (let i = 0; i < count; ++i) value = value * 2 + (this.take_(2048) ? 1 : 0);
+    for (let i = 0; i < count; ++i) value = value * 2 + (this.decodeBit_(2048) ? 1 : 0);
     return value;
   }
 }

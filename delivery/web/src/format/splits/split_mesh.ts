@@ -1,3 +1,6 @@
+/** No point, wedge, corner or face: SplitMesh::kNone. */
+export const none = -1;
+
 /** A typed array that grows. */
 export class Growing {
   data: Int32Array;
@@ -85,9 +88,9 @@ export class SplitMesh {
 
   addPoint(): number {
     this.places.extend(3);
-    this.head.push(-1);
+    this.head.push(none);
     this.degree.push(0);
-    this.firstA_.push(-1);
+    this.firstA_.push(none);
     this.countB_.push(0);
     return this.head.length - 1;
   }
@@ -149,15 +152,15 @@ export class SplitMesh {
       firstA[loose.a[i]] = i;
       ++countB[loose.b[i]];
     }
-    for (let i = 0; i < n; ++i) if (!taken[i] && countB[loose.a[i]] === 0) this.walk_(i, corners, fans);
-    for (let i = 0; i < n; ++i) if (!taken[i]) this.walk_(i, corners, fans);
+    for (let i = 0; i < n; ++i) if (!taken[i] && countB[loose.a[i]] === 0) this.appendFan_(i, corners, fans);
+    for (let i = 0; i < n; ++i) if (!taken[i]) this.appendFan_(i, corners, fans);
     for (let i = 0; i < n; ++i) {
-      firstA[loose.a[i]] = -1;
+      firstA[loose.a[i]] = none;
       countB[loose.b[i]] = 0;
     }
   }
   /** Appends the fan that begins with a loose corner. */
-  private walk_(start: number, corners: Corners, fans: Fan[]): void {
+  private appendFan_(start: number, corners: Corners, fans: Fan[]): void {
     const { loose_: loose, chain_: chain, taken_: taken } = this;
     const firstA = this.firstA_.data;
     const begin = corners.count;
@@ -175,7 +178,7 @@ export class SplitMesh {
   distribute(from: number, to: number, corners: Corners): void {
     const head = this.head.data;
     const degree = this.degree.data;
-    head[from] = head[to] = -1;
+    head[from] = head[to] = none;
     degree[from] = degree[to] = 0;
     for (let i = corners.count - 1; i >= 0; --i) {
       const id = 3 * corners.face[i] + corners.corner[i];
