@@ -1,0 +1,94 @@
+import { dirname, join, normalize } from 'node:path/posix';
+import ts from 'typescript';
+
+/** Source files by their path beneath src. */
+export type Sources = Map<string, string>;
+
+/** The rooms that the files of each room may import from, besides their own. Files beneath no room, the entries, may import all. */
+export const roomsBelow: Record<string, readonly string[]> = {
+  format: [],
+  http: ['format'],
+  worker: ['format'],
+  decide: ['format', 'http'],
+  scene: ['format', 'http', 'worker', 'decide'],
+};
+
+/** Lines of a function, of a class, of a file, of the median file, and files in a folder. */
+export const most = { functionLines: 80, classLines: 250, fileLines: 400, medianLines: 160, filesInFolder: 24 };
+
+const roomOf = (file: string): string => (file.includes('/') ? file.slice(0, file.indexOf('/')) : '');
+const linesOf = (text: string): number => text.split('\n').length - 1;
+
+function parsed(file: string, text: string): ts.SourceFile {
+  return ts.createSourceFile(file, text, ts.ScriptTarget.Latest, true);
+}
+
+/** What a file imports, by whatever form: import, export from, import(), typeof import(). */
+function specifiersOf(source: ts.SourceFile): string[] {
+  const found: string[] = [];
+  const visit = (node: ts.Node): void => {
+    if ((ts.isImportDeclaration(node) || ts.isExportDeclaration(node)) && node.moduleSpecifier) found.push((node.moduleSpecifier as ts.StringLiteral).text);
+    if (ts.isCallExpression(node) && node.expression.kind === ts.SyntaxKind.ImportKeyword && ts.isStringLiteral(node.arguments[0])) found.push(node.arguments[0].text);
+    if (ts.isImportTypeNode(node) && ts.isLiteralTypeNode(node.argument)) found.push((node.argument.literal as ts.StringLiteral).text);
+    ts.forEachChild(node, visit);
+  };
+  visit(source);
+  return found;
+}
+
+/** The files of `sources` that each file imports. */
+export function importsOf(sources: Sources): Map<string, string[]> {
+  return new Map([...sources].map(([file, text]) => {
+    const named = specifiersOf(parsed(file, text)).filter((name) => name.startsWith('.'));
+    return [file, named.map((name) => `${normalize(join(dirname(file), name))}.ts`).filter((name) => sources.has(name))];
+  }));
+}
+
+/** Circles of imports, each as the files on its way. */
+export function circles(sources: Sources): string[] {
+  const imports = importsOf(sources);
+  const done = new Set<string>();
+  const found: string[] = [];
+  const follow = (file: string, way: string[]): void => {
+    const at = way.indexOf(file);
+    if (at >= 0) found.push([...way.slice(at), file].join(' -> '));
+    if (at >= 0 || done.has(file)) return;
+    for (const next of imports.get(file)!) follow(next, [...way, file]);
+    done.add(file);
+  };
+  for (const file of sources.keys()) follow(file, []);
+  return found;
+}
+
+/** Imports that rooms do not allow. */
+export function wrongWays(sources: Sources): string[] {
+  return [...importsOf(sources)].flatMap(([file, imported]) => {
+    const room = roomOf(file);
+    const allowed = room === '' ? undefined : [room, ...(roomsBelow[room] ?? [])];
+    return imported.filter((to) => allowed && !allowed.includes(roomOf(to))).map((to) => `${file} -> ${to}`);
+  });
+}
+
+/** Functions, classes and files that are too long, and folders with too many files. */
+export function tooLarge(sources: Sources): string[] {
+  const found: string[] = [];
+  const folders = new Map<string, number>();
+  for (const [file, text] of sources) {
+    const source = parsed(file, text);
+    const lineOf = (position: number): number => source.getLineAndCharacterOfPosition(position).line;
+    const visit = (node: ts.Node): void => {
+      const isClass = ts.isClassLike(node);
+      const lines = lineOf(node.end) - lineOf(node.getStart()) + 1;
+      const limit = isClass ? most.classLines : ts.isFunctionLike(node) ? most.functionLines : Infinity;
+      if (lines > limit) found.push(`${file}:${lineOf(node.getStart()) + 1}: ${lines} lines of ${limit}`);
+      ts.forEachChild(node, visit);
+    };
+    visit(source);
+    if (linesOf(text) > most.fileLines) found.push(`${file}: ${linesOf(text)} lines of ${most.fileLines}`);
+    folders.set(dirname(file), (folders.get(dirname(file)) ?? 0) + 1);
+  }
+  for (const [folder, count] of folders) if (count > most.filesInFolder) found.push(`${folder}: ${count} files of ${most.filesInFolder}`);
+  const median = [...sources.values()].map(linesOf).sort((a, b) => a - b)[sources.size >> 1];
+  if (median > most.medianLines) found.push(`median file: ${median} lines of ${most.medianLines}`);
+  return found;
+}
