@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
 import * as t from '../src/reader';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
-import { readBytes, readText, root, sameBits } from './support';
+import { readBytes, readText, root, sameBits } from './support/files';
 
 // Every decision that delivery/cpp takes, to the same bits (delivery/vectors/README.md).
 

@@ -1,6 +1,6 @@
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { readText, root } from './support';
+import { readText, root } from './support/files';
 
 interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number | null; rung: number | null }
 const { capsWith, choicesFromAddress, kPolicies, readable } = (await import(join(root, 'examples/viewer/src/choices.ts'))) as {

@@ -1,11 +1,11 @@
 import { BoxGeometry, BufferGeometry, Group, Mesh, MeshStandardMaterial, Scene, Texture, WebGLRenderer } from 'three';
-import { samePrefix } from '../src/format/bytes';
-import type { LoadEvents, LoadOptions, LoadedModel } from '../src/scene/api';
-import { FormatError, TexmeshPackage } from '../src/open';
-import type { OpenOptions } from '../src/reader';
-import { sha256 } from '../src/format/sha256';
-import { handle } from '../src/worker';
-import type { WorkerRequest } from '../src/worker/protocol';
+import { samePrefix } from '../../src/format/bytes';
+import type { LoadEvents, LoadOptions, LoadedModel } from '../../src/scene/api';
+import { FormatError, TexmeshPackage } from '../../src/open';
+import type { OpenOptions } from '../../src/reader';
+import { sha256 } from '../../src/format/sha256';
+import { handle } from '../../src/worker';
+import type { WorkerRequest } from '../../src/worker/protocol';
 import { FakeServer } from './fake_server';
 
 // Whole loads without a GPU: a context that takes everything, pictures that are nothing but the bytes they are made of.

@@ -3,7 +3,7 @@ import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 /** The project's root. */
-export const root = process.env.TEXMESH_ROOT ?? join(dirname(fileURLToPath(import.meta.url)), '..', '..', '..');
+export const root = process.env.TEXMESH_ROOT ?? join(dirname(fileURLToPath(import.meta.url)), '..', '..', '..', '..');
 
 export function readBytes(path: string): Uint8Array {
   return new Uint8Array(readFileSync(join(root, path)));

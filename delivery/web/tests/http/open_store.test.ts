@@ -1,11 +1,11 @@
 import { describe, expect, it, vi } from 'vitest';
-import { FormatError, PackageReader, TexmeshError } from '../src/reader';
-import { FaultKind, fakeServer } from './fake_server';
-import { golden } from './support';
+import { FormatError, PackageReader, TexmeshError } from '../../src/reader';
+import { FaultKind, fakeServer } from '../support/fake_server';
+import { golden } from '../support/files';
 
 // Pages whose server does not give the part for servers without ranges, perhaps because it is what fails.
 let asked = 0;
-vi.mock('../src/http/without_ranges', () => {
+vi.mock('../../src/http/without_ranges', () => {
   ++asked;
   throw new Error('not there');
 });

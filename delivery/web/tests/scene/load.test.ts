@@ -1,16 +1,12 @@
-import { PerspectiveCamera, SphereGeometry } from 'three';
+import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera, SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
-import { InputError, PackageReader } from '../src/reader';
-import { fakeServer } from './fake_server';
-import { Loading, fakeGltf, loading, until } from './loading';
-import { golden } from './support';
+import { InputError, PackageReader } from '../../src/reader';
+import { fakeServer } from '../support/fake_server';
+import { fakeGltf, loading, Loading, until } from '../support/loading';
+import { container, files, url } from '../support/scan';
 
-const container = golden('v1.1-scan');
-const url = 'http://host/a/scan.texmesh';
-const files = { '/a/scan.texmesh': container };
 const reader = await PackageReader.openBytes(container, 'golden');
 const planes = await reader.textures();
-
 const rungsOf = (l: Loading, base = 0): number[] => [...l.model.state.planes.find((p) => p.base === base)!.rungs];
 /** Requests for bytes of these entries. */
 const askedFor = (l: Loading, ...refs: { offset: number; bytes: number }[]): number =>
@@ -194,4 +190,35 @@ describe('a load', () => {
     expect(askedFor(l, ...packs)).toBe(0);
     l.dispose();
   });
+});
+
+/** Which of these are told that they are disposed of from now on. */
+function watched(all: readonly unknown[]): Set<unknown> {
+  const told = new Set<unknown>();
+  for (const one of all) (one as EventDispatcher<{ dispose: object }>).addEventListener('dispose', () => told.add(one));
+  return told;
+}
+
+it('a load that is disposed of frees textures, materials and geometries, and hears of nothing any more', async () => {
+  const server = fakeServer(files);
+  const l = await loading(url, server, { autoRefine: false });
+  await l.model.done;
+  const meshes: Mesh[] = [];
+  l.model.object.traverse((o) => void ((o as Mesh).isMesh && meshes.push(o as Mesh)));
+  const materials: Material[] = [...l.model.materials];
+  const geometries: BufferGeometry[] = meshes.map((m) => m.geometry);
+  const textures = l.model.state.planes.flatMap((p) => [...p.textures]);
+  expect([materials, geometries, textures].every((all) => all.length > 0)).toBe(true);
+  const all = [...materials, ...geometries, ...textures];
+  const told = watched(all);
+  l.model.dispose();
+  expect(all.filter((one) => !told.has(one))).toEqual([]);
+  expect([l.model.object.children, l.model.state.planes]).toEqual([[], []]);
+  const before = l.count('request');
+  const asked = server.log.length;
+  await l.pkg.scaleGlb(0);
+  expect(l.count('request')).toBe(before);
+  expect(l.pkg.client.listeners.size).toBe(0);
+  expect(server.log.length).toBeGreaterThan(asked);
+  l.dispose();
 });

@@ -1,0 +1,53 @@
+import { describe, expect, it } from 'vitest';
+import {
+  FormatError, PackageReader, readIndex, readManifest, readQuality, readTablesHead, readTablesSection, readTextures,
+} from '../../src/reader';
+import { golden, goldenNames } from '../support/files';
+import { problem } from '../support/scan';
+
+async function entryOf(name: string, path: string): Promise<Uint8Array> {
+  const reader = await PackageReader.openBytes(golden(name), name);
+  if (path === 'manifest.json') return reader.store.manifest();
+  if (path === 'index.bin') {
+    const { offset, bytes } = reader.manifest.index;
+    return golden(name).slice(offset, offset + bytes);
+  }
+  return reader.entry(path);
+}
+async function readTables(bytes: Uint8Array): Promise<unknown> {
+  const head = readTablesHead(bytes);
+  const end = head.planes.at(-1);
+  if (end && end.offset + end.bytes !== bytes.length) throw new FormatError('tables.bin', '', 'another length', '');
+  return Promise.all(head.planes.map((s, p) => readTablesSection(head, p, bytes.subarray(s.offset, s.offset + s.bytes))));
+}
+const documents: Record<string, (bytes: Uint8Array) => unknown> = {
+  'manifest.json': readManifest,
+  'index.bin': readIndex,
+  'textures.json': readTextures,
+  'tables.bin': readTables,
+  'quality.json': readQuality,
+};
+
+describe.each(goldenNames)('%s', (name) => {
+  it.each(Object.keys(documents))('%s: every truncation is told', async (path) => {
+    const bytes = await entryOf(name, path);
+    expect(await problem(() => documents[path](bytes))).toBeUndefined();
+    const step = bytes.length > 4000 ? 37 : 1;
+    for (let n = 0; n < bytes.length; n += step) {
+      const error = await problem(() => documents[path](bytes.slice(0, n)));
+      // Blanks may follow a JSON document.
+      if (error === undefined && path === 'manifest.json') expect(new TextDecoder().decode(bytes.slice(n)).trim()).toBe('');
+      else expect(error, `${n} bytes`).toBeInstanceOf(FormatError);
+    }
+  });
+  it.each(Object.keys(documents))('%s: a flipped byte never breaks more than a FormatError', async (path) => {
+    const bytes = await entryOf(name, path);
+    const step = Math.max(1, Math.floor(bytes.length / 700));
+    for (let at = 0; at < bytes.length; at += step) {
+      const copy = bytes.slice();
+      copy[at] ^= 1 << at % 8;
+      const error = await problem(() => documents[path](copy));
+      if (error !== undefined) expect(error, `byte ${at}`).toBeInstanceOf(FormatError);
+    }
+  });
+});

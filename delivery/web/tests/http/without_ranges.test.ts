@@ -1,0 +1,58 @@
+import { describe, expect, it } from 'vitest';
+import { treeUrl } from '../../src/http/without_ranges';
+import { InputError, PackageReader } from '../../src/reader';
+import { fakeServer } from '../support/fake_server';
+import { expected, readSome, tree } from '../support/reading';
+import { container, openAt, openRetrying, range, rejection } from '../support/scan';
+
+describe('hostile answers', () => {
+  it('a server that gives its front page for everything has the whole container, too', async () => {
+    const page = new TextEncoder().encode('<!doctype html><title>front page</title>'.repeat(20));
+    const files = { '/a/scan.texmesh': container, '/a/scan/manifest.json': page, '/a/scan/fragments.json': page };
+    const reader = await openAt(fakeServer(files, { ranges: false }));
+    expect(reader.form).toBe('whole');
+  });
+  it('mode files wants a URL that has a tree', async () => {
+    const opening = PackageReader.openUrl('http://host/a/scan.zip', { fetch: range().fetch, mode: 'files' });
+    expect(await rejection(opening)).toBeInstanceOf(InputError);
+  });
+});
+
+describe('a server without ranges', () => {
+  it('the tree beside the container is taken', async () => {
+    const server = await tree();
+    const reader = await openRetrying(server);
+    expect(reader.form).toBe('files');
+    expect(await readSome(reader)).toBe(expected);
+    const files = server.log.map((r) => r.url).filter((u) => !u.endsWith('fragments.json'));
+    expect(new Set(files).size).toBe(files.length);
+  });
+  it('a damaged file is fetched again', async () => {
+    const path = 'mesh/s00.glb';
+    let damaged = false;
+    const server = await tree(({ url: u }) => {
+      if (!u.endsWith(path) || damaged) return false;
+      damaged = true;
+      return 'flip';
+    });
+    expect(await readSome(await openRetrying(server))).toBe(expected);
+  });
+  it('or the whole container, where there is no tree', async () => {
+    const server = fakeServer({ '/a/scan.texmesh': container }, { ranges: false });
+    const reader = await openRetrying(server);
+    expect(reader.form).toBe('whole');
+    expect(await readSome(reader)).toBe(expected);
+  });
+  it('unless ranges are insisted on', async () => {
+    const server = fakeServer({ '/a/scan.texmesh': container }, { ranges: false });
+    expect((await rejection(openRetrying(server, { mode: 'range' }))).message).toContain('answers ranges');
+  });
+  it('a container that is too large is refused', async () => {
+    const server = fakeServer({ '/a/scan.texmesh': container }, { ranges: false });
+    expect((await rejection(openRetrying(server, { maxWholeBytes: 1000 }))).message).toContain('at most 1000 bytes');
+  });
+  it('the URL of a tree keeps query and fragment', () => {
+    expect(treeUrl('https://h/a/N.texmesh?v=1#x')).toBe('https://h/a/N/?v=1#x');
+    expect(treeUrl('https://h/a/N.zip')).toBe('');
+  });
+});

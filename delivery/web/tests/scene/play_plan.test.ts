@@ -1,0 +1,43 @@
+import { describe, expect, it } from 'vitest';
+import { groupedList } from '../../src/decide/request_groups';
+import { UncheckedPlan } from '../../src/decide/unchecked_plan';
+import { defaultHtcOptions, HtcStep, planOptions } from '../../src/reader';
+import { playPlan } from '../../src/scene/play_plan';
+import { bytesAskedTwice, Fault } from '../support/fake_server';
+import { setUp, url } from '../support/transferring';
+
+describe('a timed fetch', () => {
+  async function fetchInTime(fault: Fault | undefined, mostS: number, signal = new AbortController().signal) {
+    const s = await setUp(fault);
+    const list = groupedList(s.list, 2000, 60000);
+    const plan = new UncheckedPlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
+    const ended: HtcStep[] = [];
+    const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
+    const run = playPlan(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });
+    return { ...s, list, plan, ended, run };
+  }
+  it('ends when every offer was decided and has come', async () => {
+    const t = await fetchInTime(undefined, 10);
+    await t.run;
+    await t.settled();
+    expect(t.plan.finished()).toBe(true);
+    const wanted = t.plan.steps.flatMap((s) => (s.rung < 0 ? [] : t.list.groups[s.offer]));
+    expect(t.decoded.length).toBe(wanted.length);
+    expect(bytesAskedTwice(t.server.log, url)).toBe(0);
+    expect(new Set(t.ended.map((step) => step.offer)).size).toBe(t.list.offers.length);
+  });
+  it('gives up what does not come', async () => {
+    const t = await fetchInTime(({ range }) => range !== undefined && range[0] > 100000 && 'stall', 0.3);
+    const begin = performance.now();
+    await t.run;
+    expect(performance.now() - begin).toBeLessThan(3000);
+    expect(t.plan.finished()).toBe(true);
+    expect(t.plan.steps.map((s) => s.rung)).toContain(-1);
+  });
+  it('can be cancelled', async () => {
+    const abort = new AbortController();
+    const t = await fetchInTime(() => false, 10, abort.signal);
+    abort.abort();
+    await expect(t.run).rejects.toThrow('cancelled');
+  });
+});
