@@ -10,7 +10,7 @@ export { FormatError, InputError, TexmeshError } from './format/errors';
 export type * from './reader';
 export type * from './scene/api';
 
-/** Options with names; what is left out is chosen by the library. */
+/** Names that options may have; the library chooses options that are left out. */
 const names = {
   policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static'],
   order: ['credit', 'beta0', 'finest'],
@@ -22,12 +22,12 @@ const names = {
 export class TexmeshPackage extends PackageReader {
   private readonly loads_ = new Set<LoadedModel>();
   private loaded_ = false;
-  /** For documents, until a load has it. */
+  /** Workers for documents, until a load has the pool. */
   pool?: WorkerPool;
 
   /**
-   * Shows the package in a scene: at once as it is at its coarsest, then as well as time and display allow. The time
-   * counts from the package's first request for the first load, from this call for others. InputError: options that are none.
+   * Shows the package in a scene: at once at its coarsest, then as well as time and display allow. The time of the first load
+   * counts from the package's first request, that of others from this call. InputError: an option has a value that it cannot have.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
     const policy = options.policy === 'htca' ? 'htc' : (options.policy ?? 'guard');
@@ -39,11 +39,11 @@ export class TexmeshPackage extends PackageReader {
     if (!(time >= -Infinity)) throw new InputError('options', 'time', 'seconds', String(time));
     if (typeof display === 'number' && !(display >= 0)) throw new InputError('options', 'display', 'pixels', String(display));
     let { pool } = this;
-    if (!pool || pool.none || options.workerUrl || options.decode) {
+    if (!pool || pool.isUnavailable || options.workerUrl || options.decode) {
       pool?.dispose();
       pool = new WorkerPool(options);
     } else pool.grow(options.workers);
-    this.pool = pool; // until a load has it: options may be refused
+    this.pool = pool; // until a load has the pool: options may be refused
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
     const load = loadModel(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
@@ -53,7 +53,7 @@ export class TexmeshPackage extends PackageReader {
     return load;
   }
 
-  /** Disposes of all loads and forgets what was read. */
+  /** Disposes of all loads and forgets the documents that were read. */
   override dispose(): void {
     for (const load of this.loads_) load.dispose();
     this.loads_.clear();
@@ -67,7 +67,7 @@ export class TexmeshPackage extends PackageReader {
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
 export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {
-  const pool = new WorkerPool({ ...options, workers: 1 }); // it comes while the manifest does
+  const pool = new WorkerPool({ ...options, workers: 1 }); // the worker starts while the manifest comes
   try {
     const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);
     opened.pool = pool;

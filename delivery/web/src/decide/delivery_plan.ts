@@ -7,16 +7,16 @@ import { LinkOptions, fetchedS } from './network_model';
 import { InTime, choiceInTime, finerWhereSeen } from './scale_choice';
 import { StepRule, selectScale } from './viewing';
 
-/** How somebody looks at the object, and over what. */
+/** How somebody looks at the object, and over which link. */
 export interface DeliveryRequest {
-  /** Device px. */
+  /** Displayed height, device px. */
   displayedPx: number;
   rule: StepRule;
-  /** Of the default rule: finer than that where finerWhereSeen says so. */
+  /** The default rule takes a finer scale where finerWhereSeen says so. */
   measured: boolean;
-  /** -1: by the rule. */
+  /** Scale by hand; -1: by the rule. */
   scale: number;
-  /** From the first request on. */
+  /** Seconds from the first request on. */
   timeLimitS: number;
   /** 0: what the mesh's transfer has shown. */
   beta0BytesS: number;
@@ -30,7 +30,7 @@ export function defaultDeliveryRequest(): DeliveryRequest {
   return { displayedPx: 1000, rule: 'default', measured: true, scale: -1, timeLimitS: 5, beta0BytesS: 0, htc: defaultHtcOptions(), link };
 }
 
-/** What a viewer will get. */
+/** The delivery that a viewer will get. */
 export interface DeliveryPlan extends InTime {
   /** Besides fragments. */
   fixedBytes: number;
@@ -72,8 +72,8 @@ function timesOf(m: Manifest, link: LinkOptions, scale: number) {
 }
 
 /**
- * What delivery/cpp's plan_delivery decides over a link of constant rate, to the same bits; undefined when the package
- * has no such scale. Needs the tables of all planes.
+ * Decides as delivery/cpp's plan_delivery over a link of constant rate, to the same bits; undefined when the package
+ * has no such scale. The tables of all planes are needed.
  */
 export function planDelivery(data: PackageData, quality: QualityTable, request: DeliveryRequest): DeliveryPlan | undefined {
   const { manifest } = data;

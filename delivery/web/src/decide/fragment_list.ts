@@ -16,7 +16,7 @@ export interface PlaneChoice {
   base: number;
   plane: number;
 }
-/** Where an offer of the list comes from. */
+/** Plane and fragment of an offer of the list. */
 export interface ListedFragment {
   plane: number;
   fragment: number;
@@ -24,17 +24,17 @@ export interface ListedFragment {
 /** The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4). */
 export interface FragmentList {
   offers: FragmentOffer[];
-  /** By offer. */
+  /** Places by offer. */
   fragments: ListedFragment[];
-  /** Of the losses: a loss of this is 1 - SSIM = 1 everywhere. */
+  /** Sum of weights: a loss of so much is 1 - SSIM = 1 everywhere. */
   totalWeight: number;
-  /** Of fragments that are not in the list because no rung shows more of them than the preview. */
+  /** Loss of fragments that are not in the list because no rung shows more than the preview. */
   previewLoss: number;
 }
-/** Of fragmentList. */
+/** Options of fragmentList. */
 export interface ListOptions {
   scale: number;
-  /** Of q_i(x, y); -1 = the mean of eta. */
+  /** Gamma of q_i(x, y); -1 = the mean of eta. */
   gamma: number;
   qualityLow: number;
   qualityHigh: number;
@@ -49,7 +49,7 @@ const mostCoarser = 4;
 /** Losses as spendBytes counts them. */
 const lossUnit = 2 ** 40;
 
-/** What a role counts for in the list and in losses. */
+/** Weight of a role in the list and in losses. */
 export function roleWeight(role: string): number {
   if (role === 'base-colour') return 1;
   if (role === 'emissive') return 0.7;
@@ -62,7 +62,7 @@ function tablesOf(data: PackageData, plane: number): PlaneTables {
   return t;
 }
 
-/** What is lost where the preview stands for a fragment. */
+/** Loss where the preview stands for a fragment. */
 const skippedLoss = (t: PlaneTables, fragment: number): number => t.skipDssim[fragment] ?? 1;
 
 function addPlane(data: PackageData, plane: number, options: ListOptions, list: FragmentList): void {
@@ -110,7 +110,7 @@ export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
   return Array.from({ length: fullSizePlanes(textures) }, (_, p) => ({ base: p, plane: p }));
 }
 
-/** Area of the object; where the package does not say it that of the bounding box. */
+/** Area of the object; where the package does not say the area, that of the bounding box. */
 function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
   const [x, y, z] = boundsMin.map((least, i) => boundsMax[i] - least);
   return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
@@ -146,16 +146,16 @@ export function planesForDisplay(data: PackageData, displayedPx: number): PlaneC
   return planesAt(data, displayedPx, [0, 0]);
 }
 
-/** Surface-weighted mean of what the previews lose. */
+/** Surface-weighted mean of the previews' losses. */
 function previewLoss(t: PlaneTables): number {
   if (t.skipDssim.length === 0) return 1;
   const weights = surfaceWeights(t);
-  const of = [...t.order];
-  const weight = sumOf(of.map((f) => weights[f]));
-  return weight > 0 ? sumOf(of.map((f) => weights[f] * t.skipDssim[f])) / weight : 0;
+  const stored = [...t.order];
+  const weight = sumOf(stored.map((f) => weights[f]));
+  return weight > 0 ? sumOf(stored.map((f) => weights[f] * t.skipDssim[f])) / weight : 0;
 }
 
-/** What the picture loses, as 1 - SSIM over the surface, because mips stand for textures that have more texels. */
+/** Loss of the picture, as 1 - SSIM over the surface, because mips stand for textures with more texels. */
 export function mipLoss(data: PackageData, planes: readonly PlaneChoice[], displayedPx: number): number {
   let [loss, weight] = [0, 0];
   for (const { base, plane } of planes) {
@@ -176,7 +176,7 @@ export function mipLoss(data: PackageData, planes: readonly PlaneChoice[], displ
 export interface TextureSpending {
   planes: PlaneChoice[];
   list: FragmentList;
-  /** By offer; 0 = skipped, or one more than its rung. */
+  /** Ways by offer; 0 = skipped, or one more than the rung. */
   ways: number[];
   /** Predicted 1 - SSIM over the surface, loss by mips included. */
   dssim: number;
@@ -219,9 +219,9 @@ export function* budgetSteps(
 
 /** The best texture that so many bytes can show. */
 export interface TextureBudget extends TextureSpending {
-  /** By offer; -1 = skipped. */
+  /** Rungs by offer; -1 = skipped. */
   rungs: number[];
-  /** Of fragments, at most the budget. */
+  /** Bytes of fragments, at most the budget. */
   bytes: number;
 }
 

@@ -7,11 +7,11 @@ import { UncheckedPlan } from './unchecked_plan';
 
 export type { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlanOptions };
 
-/** Of a HarmonicTimePlan. */
+/** Options of a HarmonicTimePlan. */
 export interface HtcOptions {
   policy: Policy;
   order: HtcOrder;
-  /** T_0, of the fragments alone. */
+  /** T_0, for the fragments alone. */
   timeLimitS: number;
   /** initialBytesS is beta_0. */
   throughput: ThroughputOptions;
@@ -30,7 +30,7 @@ export interface HtcOptions {
   priceKappa: number;
 }
 
-/** Those of delivery/cpp. */
+/** The options of delivery/cpp. */
 export function defaultHtcOptions(): HtcOptions {
   return {
     policy: 'htc',
@@ -67,7 +67,7 @@ function checkOffers(offers: readonly FragmentOffer[]): void {
   }
 }
 
-/** What options mean to one plan, whose transfers they count. A limit <= 0 is some; RangeError for other values out of range. */
+/** Options for one plan, whose transfers they count. A limit <= 0 is allowed; RangeError for other values out of range. */
 export function planOptions(o: HtcOptions): TimePlanOptions {
   checkOptions(o);
   const serial = o.window === 1;
@@ -129,7 +129,7 @@ export class HarmonicTimePlan {
     for (const s of this.steps) rungs[s.offer] = s.rung;
     return rungs;
   }
-  /** As it is estimated now. */
+  /** Throughput as the plan estimates it now. */
   throughputBytesS(): number {
     return this.plan_.throughputBytesS();
   }
@@ -148,7 +148,7 @@ export class HarmonicTimePlan {
   completed(offer: number, nowS: number): void {
     this.finish_(offer, nowS, true);
   }
-  /** The request failed and was given up: its time is spent, its fragment counts as skipped. */
+  /** The request for this offer failed and was given up: its time is spent, its fragment counts as skipped. */
   failed(offer: number, nowS: number): void {
     this.finish_(offer, nowS, false);
   }

@@ -2,7 +2,7 @@
 
 /** A link as a plan supposes it. */
 export interface LinkOptions {
-  /** Shared evenly by all that is in flight. */
+  /** Throughput, shared evenly by all transfers in flight. */
   bytesS: number;
   rttS: number;
   /** Requests answered at once; one beyond them waits. */
@@ -14,17 +14,17 @@ export interface LinkModel<T> {
   readonly nowS: number;
   /** Asks for bytes now. */
   request(what: T, bytes: number): void;
-  /** Runs until a request is complete and gives it; undefined: none ever will be. */
+  /** Runs until a request is complete, and gives that request; undefined: none ever will be. */
   advance(): T | undefined;
 }
 
 const serverBytesS = 1e12;
 const noCap = 1e300;
-/** What rounding may leave of a transfer. */
+/** Bytes that rounding may leave of a transfer. */
 const doneBytes = 1e-6;
 const never = 1e9;
 
-/** An even share of `capacity` for each, what a capped one leaves going to the others. */
+/** An even share of `capacity` for each; the rest of a capped one goes to the others. */
 function shareEvenly(capacity: number, caps: readonly number[]): number[] {
   const order = [...caps.keys()].sort((a, b) => caps[a] - caps[b]);
   const rates: number[] = [];
@@ -35,7 +35,7 @@ function shareEvenly(capacity: number, caps: readonly number[]): number[] {
   return rates;
 }
 
-/** From `nowS` on. */
+/** A link from `nowS` on. */
 export function linkModel<T>({ bytesS, rttS, connections }: LinkOptions, nowS = 0): LinkModel<T> {
   const flows: { what: T; bytesLeft: number; startsS?: number }[] = []; // by order of request
   return {

@@ -17,7 +17,7 @@ export class PlannedBytes {
   }
 }
 
-/** What bytes cost in units of loss where a budget is spent with the least loss, and the bytes of each offer then. */
+/** Price of bytes in units of loss at which a budget is spent with the least loss, and the bytes of each offer then. */
 export interface PricedBytes {
   price: number;
   bytes: PlannedBytes;

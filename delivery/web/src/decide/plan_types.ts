@@ -2,13 +2,13 @@ import type { TransferRate } from '../http/throughput';
 
 /** One fragment as the plan sees it. */
 export interface FragmentOffer {
-  /** By rung, lowest first; at least one, all > 0. */
+  /** Bytes by rung, lowest first; at least one, all > 0. */
   bytes: number[];
-  /** [rungs + 1] what is lost when it is skipped, then by rung; any unit, >= 0. */
+  /** [rungs + 1] loss when the fragment is skipped, then by rung; any unit, >= 0. */
   loss: number[];
   /** Feature density times weights; orders the list. */
   eta: number;
-  /** d_g > 0: what it gets by Eq. 3.2. */
+  /** d_g > 0: bytes of the fragment by Eq. 3.2. */
   plannedBytes: number;
   /** Limits of quality, see HtcOptions.hardLimits. */
   lowRung: number;
@@ -38,7 +38,7 @@ export interface HtcStep {
   thetaS: number;
   /** d_k asked for. */
   targetBytes: number;
-  /** beta_{k-1} it was asked with. */
+  /** beta_{k-1}: throughput that the decision supposes. */
   throughputBytesS: number;
   issuedS: number;
   /** -1: in flight */
@@ -49,7 +49,7 @@ export interface HtcStep {
   residualS: number;
 }
 
-/** What a plan is made for; from `guard` on what only studies choose otherwise, see HtcOptions. */
+/** Options of a plan; those from `guard` on only studies choose otherwise, see HtcOptions. */
 export interface TimePlanOptions {
   policy: Policy;
   order: HtcOrder;
@@ -58,10 +58,10 @@ export interface TimePlanOptions {
   rttS: number;
   guard?: number;
   priceKappa?: number;
-  /** Requests in flight: so many always, as many as the link needs, and never more. */
+  /** Least and most requests in flight; between them, as many as the link needs. */
   leastInFlight?: number;
   mostInFlight?: number;
-  /** At the start, in which nothing can arrive; and of every transfer by itself. */
+  /** Time at the start in which nothing can arrive; and waiting time of every transfer by itself. */
   latencyS?: number;
   waitS?: number;
   lowestRung?: (f: FragmentOffer, limits: boolean) => number;

@@ -83,12 +83,12 @@ export function log(x: number): number {
   return e * ln2Hi + (2 * f * s + e * ln2Lo);
 }
 
-/** Of |x| <= 1e6. */
+/** Sine of |x| <= 1e6. */
 export function sin(x: number): number {
   return sinQuadrant(x + 0, 0); // 0 of -0, as in C++
 }
 
-/** Of |x| <= 1e6. */
+/** Cosine of |x| <= 1e6. */
 export function cos(x: number): number {
   return sinQuadrant(x, 1);
 }

@@ -1,10 +1,10 @@
 import { PlaneTables, bytesToShow, fragmentCount, rungCount } from '../format/tables';
 import { positive, sumOf } from './numbers';
 
-// What a budget of bytes is best spent on: format/rate_distortion.cpp, bit for bit.
+// How a budget of bytes is best spent: format/rate_distortion.cpp, bit for bit.
 
 /**
- * What a fragment's quality is worth: its surface fraction, with the area per texel capped at the 99th percentile of
+ * Weight of a fragment's quality: its surface fraction, with the area per texel capped at the 99th percentile of
  * all covered texels. [F]
  */
 export function surfaceWeights({ coveredTexels, surfaceFraction }: PlaneTables): Float32Array {

@@ -6,11 +6,11 @@ import type { FragmentOffer } from './plan_types';
 /** Offers of neighbours that are fetched and decided together. */
 export interface GroupedList {
   offers: FragmentOffer[];
-  /** By offer; all of one plane, in the order of its packs. */
+  /** Fragments by offer; those of an offer are of one plane, in the order of its packs. */
   groups: ListedFragment[][];
 }
 
-/** A request is worth at least these seconds of the link. */
+/** A request should take at least these seconds of the link. */
 const leastRequestS = 0.006;
 /** Round trips that six connections at once hide. */
 const hiddenRtts = 0.6;

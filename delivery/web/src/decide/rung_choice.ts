@@ -8,13 +8,13 @@ export function lowestShown(f: FragmentOffer, limits: boolean): number {
   return low;
 }
 
-/** What showing a fragment costs, and what it then loses. */
+/** Cost of a fragment of so many bytes and so much loss. */
 export type Cost = (bytes: number, loss: number) => number;
 
-/** Loss, and bytes at a price in units of loss. */
+/** Cost where bytes have a price in units of loss. */
 export const costAt = (price: number): Cost => (bytes, loss) => loss + price * bytes;
 
-/** The rung from `low` on that costs least (ties: the first), of those that have so few bytes; -1: skipping does. */
+/** The rung from `low` on that costs least (ties: the first), among rungs of at most `mostBytes`; -1: skipping costs least. */
 export function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number, cost: Cost): number {
   let best = skip ? -1 : low;
   let least = skip ? cost(0, loss[0]) : cost(bytes[low], loss[low + 1]);
@@ -27,7 +27,7 @@ export function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: numb
   return best;
 }
 
-/** 0 where it is skipped. */
+/** Bytes at a rung; 0 where the fragment is skipped. */
 export const bytesAtRung = (f: FragmentOffer, rung: number): number => (rung < 0 ? 0 : f.bytes[rung]);
 
 /** The fragment with eta nearest the mean (ties: the first). */

@@ -35,7 +35,7 @@ export interface InTime extends Simulated {
   /** No time is left after the mesh. */
   late: boolean;
 }
-/** What a choice is made for. */
+/** Display, scales and link that a choice is made for. */
 export interface InTimeRequest {
   displayedPx: number;
   /** The finest scale that is worth showing. */

@@ -6,17 +6,17 @@ import { UncheckedPlan } from './unchecked_plan';
 
 // delivery/cpp/simulation for one server on a link of constant rate: the same arithmetic, the same bits.
 
-/** What a plan would do over a link. */
+/** The course of a plan over a link. */
 export interface Simulated {
-  /** By offer; -1 = skipped. */
+  /** Rungs by offer; -1 = skipped. */
   rungs: number[];
   bytes: number;
   /** Sum of the offers' losses as shown. */
   loss: number;
-  /** After the first request. */
+  /** End, seconds after the first request. */
   endS: number;
 }
-/** Plays a plan over a link; in no time (a limit <= 0) nothing is transferred. */
+/** Plays a plan over a link. A limit <= 0 leaves no time: nothing is transferred. */
 export function simulate(offers: readonly FragmentOffer[], options: TimePlanOptions, link: LinkOptions): Simulated {
   const rungs = offers.map(() => -1);
   let endS = 0;

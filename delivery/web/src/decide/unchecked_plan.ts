@@ -22,7 +22,7 @@ const lateFactor = 1.2;
 function completed(options: TimePlanOptions): Required<TimePlanOptions> {
   const {
     timeLimitS, initialBytesS, rttS, guard = 1.5, priceKappa = 10, leastInFlight = 2, mostInFlight = 64,
-    // Counted as a delay it would starve the fragments that come next.
+    // Counted as a delay, the round trip would starve the fragments that come next.
     latencyS = Math.min(rttS, timeLimitS / 2), waitS = 0, lowestRung = lowestShown, skips = true,
     rate = transferRate(initialBytesS),
     // With several requests in flight completions come in bunches: only sums over some of them say anything.
@@ -70,7 +70,7 @@ export class UncheckedPlan {
   finished(): boolean {
     return this.remaining_.length + this.inFlight_.length === 0;
   }
-  /** As it is estimated now. */
+  /** Throughput as the plan estimates it now. */
   throughputBytesS(): number {
     return this.options_.estimate();
   }
@@ -87,21 +87,21 @@ export class UncheckedPlan {
         this.inFlight_.push(step);
         return step;
       }
-      // No transfer: it takes no time and says nothing of the link.
+      // A skipped fragment takes no time and says nothing about the link.
       step.doneS = nowS;
       this.spread_((step.residualS = step.thetaS));
     }
     return undefined;
   }
   /**
-   * A request has ended, in any order; times must not fall. Not `well`: it was given up, its time is spent, its fragment counts as
-   * skipped.
+   * A request has ended, in any order; times must not fall. Not `well`: the request was given up, its time is spent, its fragment
+   * counts as skipped.
    */
   ended(step: HtcStep, nowS: number, well: boolean): void {
     const { latencyS, rttS, rate } = this.options_;
     step.doneS = nowS;
     step.spacingS = Math.max(0, nowS - Math.max(this.lastDoneS_, latencyS));
-    // The link was idle only while nothing that was asked for could have been on its way.
+    // The link was idle only while no answer could have been on its way.
     if (well) rate.add(step.bytes, nowS - Math.max(this.lastDoneS_, this.inFlight_[0].issuedS + rttS));
     else step.rung = -1;
     this.inFlight_.splice(this.inFlight_.indexOf(step), 1);
@@ -141,7 +141,7 @@ export class UncheckedPlan {
     const { timeLimitS, latencyS } = this.options_;
     return (timeLimitS - latencyS) * (this.planned_.each[offer] / this.planned_.total);
   }
-  /** What the position after the last issued one gets of the residuals so far. */
+  /** Credit of the position after the last issued one, from the residuals so far. */
   private creditS_(): number {
     return this.credits_.reduce((sum, c) => sum + c.value / (this.steps.length - c.issued + 2), 0);
   }
@@ -157,7 +157,7 @@ export class UncheckedPlan {
     return sumOf(this.inFlight_.map((s) => s.bytes));
   }
   /**
-   * Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip later, whether
+   * Bytes that can still arrive in time besides those in flight. A request now is answered a round trip later, whether
    * or not enough is in flight until then.
    */
   private roomBytes_(beta = this.options_.rate.recentBytesS(), leftS = this.options_.timeLimitS - this.nowS_): number {
@@ -167,7 +167,7 @@ export class UncheckedPlan {
     const { leastInFlight, mostInFlight, timeLimitS, latencyS, rttS, rate } = this.options_;
     const n = this.inFlight_.length;
     if (n < leastInFlight || n >= mostInFlight) return n < leastInFlight;
-    // What is in flight takes all the time that is left: what is asked for now could only be late.
+    // Transfers in flight take all the time that is left: a request now could only be late.
     if (timeLimitS - this.nowS_ > latencyS && this.roomBytes_() <= 0) return false;
     // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there is little
     // time, and those are received side by side and late.
@@ -175,8 +175,8 @@ export class UncheckedPlan {
     return n < leastInFlight + (windowFactor * (rate.recentBytesS(tripSamples) * rttS)) / fragmentBytes;
   }
   /**
-   * What the link will give in the time left: its mean over as long a time until now, so that bursts shorter than that do
-   * not count; but a link that stalls, falls or comes back by more than breakFactor does not return to its mean.
+   * Throughput of the link in the time left: the mean over as long a time until now, so that shorter bursts do not count. But a link
+   * that stalls, falls or comes back by more than breakFactor does not return to its mean.
    */
   private lastingBytesS_(): number {
     const { rate, timeLimitS } = this.options_;
@@ -204,18 +204,18 @@ export class UncheckedPlan {
   private priceNow_({ price, bytes }: PricedBytes): number {
     const { timeLimitS, priceKappa } = this.options_;
     const plannedS = bytes.total > 0 ? timeLimitS * ((bytes.total - bytes.left) / bytes.total) : 0;
-    // What is in flight has been issued but not paid for yet.
+    // Bytes in flight have been issued but not paid for yet.
     const lag = this.nowS_ - (plannedS - this.inFlightBytes_() / this.throughputBytesS());
     const leftS = Math.max(timeLimitS - this.nowS_, 1e-3 * timeLimitS);
-    // A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
+    // A lag alone asks for too much after a stall: the price is no higher than the remaining bytes need.
     const ratio = bytes.left / Math.max(this.roomBytes_(undefined, timeLimitS - (timeLimitS - leftS)), 1);
     const enough = spareExponent + elasticity * log(Math.max(ratio, 1));
     return price * exp(clamp((priceKappa * lag) / leftS, -largestExponent, Math.min(enough, largestExponent)));
   }
   private maySkip_(roomBytes: number): boolean {
     const { policy, skips, timeLimitS, latencyS } = this.options_;
-    // A stall that is over looks like a slow link until something has been transferred: what is skipped on such evidence is
-    // lost for good, so never two in a row; but of what could not arrive in time all.
+    // A stall that is over looks like a slow link until something has been transferred. A fragment that is skipped on such evidence is
+    // lost for good: never two in a row are skipped, unless the rest could not arrive in time.
     const careless = policy === 'htc' || policy === 'static' || this.smallest_.left > roomBytes;
     return skips && (timeLimitS - this.nowS_ <= latencyS || (careless && this.steps.at(-1)?.bytes !== 0));
   }

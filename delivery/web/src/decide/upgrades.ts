@@ -1,6 +1,6 @@
 import type { FragmentOffer } from './plan_types';
 
-/** What may be fetched after the deadline: an upgrade of a fragment to a higher rung. */
+/** An upgrade of a fragment to a higher rung, which may be fetched after the deadline. */
 export interface Upgrade {
   offer: number;
   rung: number;

@@ -32,7 +32,7 @@ export function viewingDistance(objectHeight: number, heightPx: number, camera: 
 }
 
 /**
- * What decides about the scale: the just-noticeable difference; an error of one pixel; the O_V / E_S that matches the
+ * The rule that decides about the scale: the just-noticeable difference; an error of one pixel; the O_V / E_S that matches the
  * displayed height best; or (default) the finer of jnd and error, which is what Manifest.steps holds.
  */
 export type StepRule = 'default' | 'jnd' | 'error' | 'edge';
@@ -84,7 +84,7 @@ export function pixelError(
   return { p95, rms: scale.errorRms * pxPerUnit, max: Math.max(p95, scale.errorMax * pxPerUnit) };
 }
 
-/** In px, y downwards. */
+/** A rectangle on the screen in px, y downwards. */
 export interface ScreenRect {
   x0: number;
   y0: number;
@@ -96,13 +96,13 @@ export interface VisiblePart {
   /** Both 0: nothing of the object is to be seen. */
   widthPx: number;
   heightPx: number;
-  /** false: all of it. */
+  /** false: the whole object is visible. */
   clipped: boolean;
 }
-/** Nothing is cut off. */
+/** The visible part of an object of which nothing is cut off. */
 export const wholeObject: VisiblePart = { widthPx: 0, heightPx: 0, clipped: false };
 
-/** What of an object that `object` bounds on the screen the border of the view leaves. */
+/** The part of an object's bounding box on the screen that lies within the view. */
 export function clipTo(object: ScreenRect, view: ScreenRect): VisiblePart {
   const x0 = Math.max(object.x0, view.x0);
   const x1 = Math.min(object.x1, view.x1);

@@ -1,6 +1,6 @@
 import { FormatError } from './errors';
 
-/** Reads little-endian numbers from bytes and says where they end too early. */
+/** Reads little-endian numbers from bytes; FormatError names the place where the bytes end too early. */
 export class BytesIn {
   private readonly view_: DataView;
   private position_ = 0;
@@ -19,40 +19,40 @@ export class BytesIn {
     return this.bytes_.length - this.position_;
   }
 
-  private take_(bytes: number): number {
+  private advance_(bytes: number): number {
     if (bytes > this.left) this.fail(`${bytes} bytes`, `${this.left} bytes`);
     const at = this.position_;
     this.position_ += bytes;
     return at;
   }
   u8(): number {
-    return this.view_.getUint8(this.take_(1));
+    return this.view_.getUint8(this.advance_(1));
   }
   u16(): number {
-    return this.view_.getUint16(this.take_(2), true);
+    return this.view_.getUint16(this.advance_(2), true);
   }
   u32(): number {
-    return this.view_.getUint32(this.take_(4), true);
+    return this.view_.getUint32(this.advance_(4), true);
   }
-  /** Of at most 2^53. */
+  /** A number of 8 bytes, at most 2^53. */
   u64(): number {
-    const at = this.take_(8);
+    const at = this.advance_(8);
     const value = this.view_.getUint32(at + 4, true) * 4294967296 + this.view_.getUint32(at, true);
     if (value > 9007199254740992) this.fail('at most 2^53', 'more');
     return value;
   }
   f32(): number {
-    return this.view_.getFloat32(this.take_(4), true);
+    return this.view_.getFloat32(this.advance_(4), true);
   }
-  /** Of 1 to 4 bytes. */
+  /** A number of 1 to 4 bytes. */
   number(width: number): number {
     let value = 0;
-    const at = this.take_(width);
+    const at = this.advance_(width);
     for (let i = width - 1; i >= 0; --i) value = value * 256 + this.bytes_[at + i];
     return value;
   }
   raw(bytes: number): Uint8Array {
-    const at = this.take_(bytes);
+    const at = this.advance_(bytes);
     return this.bytes_.subarray(at, at + bytes);
   }
   text(bytes: number): string {

@@ -1,10 +1,10 @@
 /** How a plane's fragments are coded (format/SPEC.md, section 9). */
 export type CodecId = 'jpeg' | 'jpeg-progressive' | 'webp';
 
-/** What a codec needs and gives. */
+/** Traits of a codec. */
 export interface CodecTraits {
   requiredFeature: string;
-  /** Of complete files, without the dot. */
+  /** Ending of complete files, without the dot. */
   extension: string;
   mediaType: string;
   /** A rung's streams continue those of the rungs below. */
@@ -20,7 +20,7 @@ const traits: Record<CodecId, CodecTraits> = {
   },
   webp: { requiredFeature: 'codec-webp', extension: 'webp', mediaType: 'image/webp', incremental: false },
 };
-/** Of a codec that this reader knows. */
+/** Traits of a codec that this reader knows. */
 export function codecTraits(codec: CodecId): CodecTraits {
   return traits[codec];
 }

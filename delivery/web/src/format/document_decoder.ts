@@ -1,6 +1,6 @@
-/** What documents.ts decodes. */
+/** The functions of documents.ts. */
 export type Documents = typeof import('./documents');
-/** Decodes a document by the name of a function there. */
+/** Decodes a document by the name of a function of documents.ts. */
 export type DocumentDecoder = <K extends keyof Documents>(
   name: K,
   ...args: Parameters<Documents[K]>

@@ -10,8 +10,8 @@ import { TextureInfo, fullSizePlanes, missingFeature, readTextures } from './tex
 import * as paths from './entry_paths';
 import * as layout from './layout';
 
-// What is decoded and checked, meshes by themselves, documents against the manifest and against each other: in workers, or here where there are none. Digests
-// have been checked before.
+// Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
+// where there are none. Digests have been checked before.
 
 export { readIndex } from './index_table';
 export { requireSelfContained } from './self_contained_glb';
@@ -23,7 +23,7 @@ function require(good: boolean, file: string, place: string, expected: string, f
   if (!good) throw new FormatError(file, place, expected, String(found));
 }
 
-/** manifest.json and its SHA-256; of the first bytes of a container where that has a name. */
+/** Manifest and package id from manifest.json, or from the first bytes of a container where `container` names one. */
 export async function manifest(bytes: Uint8Array, container = ''): Promise<{ parsed: Manifest; id: string }> {
   const json = container ? manifestOfContainer(bytes, container) : bytes;
   return { parsed: readManifest(json), id: toHex(await sha256(json)) };
@@ -31,7 +31,7 @@ export async function manifest(bytes: Uint8Array, container = ''): Promise<{ par
 
 /** A page of index.bin. */
 export interface PageRef extends EntryRef {
-  /** -1: of what belongs to none. */
+  /** -1: the page of entries that belong to no plane. */
   plane: number;
   entries: number;
   minor: number;
@@ -43,7 +43,7 @@ export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
   return pages.map((p) => ({ ...p, minor, path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
 }
 
-/** The entries of a page of index.bin by their paths; those of the page without a plane are what the manifest says of them. */
+/** The entries of a page of index.bin by their paths. Entries without a plane must be as the manifest says. */
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
@@ -55,7 +55,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
   return entries;
 }
 
-/** textures.json. */
+/** The planes of textures.json. */
 export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
   require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
@@ -90,13 +90,13 @@ export interface PlaneDocument {
   tables: PlaneTables;
   /** What the fragments of its rungs have in common. */
   tableStreams: EntryRef;
-  /** By rung. */
+  /** Packs by rung. */
   packs: EntryRef[];
-  /** Of each fragment's stream within its rung's pack: [rung * F + fragment]. */
+  /** [rung * F + fragment] offset of each fragment's stream within its rung's pack. */
   offsets: Float64Array;
 }
 
-/** A section of tables.bin; textures.json and the index speak of the same fragments and bytes. */
+/** Tables from a section of tables.bin; textures.json and the index must speak of the same fragments and bytes. */
 export function planeTables(
   bytes: Uint8Array,
   { minor }: SectionRef,

@@ -12,21 +12,21 @@ export const texturesPath = 'textures.json';
 export const qualityPath = 'quality.json';
 /** How the package was made. */
 export const provenancePath = 'provenance.json';
-/** mesh/s07.glb */
+/** Path of a scale's GLB, as mesh/s07.glb. */
 export const meshPath = (scale: number): string => `mesh/s${String(scale).padStart(2, '0')}.glb`;
 
-/** texture/3/tables.pack */
+/** Path of a plane's table streams, as texture/3/tables.pack. */
 export const tableStreamsPath = (plane: number): string => `texture/${plane}/tables.pack`;
 /** The plane that an entry's page in the index belongs to; -1 = none. */
 export function planeOfPath(path: string): number {
   const match = /^texture\/(0|[1-9]\d*)\/(tables\.pack|r\d\d+(\.pack|\/\d{4,}\.(jpg|webp)))$/.exec(path);
   return match ? Number(match[1]) : -1;
 }
-/** texture/3/r07/0123.jpg, in trees made with `unpack --fragments files` only. */
+/** Path of a fragment's file, as texture/3/r07/0123.jpg; only trees made with `unpack --fragments files` have such files. */
 export const fragmentFilePath = (plane: number, rung: number, fragment: number, extension: string): string =>
   `texture/${plane}/r${String(rung).padStart(2, '0')}/${String(fragment).padStart(4, '0')}.${extension}`;
 
-/** A relative path of a-z 0-9 . _ - and /, without empty parts, "." and "..". */
+/** Whether a path is relative, of a-z 0-9 . _ - and /, without empty parts, "." and "..". */
 export function isValidEntryPath(path: string): boolean {
   return (
     path.length <= 200 &&

@@ -1,6 +1,6 @@
 /**
- * What every texmesh error carries: the file (or URL), the place in it, what was expected and what was found. Any of
- * them may be empty; the message joins those that are not.
+ * Every texmesh error carries the file (or URL), the place in the file, what was expected and what was found. Any of
+ * these may be empty; the message joins those that are not.
  */
 export class TexmeshError extends Error {
   constructor(
@@ -14,7 +14,7 @@ export class TexmeshError extends Error {
   }
 }
 
-/** A server or a caller does not give what it must: no answer, no such file, an option out of range. */
+/** A server or a caller does not give what is needed: no answer, no such file, an option out of range. */
 export class InputError extends TexmeshError {
   override readonly name = 'InputError'; // in letters: bundlers rename classes
 }

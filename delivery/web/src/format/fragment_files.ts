@@ -1,16 +1,16 @@
 import { parseJson } from './json_fields';
 
-/** Complete files of fragments in a tree that `unpack --fragments files` made: fragments.json. */
+/** A complete file of a fragment, in a tree that `unpack --fragments files` made. */
 export interface FragmentFile {
   bytes: number;
   /** First 8 bytes of the file's SHA-256. */
   sha256: Uint8Array;
 }
-/** [plane][rung] by fragment. */
+/** fragments.json: [plane][rung] by fragment. */
 export type FragmentFiles = Map<number, FragmentFile>[][];
 
 const file = 'fragments.json';
-/** FormatError where lists are not parallel, or a digest is none. */
+/** Reads fragments.json. FormatError where lists are not parallel, or a digest is none. */
 export function readFragmentFiles(json: Uint8Array): FragmentFiles {
   const at = parseJson(json, file, 256 << 20);
   at.at('version').integer(1, 1);

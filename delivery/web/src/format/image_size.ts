@@ -1,6 +1,6 @@
 /**
- * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for them; 0, 0 where it is none, or
- * decoders may find another frame than the first one here: behind markers that have no length.
+ * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for the picture. 0, 0 where the file is none of
+ * these, or where decoders may find another frame than this function, behind markers that have no length.
  */
 export function imageSize(b: Uint8Array): [number, number] {
   const at = (i: number): number => b[i] ?? 0;

@@ -12,12 +12,12 @@ const noPlane = 0xffffffff;
 export interface IndexPage {
   plane: number;
   entries: number;
-  /** Within index.bin. */
+  /** Offset within index.bin. */
   offset: number;
   bytes: number;
   sha256: Uint8Array;
 }
-/** Places and digests of the pages. */
+/** Head of index.bin: places and digests of the pages. */
 export interface IndexHead {
   minor: number;
   bytes: number;
@@ -81,7 +81,7 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   return { path, offset, bytes, sha256: digest };
 }
 
-/** The entries of a page of some plane, in container order; whoever has the bytes has checked their digest. */
+/** The entries of a page, in container order. The caller has checked the digest. */
 export function parseIndexPage(bytes: Uint8Array, plane: number, count: number, minor: number): EntryRef[] {
   const input = new BytesIn(bytes, `${file}: ${plane < 0 ? 'page 0' : `page of plane ${plane}`}`);
   const entries: EntryRef[] = [];

@@ -1,6 +1,6 @@
 import { FormatError } from './errors';
 
-/** A value in a JSON document: checks type and range before anyone uses it, and names its place when it is wrong. */
+/** A value in a JSON document: checks type and range before anyone uses the value, and names the place of a wrong one. */
 export class JsonAt {
   constructor(
     private readonly value_: unknown,
@@ -29,7 +29,7 @@ export class JsonAt {
     if (n < least || n > most) this.fail(least === most ? `${least} elements` : `${least} to ${most} elements`, `${n}`);
     return n;
   }
-  /** What is read of each element of an array. */
+  /** Reads each element of an array. */
   each<T>(least: number, most: number, read: (at: JsonAt, i: number) => T): T[] {
     return Array.from({ length: this.array(least, most) }, (_, i) => read(this.at(i), i));
   }
@@ -62,7 +62,7 @@ export class JsonAt {
   }
 }
 
-/** A document of at most so many bytes of UTF-8; FormatError where it is no JSON. */
+/** Bounded JSON: a document of at most so many bytes of UTF-8. FormatError where the document is longer, or no JSON. */
 export function parseJson(bytes: Uint8Array, file: string, mostBytes: number): JsonAt {
   if (bytes.length > mostBytes) throw new FormatError(file, '', `at most ${mostBytes} bytes`, `${bytes.length}`);
   try {

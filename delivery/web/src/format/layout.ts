@@ -2,16 +2,16 @@
 
 /** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
 export const bootstrapBytes = 16384;
-/** "Enough at any size": displayPx... of S_0 and the last step's upToPx. */
+/** A displayed height that is enough at any size: displayPx... of S_0 and the last step's upToPx. */
 export const anyDisplayPx = 1e9;
-/** Previews are no larger: GPUs that take less are none. */
+/** Previews are no larger: every GPU takes textures of this size. */
 export const mostPreviewPx = 4096;
-/** The vertex-split stream. */
+/** Path of the vertex-split stream. */
 export const splitStreamPath = 'mesh/stream.bin';
 
 const digits = (n: number, least: number): string => String(n).padStart(least, '0');
 
-/** preview/003.jpg */
+/** Path of a preview, as preview/003.jpg. */
 export const previewPath = (plane: number): string => `preview/${digits(plane, 3)}.jpg`;
-/** texture/3/r07.pack */
+/** Path of a rung's pack, as texture/3/r07.pack. */
 export const rungPath = (plane: number, rung: number): string => `texture/${plane}/r${digits(rung, 2)}.pack`;

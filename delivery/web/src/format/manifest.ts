@@ -3,13 +3,13 @@ import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
 
-/** Version of the format that this reader is for. */
+/** Major version of the format that this reader is for. */
 export const formatMajor = 1;
 /** Minor version: packages of later ones can be read, too. */
 export const formatMinor = 1;
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp', 'mips'];
-/** Previews whose place the manifest tells. */
+/** Most previews whose places the manifest tells. */
 export const mostManifestPreviews = 256;
 
 /** Where an entry's data stands in the container, and its digest. */
@@ -56,7 +56,7 @@ export interface ManifestScale {
   displayPxJnd: number;
   displayPxError: number;
   displayPxEdge: number;
-  /** Why it has more vertices than its scale asks for, or (on the last one) why none is coarser; mostly "". Since 1.1. */
+  /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". Since 1.1. */
   floor: string;
 }
 /** One step of the step function from displayed height to scale. */
@@ -69,7 +69,7 @@ export interface Manifest {
   version: { major: number; minor: number };
   requiredFeatures: string[];
   title: string;
-  /** Added to a mesh's position it gives the source's coordinates. */
+  /** Mesh positions and this vector add up to the source's coordinates. */
   origin: Vector3;
   boundsMin: Vector3;
   boundsMax: Vector3;
@@ -78,11 +78,11 @@ export interface Manifest {
   /** Area of S_0; 0 = not said. */
   surfaceArea: number;
   jnd: number;
-  /** S_0 first. */
+  /** Scales, S_0 first. */
   scales: ManifestScale[];
-  /** Coarse to fine. */
+  /** Steps, coarse to fine. */
   steps: ManifestStep[];
-  /** Texture planes, mips included. */
+  /** Number of texture planes, mips included. */
   planeCount: number;
   firstPicture: ByteRange & { sha256: Uint8Array };
   previews: ByteRange[];
@@ -144,7 +144,7 @@ function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'>
   return { version: { major, minor }, requiredFeatures };
 }
 
-/** An array for each field, all of one length. */
+/** Scales from an array for each field, all of one length. */
 function readScales(at: JsonAt): ManifestScale[] {
   const n = at.at('scale').array(1, 100);
   const floors = at.has('floor');
@@ -210,8 +210,8 @@ function readFirstPicture(
 }
 
 /**
- * Strict for what this version defines, ignores unknown fields, refuses an unknown major version and unknown required
- * features. FormatError names the place in the document.
+ * Reads manifest.json: strict about fields of this version, ignores unknown fields, refuses an unknown major version and unknown
+ * required features. FormatError names the place in the document.
  */
 export function readManifest(json: Uint8Array): Manifest {
   const at = parseJson(json, paths.manifestPath, layout.bootstrapBytes);

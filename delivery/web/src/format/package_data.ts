@@ -2,7 +2,7 @@ import type { Manifest } from './manifest';
 import type { PlaneTables } from './tables';
 import type { TextureInfo } from './textures';
 
-/** What decisions about textures are made from. Tables may lack planes that nobody asks about. */
+/** Data that decisions about textures are made from. Tables may lack planes that nobody asks about. */
 export interface PackageData {
   manifest: Manifest;
   textures: readonly TextureInfo[];

@@ -9,9 +9,9 @@ export interface QualityTable {
   scales: number[];
   /** IJG qualities, rising. */
   rungs: number[];
-  /** [scale index * rungs + rung index], 1 = equal. */
+  /** [scale index * rungs + rung index] SSIM of pictures, 1 = equal. */
   ssim: Float32Array;
-  /** The same shape, 0 = equal. */
+  /** Difference of pictures in the same shape, 0 = equal. */
   difference: Float32Array;
 }
 
@@ -30,7 +30,7 @@ function readFractions(at: JsonAt, count: number): Float32Array {
   return Float32Array.from({ length: count }, (_, i) => at.at(i).number(0, 1));
 }
 
-/** Strict; FormatError names the place in the document. */
+/** Reads quality.json, strictly; FormatError names the place in the document. */
 export function readQuality(json: Uint8Array): QualityTable {
   const at = parseJson(json, qualityPath, 4 << 20);
   const views = at.at('views').integer(1, 10000);

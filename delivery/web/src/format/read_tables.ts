@@ -9,7 +9,7 @@ import { PlaneTables, TablesHead, fragmentCount, gammaSteps } from './tables';
 const mostFragments = 65535;
 const mostRungs = 100;
 const mostScales = 100;
-/** Head of tables.bin; the bytes may stop after it. */
+/** Head of tables.bin; the bytes may stop after the head. */
 export function readTablesHead(bytes: Uint8Array): TablesHead {
   const input = new BytesIn(bytes, file);
   input.expect('TXMT');
@@ -84,7 +84,7 @@ function readArrays(input: BytesIn, t: PlaneTables, r: number, order: number, w:
   t.totalBytes = fill(new Float64Array(n * gammaSteps), () => input.u64());
 }
 
-/** What stands behind the fields of format 1.0. */
+/** Fields behind those of format 1.0. */
 function readExtension(input: BytesIn, t: PlaneTables, minor: number): void {
   if (minor < 1) return input.finish();
   const allocation = input.u8();
@@ -129,7 +129,7 @@ function widthOf(values: Uint32Array): number {
   return most < 256 ? 1 : most < 65536 ? 2 : most < 16777216 ? 3 : 4;
 }
 
-/** Whatever the bytes could say that makes no sense. */
+/** Throws FormatError where values make no sense. */
 function checkPlane(t: PlaneTables, place: string): void {
   const require = (good: boolean, what: string, expected: string, found: unknown): void => {
     if (!good) throw new FormatError(file, `${place}/${what}`, expected, String(found));

@@ -2,7 +2,7 @@ import { FormatError } from './errors';
 import { imageSize } from './image_size';
 import { mostPreviewPx } from './layout';
 
-/** What of a GLB's JSON makes loaders ask somebody, or make room for pictures. */
+/** Fields of a GLB's JSON that make loaders ask other hosts, or make room for pictures. */
 interface Embedding {
   buffers?: { uri?: unknown }[];
   images?: { uri?: unknown; bufferView?: number }[];
@@ -13,7 +13,7 @@ function require(good: unknown, what: string): asserts good {
   if (!good) throw new FormatError('mesh', '', what, 'something else');
 }
 
-/** JSON and bytes of a GLB of at most two chunks, which is all that glTF has; loaders differ in what they make of others. */
+/** JSON and bytes of a GLB of at most two chunks. glTF has no further chunks, and loaders differ in what they make of those. */
 function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
   const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
@@ -24,15 +24,15 @@ function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   try {
     json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end)));
   } catch {
-    // told below
+    // the next line throws
   }
   require(typeof json === 'object' && json, 'JSON in its GLB');
   return { json, bytes: glb.subarray(end + 8) };
 }
 
 /**
- * Nothing but the file itself is read: a URI in it would make pages ask whomever it names. Its pictures, which loaders decode, are no
- * larger than previews. FormatError otherwise.
+ * Requires a GLB whose data is all in the file: a URI would make pages ask the host of that URI. Pictures in the GLB, which loaders
+ * decode, must be no larger than previews. FormatError otherwise.
  */
 export function requireSelfContained(glb: Uint8Array): void {
   const { json, bytes } = partsOfGlb(glb);

@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4) by hand, where pages have no WebCrypto (plain http); loaded when it is needed.
+// SHA-256 (FIPS 180-4) by hand, for pages without WebCrypto (plain http); loaded when needed.
 
 const roundConstants = /* @__PURE__ */ makeRoundConstants();
 

@@ -8,15 +8,15 @@ export const gammaSteps = 21;
 export interface PlaneTables {
   columns: number;
   rows: number;
-  /** N - 1 */
+  /** Number of the coarsest scale, N - 1. */
   scales: number;
   /** A rung's streams continue those of the rungs below. */
   incremental: boolean;
   /** [R] IJG quality, strictly rising. */
   rungQuality: Uint8Array;
-  /** [R] size of the rung's table stream. */
+  /** [R] bytes of the rung's table stream. */
   tableBytes: Uint32Array;
-  /** [R * F], index rung * F + fragment; 0 where the fragment is not stored. */
+  /** [R * F] bytes of streams, index rung * F + fragment; 0 where the fragment is not stored. */
   sizeBytes: Uint32Array;
   /** [R * F * 8] first 8 bytes of each stream's SHA-256. */
   digest: Uint8Array;
@@ -24,9 +24,9 @@ export interface PlaneTables {
   mse: Float32Array;
   /** [R * F] 1 - SSIM. */
   dssim: Float32Array;
-  /** [F] */
+  /** [F] texels that the object uses. */
   coveredTexels: Uint32Array;
-  /** [F] of the object's surface. */
+  /** [F] share of the object's surface. */
   surfaceFraction: Float32Array;
   /** [F] predictors. */
   z: Float32Array;
@@ -38,12 +38,12 @@ export interface PlaneTables {
   order: Uint16Array;
   /** [F] 1 - SSIM when the preview stands for the fragment; empty: format 1.0 did not say. */
   skipDssim: Float32Array;
-  /** Qualities between rungs, rising, and the part of the way between these that bytes have gone there. */
+  /** Qualities between rungs, rising; and the share of the way from rung to rung that bytes have gone at each. */
   knotQuality: Uint8Array;
   knotPosition: Float32Array;
   /** [N * F] feature points f_i, index scale * F + fragment. */
   features: Uint32Array;
-  /** [N] Q_i */
+  /** [N] quality Q_i. */
   quality: Float32Array;
   /** [N * 21] D_i(Gamma): bytes of the plane. */
   totalBytes: Float64Array;
@@ -60,16 +60,16 @@ export interface PlaneTables {
   modelError: number;
 }
 
-/** F */
+/** F: fragments of the plane. */
 export const fragmentCount = (t: PlaneTables): number => t.columns * t.rows;
-/** R */
+/** R: rungs of the plane. */
 export const rungCount = (t: PlaneTables): number => t.rungQuality.length;
 
-/** What a client must have of a fragment to show it at a rung; 0 when it is not stored there. */
+/** Bytes that a client must have to show a fragment at a rung; 0 when the fragment is not stored there. */
 export function bytesToShow(t: PlaneTables, rung: number, fragment: number): number {
-  const own = (r: number): number => t.sizeBytes[r * fragmentCount(t) + fragment];
-  let bytes = own(rung);
-  if (t.incremental && bytes > 0) for (let r = 0; r < rung; ++r) bytes += own(r);
+  const streamBytes = (r: number): number => t.sizeBytes[r * fragmentCount(t) + fragment];
+  let bytes = streamBytes(rung);
+  if (t.incremental && bytes > 0) for (let r = 0; r < rung; ++r) bytes += streamBytes(r);
   return bytes;
 }
 

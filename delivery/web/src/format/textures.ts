@@ -8,7 +8,7 @@ export interface TextureInfo {
   image: number;
   /** Sides are 1 / 2^mip of the full-size plane's, rounded up. */
   mip: number;
-  /** Of a mip: the full-size plane. */
+  /** The full-size plane of a mip. */
   base: number;
   /** base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data, or one of a later version. */
   role: string;
@@ -27,13 +27,13 @@ export interface TextureInfo {
   previewHeightPx: number;
   /** IJG quality per rung, strictly rising. */
   rungQuality: number[];
-  /** The last rung loses nothing of the source: shown as any other, and fetched where it is asked for or refining is to go so far. */
+  /** The last rung loses nothing of the source. That rung is shown as any other, and fetched where a load asks for it or refines so far. */
   lossless: boolean;
-  /** Ending of the source's own file among the entries, source/PPP.EXT; "" = none. Loads leave it alone; PackageReader.entry reads it. */
+  /** Ending of the source file among the entries, source/PPP.EXT; "" = none. Loads leave that file alone; PackageReader.entry reads it. */
   source: string;
 }
 
-/** How many of the planes have full size; they stand first. */
+/** Number of full-size planes, which stand first. */
 export function fullSizePlanes(textures: readonly TextureInfo[]): number {
   const mip = textures.findIndex((t) => t.mip > 0);
   return mip < 0 ? textures.length : mip;
@@ -69,7 +69,7 @@ function readGrid(at: JsonAt) {
 
 const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
 
-/** What a package may keep of the source itself; since 1.1. */
+/** Fields about the source itself; since 1.1. */
 function readSource(at: JsonAt, codec: CodecId, mip: number): { lossless: boolean; source: string } {
   const lossless = at.has('lossless') && at.at('lossless').boolean();
   if (lossless && (codec !== 'jpeg' || mip > 0)) at.at('lossless').fail('a full-size plane of codec jpeg', 'another');
@@ -129,7 +129,7 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
   }
 }
 
-/** Strict; FormatError names the place in the document. */
+/** Reads textures.json, strictly; FormatError names the place in the document. */
 export function readTextures(json: Uint8Array): TextureInfo[] {
   const list = parseJson(json, paths.texturesPath, 32 << 20).at('textures');
   const textures: TextureInfo[] = [];
@@ -138,7 +138,7 @@ export function readTextures(json: Uint8Array): TextureInfo[] {
   return textures;
 }
 
-/** Whether every plane's codec is among the package's required features. */
+/** The first feature that a plane's codec needs and the package does not require; '' = none. */
 export function missingFeature(textures: readonly TextureInfo[], features: readonly string[]): string {
   for (const t of textures) {
     const { requiredFeature } = codecTraits(t.codec);

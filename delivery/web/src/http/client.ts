@@ -4,10 +4,10 @@ import { nowS, sleepS } from './clock';
 import { HttpOptions, defaultHttpOptions } from './options';
 import { Answer, GetOptions, RequestRecord, contentRange } from './requests';
 
-/** Answers that latency is the median of. */
+/** Number of answers that latency is the median of. */
 const latencySamples = 7;
 
-/** As the browser names it; a URL that somebody has answered at. */
+/** A URL that has answered, as the browser names the URL. */
 export const absolute = (url: string): string => new URL(url, globalThis.location?.href).href;
 
 /** Requests to one or more servers: a window of connections, stalls, a cap; one try each. */
@@ -16,10 +16,10 @@ export class HttpClient {
   /** Least time from asking to the answer's head, without the first request, which opens the connection. */
   rttS = 0;
   received = 0;
-  /** Those that have ended. */
+  /** Requests that have ended. */
   readonly records: RequestRecord[] = [];
   readonly listeners = new Set<(record: RequestRecord) => void>();
-  private readonly waits_: number[] = []; // of the last requests
+  private readonly waits_: number[] = []; // seconds to the answers of the last requests
   private active_ = 0;
   private readonly waiting_: (() => void)[] = [];
   private limit_: number;
@@ -30,7 +30,7 @@ export class HttpClient {
     this.limit_ = this.options.connections;
   }
 
-  /** What a request takes to be answered, in the middle of the last ones: servers and busy pages add to the round trip. */
+  /** Median time from request to answer over the last requests: servers and busy pages add to the round trip. */
   get latencyS(): number {
     const sorted = [...this.waits_].sort((a, b) => a - b);
     return sorted[sorted.length >> 1] ?? this.rttS;
@@ -82,7 +82,7 @@ export class HttpClient {
         if (done) break;
         if (options.capBytesS > 0) {
           clearTimeout(timer);
-          await this.holdBack_(value.length, signal); // nobody may know of it before
+          await this.holdBack_(value.length, signal); // nobody may hear of the bytes before
           restartStallTimer();
         }
         chunks.push(value);
@@ -100,9 +100,9 @@ export class HttpClient {
     } finally {
       clearTimeout(timer);
       signal?.removeEventListener('abort', cancel);
-      if (!answer.complete || !record.ok) cancel(); // what nobody reads
+      if (!answer.complete || !record.ok) cancel(); // nobody reads the rest
       (this.waiting_.shift() ?? (() => --this.active_))();
-      answer.body = concat(chunks); // what came before a cut is worth keeping
+      answer.body = concat(chunks); // bytes before a cut are worth keeping
       record.ok &&= answer.complete;
       record.status = answer.status;
       record.ended = nowS();
@@ -111,7 +111,7 @@ export class HttpClient {
     return answer;
   }
 
-  /** Waits as long as the cap wants. */
+  /** Waits as long as the cap on throughput wants. */
   private async holdBack_(bytes: number, signal?: AbortSignal): Promise<void> {
     this.capFreeS_ = Math.max(nowS(), this.capFreeS_) + bytes / this.options.capBytesS;
     await sleepS(this.capFreeS_ - nowS(), signal);

@@ -1,7 +1,7 @@
 import { decodeHere, type DocumentDecoder, type Documents } from '../format/document_decoder';
 import { FormatError, abortError, throwIfAborted } from '../format/errors';
 
-/** What a function of format/documents gives. */
+/** Result of a function of format/documents. */
 export type Decoded<K extends keyof Documents> = Awaited<ReturnType<Documents[K]>>;
 
 /** Rejects after so many seconds, or when a signal says so; `clear` ends the waiting. */

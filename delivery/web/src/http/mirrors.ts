@@ -7,11 +7,11 @@ const silenceFactor = 4;
 const leastPatienceRtts = 8;
 const leastPatienceS = 0.5;
 
-/** A URL that a package can be had from, and what it has shown so far. */
+/** A URL that a package can be had from, and its transfers so far. */
 export interface Mirror {
   url: string;
   alive: boolean;
-  /** Where its answers come from. */
+  /** URL that answers come from, behind redirections. */
   at: string;
   etag: string;
   /** Bytes of the container; -1 = not known. */
@@ -20,16 +20,16 @@ export interface Mirror {
   owedBytes: number;
   lastS: number;
 }
-/** How a mirror is to be asked. */
+/** How a mirror is asked. */
 export interface Asking {
   stallTimeoutS: number;
-  /** Past what caches hold. */
+  /** Caches are passed by. */
   reload: boolean;
-  /** Somebody else may have it. */
-  elsewhere: boolean;
+  /** Other mirrors are left that may have the bytes. */
+  othersLeft: boolean;
 }
 
-/** Servers that have the same files. */
+/** Servers with the same files. */
 export class Mirrors {
   readonly all: Mirror[];
 
@@ -43,34 +43,34 @@ export class Mirrors {
     return this.all.filter((m) => m.alive);
   }
 
-  /** One that fails is not asked again, as long as there are others. Says whether there are. */
+  /** Leaves a mirror that fails alone, as long as there are others. Gives whether there are. */
   failed(m: Mirror): boolean {
     if (m.alive) m.alive = this.alive_.length < 2;
     return !m.alive;
   }
 
   /**
-   * Asks the one that delivers first, by what each has delivered so far and has to deliver yet; then the next. The last one's failure is
-   * everybody's; where its bytes are damaged, it is asked once more: a cache on the way may hold something bad.
+   * Asks the mirror that should deliver first, by the throughput and the bytes under way of each; then the next. The failure of the last
+   * mirror is thrown. A last mirror whose bytes are damaged is asked once more: a cache on the way may hold bad bytes.
    */
   async ask<T>(bytes: number, ask: (m: Mirror, how: Asking) => Promise<T>): Promise<T> {
     for (let reload = false; ; ) {
       const { rttS, options } = this.client;
       const expectedS = (k: Mirror): number => (k.owedBytes + bytes) / k.throughput.recentBytesS();
       const [m, ...others] = this.alive_.sort((a, b) => expectedS(a) - expectedS(b));
-      const elsewhere = others.length > 0;
+      const othersLeft = others.length > 0;
       const patienceS = Math.max(leastPatienceS, leastPatienceRtts * rttS, silenceFactor * expectedS(m));
-      const stallTimeoutS = elsewhere ? Math.min(patienceS, options.stallTimeoutS) : options.stallTimeoutS;
+      const stallTimeoutS = othersLeft ? Math.min(patienceS, options.stallTimeoutS) : options.stallTimeoutS;
       const started = nowS();
       m.owedBytes += bytes;
       try {
-        const result = await ask(m, { stallTimeoutS, reload, elsewhere });
+        const result = await ask(m, { stallTimeoutS, reload, othersLeft });
         const ended = nowS();
         m.throughput.add(bytes, ended - Math.max(m.lastS, started + rttS));
         m.lastS = ended;
         return result;
       } catch (error) {
-        // What is cancelled says nothing of the mirror.
+        // A cancelled request says nothing about the mirror.
         if (error instanceof TexmeshError && this.failed(m)) continue;
         if (reload || !(error instanceof FormatError)) throw error;
         reload = true;

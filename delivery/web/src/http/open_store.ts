@@ -4,7 +4,7 @@ import { RangeStore } from './range_store';
 import type { OpenedStore, StoreMode } from './store';
 
 /**
- * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside it where it
+ * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside the container where the server
  * answers 200 to a range; the whole container where there is no tree.
  */
 export async function openStore(
@@ -22,7 +22,7 @@ export async function openStore(
     return { store, manifest: await store.manifest(signal) };
   } catch (error) {
     const { noRanges } = store;
-    // Whole files are better than nothing, whatever the other mirrors said.
+    // Whole files are better than nothing, whatever other mirrors answered.
     if (!noRanges || isAbort(error)) throw error;
     if (mode === 'range') throw noRanges;
     const { openWithoutRanges } = await files().catch(() => {

@@ -1,28 +1,28 @@
-/** Limits of what a server may do to us. */
+/** Limits on servers: time, tries, bytes, requests at once. */
 export interface HttpOptions {
-  /** Instead of the browser's; gets a URL and a RequestInit. */
+  /** Stands in for the browser's fetch; gets a URL and a RequestInit. */
   fetch?: typeof fetch;
-  /** Of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
+  /** Retries of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
   retries: number;
-  /** Before the first retry, doubled for each further one. */
+  /** Pause before the first retry, doubled for each further one. */
   retryDelayS: number;
-  /** Without a byte, or without a worker's answer about a document. */
+  /** Longest time without a byte, or without a worker's answer about a document. */
   stallTimeoutS: number;
   /**
-   * The browser's cache, for ranges. Default no-store: Chromium answers ranges of one URL that may be cached one after
-   * the other, however many were asked for at once, and with a round trip for each a slow link stands idle.
+   * How ranges use the browser's cache. Default no-store: Chromium answers ranges of one URL that may be cached one after
+   * the other, however many were asked for at once; with a round trip for each, a slow link stands idle.
    */
   rangeCache: RequestCache;
   /** Requests at once while the server speaks HTTP/1.1. */
   connections: number;
   /** Requests at once over HTTP/2 and HTTP/3. */
   streams: number;
-  /** Of a container from a server that knows no ranges. */
+  /** Most bytes of a container from a server that knows no ranges. */
   maxWholeBytes: number;
   /** Bytes per second at most, for trying slow links; 0 = no limit. */
   capBytesS: number;
 }
-/** Where the caller says nothing. */
+/** Options where the caller says nothing. */
 export const defaultHttpOptions: HttpOptions = {
   retries: 3,
   retryDelayS: 0.2,

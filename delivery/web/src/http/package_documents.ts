@@ -14,7 +14,7 @@ import { type Decoded, decodeWith } from './decoding';
 import type { RequestKind } from './requests';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
-/** Where the fragments of a plane are. */
+/** Places of the fragments of a plane. */
 export interface PlaneFiles extends PlaneDocument {
   /** Complete files instead of packs, where the package is a tree that has them: [rung] by fragment. */
   complete?: FragmentFiles[number];
@@ -47,7 +47,7 @@ export class PackageDocuments {
     readonly id: string,
     /** When the first request was made, seconds of performance.now(). */
     readonly openedS: number,
-    /** Who decodes documents: loads have workers that do. Where that fails, this thread does. */
+    /** Decoder of documents: loads have workers. Where the decoder fails, this thread decodes. */
     public decodeDocument = decodeHere,
   ) {}
 
@@ -65,7 +65,7 @@ export class PackageDocuments {
 
   // ---- reading once, and checking
 
-  /** Read once for all who ask; again after a failure, or where it was another asker who cancelled. */
+  /** Reads once for all who ask; again after a failure, or where another asker cancelled. */
   protected async readOnce_<T>(name: string, read: () => Promise<T>, signal?: AbortSignal): Promise<T> {
     const known = this.reads_.get(name) as Promise<T> | undefined;
     const wanted = known ?? read();
@@ -80,11 +80,11 @@ export class PackageDocuments {
       throw error;
     }
   }
-  /** From now on this is what readOnce_ gives under that name. */
+  /** readOnce_ gives this under that name from now on. */
   protected keepRead_(name: string, read: Promise<unknown>): void {
     this.reads_.set(name, read);
   }
-  /** A range of the container within an entry; of what comes, these parts are held to their digests. */
+  /** Reads a range of the container within an entry; these parts of the range are held to their digests. */
   protected readParts_(place: Place, range: ByteRange, how: ReadOptions, ...parts: EntryRef[]): Promise<Uint8Array> {
     const verify = async (got: Uint8Array): Promise<void> => {
       for (const { path, offset, bytes, sha256 } of parts)
@@ -92,20 +92,20 @@ export class PackageDocuments {
     };
     return this.store.read(place, range, { ...how, verify });
   }
-  /** An entry, or a part of one. */
+  /** Reads an entry, or a part of one, and checks the digest. */
   readChecked(part: EntryRef, how: ReadOptions, place: Place = part): Promise<Uint8Array> {
     return this.readParts_(place, part, how, part);
   }
-  /** Bytes behind an offset of something with a head, the whole head among them, which is checked. */
+  /** Reads the first bytes of an entry with a head; the head, which must be among these bytes, is checked. */
   protected readWithHead_(ref: StreamRef, bytes: number, how: ReadOptions): Promise<Uint8Array> {
     return this.readParts_(ref, { offset: ref.offset, bytes }, how, headOf(ref));
   }
-  /** A document, or only its head where it is long and that can be had. */
+  /** Reads a document, or only the head of a long one where ranges can be had. */
   private readPaged_(ref: PagedRef, how: ReadOptions): Promise<Uint8Array> {
     const part = ref.bytes <= wholeDocumentBytes || this.form !== 'range' ? ref : headOf(ref);
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
-  /** A document, read and decoded once for all who ask. */
+  /** Reads and decodes a document once for all who ask. */
   private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
     name: K,
     signal: AbortSignal | undefined,
@@ -137,11 +137,11 @@ export class PackageDocuments {
     };
     return this.readOnce_(`index/${plane}`, read, signal);
   }
-  /** An entry of the index, of which only the page that has it is read. */
+  /** An entry of the index; only the page of the index with that entry is read. */
   async find(path: string, signal?: AbortSignal): Promise<EntryRef> {
     return this.findOn(planeOfPath(path), path, signal);
   }
-  /** An entry of that page of the index: of a plane, or (-1) of none. */
+  /** An entry on the index page of a plane, or (-1) of no plane. */
   async findOn(plane: number, path: string, signal?: AbortSignal): Promise<EntryRef> {
     const entry = (await this.indexPage_(plane, signal)).get(path);
     if (!entry) throw new FormatError(this.store.name, path, 'an entry of the index', 'none');
@@ -166,11 +166,11 @@ export class PackageDocuments {
   quality(signal?: AbortSignal): Promise<QualityTable> {
     return this.document_('quality', signal, (m) => this.readChecked(m.quality, { kind: 'quality', signal }));
   }
-  /** What the package was made from and with, as JSON. */
+  /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
   }
-  /** Reads index, tables, textures.json and quality.json by one request, where they are small; false where not. */
+  /** Reads index, tables, textures.json and quality.json by one request where these documents are small; false where not. */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
     const { index, quality } = this.manifest;
     const bytes = quality.offset + quality.bytes - index.offset;
@@ -224,7 +224,7 @@ export class PackageDocuments {
   protected planeDocument_(plane: number): PlaneDocument {
     return this.planes_.get(plane)!;
   }
-  /** What decisions about textures are made from, with the tables of these planes. */
+  /** Data that decisions about textures are made from, with the tables of these planes. */
   async data(planes?: readonly number[], signal?: AbortSignal): Promise<PackageData> {
     const [textures, tables] = [await this.textures(signal), await this.tables(planes, signal)];
     return { manifest: this.manifest, textures, tables };

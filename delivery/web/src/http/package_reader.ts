@@ -17,7 +17,7 @@ import { PackageDocuments, type PlaneFiles } from './package_documents';
 import type { RequestKind, RequestRecord } from './requests';
 import type { ReadOptions, StoreMode } from './store';
 
-/** Of a package's opening. */
+/** Options of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {
   /**
    * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges, and the tree
@@ -83,7 +83,7 @@ export class PackageReader extends PackageDocuments {
 
   // ---- meshes and previews
 
-  /** Reads the range of the first picture, so that what it holds needs no further request. */
+  /** Reads the range of the first picture, so that the mesh and the previews in that range need no further request. */
   firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
     const read = async (): Promise<void> => {
       if (this.form !== 'range') return;
@@ -94,26 +94,26 @@ export class PackageReader extends PackageDocuments {
     };
     return this.readOnce_('picture', read, how.signal);
   }
-  /** The GLB of a scale; needs no index. */
+  /** The GLB of a scale; no index is needed. */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
-  /** preview/PPP.jpg of a full-size plane. */
+  /** The preview of a full-size plane, preview/PPP.jpg. */
   async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
     const read = async (): Promise<Uint8Array> =>
       this.readChecked(await this.findWithoutPlane_(previewPath(plane), signal), { kind: 'preview', signal });
     return this.readOnce_(`preview/${plane}`, read, signal);
   }
-  /** See firstPicture. */
+  /** Keeps a preview that came with the first picture. */
   keepPreview(plane: number, bytes: Uint8Array): void {
     this.keepRead_(`preview/${plane}`, Promise.resolve(bytes));
   }
 
   // ---- fragments
 
-  /** What the fragments of a rung have in common. */
+  /** The table stream of a rung, which the rung's fragments share. */
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { tableBytes } = await this.planeTables(plane, signal);
     const { tableStreams } = this.planeDocument_(plane);
@@ -160,7 +160,7 @@ export class PackageReader extends PackageDocuments {
     return joinFragment(codec, await this.tableStream(plane, first, signal), streams);
   }
 
-  /** What `unpack --fragments files` added to a tree; undefined where there is nothing of the kind. */
+  /** Files of fragments that `unpack --fragments files` added to a tree; undefined where there are none. */
   async fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
     if (this.form !== 'files') return undefined;
     return this.readOnce_('files', async () => (await withoutRanges()).readFragmentList(this.store, signal), signal);
@@ -184,12 +184,12 @@ export class PackageReader extends PackageDocuments {
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
     return (await this.splitStreamStart(0, signal))?.subarray(0, this.manifest.stream!.headBytes);
   }
-  /** The head and so many bytes behind it (or all there are); the head is checked. */
+  /** The head of the vertex-split stream and so many bytes behind the head (or all there are); the head is checked. */
   async splitStreamStart(more: number, signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const { stream: s } = this.manifest;
     return s && this.readWithHead_(s, Math.min(s.bytes, s.headBytes + more), { kind: 'stream', signal });
   }
-  /** Bytes of the vertex-split stream; InputError where there is none. Whoever takes blocks of it checks them by its head. */
+  /** Bytes of the vertex-split stream; InputError where there is none. The caller checks blocks by the stream's head. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const { stream } = this.manifest;
     if (!stream) throw new InputError(this.store.name, '', 'a stream of vertex splits', 'none');

@@ -8,18 +8,18 @@ import { Answer, shownUrl, whatCame } from './requests';
 import { retriesOf } from './retries';
 import type { PackageStore, ReadOptions } from './store';
 
-/** Whether an answer from there is read without asking the server first (CORS). */
+/** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */
 function sameOrigin(url: string): boolean {
   const here = globalThis.location;
   return !here || new URL(url, here.href).origin === here.origin;
 }
 
-/** Ranges of a container. What was read is not asked for again, unless it was read `once`. */
+/** Reads ranges of a container. Bytes that were read are not asked for again, unless they were read `once`. */
 export class RangeStore implements PackageStore {
   readonly form = 'range';
-  /** What a server said that knows no ranges. */
+  /** Error of a server that knows no ranges. */
   noRanges?: InputError;
-  private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last one first
+  private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
   private readonly mirrors_: Mirrors;
 
   constructor(urls: readonly string[], client: HttpClient) {
@@ -34,7 +34,7 @@ export class RangeStore implements PackageStore {
   }
 
   async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
-    if (bytes === 0) return new Uint8Array(0); // as WebP's tables are; no range says that
+    if (bytes === 0) return new Uint8Array(0); // WebP's tables are empty; no range header can say that
     const end = begin + bytes;
     const part = this.parts_.find((p) => p.begin <= begin && p.begin + p.bytes.length > begin);
     let got: Uint8Array | undefined;
@@ -47,7 +47,7 @@ export class RangeStore implements PackageStore {
         if (have === bytes) return got;
       } catch (error) {
         if (!(error instanceof FormatError) || !how.verify) throw error;
-        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // what was known may be what is bad
+        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // the remembered bytes may be the bad ones
         got = undefined;
       }
     got ??= await this.fetch_(begin, bytes, how);
@@ -62,18 +62,18 @@ export class RangeStore implements PackageStore {
       return got;
     });
   }
-  /** A cut transfer goes on where it broke. */
+  /** Fetches from one mirror; a cut transfer goes on where it broke. */
   private async fetchFrom_(m: Mirror, asking: Asking, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): Promise<Uint8Array> {
     const { client } = this.mirrors_;
-    const again = retriesOf(client, signal);
+    const mayTryAgain = retriesOf(client, signal);
     const chunks: Uint8Array[] = [];
     for (let have = 0; ; ) {
-      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before room is made
+      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before memory is taken
       const before = have;
       const range = { offset: offset + have, bytes: bytes - have };
       const a = await client.get(m.url, {
         range, kind, signal, maxBytes: range.bytes, ...asking,
-        ifRange: sameOrigin(m.at) ? m.etag : '', // from another origin it would cost a preflight request
+        ifRange: sameOrigin(m.at) ? m.etag : '', // to another origin the header would cost a preflight request
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
@@ -85,7 +85,7 @@ export class RangeStore implements PackageStore {
         have += a.body.length;
         if (a.complete) return concat(chunks);
       }
-      if ((asking.elsewhere && have === before) || !(await again(a)))
+      if ((asking.othersLeft && have === before) || !(await mayTryAgain(a)))
         throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206', whatCame(a));
     }
   }
@@ -93,11 +93,11 @@ export class RangeStore implements PackageStore {
     if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
   }
 
-  /** Whether it is of the file that reading began with, and what was asked for. */
+  /** Requires an answer from the file that reading began with, and with the range that was asked for. */
   private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
     this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');
     m.etag ||= etag;
-    // Another origin may keep the header to itself; then only the length tells.
+    // Another origin may keep Content-Range to itself; then the length alone is checked.
     if (!range) {
       this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
       return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`, body.length);

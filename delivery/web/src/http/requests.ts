@@ -1,6 +1,6 @@
 import { FormatError, InputError } from '../format/errors';
 
-/** What bytes are for; of request events and of the bytes counted by kind. */
+/** Purpose of a request's bytes, in request events and in bytes counted by kind. */
 export type RequestKind =
   | 'manifest'
   | 'index'
@@ -31,24 +31,24 @@ export interface RequestRecord {
   ok: boolean;
 }
 
-/** What came back; the body holds at most what was asked for. */
+/** Answer to a request; the body holds no more bytes than were asked for. */
 export interface Answer {
-  /** 0: no answer at all, see problem. */
+  /** HTTP status; 0: no answer at all, see problem. */
   status: number;
   problem: string;
   body: Uint8Array;
-  /** Where it came from: behind redirections. */
+  /** URL of the answer, behind redirections. */
   url: string;
-  /** Strong ones only. */
+  /** Strong ETag; '' = none. */
   etag: string;
-  /** Of Content-Range, when it may be read: first and last byte, bytes of the file. */
+  /** Content-Range, when that header may be read: first and last byte, bytes of the file. */
   range?: number[];
   /** The body ended as it should. */
   complete: boolean;
   tooLong: boolean;
 }
 
-/** Of one GET. */
+/** Options of one GET. */
 export interface GetOptions {
   range?: { offset: number; bytes: number };
   ifRange?: string;
@@ -56,28 +56,28 @@ export interface GetOptions {
   kind: RequestKind;
   signal?: AbortSignal;
   stallTimeoutS?: number;
-  /** Called with the bytes that have come so far. */
+  /** Hears how many bytes have come so far. */
   onBytes?: (received: number) => void;
   reload?: boolean;
 }
 
-/** First and last byte, bytes of the file; undefined where it does not say so. */
+/** First and last byte, bytes of the file, from a Content-Range; undefined where the text is none. */
 export function contentRange(text: string): Answer['range'] {
   const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
   return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
 }
 
-/** https://host/path without user, password and query, for messages. */
+/** A URL without user, password and query, for messages. */
 export function shownUrl(url: string): string {
   return url.replace(/^(\w+:\/\/)[^/@]*@/, '$1').replace(/[?#].*$/, '');
 }
 
-/** Whether what could not be had will not be there later on, either. */
+/** Whether an error says that asking later is of no use, either. */
 export function isForGood(error: unknown): boolean {
   return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
 }
 
-/** For messages. */
+/** An answer's problem or status, for messages. */
 export function whatCame(a: Answer): string {
   return a.problem || (a.status > 0 ? `status ${a.status}` : 'no answer');
 }

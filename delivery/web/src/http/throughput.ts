@@ -1,10 +1,10 @@
-/** What transfers that have ended say of a connection or a group of them: delivery/cpp/throughput.h. */
+/** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/throughput.h. */
 export interface TransferRate {
   /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
   add(bytes: number, seconds: number): void;
   /** Bytes over seconds of at most so many samples (default 10). */
   recentBytesS(samples?: number): number;
-  /** The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0. */
+  /** The mean of the last `seconds` > 0 of transfers; time before the first transfer counts with beta_0. */
   meanBytesS(seconds: number): number;
 }
 
@@ -47,7 +47,7 @@ export function transferRate(initialBytesS: number): TransferRate {
  */
 export type Estimator = 'last' | 'harmonic' | 'ewma';
 
-/** Of a Throughput. */
+/** Options of a Throughput. */
 export interface ThroughputOptions {
   estimator: Estimator;
   /** 1 .. 64 */
@@ -59,7 +59,7 @@ export interface ThroughputOptions {
   /** beta_0, until there is a sample; > 0. */
   initialBytesS: number;
 }
-/** Those of delivery/cpp. */
+/** The options of delivery/cpp. */
 export const defaultThroughput: ThroughputOptions = {
   estimator: 'harmonic',
   samples: 10,

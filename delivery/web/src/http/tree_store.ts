@@ -8,14 +8,14 @@ import { GetOptions, shownUrl, whatCame } from './requests';
 import { retriesOf } from './retries';
 import type { PackageStore, Place, ReadOptions } from './store';
 
-/** A whole file; with retries, unless somebody else has it. */
-export async function getWhole(client: HttpClient, url: string, how: GetOptions, elsewhere: boolean): Promise<Uint8Array> {
-  const again = retriesOf(client, how.signal);
+/** Gets a whole file; with retries, unless another mirror may have the file. */
+export async function getWhole(client: HttpClient, url: string, how: GetOptions, othersLeft: boolean): Promise<Uint8Array> {
+  const mayTryAgain = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
     if (a.status === 200 && a.complete) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
-    if (elsewhere || !(await again(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
+    if (othersLeft || !(await mayTryAgain(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
   }
 }
 
@@ -24,7 +24,7 @@ export class TreeStore implements PackageStore {
   readonly form = 'files';
   private readonly files_ = new Map<string, Promise<Uint8Array>>();
   private readonly mirrors_: Mirrors;
-  private readonly from_ = new Map<string, Mirror>(); // who was asked last
+  private readonly from_ = new Map<string, Mirror>(); // by path: the mirror that was asked last
 
   constructor(roots: readonly string[], client: HttpClient) {
     this.mirrors_ = new Mirrors(roots, client);
@@ -48,17 +48,17 @@ export class TreeStore implements PackageStore {
       } catch (error) {
         if (!(error instanceof FormatError)) throw error;
         this.files_.delete(place.path);
-        // Damaged on the way, perhaps: elsewhere, or once more, past caches.
+        // The file may be damaged on the way: it is asked for at another mirror, or once more, past caches.
         const from = this.from_.get(place.path);
         if (!(from && this.mirrors_.failed(from)) && reload) throw error;
       }
   }
-  /** A file of the tree; a failed one may be asked for again. */
+  /** A file of the tree; a file that failed may be asked for again. */
   private file_(path: string, maxBytes: number, how: ReadOptions, reload = false): Promise<Uint8Array> {
     const known = this.files_.get(path);
     if (known)
       return known.catch((error: unknown) => {
-        if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload); // another asker's
+        if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload); // another asker cancelled
         throw error;
       });
     if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
@@ -72,7 +72,7 @@ export class TreeStore implements PackageStore {
     return wanted;
   }
   private get_(m: Mirror, path: string, maxBytes: number, { kind, signal, onBytes }: ReadOptions, asking: Asking): Promise<Uint8Array> {
-    return getWhole(this.mirrors_.client, joinUrl(m.url, path), { kind, signal, onBytes, maxBytes, ...asking }, asking.elsewhere);
+    return getWhole(this.mirrors_.client, joinUrl(m.url, path), { kind, signal, onBytes, maxBytes, ...asking }, asking.othersLeft);
   }
   extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
     return this.mirrors_.ask(Math.min(maxBytes, bootstrapBytes), async (m, asking) => {
@@ -81,7 +81,7 @@ export class TreeStore implements PackageStore {
         await how.verify?.(got);
         return got;
       } catch (error) {
-        // Nobody has to have it.
+        // Extra files need not exist.
         if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found)) return undefined;
         throw error;
       }

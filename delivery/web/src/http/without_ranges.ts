@@ -12,7 +12,7 @@ import { openBytes } from './whole_store';
 
 export { openBytes };
 
-/** https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+/** URL of the tree beside a container: https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
 export function treeUrl(url: string): string {
   const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
   return m ? `${m[1]}/${m[2] ?? ''}` : '';
@@ -23,7 +23,7 @@ async function opened(store: PackageStore, signal?: AbortSignal): Promise<Opened
 }
 const treesOf = (urls: readonly string[]): string[] => urls.map(treeUrl).filter((root) => root !== '');
 
-/** A tree, by its own URL or that of the container beside it. */
+/** Opens a tree by its own URL, or by the URL of the container beside the tree. */
 export function openTree(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
   const isTree = urls[0].replace(/[?#].*$/, '').endsWith('/');
   const roots = isTree ? urls : treesOf(urls);
@@ -32,7 +32,7 @@ export function openTree(urls: readonly string[], client: HttpClient, signal?: A
   return opened(new TreeStore(roots, client), signal);
 }
 
-/** The tree beside a container, or the whole container. */
+/** Opens the tree beside a container, or the whole container. */
 export async function openWithoutRanges(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
   const roots = treesOf(urls);
   if (roots.length > 0) {
@@ -43,9 +43,9 @@ export async function openWithoutRanges(urls: readonly string[], client: HttpCli
       if (!(error instanceof InputError)) throw error;
     }
   }
-  return new Mirrors(urls, client).ask(bootstrapBytes, async (m, { elsewhere, ...asking }) => {
+  return new Mirrors(urls, client).ask(bootstrapBytes, async (m, { othersLeft, ...asking }) => {
     const how = { kind: 'other', signal, maxBytes: client.options.maxWholeBytes, ...asking } as const;
-    const bytes = await getWhole(client, m.url, how, elsewhere);
+    const bytes = await getWhole(client, m.url, how, othersLeft);
     return opened(openBytes(bytes, shownUrl(m.url)), signal);
   });
 }

@@ -6,7 +6,7 @@ import { sampleTriangles } from './scale_parts';
 /** Triangles whose first corners are looked at. */
 const mostPoints = 600;
 
-/** How a camera shows the object: displayed height in device px, and what of it is seen (Fig. 7.5). */
+/** How a camera shows the object: displayed height in device px, and the visible part of the object (Fig. 7.5). */
 export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, renderer: WebGLRenderer): Display {
   object.updateWorldMatrix(true, true);
   camera.updateWorldMatrix(true, false);
@@ -18,9 +18,9 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   const screen = new Box3(new Vector3(-1, -1, -Infinity), new Vector3(1, 1, Infinity));
   const rect = new Box3();
   let [near, outside, all] = [Infinity, 0, 0];
-  const see = (p: Vector3): void => {
+  const countPoint = (p: Vector3): void => {
     near = Math.min(near, eye.distanceTo(p));
-    // A point behind the eye makes it larger than any screen.
+    // A point behind the eye makes the object larger than any screen.
     const behind = p.applyMatrix4(camera.matrixWorldInverse).z >= 0 && !orthographic;
     p.applyMatrix4(camera.projectionMatrix);
     if (behind) for (const far of [-1e9, 1e9]) rect.expandByPoint(p.setScalar(far));
@@ -28,19 +28,19 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
     ++all;
     if (!screen.containsPoint(p)) ++outside;
   };
-  // What is cut off of the bounds alone is nothing; until a mesh is there, the bounds decide.
+  // The mesh decides about what is cut off; until a mesh is there, the corners of its bounding box decide.
   const p = new Vector3();
   sampleTriangles(object, mostPoints, ({ geometry, matrixWorld }, [corner]) =>
-    see(p.fromBufferAttribute(geometry.attributes.position, corner).applyMatrix4(matrixWorld)));
+    countPoint(p.fromBufferAttribute(geometry.attributes.position, corner).applyMatrix4(matrixWorld)));
   for (let k = 0, none = all === 0; none && k < 8; ++k) {
     p.set(k & 1, (k >> 1) & 1, k >> 2).multiply(box.getSize(new Vector3())).add(box.min);
-    see(p.applyMatrix4(object.matrixWorld));
+    countPoint(p.applyMatrix4(object.matrixWorld));
   }
   const clipped = !screen.containsBox(rect);
   const seen = rect.intersect(screen).getSize(new Vector3());
   const part = { widthPx: (seen.x * size.x) / 2, heightPx: (seen.y * size.y) / 2, clipped };
   const middle = eye.distanceTo(box.getCenter(new Vector3()).applyMatrix4(object.matrixWorld));
-  // The more is cut off, the more what is near the eye decides, not the object's middle.
+  // The more is cut off, the more the points near the eye decide, not the object's middle.
   const share = Math.min(1, (2 * outside) / all);
   const distance = middle + share * Math.min(0, Math.max(near, height / 50) - middle);
   // The projection tells how much of half the picture a length takes: at the distance 1, or at all.

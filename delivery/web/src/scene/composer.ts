@@ -4,24 +4,24 @@ import { PlaneStorage } from './plane_storage';
 import type { TextureInfo } from '../format/textures';
 
 /**
- * One texture of the model: fragments are uploaded into it where they belong, and materials use views of it, which
- * share its storage on the GPU as long as their samplers are alike.
+ * One texture of the model: fragments are uploaded into the texture where they belong. Materials use views of the texture, which
+ * share storage on the GPU as long as their samplers are alike.
  */
 export interface PlaneComposer extends ComposedPlane {
   readonly info: TextureInfo;
-  /** Fragments that have come, be it before they can be shown. */
+  /** Fragments that have come, shown or not yet. */
   readonly come: Set<number>;
-  /** Every pixel is something: fragments may be shown. */
+  /** Every pixel has a colour: fragments may be shown. */
   filled?: boolean;
   ready?: Promise<void>;
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture;
   /** Fills the whole with another texture, scaled bilinearly. */
   fill(from: Texture): void;
-  /** Pixels at a place of level 0 (multiples of 16), and the same in the levels below it; what reaches beyond the image is left out. */
+  /** Uploads pixels at a place of level 0 (multiples of 16), and the same in the levels below. Pixels beyond the image are left out. */
   upload(levels: readonly ImageBitmap[], x: number, y: number): void;
   uploadFragment(levels: readonly ImageBitmap[], fragment: number, rung: number): void;
-  /** The smallest levels follow what has been uploaded. */
+  /** The smallest levels follow the uploads. */
   updateMips(): void;
   /** RGBA bytes, row 0 at the top. */
   read(): Uint8Array;

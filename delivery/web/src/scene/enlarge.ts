@@ -3,9 +3,9 @@ import { ownLevels } from './plane_storage';
 import type { UploadQueue } from './upload_queue';
 import type { WorkerPool } from '../worker/pool';
 
-// Where the processor draws for want of a GPU, and for previews of their own; loaded when it is needed.
+// Enlarging for machines whose processor draws for want of a GPU, and for previews of coverage; loaded when needed.
 
-/** Of a piece of an enlarged preview, which is uploaded in one go; and pieces under way. */
+/** Pixels of a piece of an enlarged preview, which is uploaded in one go; and pieces under way at once. */
 const stripPx = 1 << 18;
 const mostPieces = 4;
 
@@ -17,8 +17,8 @@ interface Piece {
 }
 
 /**
- * A preview enlarged off the main thread, piece by piece: GPUs that are none take seconds for a large texture. Fragments that have
- * come meanwhile need none.
+ * Enlarges a preview off the main thread, piece by piece: a processor that draws takes seconds for a large texture. Fragments that have
+ * come meanwhile need no preview.
  */
 export async function enlarge(
   next: PlaneComposer,
@@ -37,7 +37,7 @@ export async function enlarge(
   await Promise.all(running);
 }
 
-/** Runs of neighbours that have not come when it is their turn. */
+/** Runs of neighbouring fragments that have not come when the turn of the run comes. */
 function* pieces(next: PlaneComposer): Generator<Piece> {
   const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
   const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));

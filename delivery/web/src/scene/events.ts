@@ -9,9 +9,9 @@ export class Emitter<Events> {
   }
   /** Every event gets the time. */
   emit<K extends keyof Events>(name: K, event: Omit<Events[K], 'at'>): void {
-    for (const [its, listener] of this.listeners_)
+    for (const [listenedTo, listener] of this.listeners_)
       try {
-        if (its === name) listener({ ...event, at: performance.now() } as never);
+        if (listenedTo === name) listener({ ...event, at: performance.now() } as never);
       } catch (error) {
         console.error(error);
       }

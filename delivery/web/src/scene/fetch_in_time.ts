@@ -8,16 +8,16 @@ import type { LoadContext } from './load_context';
 import { playPlan } from './play_plan';
 import type { Wish } from './transfers';
 
-/** What decoding and uploading take after the last byte: 4 ms, or 11, on a machine whose GPU is its processor. */
+/** Decoding and uploading take so long after the last byte: 4 ms, or 11 on a machine without a GPU, were measured. */
 export const composeS = 0.015;
-/** Fragments that are this late, of the limit, are given up. */
+/** Fragments that are later than this share of the limit are given up. */
 const mostLate = 0.02;
-/** Less of the limit than this, beside a round trip, is not worth another request. */
+/** A rest of less than this share of the limit, a round trip taken off, is not worth another request. */
 const leastRest = 0.004;
-/** Of the bytes that throughput promises. */
+/** Share of the bytes promised by the throughput that a request may count on. */
 const certain = 0.85;
 
-/** Of the plan for fragments in so many seconds. */
+/** Options of the plan for fragments in so many seconds. */
 export function timePlanOptions({ options, reader, beta0 }: LoadContext, timeLimitS: number): TimePlanOptions {
   const { policy, order = 'credit' } = options;
   return { policy: policy as Policy, order, timeLimitS, rttS: reader.client.latencyS, initialBytesS: Math.max(1, beta0) };
@@ -32,7 +32,7 @@ export class FetchInTime {
     private readonly fetching_: FragmentFetch,
   ) {}
 
-  /** As the plan estimates it now. */
+  /** The plan's estimate now. */
   throughputBytesS(): number | undefined {
     return this.plan_?.throughputBytesS();
   }
@@ -71,7 +71,7 @@ export class FetchInTime {
       skipped: s.rung < 0,
     });
   }
-  /** What a plan leaves of the time, because rungs do not fit it to the byte, goes into upgrades: ever smaller requests. */
+  /** Upgrades take the rest of the time, in ever smaller requests: rungs do not fit a plan to the byte. */
   private async spendRest_(list: FragmentList, plan: UncheckedPlan): Promise<void> {
     const { limitS, signal, reader: { client } } = this.load_;
     for (;;) {

@@ -1,6 +1,6 @@
 import { isForGood } from '../http/requests';
 
-/** A fragment at a rung: on its way, not to be had for now, or never. */
+/** A fragment at a rung is on its way, cannot be had for now, or cannot be had ever. */
 type Fate = 'comes' | 'lost' | 'gone';
 /** A fragment of a plane. */
 export interface FragmentPlace {
@@ -11,14 +11,14 @@ const keyOf = (f: FragmentPlace, rung: number): string => `${f.plane}/${f.fragme
 
 /** What becomes of fragments that were asked for, by fragment and rung. */
 export class FragmentFates {
-  /** How many could not be had so far. */
+  /** Number of fragments that could not be had so far. */
   losses = 0;
   private readonly fates_ = new Map<string, Fate>();
 
   asked(f: FragmentPlace, rung: number): void {
     this.fates_.set(keyOf(f, rung), 'comes');
   }
-  /** It has come, or nobody waits for it any more. */
+  /** The fragment has come, or nobody waits for the fragment any more. */
   ended(f: FragmentPlace, rung: number): void {
     this.fates_.delete(keyOf(f, rung));
   }
@@ -29,11 +29,11 @@ export class FragmentFates {
   isComing(f: FragmentPlace, rung: number): boolean {
     return this.fates_.get(keyOf(f, rung)) === 'comes';
   }
-  /** Not to be asked for. */
+  /** Whether the fragment must not be asked for. */
   isRefused(f: FragmentPlace, rung: number): boolean {
     return (this.fates_.get(keyOf(f, rung)) ?? 'comes') !== 'comes';
   }
-  /** What could not be had for a while may be asked for again. */
+  /** Fragments that could not be had for a while may be asked for again. */
   allowLostAgain(): void {
     this.fates_.forEach((fate, key) => fate === 'lost' && this.fates_.delete(key));
   }

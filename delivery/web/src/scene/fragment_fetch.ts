@@ -13,7 +13,7 @@ import { seenShares } from './visibility';
 export const requestBytes = 256 << 10;
 const gapBytes = 1024;
 
-/** The fragments of a load: what may be fetched, fetching it, and what became of it. */
+/** The fragments of a load: which may be fetched, fetching them, and what became of them. */
 export class FragmentFetch {
   readonly fates = new FragmentFates();
   readonly transfers: Transfers;
@@ -32,20 +32,20 @@ export class FragmentFetch {
   pending(): number {
     return this.transfers.pending + this.planes.pending;
   }
-  /** Waits until all that has come (but so many) is in its texture. */
+  /** Waits until all fragments that have come, but so many, are in their textures. */
   async composed(but = 0): Promise<void> {
     for (; this.pending() > but; await sleepS(0.004)) throwIfAborted(this.load_.signal);
     if (but === 0) this.planes.finishMips();
   }
-  /** A rung comes as a whole, whatever is asked for: a tree without files of fragments. */
+  /** Whether rungs come as a whole, whichever fragment is asked for: from a tree without files of fragments. */
   wholeRungs(): boolean {
     const [first] = this.planes.all();
     return this.load_.reader.form === 'files' && !!first && !this.transfers.filesOf(first.plane).complete;
   }
 
   /**
-   * The list of what may be fetched of the planes shown, with the bytes that fetching takes. Losses count by what the camera sees of a
-   * fragment, the rest of it by `unseen`.
+   * The list of the fragments of the planes shown, with the bytes that fetching takes. A fragment's losses count by the share that the
+   * camera sees, and by `unseen` at least.
    */
   async listOf(scale: number, unseen: number): Promise<FragmentList> {
     const { planes, transfers } = this;
@@ -71,7 +71,7 @@ export class FragmentFetch {
     return view.camera && seenShares(info, object, view.camera, shows);
   }
 
-  /** How many have come. */
+  /** Fetches fragments; gives the number that have come. */
   async fetch(wishes: readonly Wish[], until = this.load_.signal): Promise<number> {
     for (const w of wishes) this.fates.asked(w, w.rung);
     let arrived = 0;
@@ -82,7 +82,7 @@ export class FragmentFetch {
   }
   lost(wish: Wish, error: unknown): void {
     this.fates.ended(wish, wish.rung);
-    if (isAbort(error) || this.load_.pool.none) return;
+    if (isAbort(error) || this.load_.pool.isUnavailable) return;
     this.fates.failed(wish, wish.rung, error);
     this.load_.fail(error, `fragment ${wish.fragment} of plane ${wish.plane} at rung ${wish.rung}`);
   }

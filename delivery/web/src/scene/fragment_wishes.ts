@@ -5,14 +5,14 @@ import type { FragmentFates } from './fragment_fates';
 import type { ShownPlanes } from './shown_planes';
 import type { Wish } from './transfers';
 
-/** What there is, and what is on its way. */
-export interface Held {
+/** Fragments that are there, and fragments on their way. */
+export interface HeldFragments {
   planes: ShownPlanes;
   fates: FragmentFates;
 }
 
-/** Upgrades that save most for these bytes, by plane and importance: over what there will be when all that is under way has come. */
-export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: number, { planes, fates }: Held): Wish[] {
+/** Upgrades that save most for these bytes, by plane and importance. Fragments under way count as if they had come. */
+export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: number, { planes, fates }: HeldFragments): Wish[] {
   const curves = offers.map(({ bytes, loss }, offer) => {
     const f = fragments[offer];
     let from = bytes.length - 1;
@@ -24,8 +24,8 @@ export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: nu
   return fragments.map((f, offer): Wish => ({ ...f, offer, rung: ways[offer] - 1 })).filter((w) => w.rung >= 0);
 }
 
-/** Every fragment at this rung (left out: the highest); at the next below where that one cannot be had. */
-export function allWishes({ offers, fragments }: FragmentList, only: number | undefined, { planes, fates }: Held): Wish[] {
+/** Every fragment at this rung (left out: the highest), or at the next rung below that can be had. */
+export function allWishes({ offers, fragments }: FragmentList, only: number | undefined, { planes, fates }: HeldFragments): Wish[] {
   const wishes = fragments.map((f, offer): Wish => {
     let rung = Math.min(only ?? Infinity, offers[offer].bytes.length - 1);
     while (fates.isRefused(f, rung)) --rung;
@@ -34,8 +34,8 @@ export function allWishes({ offers, fragments }: FragmentList, only: number | un
   return wishes.filter((w) => w.rung >= 0 && (w.replaces ? planes.rungOf(w) !== w.rung : planes.rungOf(w) < w.rung));
 }
 
-/** What saves most for these bytes, up to where a fragment's 1 - SSIM is no more than `enoughDssim`. Cuts the offers of the list off there. */
-export function bestWishes(list: FragmentList, mostBytes: number, enoughDssim: number, { tables }: PackageData, held: Held): Wish[] {
+/** Upgrades that save most for these bytes, to where a fragment's 1 - SSIM is no more than `enoughDssim`. The list's offers are cut off there. */
+export function bestWishes(list: FragmentList, mostBytes: number, enoughDssim: number, { tables }: PackageData, held: HeldFragments): Wish[] {
   list.offers.forEach((o, i) => {
     const { plane, fragment } = list.fragments[i];
     const { rungQuality, dssim, columns, rows } = tables[plane]!;

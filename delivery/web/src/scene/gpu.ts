@@ -4,10 +4,10 @@ import { nowS, sleepS } from '../http/clock';
 import type { LoadContext } from './load_context';
 import { texturesOf } from './scale_parts';
 
-/** A picture that waits for its programs no longer than this. */
+/** The first picture waits for its programs no longer than this. */
 const mostCompileS = 0.5;
 
-/** Resolves when the GPU has done all that it was asked for, or after `mostS`: what asks it for an answer then does not hold the page up. */
+/** Resolves when the GPU has done all its work, or after `mostS`. A question to a GPU without work does not hold the page up. */
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
   const gl = renderer.getContext() as WebGL2RenderingContext;
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -16,38 +16,38 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
   gl.deleteSync(fence);
 }
 
-/** Each program once ready and asked for what it holds, in a turn of its own: in the first frame with it the page would wait for the linker. */
-async function programsReady(renderer: WebGLRenderer, mostS: number, goOn: () => void): Promise<void> {
+/** Waits for each program, then asks the program for its uniforms, in a turn of its own: the first frame would wait for the linker otherwise. */
+async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
   for (const program of [...(renderer.info?.programs ?? [])] as (WebGLProgram & { isReady?(): boolean })[]) {
     do {
       await sleepS(0.004);
-      goOn();
+      stopIfCancelled();
     } while (program.isReady?.() === false && nowS() < end);
     program.getUniforms();
   }
 }
 
-/** Programs and previews before they are first drawn with, each in a turn of its own: the page goes on while the GPU's process makes them. */
+/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on while the GPU's process makes them. */
 export async function readyToDraw(load: LoadContext, scene: Object3D, shape: Object3D): Promise<void> {
   const { signal, options: { renderer }, materials } = load;
-  const goOn = (): void => throwIfAborted(signal);
+  const stopIfCancelled = (): void => throwIfAborted(signal);
   let root = scene;
   while (root.parent) root = root.parent;
   await sleepS(0);
-  goOn();
+  stopIfCancelled();
   renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
   await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
-  await programsReady(renderer, mostCompileS, goOn);
+  await programsReady(renderer, mostCompileS, stopIfCancelled);
   for (const [, texture] of materials.all.flatMap(texturesOf)) {
     await sleepS(0);
-    goOn();
+    stopIfCancelled();
     renderer.initTexture(texture);
   }
   await gpuIdle(renderer, mostCompileS);
 }
 
-/** Nothing but the processor draws: what a GPU does at once takes it seconds, and workers less. */
+/** Whether the processor draws for want of a GPU: the processor takes seconds for what a GPU does at once, and workers take less. */
 export async function isSoftware(renderer: WebGLRenderer): Promise<boolean> {
   await gpuIdle(renderer);
   const gl = renderer.getContext();

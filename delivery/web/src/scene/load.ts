@@ -8,7 +8,7 @@ import { ScaleSource } from './scale_source';
 import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
 
-/** Everything about one package in one scene, from `startS` on; `forget` is called at its end. */
+/** Loads one package into one scene, from `startS` on; `forget` is called when the load is disposed of. */
 export function loadModel(
   reader: PackageReader,
   scene: Object3D,
@@ -58,7 +58,7 @@ class ModelLoad {
     private readonly forget_: () => void,
   ) {
     const { reader, options, materials, pool, signal, disposal } = context;
-    pool.onNone = (error) => context.fail(error, 'workers');
+    pool.onUnavailable = (error) => context.fail(error, 'workers');
     this.source_ = new ScaleSource({
       reader, options, materials, pool, signal,
       added: () => this.textures?.showInNewMaterials(),
@@ -105,13 +105,12 @@ class ModelLoad {
     const { scale, glb } = manifest.scales.at(-1)!;
     context.expectedBytes = client.received + glb.bytes;
     context.enter('first-picture');
-    // On a slow link nothing shares it with the first picture. What comes next is asked for while the GPU
-    // prepares for it.
+    // On a slow link nothing shares the link with the first picture. The documents are asked for while the GPU prepares for the picture.
     const { shape, shown } = this.scale_.load(scale);
     this.coming_ = Promise.all([import('./texture_load'), shape]).then(([part]) => part.openTextureLoad(context, this.scale_, this.source_));
     this.coming_.catch(() => undefined);
     await shown;
-    this.update(context.view.camera ?? context.options.camera); // by what is there, not by its bounds alone
+    this.update(context.view.camera ?? context.options.camera); // by the mesh that is there, not by its bounding box alone
     context.emit('first-picture', { scale, bytes: client.received });
   }
   private async showInTime_(): Promise<void> {
@@ -177,7 +176,7 @@ class ModelLoad {
   private refineUntilDone_(): Promise<void> {
     return (this.refining_ ??= this.refineRounds_());
   }
-  /** Until all that is wanted is there. */
+  /** Refines until every wanted fragment is there. */
   private async refineRounds_(): Promise<void> {
     const { context } = this;
     try {
@@ -187,7 +186,7 @@ class ModelLoad {
         if (!context.signal.aborted) await this.refineOnce_(this.textures!);
       } while (this.refineAgain_ && !context.signal.aborted);
     } finally {
-      this.refining_ = undefined; // what is asked for from now on, by listeners too, is a turn of its own
+      this.refining_ = undefined; // a request from now on, by listeners too, is a turn of its own
     }
     if (context.signal.aborted) return;
     context.phase = 'done';
@@ -206,7 +205,7 @@ class ModelLoad {
       this.context.fail(error, 'refining');
     }
   }
-  /** three.js makes geometries and pictures of its own anew; what was composed is gone. */
+  /** After a lost context: three.js makes its geometries and pictures anew, but composed textures are gone. */
   private restore_(): void {
     const { context } = this;
     context.emit('context', { lost: false });

@@ -8,23 +8,23 @@ import { displayOf } from './camera';
 import { Emitter } from './events';
 import { MaterialSet } from './scale_parts';
 
-/** A change of scale or plane has to be wanted by this factor of displayed height. */
+/** The displayed height must change by this factor before another scale or plane is wanted. */
 export const hysteresis = 1.1;
-/** Limits beyond are none: timers and plans end there. */
+/** A longer time limit counts as none: timers and plans end there. */
 const longestS = 1e5;
 /** Displayed height where nobody says one, device px. */
 const defaultHeightPx = 1000;
 
-/** What was chosen instead of what display and time ask for. */
+/** Scale and rung that were chosen by hand, whatever display and time ask for. */
 export interface Override {
   scale?: number;
   rung?: number;
 }
 
-/** What the parts of one load share: its options, its state, and who hears of it. */
+/** The shared parts of one load: options, state, and events. */
 export class LoadContext {
   readonly materials = new MaterialSet();
-  /** What stands in the scene. */
+  /** The object in the scene. */
   readonly object = new Group();
   readonly events = new Emitter<LoadEvents>();
   readonly limitS: number;
@@ -63,12 +63,12 @@ export class LoadContext {
   get resting(): boolean {
     return this.phase === 'refining' || this.phase === 'done';
   }
-  /** Since the load's start. */
+  /** Seconds since the load's start. */
   elapsedS(): number {
     return nowS() - this.startS_;
   }
 
-  // ---- who hears of it
+  // ---- events
 
   emit<K extends keyof LoadEvents>(name: K, event: Omit<LoadEvents[K], 'at'>): void {
     this.events.emit(name, event);
@@ -95,7 +95,7 @@ export class LoadContext {
 
   // ---- what is wanted
 
-  /** A scale that the package has, as near as possible. InputError: no numbers of scale or rung. */
+  /** The override with the nearest scale that the package has. InputError: scale or rung is no whole number from 0 on. */
   snapped({ scale, rung }: Override): Override {
     for (const [name, v] of Object.entries({ scale, rung }))
       if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
@@ -103,7 +103,7 @@ export class LoadContext {
     const near = this.reader.manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
     return { scale: scale === undefined ? scale : near, rung };
   }
-  /** The view as this camera sees it is what counts from now on; false where it has not changed. */
+  /** This camera's view counts from now on; false where the view has not changed. */
   lookFrom(camera?: Camera): boolean {
     camera?.updateMatrixWorld();
     this.object.updateWorldMatrix(true, false);

@@ -1,7 +1,7 @@
 import { FramebufferTexture, type Texture, type WebGLRenderer } from 'three';
 import type { TextureInfo } from '../format/textures';
 
-/** Levels that come with every fragment; the others, 1/256 of the whole and less, are made of the last of them. */
+/** Levels that come with every fragment. The further levels, 1/256 of the whole and less, are made of the last of these. */
 export const ownLevels = 5;
 
 /** Filters of three.js behind NearestFilter (1003) and LinearFilter (1006) ask for mip levels. */
@@ -10,7 +10,7 @@ const linearFilter = 1006;
 /** The storage on the GPU of one texture plane: views for materials share the storage as long as their samplers are alike. */
 export class PlaneStorage {
   private readonly gl_: WebGL2RenderingContext;
-  private readonly views_ = new Map<Texture, FramebufferTexture>(); // by what they are like
+  private readonly views_ = new Map<Texture, FramebufferTexture>(); // by the texture that each view is like
   private readonly storages_ = new Set<WebGLTexture>();
   private stale_ = false; // the smallest levels
 
@@ -24,7 +24,7 @@ export class PlaneStorage {
   get textures(): Texture[] {
     return [...this.views_.values()];
   }
-  /** See PlaneComposer.view; `filled`: a storage that is new gets what the others show. */
+  /** See PlaneComposer.view. `filled`: a new storage gets the picture of the others. */
   view(old: Texture, filled: boolean): Texture {
     const known = this.views_.get(old);
     if (known) return known;
@@ -60,7 +60,7 @@ export class PlaneStorage {
     }
     this.stale_ = true;
   }
-  /** The smallest levels follow what has been uploaded. */
+  /** The smallest levels follow the uploads. */
   updateMips(): void {
     if (this.stale_) this.withBuffers_(() => this.storages_.forEach((storage) => this.halve_(storage, ownLevels - 1)));
     this.stale_ = false;
@@ -90,7 +90,7 @@ export class PlaneStorage {
   private side_(px: number, level: number): number {
     return Math.max(1, px >> level);
   }
-  /** Levels that there are: one, where no view asks for more. */
+  /** Number of levels: one, where no view asks for more. */
   private levelCount_(): number {
     const { widthPx, heightPx } = this.info_;
     return this.textures.some((v) => v.minFilter > linearFilter) ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1;
@@ -109,7 +109,7 @@ export class PlaneStorage {
     buffers.forEach((buffer) => gl.deleteFramebuffer(buffer));
     if (scissor) gl.enable(gl.SCISSOR_TEST);
   }
-  /** The framebuffer that is read from, or drawn to, is a level of a texture. */
+  /** Makes a level of a texture the framebuffer to read from, or to draw to. */
   private attach_(target: number, texture: WebGLTexture, level: number): void {
     const { gl_: gl } = this;
     gl.framebufferTexture2D(target, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level);
@@ -120,7 +120,7 @@ export class PlaneStorage {
     this.attach_(gl.DRAW_FRAMEBUFFER, to, level);
     gl.blitFramebuffer(0, 0, width, height, 0, 0, this.side_(widthPx, level), this.side_(heightPx, level), gl.COLOR_BUFFER_BIT, gl.LINEAR);
   }
-  /** Makes the levels behind one, each of the one before. */
+  /** Makes the levels behind level `from`, each of the level before. */
   private halve_(storage: WebGLTexture, from: number): void {
     const { widthPx, heightPx } = this.info_;
     for (let level = from + 1; level < this.levelCount_(); ++level)

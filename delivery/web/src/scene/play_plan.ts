@@ -5,7 +5,7 @@ import { throwIfAborted } from '../format/errors';
 import { nowS } from '../http/clock';
 import type { Transfers, Wish } from './transfers';
 
-/** Who hears of it. */
+/** Those who hear of the plan's course. */
 export interface PlayedPlanHooks {
   /** A decision was taken, or its transfer has ended. */
   decided(step: HtcStep): void;
@@ -13,8 +13,8 @@ export interface PlayedPlanHooks {
 }
 
 /**
- * Plays a plan over the network: asks for what it says, tells it what has come. Until everything has come or was given up; what has not
- * come after `mostS` seconds is.
+ * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which have come. Ends when every
+ * fragment has come or was given up; after `mostS` seconds the rest is given up.
  */
 export async function playPlan(
   plan: UncheckedPlan,
@@ -30,22 +30,22 @@ export async function playPlan(
   const stop = (): void => abort.abort();
   signal.addEventListener('abort', stop);
   const timer = setTimeout(stop, mostS * 1000);
-  let told = 0;
-  const pump = (end: () => void): void => {
+  let reported = 0;
+  const askForMore = (end: () => void): void => {
     const wishes: Wish[] = [];
     for (let step; !signal.aborted && (step = plan.next(nowS() - startS)); ) {
       const { offer, rung } = step;
       underWay.set(offer, { step, left: groups[offer].length });
       for (const f of groups[offer]) wishes.push({ ...f, rung, offer });
     }
-    while (told < plan.steps.length) hooks.decided(plan.steps[told++]);
+    while (reported < plan.steps.length) hooks.decided(plan.steps[reported++]);
     const ended = ({ offer }: Wish, well: boolean): void => {
       const group = underWay.get(offer)!;
       if (--group.left > 0) return;
       underWay.delete(offer);
       plan.ended(group.step, nowS() - startS, well);
       hooks.decided(group.step);
-      queueMicrotask(() => pump(end));
+      queueMicrotask(() => askForMore(end));
     };
     const lost = (wish: Wish, error: unknown): void => {
       hooks.lost(wish, error);
@@ -55,7 +55,7 @@ export async function playPlan(
     if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
   };
   try {
-    await new Promise<void>(pump);
+    await new Promise<void>(askForMore);
     throwIfAborted(signal);
   } finally {
     clearTimeout(timer);

@@ -1,7 +1,7 @@
 import { Material, Mesh, Object3D, Texture } from 'three';
 import type { GltfLoaderLike } from './api';
 
-/** What this library uses of GLTFLoader's result and parser. */
+/** The parts of GLTFLoader's result and parser that this library uses. */
 export interface ParsedGltf {
   scene: Object3D;
   parser: {
@@ -17,7 +17,7 @@ interface GltfJson {
   materials?: unknown[];
 }
 
-/** Number of the package's image that is called so; -1: none. */
+/** Number of the package's image of that name; -1: none. */
 const imageNumber = (name = ''): number => Number(/^texture\/(\d+)$/.exec(name)?.[1] ?? -1);
 
 /** Number of the source image that a texture of a GLB shows; -1 when it is none of the package's. */
@@ -34,7 +34,7 @@ export interface Slot {
   image: number;
 }
 
-/** What a material has, seen as its textures by the name of their slot. */
+/** A material seen as its textures by the name of their slot. */
 export const texturesIn = (material: Material) => material as unknown as Record<string, Texture | null | undefined>;
 
 /** Textures of a material by the name of their slot. */
@@ -42,7 +42,7 @@ export function texturesOf(material: Material): [string, Texture][] {
   return Object.entries(material).filter((entry): entry is [string, Texture] => entry[1] instanceof Texture);
 }
 
-/** With its picture, which GLTFLoader decoded and nobody closes. */
+/** Disposes of a texture and closes its picture, which GLTFLoader decoded and nobody else closes. */
 export function disposeTexture(texture: Texture): void {
   texture.dispose();
   (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
@@ -91,7 +91,7 @@ export function sampleTriangles(object: Object3D, most: number, use: (mesh: Mesh
   }
 }
 
-/** Materials of all scales: those of the first one that has them. */
+/** Materials of all scales: scales share the materials of the first scale that has them. */
 export class MaterialSet {
   readonly slots: Slot[] = [];
   private readonly byKey_ = new Map<string, Material>();
@@ -101,7 +101,7 @@ export class MaterialSet {
   }
 
   /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
-  adopt(gltf: ParsedGltf, meshes: readonly Mesh[], added: (slot: Slot) => void): void {
+  shareMaterials(gltf: ParsedGltf, meshes: readonly Mesh[], added: (slot: Slot) => void): void {
     for (const mesh of meshes) mesh.material = this.shared_(gltf, mesh.material as Material, added);
   }
   private shared_(gltf: ParsedGltf, material: Material, added: (slot: Slot) => void): Material {
@@ -119,8 +119,8 @@ export class MaterialSet {
     }
     this.byKey_.set(key, material);
     for (const [name, texture] of texturesOf(material)) {
-      const own = imageNumber(texture.name);
-      const image = own < 0 ? imageOfTexture(parser.json, parser.associations.get(texture)?.textures) : own;
+      const named = imageNumber(texture.name);
+      const image = named < 0 ? imageOfTexture(parser.json, parser.associations.get(texture)?.textures) : named;
       if (image < 0) continue;
       const slot = { material, name, image };
       this.slots.push(slot);

@@ -13,7 +13,7 @@ export interface ScaleLoad {
   shape: Promise<Object3D>;
 }
 
-/** What a ScaleSource works with. */
+/** The parts of a load that a ScaleSource works with. */
 export interface ScaleSourceParts {
   reader: PackageReader;
   options: LoadOptions;
@@ -22,7 +22,7 @@ export interface ScaleSourceParts {
   signal: AbortSignal;
   /** Hears of every slot of a material that has a texture of the package. */
   added: (slot: Slot) => void;
-  /** Hears of what went wrong and has another way. */
+  /** Hears of a problem for which there is another way. */
   problem: (error: unknown, what: string) => void;
 }
 
@@ -32,12 +32,12 @@ export class ScaleSource {
   private readonly underWay_ = new Map<number, ScaleLoad>();
   private splits_?: SplitShapes;
   private streamUsable_ = false;
-  /** The GLB of the coarsest scale: it has the materials and their textures. */
+  /** The GLB of the coarsest scale, which has the materials and their textures. */
   private first_?: ParsedGltf;
 
   constructor(private readonly parts_: ScaleSourceParts) {}
 
-  /** Reads the head of the vertex-split stream, where it is to be used. */
+  /** Reads the head of the vertex-split stream, where the stream is to be used. */
   async openStream(): Promise<void> {
     const { reader, options, pool, materials, added, signal, problem } = this.parts_;
     const { meshes } = options;
@@ -50,7 +50,7 @@ export class ScaleSource {
       this.streamUsable_ = true;
     } catch (error) {
       if (isAbort(error)) throw error;
-      if (!pool.none) problem(error, 'vertex splits'); // GLB files do, too
+      if (!pool.isUnavailable) problem(error, 'vertex splits'); // GLB files do, too
     }
   }
   /** Bytes that a scale still costs. */
@@ -58,17 +58,17 @@ export class ScaleSource {
     if (this.shapes_.has(scale)) return 0;
     return this.usesStream_(scale) ? this.streamBytes_(scale) : this.glbBytes_(scale);
   }
-  /** Loads a scale; `passed` hears of coarser ones that are complete on the way. */
+  /** Loads a scale; `passed` hears of coarser scales that are complete on the way. */
   load(scale: number, passed: (scale: number) => void): ScaleLoad {
     const asked = this.underWay_.get(scale);
     if (asked) return asked;
-    let tellArrived = (): void => undefined;
-    const arrived = new Promise<void>((done) => (tellArrived = done));
-    const load = { arrived, shape: this.read_(scale, tellArrived, passed) };
+    let resolveArrived = (): void => undefined;
+    const arrived = new Promise<void>((done) => (resolveArrived = done));
+    const load = { arrived, shape: this.read_(scale, resolveArrived, passed) };
     this.underWay_.set(scale, load);
     const end = (): void => {
       this.underWay_.delete(scale);
-      tellArrived();
+      resolveArrived();
     };
     load.shape.then(end, end);
     return load;
@@ -123,7 +123,7 @@ export class ScaleSource {
     await reader.decoded(signal, 'requireSelfContained', glb);
     const gltf = await parseScale(options.gltfLoader(), glb, this.first_ !== undefined);
     this.first_ ??= gltf;
-    materials.adopt(gltf, meshesOf(gltf.scene), added);
+    materials.shareMaterials(gltf, meshesOf(gltf.scene), added);
     this.shapes_.set(scale, gltf.scene);
     return gltf.scene;
   }

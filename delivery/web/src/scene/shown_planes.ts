@@ -15,7 +15,7 @@ function planesFor({ options, view }: LoadContext, data: PackageData, displayedP
   return options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
 }
 
-/** What decisions about textures are made from, with the tables of the planes that this display may need; all where they are small. */
+/** Reads the data for decisions about textures, with the tables of the planes that this display may need, or all tables where they are small. */
 export async function readPlaneData(load: LoadContext, scales: ScaleSource): Promise<PackageData> {
   const { reader, pool, signal } = load;
   pool.start();
@@ -24,9 +24,9 @@ export async function readPlaneData(load: LoadContext, scales: ScaleSource): Pro
   const all = await reader.textures(signal);
   const base = [...Array(fullSizePlanes(all)).keys()];
   const shown = planesFor(load, await reader.data(base, signal));
-  // With the mips below, which a short time may ask for.
-  const among = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= all[c.plane].mip);
-  return reader.data([...base, ...all.flatMap((t, p) => (among(t) ? [p] : []))], signal);
+  // A short time may ask for the mips below, too.
+  const mayBeAskedFor = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= all[c.plane].mip);
+  return reader.data([...base, ...all.flatMap((t, p) => (mayBeAskedFor(t) ? [p] : []))], signal);
 }
 
 /** Which planes show the textures of a load: choosing them, and showing them. */
@@ -35,7 +35,7 @@ export class ShownPlanes {
 
   constructor(
     private readonly load_: LoadContext,
-    /** With the tables of the planes that are shown, at least. */
+    /** Data with the tables of the planes that are shown, at least. */
     public data: PackageData,
   ) {
     this.set_ = this.newSet_();
@@ -88,7 +88,7 @@ export class ShownPlanes {
   forDisplay(): PlaneChoice[] {
     return planesFor(this.load_, this.data);
   }
-  /** Planes that the GPU can hold: a mip where it cannot; where there is none, what the mesh brought along stays. */
+  /** Planes that the GPU can hold: a mip where the plane is too large; without such a mip the picture of the mesh stays. */
   fitting(choices: readonly PlaneChoice[]): PlaneChoice[] {
     const most = this.load_.options.renderer.capabilities.maxTextureSize;
     const fits = (t: TextureInfo): boolean => Math.max(t.widthPx, t.heightPx) <= most;
@@ -100,7 +100,7 @@ export class ShownPlanes {
       return [];
     });
   }
-  /** Planes with more texels where the view has come nearer; never back, as what is there is there. */
+  /** Planes with more texels where the view has come nearer; never planes with fewer, as the texels are there already. */
   finer(): PlaneChoice[] {
     const { planes } = this.set_;
     const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis).filter((c) => planes.has(c.base));
@@ -115,7 +115,7 @@ export class ShownPlanes {
   // ---- showing
 
   /**
-   * Shows textures by these planes; those that the first GLB does not show begin with the package's preview. Fragments may come from
+   * Shows textures by these planes; textures that the first GLB does not have begin with the package's preview. Fragments may come from
    * then on; `shown` resolves when the scene has changed.
    */
   async show(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
@@ -124,12 +124,12 @@ export class ShownPlanes {
     for (const choice of choices) {
       const { base, plane } = choice;
       const { role, widthPx, heightPx } = this.textures[plane];
-      // A plane that cannot be shown leaves what the mesh brought along.
+      // A plane that cannot be shown leaves the picture of the mesh.
       const lostPlane = (error: unknown): void => this.load_.fail(error, `texture plane ${plane}`);
       try {
         const needed = !this.set_.planes.has(base) && (anew || role === 'alpha' || !this.isUsed(base));
         const preview = needed ? await this.previewOf_(base) : undefined;
-        throwIfAborted(signal); // what is shown from now on nobody would dispose of
+        throwIfAborted(signal); // after the end of the load nobody would dispose of the plane
         const planeShown = (): void => this.load_.emit('plane', { base, plane, widthPx, heightPx });
         shown.push(this.set_.show(choice, preview).then(planeShown, lostPlane).finally(() => preview?.close()));
       } catch (error) {

@@ -15,7 +15,7 @@ export class ShownScale {
   /** In the scene; -1: none yet. */
   shown = noScale;
   wanted = noScale;
-  /** The scale that is enough at a displayed height; there once the documents are. */
+  /** Gives the scale that is enough at a displayed height; set once the documents are there. */
   scaleFor?: (heightPx: number, part: VisiblePart | undefined) => number;
   private retryScale_ = noScale;
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
@@ -27,11 +27,11 @@ export class ShownScale {
     private readonly source_: ScaleSource,
   ) {}
 
-  /** Loads a scale and puts it into the scene; what is complete on the way is shown, too. */
+  /** Loads a scale and puts the scale into the scene; scales that are complete on the way are shown, too. */
   load(scale: number): { arrived: Promise<void>; shape: Promise<Object3D>; shown: Promise<void> } {
     this.wanted = scale;
     const show = (k: number): void => {
-      // Another scale may be wanted by now; what comes on the way to it must not be coarser than what is shown.
+      // Another scale may be wanted by now. A scale on the way must not be coarser than the shown one.
       if (this.wanted === scale && (k === scale || k < this.shown)) this.show_(k);
     };
     const { arrived, shape } = this.source_.load(scale, show);
@@ -41,7 +41,7 @@ export class ShownScale {
     });
     return { arrived, shape, shown };
   }
-  /** Loads the scale that the view asks for, if it is another one. */
+  /** Loads the scale that the view asks for, if that is another one. */
   async follow(scale = this.scaleForView_()): Promise<void> {
     if (scale === this.wanted || scale === this.retryScale_) return;
     try {
@@ -51,7 +51,7 @@ export class ShownScale {
       this.lost(error, scale);
     }
   }
-  /** What is shown stays; the scale, or what is wanted by then, is asked for again a little later. */
+  /** The shown scale stays. The lost scale, or the scale that is wanted by then, is asked for again a little later. */
   lost(error: unknown, scale: number): void {
     this.load_.fail(error, `scale ${scale}`);
     if (this.wanted === scale) this.wanted = this.shown;
@@ -69,7 +69,7 @@ export class ShownScale {
     this.retryScale_ = noScale;
   }
 
-  /** In one turn of the page: what is drawn next is the new scale, whole. */
+  /** Changes the scene in one turn of the page: the next frame has the new scale, whole. */
   private show_(scale: number): void {
     const { signal, object, reader } = this.load_;
     throwIfAborted(signal);

@@ -6,7 +6,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { SplitInfo, SplitUpdate } from '../worker/protocol';
 import { type MaterialSet, type ParsedGltf, type Slot, meshesOf } from './scale_parts';
 
-/** Bytes behind the head that its request brings along. */
+/** Bytes behind the head that the request for the head brings along. */
 const withHeadBytes = 12 << 10;
 /** Scales that stand together within so many bytes are fetched by one request. */
 const leastRequestBytes = 32 << 10;
@@ -52,14 +52,14 @@ export class SplitShapes {
     this.decoded_ = info_.headBytes;
   }
 
-  /** Bytes that a scale still costs; Infinity where the stream does not pass it. */
+  /** Bytes that a scale still costs; Infinity where the stream does not pass the scale. */
   bytesOf(scale: number): number {
     const s = this.info_.scales.find((k) => k.scale === scale);
     return s ? Math.max(0, s.end - Math.max(this.decoded_, this.known_.length)) : Infinity;
   }
   /**
-   * Fetches and decodes up to a scale. `arrived` when its bytes are there; `passed` hears of every scale on the way,
-   * the one asked for included.
+   * Fetches and decodes up to a scale. `arrived` is called when the bytes are there; `passed` hears of every scale on the way,
+   * the wanted one included.
    */
   load(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
     const mesh = this.lastLoad_.then(() => this.loadNow_(scale, gltf, signal, arrived, passed));
@@ -130,7 +130,7 @@ export class SplitShapes {
     this.meshes_.set(scale, mesh);
     return mesh;
   }
-  /** Appends values to a buffer; one that is too small is replaced by one with room for more. */
+  /** Appends values to a buffer; a buffer that is too small is replaced by a larger one. */
   private append_(name: string, components: number, values: Float32Array, { from, to }: SplitUpdate): void {
     let attribute = this.attributes_.get(name);
     if (!attribute || attribute.count < to) {
@@ -143,7 +143,7 @@ export class SplitShapes {
     attribute.array.set(values, components * from);
     attribute.needsUpdate = true;
   }
-  /** The material that a mesh of this geometry gets: that of the GLB with this number, or its first. */
+  /** The material that a mesh of this geometry gets: the GLB's material with this number, or the GLB's first. */
   private async materialOf_(gltf: ParsedGltf, index: number, geometry: BufferGeometry): Promise<Material> {
     const { parser, scene } = gltf;
     const there = index < (parser.json.materials ?? []).length;
@@ -151,7 +151,7 @@ export class SplitShapes {
     if (!chosen) throw new FormatError('mesh', '', `material ${index}`, 'none');
     const mesh = new Mesh(geometry, chosen);
     parser.assignFinalMaterial(mesh);
-    this.materials_.adopt(gltf, [mesh], this.added_);
+    this.materials_.shareMaterials(gltf, [mesh], this.added_);
     return mesh.material as Material;
   }
 }

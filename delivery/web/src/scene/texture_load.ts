@@ -19,17 +19,17 @@ import type { ShownScale } from './shown_scale';
 const refineBytes = 4 * requestBytes;
 /** Fragments that may wait for decoding and uploads when the next ones are asked for. */
 const mostPending = 48;
-/** Of the time left when a mesh is asked for: textures do not wait longer for it. */
+/** Textures wait for a mesh no longer than this share of the time left when the mesh is asked for. */
 const meshShare = 0.5;
 const longestTimerS = 1e6;
-/** What the camera does not see is worth this much of what it sees, while there is time. */
+/** In the timed part a surface that the camera does not see is worth this much of a surface that the camera sees. */
 const unseen = 1e-3;
 /** 1 - SSIM at which refining ends by default. */
-const tellsApart = 0.003;
+const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
-const mostBarren = 3;
+const mostFruitlessRounds = 3;
 
-/** Reads what decisions about textures are made from. */
+/** Reads the documents that decisions about textures are made from. */
 export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
   const data = await readPlaneData(load, source);
   const quality = await load.reader.quality(load.signal);
@@ -37,13 +37,13 @@ export async function openTextureLoad(load: LoadContext, scale: ShownScale, sour
 }
 
 /**
- * What a load does once the first picture stands: decides what to fetch, fetches it in time, refines. In a part of its
- * own that is loaded while the first picture comes, so that nobody waits for it.
+ * The second part of a load: decides which fragments to fetch, fetches them in time, refines. This module is loaded while the
+ * first picture comes, so that nobody waits for the module.
  */
 export class TextureLoad {
   private readonly planes_: ShownPlanes;
   private readonly inTime_: FetchInTime;
-  private barren_ = 0; // rounds of refining that brought nothing, one after the other
+  private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(
     private readonly load_: LoadContext,
@@ -87,13 +87,12 @@ export class TextureLoad {
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
     const mesh = this.scale_.load(scale);
-    // Without it picture and fragments stand all the same.
+    // Picture and fragments stand without the mesh, too.
     const meshShown = mesh.shown.catch((error: unknown) => this.scale_.lost(error, scale));
     // Coverage that no material asks for is not fetched.
     const choices = planes.fitting(chosen).filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
     const [{ shown }] = await Promise.all([planes.show(choices), fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
-    // A mesh that is only waited for leaves the link to the textures.
-    // One that takes longer than it should has coarser scales to show on its way.
+    // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for; coarser scales show on its way.
     if (meshBytes > load.beta0 * reader.client.latencyS) await Promise.race([mesh.arrived, this.timer_(meshShare)]);
     load.enter('textures');
     await this.fetchTimed_(await fetching.listOf(scale, unseen));
@@ -109,9 +108,9 @@ export class TextureLoad {
     const fragmentsS = this.inTime_.leftS() - composeS;
     const given = load.override.rung !== undefined;
     if (given || !Number.isFinite(fragmentsS)) while (given === (load.override.rung !== undefined) && (await this.refineSome_(true)));
-    else if (fragmentsS > 0 && !load.pool.none && list.offers.length > 0) await this.inTime_.run(list, fragmentsS);
+    else if (fragmentsS > 0 && !load.pool.isUnavailable && list.offers.length > 0) await this.inTime_.run(list, fragmentsS);
   }
-  /** Fragments of which previews are shown. */
+  /** Number of fragments whose previews are shown. */
   private skippedFragments_(): number {
     const { tables } = this.planes_.data;
     const skippedOf = ({ plane, rungs }: PlaneComposer): number => tables[plane]!.order.filter((f) => rungs[f] < 0).length;
@@ -121,20 +120,20 @@ export class TextureLoad {
   private timer_(share: number): Promise<void> {
     return sleepS(clamp(share * this.inTime_.leftS(), 0, longestTimerS));
   }
-  /** The scale that is enough at a displayed height: by the rule, or finer where that was measured to be seen. */
+  /** The scale that is enough at a displayed height: by the rule, or finer where a finer scale was measured to be seen. */
   private scaleFor_(heightPx: number, part: VisiblePart | undefined): number {
     const { options: { rule = 'measured' }, reader } = this.load_;
     const scale = selectScale(reader.manifest, heightPx, part, rule === 'measured' ? 'default' : rule);
     const hidden = part?.clipped && part.widthPx === 0;
     return rule === 'measured' && !hidden ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
   }
-  /** Scale and planes: those for the display, or what looks best in the time. */
+  /** Scale and planes for the display, or those that look best in the time. */
   private async choice_(): Promise<{ scale: number; planes: PlaneChoice[] }> {
     const { load_: load, planes_: planes } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
     if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) return { scale: wanted, planes: planes.forDisplay() };
-    /** What the mesh of a scale takes when nothing shares the link. */
+    /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
     const limitAfterMeshS = (scale: number): number => this.inTime_.leftS() - composeS - meshS(this.source_.bytesOf(scale));
     const steps = choiceInTime(planes.data, this.quality_, {
@@ -158,7 +157,7 @@ export class TextureLoad {
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();
   }
-  /** The GPU has lost everything: previews, then the fragments that there were. */
+  /** After the GPU has lost everything: shows previews, then fetches the fragments that were there. */
   async restore(): Promise<void> {
     const before = await this.planes_.showAnew();
     const had = before.flatMap(({ plane, rungs }) => [...rungs].map((rung, fragment) => ({ plane, fragment, rung, offer: 0 })));
@@ -173,22 +172,22 @@ export class TextureLoad {
     await this.fetching_.transfers.prepare(asked, this.load_.signal);
     await (await this.planes_.show(finer)).shown;
   }
-  /** Fetches some of what is still wanted, of everything or what the camera sees; false when there is nothing left, or no use in going on. */
+  /** Fetches some fragments that are still wanted, `all` or those that the camera sees. False: nothing is left, or going on is of no use. */
   private async refineSome_(all = this.load_.override.rung !== undefined || this.fetching_.wholeRungs()): Promise<boolean> {
     const { load_: load, fetching_: fetching } = this;
     await sleepS(0);
-    if (load.pool.none) return false;
-    if (all) await fetching.composed(); // nothing comes behind what replaces it
-    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0); // what is not to be seen is not to be fetched
-    const enough = load.options.refineTo ?? tellsApart;
+    if (load.pool.isUnavailable) return false;
+    if (all) await fetching.composed(); // a fragment must not come behind the one that replaces it
+    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0); // fragments that are not seen are not fetched
+    const enough = load.options.refineTo ?? defaultRefineTo;
     const wishes = all ? allWishes(list, load.override.rung, fetching) : bestWishes(list, refineBytes, enough, this.planes_.data, fetching);
     const before = fetching.fates.losses;
-    const some = wishes.length > 0;
-    if (some) this.barren_ = (await fetching.fetch(wishes)) > 0 ? 0 : this.barren_ + 1;
-    await fetching.composed(some && !all ? mostPending : 0);
-    // What was lost on the way leaves lower rungs to ask for.
-    if (some ? this.barren_ < mostBarren : fetching.fates.losses > before) return true;
-    this.barren_ = 0;
+    const asked = wishes.length > 0;
+    if (asked) this.fruitlessRounds_ = (await fetching.fetch(wishes)) > 0 ? 0 : this.fruitlessRounds_ + 1;
+    await fetching.composed(asked && !all ? mostPending : 0);
+    // A fragment that was lost on the way leaves lower rungs to ask for.
+    if (asked ? this.fruitlessRounds_ < mostFruitlessRounds : fetching.fates.losses > before) return true;
+    this.fruitlessRounds_ = 0;
     return false;
   }
 }

@@ -16,7 +16,7 @@ export class TextureSet {
   private readonly uploads_: UploadQueue;
   private readonly software_: Promise<boolean>;
 
-  /** For the textures of a package in these materials. */
+  /** Composes the textures of a package for these materials. */
   constructor(
     private readonly renderer_: WebGLRenderer,
     private readonly textures_: readonly TextureInfo[],
@@ -28,8 +28,8 @@ export class TextureSet {
   }
 
   /**
-   * Shows a texture by this plane from now on: filled with what was shown so far (or the preview) in small steps, then
-   * the materials are changed at once. Resolves when they have been.
+   * Shows a texture by this plane from now on. The plane is filled with the picture shown so far (or the preview) in small steps, then
+   * the materials are changed at once. Resolves when the materials have been changed.
    */
   async show({ base, plane }: PlaneChoice, preview?: ImageBitmap): Promise<void> {
     const { planes } = this;
@@ -61,7 +61,7 @@ export class TextureSet {
   showInNewMaterials(): void {
     this.planes.forEach((plane) => plane.filled && this.showInMaterials_(plane));
   }
-  /** Queues a fragment; resolves when it is in its texture, or (false) was not better than the rung there by then. */
+  /** Queues a fragment; resolves when the fragment is in its texture (true), or was not better than the rung there by then (false). */
   async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
     ++this.pending;
     plane.come.add(fragment);
@@ -74,7 +74,7 @@ export class TextureSet {
     --this.pending;
     return shown;
   }
-  /** All mip levels of everything, at once. */
+  /** Makes the smallest mip levels of all planes now. */
   finishMips(): void {
     this.uploads_.finishMips();
   }
@@ -84,7 +84,7 @@ export class TextureSet {
     this.planes.clear();
   }
 
-  /** Where materials that are there show this plane: coverage beside the colours that it belongs to, where they ask for it. */
+  /** Slots of materials that show this plane. Coverage has the slots beside its colours, in materials that ask for coverage. */
   private slotsOf_(base: number): Slot[] {
     const { image, role } = this.textures_[base];
     const slots = this.materials_.slots.filter((s) => s.image === image);
@@ -92,7 +92,7 @@ export class TextureSet {
     const covered = slots.filter(({ name, material: m }) => name === 'map' && (m.transparent || m.alphaTest > 0));
     return covered.map((s) => ({ ...s, name: 'alphaMap' }));
   }
-  /** Materials get views of a plane, those that came meanwhile or with a later scale, too. */
+  /** Gives materials views of a plane, materials that came meanwhile or with a later scale, too. */
   private showInMaterials_(plane: PlaneComposer): void {
     for (const slot of this.slotsOf_(plane.base)) {
       const old = textureAt(slot);
@@ -107,11 +107,11 @@ export class TextureSet {
     if (before?.filled) next.fill(before.textures[0]);
     else if (image?.width)
       try {
-        // A preview of its own is that of coverage, beside which the colours are shown.
+        // Coverage alone has a preview of its own: the colours are shown already.
         if (preview || (await this.software_)) await this.enlarge_(next, image);
         else next.fill(old!);
       } catch (error) {
-        // A browser whose workers cannot draw leaves it to the GPU.
+        // A browser whose workers cannot draw leaves enlarging to the GPU.
         if (preview || this.uploads_.disposed) throw error;
         next.fill(old!);
       }

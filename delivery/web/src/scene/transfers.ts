@@ -7,26 +7,26 @@ import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
 import { ownLevels } from './plane_storage';
 
-/** A fragment to be had at a rung. */
+/** A fragment that is wanted at a rung. */
 export interface Wish {
   plane: number;
   fragment: number;
   rung: number;
   /** Index into the caller's list. */
   offer: number;
-  /** Shown in place of a higher rung, too. */
+  /** The fragment is shown in place of a higher rung, too. */
   replaces?: boolean;
 }
 /** What becomes of wishes. Bytes arrive first; the picture follows when it is decoded. */
 export interface TransferHooks {
   decoded(wish: Wish, levels: Levels): void;
-  /** It cannot be had, or not decoded; the preview stays. */
+  /** The fragment cannot be had, or cannot be decoded; the preview stays. */
   lost(wish: Wish, error: unknown): void;
 }
-/** Fragments at a border may reach so far beyond their plane. */
+/** A fragment at a border may reach so far beyond its plane. */
 const beyondPx = 1024;
 
-/** A wish under way: the streams it still lacks. */
+/** A wish under way, with the streams that have come. */
 interface Job {
   wish: Wish;
   /** Rung of the first stream. */
@@ -42,21 +42,21 @@ interface Part {
   offset: number;
   bytes: number;
 }
-/** Who hears when all bytes of a wish are there (before they are checked), and when they cannot be had. */
+/** Those who hear when all bytes of a wish are there (before the bytes are checked), and when they cannot be had. */
 interface Askers {
   arrived(wish: Wish): void;
   failed(wish: Wish, error: unknown): void;
 }
 /** How requests are made of wishes. */
 export interface GroupOptions {
-  /** Streams that nobody asked for but are fetched to join two requests, at most. */
+  /** Bytes that nobody asked for may be fetched to join two requests; so many at most. */
   gapBytes: number;
   mostBytes: number;
   signal?: AbortSignal;
 }
 
-/** Further from each other than packs are long: files are not joined. */
-const ofFiles = 2 ** 40;
+/** Files of fragments count as so far from each other, further than any pack is long: requests for files are not joined. */
+const fileSpacing = 2 ** 40;
 
 /**
  * Fetches fragments: streams of one rung that stand together by one request, lower rungs of incremental codecs once
@@ -64,7 +64,7 @@ const ofFiles = 2 ** 40;
  */
 export class Transfers {
   private readonly planes_ = new Map<number, PlaneFiles>();
-  private readonly held_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
+  private readonly heldStreams_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
   /** Requests and fragments being decoded. */
   pending = 0;
 
@@ -75,7 +75,7 @@ export class Transfers {
     private readonly hooks_: TransferHooks,
   ) {}
 
-  /** Must have been called for the planes of all wishes. */
+  /** Reads where the fragments of planes are; fetch() wants this for the planes of all wishes. */
   async prepare(planes: readonly number[], signal?: AbortSignal): Promise<void> {
     await Promise.all(
       planes.map(async (p) => {
@@ -86,18 +86,18 @@ export class Transfers {
   filesOf(plane: number): PlaneFiles {
     return this.planes_.get(plane)!;
   }
-  /** Bytes of a fragment at a rung: of what has to be fetched at most. */
+  /** Most bytes that have to be fetched for a fragment at a rung. */
   bytesOf(plane: number, rung: number, fragment: number): number {
     const { complete, tables } = this.filesOf(plane);
     return complete ? (complete[rung]?.get(fragment)?.bytes ?? 0) : bytesToShow(tables, rung, fragment);
   }
 
   /**
-   * Fetches wishes. `arrived` is called when all bytes of one are there (before they are checked), `failed` when they
+   * Fetches wishes. `arrived` is called when all bytes of a wish are there (before the bytes are checked), `failed` when they
    * cannot be had. Resolves when every wish has arrived or failed.
    */
   async fetch(wishes: readonly Wish[], options: GroupOptions, arrived: Askers['arrived'], failed: Askers['failed']): Promise<void> {
-    ++this.pending; // what has arrived is not decoded before its request has ended
+    ++this.pending; // a wish that has arrived is not decoded before its request has ended
     const parts = wishes.flatMap((wish) => this.partsOf_(wish, arrived, options.signal));
     await Promise.all(groupsOf(parts, options).map((group) => this.fetchGroup_(group, { arrived, failed }, options.signal)));
     --this.pending;
@@ -107,12 +107,12 @@ export class Transfers {
     const { plane, fragment } = wish;
     const { tables, offsets, complete } = this.filesOf(plane);
     const incremental = tables.incremental && !complete;
-    const streams = [...((incremental && this.held_.get(`${plane}/${fragment}`)) || [])];
+    const streams = [...((incremental && this.heldStreams_.get(`${plane}/${fragment}`)) || [])];
     const job: Job = { wish, first: incremental ? 0 : wish.rung, streams, missing: 0, failed: false };
     const parts: Part[] = [];
     for (let rung = job.first + streams.length; rung <= wish.rung; ++rung) {
       const at = rung * fragmentCount(tables) + fragment;
-      const offset = complete ? fragment * ofFiles : offsets[at];
+      const offset = complete ? fragment * fileSpacing : offsets[at];
       parts.push({ job, rung, offset, bytes: complete ? this.bytesOf(plane, rung, fragment) : tables.sizeBytes[at] });
     }
     streams.length = wish.rung + 1 - job.first;
@@ -128,25 +128,25 @@ export class Transfers {
     const { job, rung, offset: begin } = parts[0];
     const { plane, fragment } = job.wish;
     const { complete, packs } = this.filesOf(plane);
-    let said = 0;
+    let reported = 0;
     // The plan hears of each fragment when its last byte comes, though the answer ends later.
-    const say = (upTo: number): void => {
-      for (let p; (p = parts[said]) && endOf(p) - begin <= upTo; ++said) if (--p.job.missing === 0 && !p.job.failed) arrived(p.job.wish);
+    const reportArrived = (upTo: number): void => {
+      for (let p; (p = parts[reported]) && endOf(p) - begin <= upTo; ++reported) if (--p.job.missing === 0 && !p.job.failed) arrived(p.job.wish);
     };
     try {
       const got = complete
         ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
         : await this.reader_.store.read(packs[rung], { offset: packs[rung].offset + begin, bytes: endOf(parts.at(-1)!) - begin }, {
-            kind: 'texture', once: this.reader_.form !== 'files', signal, onBytes: say,
+            kind: 'texture', once: this.reader_.form !== 'files', signal, onBytes: reportArrived,
           });
       for (const p of parts) p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);
-      say(Infinity);
+      reportArrived(Infinity);
       for (const p of parts) if (p.job.missing === 0 && !p.job.streams.includes(undefined as never)) void this.decode_(p.job, signal);
     } catch (error) {
       parts.forEach((p, i) => {
         if (p.job.failed) return;
         p.job.failed = true;
-        if (i < said && p.job.missing === 0) this.hooks_.lost(p.job.wish, error);
+        if (i < reported && p.job.missing === 0) this.hooks_.lost(p.job.wish, error);
         else failed(p.job.wish, error);
       });
     }
@@ -158,8 +158,8 @@ export class Transfers {
     try {
       const levels = await this.decodeStreams_(job, signal).catch(async (error: unknown) => {
         if (!(error instanceof FormatError) || this.filesOf(plane).complete) throw error;
-        // Damaged on the way: asked for once more, by itself, past what caches and bad mirrors hold.
-        this.held_.delete(`${plane}/${fragment}`);
+        // A fragment damaged on the way is asked for once more, by itself, past caches and bad mirrors.
+        this.heldStreams_.delete(`${plane}/${fragment}`);
         for (let r = job.first; r <= rung; ++r) job.streams[r - job.first] = await this.reader_.fragment(plane, r, fragment, signal);
         return this.decodeStreams_(job, signal);
       });
@@ -181,15 +181,15 @@ export class Transfers {
       digests: complete ? [complete[rung].get(fragment)!.sha256] : streams.map((_, i) => digestOf((first + i) * fragmentCount(t) + fragment)),
       complete: !!complete,
       levels: ownLevels,
-      // A plane that the GPU can hold says how much room there is; the sides of its only fragment may say anything.
+      // The GPU can hold the plane, so that the plane bounds the picture; the sides of an only fragment may be anything.
       most: [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)],
     });
-    if (t.incremental && !complete) this.held_.set(`${plane}/${fragment}`, streams);
+    if (t.incremental && !complete) this.heldStreams_.set(`${plane}/${fragment}`, streams);
     return levels;
   }
 
   dispose(): void {
-    this.held_.clear();
+    this.heldStreams_.clear();
     this.planes_.clear();
   }
 }

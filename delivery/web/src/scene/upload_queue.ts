@@ -6,8 +6,8 @@ import { gpuIdle } from './gpu';
 const sliceMs = 5;
 const slicePx = 1 << 19;
 /**
- * Slices that the GPU may be behind: an upload beyond what it takes at a time would wait in the middle of a page's turn. It is not
- * waited for longer than longestFenceS.
+ * The GPU may be so many slices behind: a further upload would wait in the middle of a page's turn. Nobody waits for the GPU longer
+ * than longestFenceS.
  */
 const mostBehind = 3;
 const longestFenceS = 0.25;
@@ -16,7 +16,7 @@ const mipsEveryMs = 200;
 
 /** Uploads that wait for their turn: a few between two turns of the page, and never more than the GPU has done. */
 export class UploadQueue {
-  /** What still waits is left out from now on. */
+  /** Uploads that still wait are left out from now on. */
   disposed = false;
   private readonly uploads_: { pixels: number; run(): void; ended(): void }[] = [];
   private uploading_ = false;
@@ -30,14 +30,14 @@ export class UploadQueue {
     private readonly updateMips_: () => void,
   ) {}
 
-  /** Puts off what gives some pixels to the GPU; resolves when it has been done, or nobody wants it any more. */
+  /** Puts off `run`, which gives so many pixels to the GPU; resolves when `run` has ended, or was left out. */
   enqueue(pixels: number, run: () => void): Promise<void> {
     return new Promise((ended) => {
       this.uploads_.push({ pixels, run, ended });
       if (!this.uploading_) void this.uploadWaiting_();
     });
   }
-  /** All mip levels of everything, at once. */
+  /** Makes the smallest levels now. */
   finishMips(): void {
     this.mipsAt_ = performance.now();
     this.updateMips_();

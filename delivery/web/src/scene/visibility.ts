@@ -6,8 +6,8 @@ import type { TextureInfo } from '../format/textures';
 const mostSamples = 6000;
 
 /**
- * Share of each fragment's surface that the camera sees, from a sample of the triangles: in its frustum and turned to it, by the
- * material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. [fragments]
+ * Share of each fragment's surface that the camera sees, from a sample of the triangles. Seen: within the camera's frustum and turned to
+ * the camera, by the material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. [fragments]
  */
 export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera, shows: (mesh: Mesh) => boolean): Float32Array {
   const { columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx } = plane;
@@ -33,6 +33,6 @@ export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera,
     const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
     if (turned && corners.some((p) => frustum.containsPoint(p))) seen[f] += area;
   });
-  // What no sample fell into may be seen.
+  // A fragment without a sample may be seen.
   return seen.map((area, f) => (all[f] > 0 ? area / all[f] : 0.5));
 }

@@ -5,10 +5,10 @@ import { decodePicture, enlargePicture } from './pictures';
 import type { WorkerAnswer, WorkerRequest } from './protocol';
 import { splitInfo, splitUpdate } from './split_update';
 
-// What happens off the main thread: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no
-// worker can be had.
+// The work of workers: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no worker can be
+// had.
 
-/** Those of all typed arrays in a value; several may share one. */
+/** Buffers of all typed arrays in a value; several arrays may share one. */
 function buffersOf(value: unknown, found = new Set<ArrayBuffer>()): ArrayBuffer[] {
   if (ArrayBuffer.isView(value)) found.add(value.buffer as ArrayBuffer);
   else if (value instanceof Map) for (const v of value.values()) buffersOf(v, found);
@@ -24,7 +24,7 @@ function streamOf(key: number): { reader: SplitStreamReader; wedges: number } {
   return stream;
 }
 
-/** Answers a request; the second value lists what may be handed over instead of copied. */
+/** Answers a request; the second value lists objects that may be handed over instead of copied. */
 export async function handle(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   switch (request.op) {
     case 'document': {

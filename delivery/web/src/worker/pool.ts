@@ -10,7 +10,7 @@ const mostAtOnce = 8;
 interface Job {
   pool: WorkerPool;
   request: WorkerRequest & { id: number };
-  /** Whose it is; undefined: it waits for its turn. */
+  /** The worker that has the job; undefined: the job waits for its turn. */
   worker?: number;
   done: (result: unknown) => void;
   failed: (error: unknown) => void;
@@ -26,13 +26,13 @@ function postWaitingJobs(): void {
   }
 }
 
-/** A value whose byte arrays have buffers of their own: what is posted takes all of its buffer along, be it the whole package. */
+/** A value whose byte arrays have buffers of their own: a posted array takes its whole buffer along, which may be the whole package. */
 function inBuffersOfItsOwn(value: unknown): unknown {
   if (Array.isArray(value)) return value.map(inBuffersOfItsOwn);
   return value instanceof Uint8Array && value.length < value.buffer.byteLength ? value.slice() : value;
 }
 
-/** What workers do, on the page's own thread: `handle` of texmesh/worker. */
+/** Does the work of workers on the page's own thread: `handle` of texmesh/worker. */
 export type DecodeHere = (request: WorkerRequest) => Promise<[unknown, Transferable[]]>;
 /** A worker, or the main thread where there is none. */
 interface Helper {
@@ -44,39 +44,39 @@ interface Helper {
 export interface PoolOptions {
   workers?: number;
   workerUrl?: string | URL;
-  /** Instead of workers. */
+  /** Decodes instead of workers. */
   decode?: DecodeHere;
 }
 
 /** Workers that decode documents, images and vertex splits. */
 export class WorkerPool {
-  /** Nothing can be decoded: there are no workers, and no `decode`. `onNone` hears of it, once. */
-  none = false;
-  onNone?: (error: Error) => void;
+  /** Nothing can be decoded: there are no workers, and no `decode`. `onUnavailable` hears of that, once. */
+  isUnavailable = false;
+  onUnavailable?: (error: Error) => void;
   private readonly helpers_: Helper[] = [];
   private readonly jobs_ = new Map<number, Job>();
   private readonly brokeOnce_ = new Set<number>(); // indices of helpers
-  private readonly here_: boolean;
-  private works_ = false; // a worker has answered
+  private readonly onThisThread_: boolean;
+  private hasAnswered_ = false; // a worker has answered
   private lastId_ = 0;
   private ended_ = false;
 
   constructor(private readonly options_: PoolOptions = {}) {
-    this.here_ = options_.decode !== undefined || typeof Worker === 'undefined';
+    this.onThisThread_ = options_.decode !== undefined || typeof Worker === 'undefined';
     this.grow(options_.workers);
   }
 
-  /** To so many workers; left out: 2 to 4, by the number of cores. */
+  /** Grows the pool to so many workers; left out: 2 to 4, by the number of cores. */
   grow(count = Math.min(4, Math.max(2, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1))): void {
     const { helpers_: helpers } = this;
-    for (let i = helpers.length; i < 1 || (!this.here_ && i < count); ++i) helpers.push(this.here_ ? this.startHere_() : this.startWorker_(i));
+    for (let i = helpers.length; i < 1 || (!this.onThisThread_ && i < count); ++i) helpers.push(this.onThisThread_ ? this.startHere_() : this.startWorker_(i));
   }
   /** Finds out early whether there is anything that decodes. */
   start(): void {
     this.closeSplits(0);
   }
 
-  // ---- what is asked
+  // ---- requests
 
   /** See PackageReader.decodeDocument. */
   readonly decodeDocument = ((name, ...args) => this.ask_({ op: 'document', name, args })) as DocumentDecoder;
@@ -90,7 +90,7 @@ export class WorkerPool {
   openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
     return this.ask_({ op: 'split-open', key, head });
   }
-  /** FormatError where whole blocks from a place of the stream on are not those of its head. */
+  /** FormatError where whole blocks, from a place of the stream on, have other digests than the head says. */
   checkSplits(key: number, from: number, blocks: Uint8Array): Promise<void> {
     return this.ask_({ op: 'split-check', key, from, blocks });
   }
@@ -123,7 +123,7 @@ export class WorkerPool {
       const request = { ...copied, id: ++this.lastId_ } as Job['request'];
       const job = { pool: this, request, done: done as Job['done'], failed };
       this.jobs_.set(this.lastId_, job);
-      if (request.op === 'document') return this.post(job); // everything waits for it
+      if (request.op === 'document') return this.post(job); // everything waits for documents
       queue.push(job);
       postWaitingJobs();
     });
@@ -137,7 +137,7 @@ export class WorkerPool {
     try {
       this.helpers_[job.worker].postMessage(job.request); // copied, not handed over: a worker that breaks gives its requests back
     } catch (failed) {
-      this.answered_({ id: job.request.id, failed }); // what cannot be copied takes nobody's turn
+      this.answered_({ id: job.request.id, failed }); // a request that cannot be copied takes nobody's turn
     }
   }
   private answered_({ id, result, failed, error }: WorkerAnswer): void {
@@ -146,7 +146,7 @@ export class WorkerPool {
       if (Array.isArray(result)) for (const b of result as Partial<ImageBitmap>[]) b.close?.(); // nobody waits for them any more
       return;
     }
-    this.works_ ||= !failed;
+    this.hasAnswered_ ||= !failed;
     this.jobs_.delete(id);
     --running;
     if (failed) job.failed(failed);
@@ -155,12 +155,12 @@ export class WorkerPool {
     postWaitingJobs();
   }
 
-  // ---- who answers
+  // ---- workers
 
   private startWorker_(index: number): Helper {
     const { workerUrl } = this.options_;
     try {
-      // Written so that bundlers see it.
+      // Bundlers see a worker that is written so.
       const worker = workerUrl ? new Worker(workerUrl, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
       worker.onmessage = (event: MessageEvent<WorkerAnswer>) => this.answered_(event.data);
       worker.onerror = (event) => {
@@ -188,20 +188,20 @@ export class WorkerPool {
   }
   private missing_(): never {
     const error = new Error('workers cannot be had here: give `workerUrl`, the address of dist/worker.js, or `decode`, the `handle` of texmesh/worker');
-    if (!this.none) this.onNone?.(error);
-    this.none = true;
+    if (!this.isUnavailable) this.onUnavailable?.(error);
+    this.isUnavailable = true;
     throw error;
   }
-  /** A worker that breaks gives its jobs to another one; where that breaks, too, they fail, or there are no workers here at all. */
+  /** Gives the jobs of a worker that broke to another one. Where that one breaks, too, the jobs fail, or there are no workers here at all. */
   private replace_(index: number): void {
     if (this.ended_) return;
     const again = this.brokeOnce_.has(index);
     this.brokeOnce_.add(index);
     this.helpers_[index].terminate();
-    this.helpers_[index] = again && !this.works_ ? this.startHere_() : this.startWorker_(index);
+    this.helpers_[index] = again && !this.hasAnswered_ ? this.startHere_() : this.startWorker_(index);
     // The jobs of now: each that fails gives another one its turn.
     for (const { request } of [...this.jobs_.values()].filter((job) => job.worker === index)) {
-      if (again && this.works_) this.answered_({ id: request.id, failed: new Error('a worker broke') });
+      if (again && this.hasAnswered_) this.answered_({ id: request.id, failed: new Error('a worker broke') });
       else this.helpers_[index].postMessage(request);
     }
   }

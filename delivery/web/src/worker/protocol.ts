@@ -11,9 +11,9 @@ export interface DecodeRequest {
   digests: Uint8Array[];
   /** The stream is a complete file. */
   complete: boolean;
-  /** Mip levels to make, itself included. */
+  /** Mip levels to make, the picture itself included. */
   levels: number;
-  /** Width and height that it may have, at most. */
+  /** Most width and height that the picture may have. */
   most: [number, number];
 }
 /** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
@@ -55,7 +55,7 @@ export interface SplitCloseRequest {
   op: 'split-close';
   key: number;
 }
-/** Decode a document by a function of documents.ts. Gives what that gives. */
+/** Decode a document by a function of documents.ts. Gives the result of that function. */
 export interface DocumentRequest {
   op: 'document';
   name: keyof Documents;
@@ -64,15 +64,15 @@ export interface DocumentRequest {
 /** Anything that a worker is asked. */
 export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
 
-/** What the head of a stream says of it. */
+/** Facts about a stream from its head. */
 export interface SplitInfo {
-  /** Of the head; blocks follow. */
+  /** Bytes of the head; blocks follow. */
   headBytes: number;
   /** Coarsest first; complete with the byte before `end`. */
   scales: { scale: number; blocks: number; wedges: number; end: number }[];
 }
 
-/** What has been added to a split mesh, and its triangles now. */
+/** Wedges that were added to a split mesh, and the mesh's triangles now. */
 export interface SplitUpdate {
   /** Wedges before and now; arrays hold those between. */
   from: number;
@@ -83,14 +83,14 @@ export interface SplitUpdate {
   attributes: { name: string; components: number; values: Float32Array }[];
   /** Wedges of all visible triangles, sorted by group. */
   index: Uint32Array;
-  /** What of the index is drawn by which material. */
+  /** Parts of the index that are drawn by one material each. */
   draws: { material: number; start: number; count: number }[];
 }
 
-/** What a worker answers. */
+/** A worker's answer. */
 export interface WorkerAnswer {
   id: number;
-  /** Levels of decode and enlarge, SplitUpdate of split-add, what a document says. */
+  /** Levels of decode and enlarge, SplitUpdate of split-add, the decoded document. */
   result?: unknown;
   /** The error itself, where no thread lies between. */
   failed?: unknown;

@@ -5,7 +5,7 @@ import type { SplitInfo, SplitUpdate } from './protocol';
 const f = Math.fround;
 const names = { uv0: 'uv', uv1: 'uv1', normal: 'normal', colour: 'color' } as const;
 
-/** What the main thread needs to know of a head. */
+/** The facts of a head that the main thread needs. */
 export function splitInfo(head: SplitStreamHead): SplitInfo {
   const scales = head.scales.map(({ scale, blocks, wedges }) => {
     const last = head.blocks[blocks - 1];
@@ -40,7 +40,7 @@ function normals(codes: Int32Array, from: number, to: number, bits: number): Flo
   return out;
 }
 
-/** What has been added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
+/** Wedges that were added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
 export function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
   const { mesh, head } = reader;
   const to = mesh.wedges;

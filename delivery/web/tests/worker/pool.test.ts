@@ -168,14 +168,14 @@ describe('workers that break', () => {
   it('one after the other, before any has worked: there are none', () => withWorkers(worker, async (all) => {
     const pool = new WorkerPool({ workers: 2 });
     const told: string[] = [];
-    pool.onNone = (error) => told.push(error.message);
+    pool.onUnavailable = (error) => told.push(error.message);
     const ends = [0, 1].map(() => pool.decode(asked()).then(() => 'done', (error: Error) => error.message));
     for (const k of [0, 2, 1, 3]) {
       all[k].break();
       await turns();
     }
     expect((await Promise.all(ends)).every((message) => message.includes('texmesh/worker'))).toBe(true);
-    expect([told.length, pool.none, all.length]).toEqual([1, true, 4]);
+    expect([told.length, pool.isUnavailable, all.length]).toEqual([1, true, 4]);
     pool.dispose();
   }));
 });

@@ -15,7 +15,7 @@ export class BitModels {
 
 const weights = /* @__PURE__ */ Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
 
-/** Reads zeros behind the end. */
+/** Decodes bits; behind the end of the bytes are zeros. */
 export class BitDecoder {
   private at_ = 0;
   private range_ = 0xffffffff;
@@ -61,7 +61,7 @@ export class BitDecoder {
 const steps = 20;
 const below = 12;
 const longest = 26;
-/** Models of one part of values. */
+/** Number of models of one part of values. */
 export const valueModelCount = 4 * steps + 3 * below + 1;
 const prior = 24;
 const valueLimit = 60;
@@ -81,7 +81,7 @@ export class ValueDecoder {
     this.mean_.fill(bytes[0] * 2);
     this.bits_ = new BitDecoder(bytes.subarray(1));
   }
-  /** Another wedge of the point has the same value. */
+  /** Whether another wedge of the point has the same value. */
   same(): boolean {
     return this.present_ && this.bits_.bit(this.models_, valueModelCount - 1);
   }

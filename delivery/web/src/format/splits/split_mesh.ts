@@ -33,7 +33,7 @@ export class Corners {
   readonly a: number[] = [];
   readonly b: number[] = [];
   readonly wedge: number[] = [];
-  /** Goes to the new point of a split, and gets the wedge `target` there. */
+  /** The corner goes to the new point of a split, and gets the wedge `target` there. */
   readonly moves: boolean[] = [];
   readonly target: number[] = [];
   count = 0;
@@ -47,7 +47,7 @@ export class Corners {
     this.target[i] = -1;
   }
 }
-/** Corners begin .. end, each next to the one before. A closed fan goes round. */
+/** Corners begin .. end, each next to the corner before. A closed fan goes round. */
 export interface Fan {
   begin: number;
   end: number;

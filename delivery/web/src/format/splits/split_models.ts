@@ -1,5 +1,5 @@
-// Where the probabilities of the connectivity part stand: the kinds of format/split_codec.h, SplitModels, and how many
-// contexts each has.
+// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split_codec.h, and how many contexts
+// each kind has.
 
 export const degrees = 14;
 export const lefts = 12;
@@ -33,5 +33,5 @@ export const thirdNew = block(64);
 export const thirdLeft = block(64);
 export const thirdRight = block(1);
 export const patchExpected = block(4);
-/** All of them. */
+/** Number of all probabilities. */
 export const modelCount = count;

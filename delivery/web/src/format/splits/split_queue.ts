@@ -2,7 +2,7 @@ import { Growing } from './split_mesh';
 
 /** Points that wait to be asked whether they split, in the order in which they joined; each waits once. */
 export class SplitQueue {
-  /** By point: how often it was asked without a split (3: more often); 4 = it split the last time. */
+  /** By point: how often the point was asked without a split (3: or more often); 4: the point split the last time. */
   readonly asks = new Growing();
   private readonly queued_ = new Growing(); // by point
   private readonly points_: number[] = [];
@@ -25,20 +25,20 @@ export class SplitQueue {
     this.queued_.data[point] = 0;
     return point;
   }
-  /** All points of the mesh, when nobody waits. */
+  /** Queues all points of the mesh. */
   refill(points: number): void {
     this.points_.length = 0;
     this.next_ = 0;
     for (let p = 0; p < points; ++p) this.push(p);
   }
-  /** Nobody waits, and nobody was asked. */
+  /** Empties the queue, and forgets who was asked. */
   reset(): void {
     this.points_.length = 0;
     this.next_ = 0;
     this.queued_.data.fill(0);
     this.asks.data.fill(0);
   }
-  /** Frees the room of those who wait no more. */
+  /** Frees the room of points that wait no more. */
   compact(): void {
     if (this.next_ <= 65536 || this.next_ * 2 <= this.points_.length) return;
     this.points_.splice(0, this.next_);

@@ -13,7 +13,7 @@ export interface SplitLimits {
 
 const bitWidth = (value: number): number => (value === 0 ? 0 : 32 - Math.clz32(value));
 
-/** What is known of each wedge besides the mesh. */
+/** Notes about each wedge besides the mesh. */
 class WedgeNotes {
   /** 1: the values of the wedge are still to come. */
   readonly pending = new Growing();
@@ -31,7 +31,7 @@ class WedgeNotes {
   }
 }
 
-/** What splits, patches and values share while a stream is decoded: the mesh, the bits, and the point under way. */
+/** State that splits, patches and values share while a stream is decoded: the mesh, the bits, and the point under way. */
 export class SplitState {
   /** Corners and fans of the point under way. */
   readonly corners = new Corners();
@@ -57,7 +57,7 @@ export class SplitState {
     private readonly limits_: SplitLimits,
   ) {}
 
-  // ---- what is read
+  // ---- reading
 
   /** Connectivity of the next block. */
   start(connectivity: Uint8Array): void {
@@ -135,7 +135,7 @@ export class SplitState {
     }
     return none;
   }
-  /** Whether the stream chooses this wedge of a list, which is offered once. */
+  /** Whether the stream chooses this wedge of a list; a list offers each wedge once. */
   private isChosen_(w: number): boolean {
     const { listed } = this.wedges;
     if (listed.data[w] === this.list_) return false;

@@ -8,7 +8,7 @@ import { SplitCodec } from './split_codec';
 import { ValueDecoder, valueModelCount } from './split_coder';
 import { SplitMesh } from './split_mesh';
 
-/** TEXCOORD_0, TEXCOORD_1, normals, colours. */
+/** Kinds of attributes: TEXCOORD_0, TEXCOORD_1, normals, colours. */
 export type SplitKind = 'uv0' | 'uv1' | 'normal' | 'colour';
 const kinds: readonly SplitKind[] = ['uv0', 'uv1', 'normal', 'colour'];
 
@@ -18,7 +18,7 @@ export interface SplitGrid {
   origin: number[];
   range: number;
 }
-/** Values that every wedge has. */
+/** An attribute that every wedge has a value of. */
 export interface SplitAttribute {
   kind: SplitKind;
   components: number;
@@ -31,15 +31,15 @@ export interface SplitScale {
   points: number;
   wedges: number;
   faces: number;
-  /** Of the faces, those with three different places. */
+  /** Number of faces with three different places. */
   triangles: number;
 }
-/** What is decoded at once. */
+/** A block is decoded at once. */
 export interface SplitBlock {
   isPatch: boolean;
-  /** Of faces or splits. */
+  /** Number of faces or splits. */
   count: number;
-  /** In the stream. */
+  /** Offset in the stream. */
   offset: number;
   /** Bytes of connectivity, positions, attributes. */
   parts: number[];
@@ -51,9 +51,9 @@ export interface SplitBlock {
 export interface SplitStreamHead {
   position: SplitGrid;
   attributes: SplitAttribute[];
-  /** What faces share: material and part (number of the node). */
+  /** Groups of faces that share material and part (number of the node). */
   groups: { material: number; part: number }[];
-  /** Coarsest first. */
+  /** Scales, coarsest first. */
   scales: SplitScale[];
   blocks: SplitBlock[];
   models: Uint8Array[];
@@ -144,7 +144,7 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
   return blocks;
 }
 
-/** Everything is checked that can be without the blocks. */
+/** Reads the head of a stream; checks everything that can be checked without the blocks. */
 export function readSplitHead(bytes: Uint8Array): SplitStreamHead {
   const input = new BytesIn(bytes, file);
   input.expect('TXMS');
@@ -200,7 +200,7 @@ export class SplitStreamReader {
     return this.block_;
   }
 
-  /** FormatError where whole blocks from a place of the stream on are not those of the head. */
+  /** FormatError where whole blocks, from a place of the stream on, have other digests than the head says. */
   async check(from: number, bytes: Uint8Array): Promise<void> {
     for (const [i, { offset, bytes: size, digest }] of this.head.blocks.entries())
       if (offset >= from && offset + size <= from + bytes.length && !samePrefix(await sha256(bytes.subarray(offset - from, offset - from + size)), digest))

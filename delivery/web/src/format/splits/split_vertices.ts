@@ -3,7 +3,7 @@ import * as m from './split_models';
 import type { SplitState } from './split_state';
 import type { SplitValues } from './split_values';
 
-/** Splits of a point into itself, the parent, and a child: who gets which corners, and the faces between them. */
+/** Splits of a point, the parent, which gets a child: parent and child share the corners, and get new faces between them. */
 export class SplitVertices {
   private staysNow_ = 0;
 
@@ -84,7 +84,7 @@ export class SplitVertices {
     for (let i = 0; i < corners.count; ++i)
       if (!corners.moves[i]) this.state_.wedges.stays.data[corners.wedge[i]] = this.staysNow_;
   }
-  /** The child's wedge at a corner that moves: the one that corners of the same wedge got before. */
+  /** Codes the child's wedge at a corner that moves: mostly the wedge that corners of the same wedge got before. */
   private codeTarget_(i: number): void {
     if (this.staysNow_ !== this.splitNumber_) this.noteStays_();
     const wedge = this.state_.corners.wedge[i];
