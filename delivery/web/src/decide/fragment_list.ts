@@ -1,8 +1,9 @@
 import { InputError } from '../format/errors';
+import { fullSizePlanes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
 import { PlaneTables, bytesToShow, fragmentCount } from '../format/tables';
-import { TextureInfo, fullSizePlanes } from '../format/textures';
+import { TextureInfo } from '../format/textures';
 import { etaOf, meanEta, qualityOf } from './allocation';
 import { clamp, sumOf } from './numbers';
 import { FragmentOffer } from './plan_types';

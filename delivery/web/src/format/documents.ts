@@ -2,11 +2,12 @@ import { toHex } from './bytes';
 import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
+import { fullSizePlanes } from './layout';
 import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { sha256 } from './sha256';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
-import { TextureInfo, fullSizePlanes, missingFeature, readTextures } from './textures';
+import { TextureInfo, missingFeature, readTextures } from './textures';
 import * as paths from './entry_paths';
 import * as layout from './layout';
 

@@ -1,4 +1,4 @@
-// Paths of a package's entries (format/SPEC.md, section 3), and numbers that all its readers go by.
+// Paths of a package's entries (format/SPEC.md, section 3), and numbers that all readers go by.
 
 /** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
 export const bootstrapBytes = 16384;
@@ -15,3 +15,9 @@ const digits = (n: number, least: number): string => String(n).padStart(least, '
 export const previewPath = (plane: number): string => `preview/${digits(plane, 3)}.jpg`;
 /** Path of a rung's pack, as texture/3/r07.pack. */
 export const rungPath = (plane: number, rung: number): string => `texture/${plane}/r${digits(rung, 2)}.pack`;
+
+/** Number of full-size planes, which stand before the mips. */
+export function fullSizePlanes(textures: readonly { mip: number }[]): number {
+  const mip = textures.findIndex((t) => t.mip > 0);
+  return mip < 0 ? textures.length : mip;
+}

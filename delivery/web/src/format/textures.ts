@@ -1,6 +1,7 @@
 import { CodecId, codecTraits, isCodec } from './codec';
 import * as paths from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
+import { fullSizePlanes } from './layout';
 
 /** One texture plane of textures.json (format/SPEC.md, section 7). */
 export interface TextureInfo {
@@ -31,12 +32,6 @@ export interface TextureInfo {
   lossless: boolean;
   /** Ending of the source file among the entries, source/PPP.EXT; "" = none. Loads leave that file alone; PackageReader.entry reads it. */
   source: string;
-}
-
-/** Number of full-size planes, which stand first. */
-export function fullSizePlanes(textures: readonly TextureInfo[]): number {
-  const mip = textures.findIndex((t) => t.mip > 0);
-  return mip < 0 ? textures.length : mip;
 }
 
 const mostSide = 1 << 20;

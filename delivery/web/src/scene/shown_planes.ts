@@ -1,12 +1,12 @@
-import { type PlaneChoice, fullSize, planesForDisplay } from '../decide/fragment_list';
+import { fullSize, planesForDisplay, type PlaneChoice } from '../decide/fragment_list';
 import { InputError, throwIfAborted } from '../format/errors';
-import { mostPreviewPx } from '../format/layout';
+import { fullSizePlanes, mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';
-import { type TextureInfo, fullSizePlanes } from '../format/textures';
+import { type TextureInfo } from '../format/textures';
 import type { Levels } from '../worker/protocol';
 import type { PlaneComposer } from './composer';
 import type { FragmentPlace } from './fragment_fates';
-import { type LoadContext, hysteresis } from './load_context';
+import { hysteresis, type LoadContext } from './load_context';
 import type { ScaleSource } from './scale_source';
 import { TextureSet } from './texture_set';
 
