@@ -21,6 +21,12 @@ it('no imports go round in a circle', () => expect(circles(sources)).toEqual([])
 it('rooms import from the rooms below them only', () => expect(wrongWays(sources)).toEqual([]));
 it('no function, class, file or folder is too large', () => expect(tooLarge(sources)).toEqual([]));
 
+it('a test file in a folder has the name of a source file', () => {
+  const tests = filesOf('tests', '.test.ts').filter((file) => file.includes('/'));
+  expect(tests.length).toBeGreaterThan(20);
+  expect(tests.filter((file) => !sources.has(file.replace('.test.ts', '.ts')))).toEqual([]);
+});
+
 it('a planted circle is found, whatever form its imports have', () => {
   for (const back of ["import { a } from './a';", "export * from './a';", "import type { A } from './a';", "const later = () => import('./a');", "type A = typeof import('./a');"])
     expect(circles(planted(['http/a.ts', "import { b } from './b';\n"], ['http/b.ts', `${back}\n`]))).toEqual(['http/a.ts -> http/b.ts -> http/a.ts']);

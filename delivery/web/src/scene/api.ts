@@ -6,13 +6,13 @@ import type { DecodeHere } from '../worker/pool';
 
 /** How the object is looked at; lengths in device pixels. */
 export interface Display {
-  /** Height on screen of the object's largest extent, the whole of it, seen or not. */
+  /** Height on screen of the object's largest extent, seen or not. */
   heightPx: number;
-  /** What of it is seen (Fig. 7.5); left out: all. */
+  /** Visible part of the object (Fig. 7.5); left out: the whole object. */
   part?: VisiblePart;
 }
 
-/** What GLTFLoader (three/addons) offers and this library uses. */
+/** The methods of GLTFLoader (three/addons) that this library uses. */
 export interface GltfLoaderLike {
   /** Adds an extension of the loader. */
   register(callback: (parser: any) => any): unknown;
@@ -22,48 +22,48 @@ export interface GltfLoaderLike {
 
 /** Options of TexmeshPackage.load. */
 export interface LoadOptions {
-  /** The renderer that shows the scene: textures are composed in its context. */
+  /** The renderer of the scene: textures are composed in the renderer's context. */
   renderer: WebGLRenderer;
   /**
    * Makes a GLTFLoader with whatever decoders the package's meshes need: `() => new GLTFLoader().setDRACOLoader(...)`.
    * Called once for every mesh.
    */
   gltfLoader: () => GltfLoaderLike;
-  /** Camera that looks at the object; with it scale and textures follow the display, see LoadedModel.update. */
+  /** Camera that looks at the object; scale and textures follow the camera's view, see LoadedModel.update. */
   camera?: Camera;
-  /** Without a camera (or instead of it): displayed height in device px, or a function that says. Default 1000. */
+  /** Displayed height in device px, or a function that gives the height; stands in for the camera. Default 1000. */
   display?: number | Display | (() => number | Display);
   /**
    * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
    * Infinity: no limit, everything that the display can show. Default 5.
    */
   time?: number;
-  /** How the time is spent; htca is another name of htc. Default guard. */
+  /** Policy that spends the time; htca is another name of htc. Default guard. */
   policy?: Policy | 'htca';
   /** Which fragment of the plan is fetched next. Default credit. */
   order?: HtcOrder;
-  /** First guess of the throughput, bytes per second; left out: what the first transfers have shown. */
+  /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;
   /**
-   * Which rule says what scale is enough: one of the step function's, or (default) measured: its default, and finer as
-   * long as the package's own measurements say that it is seen.
+   * The rule that says which scale is enough: a rule of the step function, or (default) measured. Measured is the step function's
+   * default, and a finer scale as long as the package's own measurements say that the difference is seen.
    */
   rule?: StepRule | 'measured';
-  /** This scale (or the nearest one that the package has) instead of what the display asks for. */
+  /** This scale (or the nearest one that the package has) instead of the scale for the display. */
   scale?: number;
-  /** This rung of every fragment (clipped to those there are) instead of what fits the time. */
+  /** This rung of every fragment (the highest one where there are fewer) instead of rungs that fit the time. */
   rung?: number;
-  /** Full-size textures, whatever the display can show. */
+  /** Textures have full size, whatever the display can show. */
   fullSize?: boolean;
   /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default auto. */
   meshes?: 'glb' | 'stream' | 'auto';
-  /** After the deadline (and when the view changes) go on fetching what the display can show. Default true. */
+  /** The load goes on after the deadline (and when the view changes) until the display can show no more. Default true. */
   autoRefine?: boolean;
-  /** Refining ends where a fragment's 1 - SSIM is no more than this: what is beyond cannot be told apart. Default 0.003. */
+  /** Refining ends where a fragment's 1 - SSIM is no more than this: higher rungs cannot be told apart. Default 0.003. */
   refineTo?: number;
-  /** Where worker.js is, when not beside the library. */
+  /** Address of worker.js, where that file does not stand beside the library. */
   workerUrl?: string | URL;
-  /** Where pages may have no workers: `handle` of texmesh/worker, which then works on the main thread. */
+  /** `handle` of texmesh/worker, for pages that may have no workers: `handle` then works on the main thread. */
   decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
@@ -88,19 +88,19 @@ export interface DecisionEvent {
   eta: number;
   /** -1: skipped */
   rung: number;
-  /** What is fetched. */
+  /** Bytes that are fetched. */
   bytes: number;
-  /** theta_k: it may take so long. */
+  /** theta_k: the transfer may take so long. */
   plannedSeconds: number;
-  /** gamma_k: it took so long; undefined until it has ended. */
+  /** gamma_k: the transfer took so long; undefined until the transfer has ended. */
   actualSeconds?: number;
-  /** Time that earlier ones have saved, or, below 0, lost. */
+  /** Time that earlier transfers have saved, or, below 0, lost. */
   creditSeconds: number;
   /** Throughput that the decision supposes. */
   bytesPerSecond: number;
-  /** When it was asked for, seconds after the first request for a fragment. */
+  /** When the fragments were asked for, seconds after the first request for a fragment. */
   issued: number;
-  /** When it had come, on the same clock; undefined until then. */
+  /** When the fragments had come, on the same clock; undefined until then. */
   done?: number;
   /** Nothing is fetched: the preview stays. */
   skipped: boolean;
@@ -122,11 +122,11 @@ export interface LoadEvents {
   decision: DecisionEvent & { at: number };
   /** More bytes, or another phase. */
   progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
-  /** The timed part is over: limit and what it took, seconds from the same start. */
+  /** The timed part is over: limit and actual time, seconds from the same start. */
   deadline: { at: number; limit: number; actual: number; skipped: number };
   /**
-   * The renderer's context was lost, or is there again: then textures begin with their previews, and what they had is fetched again; `done`
-   * tells the end of it.
+   * The renderer's context was lost, or is there again. After that, textures begin with their previews and their fragments are fetched
+   * again; event `done` tells when all have come.
    */
   context: { at: number; lost: boolean };
   /** Something went wrong; fatal: the load has ended. */
@@ -135,29 +135,29 @@ export interface LoadEvents {
   done: { at: number };
 }
 
-/** A texture as it is composed. */
+/** A texture that is being composed. */
 export interface ComposedPlane {
   /** Full-size plane. */
   base: number;
-  /** The plane that is shown: it or a mip of it. */
+  /** The plane that is shown: the full-size plane or a mip of that. */
   plane: number;
-  /** Image of the package that it holds. */
+  /** Image of the package that the texture holds. */
   image: number;
-  /** What the image says of the surface: base-colour, normal and so on. */
+  /** Role of the image: base-colour, normal and so on. */
   role: string;
   /** Texels of the shown plane across. */
   widthPx: number;
-  /** And down. */
+  /** Texels of the shown plane down. */
   heightPx: number;
   /** Rung of each fragment in the texture; -1: the preview. */
   rungs: Int16Array;
-  /** As used by materials; the same GPU texture for all of them. */
+  /** Textures in the materials; all of them have the same GPU texture. */
   textures: readonly Texture[];
 }
 
 /** State of a load, for panels and tests. */
 export interface LoadState {
-  /** Where the load stands. */
+  /** Phase of the load. */
   phase: LoadPhase;
   /** Scale in the scene; -1: none yet. */
   scale: number;
@@ -169,7 +169,7 @@ export interface LoadState {
   planes: readonly ComposedPlane[];
   /** Bytes received by this package so far. */
   bytes: number;
-  /** Throughput as it is estimated now; 0: nothing is known yet. */
+  /** Estimate of the throughput now; 0: nothing is known yet. */
   throughputBytesS: number;
   /** Round trip, seconds. */
   rttS: number;
@@ -179,33 +179,33 @@ export interface LoadState {
 
 /** A package in a scene. */
 export interface LoadedModel {
-  /** What was added to the scene; in the frame of the package's meshes (Manifest.origin). */
+  /** Object that was added to the scene, in the frame of the package's meshes (Manifest.origin). */
   readonly object: Object3D;
-  /** How it stands now; a new object each time. */
+  /** State of the load now; a new object each time. */
   readonly state: LoadState;
-  /** When the first picture stands in the scene. */
+  /** Resolves when the first picture stands in the scene. */
   readonly firstPicture: Promise<void>;
-  /** When the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
+  /** Resolves when the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
   readonly done: Promise<void>;
-  /** Calls the listener at every such event; what it returns ends that. */
+  /** Calls the listener at every such event; gives a function that ends the calls. */
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
   /**
-   * The view may have changed: call it for every frame, or when the camera moves. Picks the scale (with hysteresis),
-   * finer planes, and what to refine first. Cheap when nothing has changed.
+   * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with hysteresis), finer planes, and
+   * fragments to refine first. Cheap when nothing has changed.
    */
   update(camera?: Camera): void;
-  /** Fetches what the display can show but the time did not allow; resolves when nothing is left to fetch. */
+  /** Fetches fragments that the display can show but the time did not allow; resolves when nothing is left to fetch. */
   refine(): Promise<void>;
   /**
-   * Changes what was chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place of
-   * higher ones, too. undefined: by the display again. InputError: a rung that is none.
+   * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place
+   * of higher ones, too. undefined: by the display again. InputError: scale or rung is no whole number from 0 on.
    */
   setOverride(override: { scale?: number; rung?: number }): void;
-  /** Stops all transfers; what is shown stays. */
+  /** Stops all transfers; the picture stays. */
   cancel(): void;
-  /** Stops, takes the object out of the scene and frees geometries, materials, textures and workers. */
+  /** Stops all transfers, takes the object out of the scene and frees geometries, materials, textures and workers. */
   dispose(): void;
-  /** RGBA bytes of a composed plane, row 0 at the top: reads back from the GPU, for tests. */
+  /** RGBA bytes of a composed plane, row 0 at the top: read back from the GPU, for tests. */
   readPlane(base: number): Uint8Array;
   /** Materials in use, for effects of the application's own. */
   readonly materials: readonly Material[];
