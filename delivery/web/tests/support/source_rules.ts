@@ -19,12 +19,28 @@ export const most = { functionLines: 80, classLines: 250, fileLines: 400, median
 const roomOf = (file: string): string => (file.includes('/') ? file.slice(0, file.indexOf('/')) : '');
 const linesOf = (text: string): number => text.split('\n').length - 1;
 
+const parsedFiles = new Map<string, ts.SourceFile>();
+/** Each text is parsed once. */
 function parsed(file: string, text: string): ts.SourceFile {
-  return ts.createSourceFile(file, text, ts.ScriptTarget.Latest, true);
+  const known = parsedFiles.get(file);
+  if (known?.text === text) return known;
+  const source = ts.createSourceFile(file, text, ts.ScriptTarget.Latest, true);
+  parsedFiles.set(file, source);
+  return source;
 }
 
-/** What a file imports, by whatever form: import, export from, import(), typeof import(). */
-function specifiersOf(source: ts.SourceFile): string[] {
+/** A function of a source file that is called once for each file. */
+function once<T>(read: (source: ts.SourceFile) => T): (source: ts.SourceFile) => T {
+  const results = new WeakMap<ts.SourceFile, T>();
+  return (source) => {
+    if (!results.has(source)) results.set(source, read(source));
+    return results.get(source)!;
+  };
+}
+
+/** The imports of a file, of whatever form: import, export from, import(), typeof import(). */
+const specifiersOf = once(readSpecifiers);
+function readSpecifiers(source: ts.SourceFile): string[] {
   const found: string[] = [];
   const visit = (node: ts.Node): void => {
     if ((ts.isImportDeclaration(node) || ts.isExportDeclaration(node)) && node.moduleSpecifier) found.push((node.moduleSpecifier as ts.StringLiteral).text);
@@ -69,21 +85,27 @@ export function wrongWays(sources: Sources): string[] {
   });
 }
 
+/** Functions and classes of a file that are too long. */
+const longParts = once((source) => {
+  const found: string[] = [];
+  const lineOf = (position: number): number => source.getLineAndCharacterOfPosition(position).line;
+  const visit = (node: ts.Node): void => {
+    const limit = ts.isClassLike(node) ? most.classLines : ts.isFunctionLike(node) ? most.functionLines : Infinity;
+    const first = limit < Infinity ? lineOf(node.getStart()) : 0;
+    const lines = limit < Infinity ? lineOf(node.end) - first + 1 : 0;
+    if (lines > limit) found.push(`${source.fileName}:${first + 1}: ${lines} lines of ${limit}`);
+    ts.forEachChild(node, visit);
+  };
+  visit(source);
+  return found;
+});
+
 /** Functions, classes and files that are too long, and folders with too many files. */
 export function tooLarge(sources: Sources): string[] {
   const found: string[] = [];
   const folders = new Map<string, number>();
   for (const [file, text] of sources) {
-    const source = parsed(file, text);
-    const lineOf = (position: number): number => source.getLineAndCharacterOfPosition(position).line;
-    const visit = (node: ts.Node): void => {
-      const isClass = ts.isClassLike(node);
-      const lines = lineOf(node.end) - lineOf(node.getStart()) + 1;
-      const limit = isClass ? most.classLines : ts.isFunctionLike(node) ? most.functionLines : Infinity;
-      if (lines > limit) found.push(`${file}:${lineOf(node.getStart()) + 1}: ${lines} lines of ${limit}`);
-      ts.forEachChild(node, visit);
-    };
-    visit(source);
+    found.push(...longParts(parsed(file, text)));
     if (linesOf(text) > most.fileLines) found.push(`${file}: ${linesOf(text)} lines of ${most.fileLines}`);
     folders.set(dirname(file), (folders.get(dirname(file)) ?? 0) + 1);
   }
