@@ -7,9 +7,18 @@ add_test(NAME house_format COMMAND ${house}/check_format ${PROJECT_SOURCE_DIR})
 set_tests_properties(house_format PROPERTIES SKIP_RETURN_CODE 77)
 add_test(NAME house_text COMMAND ${house}/check_text ${PROJECT_SOURCE_DIR})
 add_test(NAME house_text_self_test COMMAND ${house}/check_text --self-test)
+add_test(NAME house_links COMMAND ${house}/check_links ${PROJECT_SOURCE_DIR})
+add_test(NAME house_links_self_test COMMAND ${house}/check_links --self-test)
+add_test(NAME house_docs COMMAND ${house}/check_docs ${PROJECT_SOURCE_DIR} $<TARGET_FILE:texmesh>)
+add_test(NAME house_docs_self_test COMMAND ${house}/check_docs --self-test)
+add_test(NAME house_tour_self_test COMMAND ${house}/check_tour --self-test)
 if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its user
   add_test(NAME house_install COMMAND ${house}/check_install ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/consumer
     ${CMAKE_CURRENT_BINARY_DIR}/install ${CMAKE_COMMAND} $<TARGET_FILE:make_scan>)
+endif()
+if(NOT TEXMESH_SANITIZE)
+  add_test(NAME house_tour COMMAND ${house}/check_tour ${PROJECT_SOURCE_DIR}/README.md $<TARGET_FILE:texmesh>
+    $<TARGET_FILE:make_scan> ${CMAKE_CURRENT_BINARY_DIR}/tour)
 endif()
 add_test(NAME house_make_scan COMMAND ${house}/check_make_scan $<TARGET_FILE:make_scan> $<TARGET_FILE:texmesh>
   ${CMAKE_CURRENT_BINARY_DIR}/make_scan)
