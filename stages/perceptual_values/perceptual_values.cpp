@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
@@ -205,10 +206,7 @@ float height_px(double numerator, double denominator) {
 void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
                             const PerceptualValuesOptions& options, const std::vector<float>& value,
                             const RunContext& context, PerceptualValues& out) {
-  Vec3f lo = scales.mesh.positions.at(0), hi = lo;
-  for (Vec3f p : scales.mesh.positions)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
-  out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  out.object_height = bounding_box(scales.mesh.positions).longest_side();
   std::vector<double> edge(scales.scales.size());
   parallel_for(context, edge.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/base/box.h"
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
@@ -19,30 +20,18 @@ constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples o
 /// the whole picture, one pixel wide, covers 0.5 %.
 constexpr double kLeastCovered = 0.002;
 
-struct Sphere {
-  Vec3d centre;
-  double radius = 0;
-};
-
-Sphere bounding_sphere(const Mesh& mesh) {
+BoundingSphere sphere_of(const Mesh& mesh) {
   if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
-  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
-  for (Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min<double>(lo[k], p[k]);
-      hi[k] = std::max<double>(hi[k], p[k]);
-    }
-  Sphere s{(lo + hi) * 0.5, 0};
-  for (Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
-  if (!(s.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
-  return s;
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
+  return sphere;
 }
 
 /// Around the place where nearly all positions lie, whatever a few others do.
-Sphere crowd_sphere(const Mesh& mesh, const Sphere& bounds) {
+BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
   constexpr double kCrowd = 0.98, kMargin = 1.25;
   const std::size_t n = mesh.positions.size();
-  Sphere s;
+  BoundingSphere s;
   std::vector<double> values(n);
   const auto at_rank = [&](std::size_t rank) {
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
@@ -280,7 +269,7 @@ struct Coverage {
   LevelCount levels;
 };
 
-Coverage look_around(const ViewScene& scene, const Sphere& sphere, std::size_t planes,
+Coverage look_around(const ViewScene& scene, const BoundingSphere& sphere, std::size_t planes,
                      const QualityTable& table, const RunContext& context) {
   const int views = static_cast<int>(table.views);
   Coverage seen{0, LevelCount(planes)};
@@ -293,7 +282,7 @@ Coverage look_around(const ViewScene& scene, const Sphere& sphere, std::size_t p
   return seen;
 }
 
-std::string count_outside(const Mesh& mesh, const Sphere& sphere) {
+std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
   const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
     return length(to_double(p) - sphere.centre) > sphere.radius;
   });
@@ -302,12 +291,12 @@ std::string count_outside(const Mesh& mesh, const Sphere& sphere) {
 
 /// The sphere that the pictures frame, and what they show: the object's, unless it shows next to nothing of
 /// the object and that of the crowd more.
-Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& table, Sphere& sphere,
+Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& table, BoundingSphere& sphere,
                Notes& notes, const RunContext& context) {
   const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
   Coverage seen = look_around(scene, sphere, planes, table, context);
   if (static_cast<double>(seen.pixels) >= kLeastCovered * all) return seen;
-  const Sphere crowd = crowd_sphere(*scene.mesh, sphere);
+  const BoundingSphere crowd = crowd_sphere(*scene.mesh, sphere);
   if (crowd.radius < sphere.radius) {
     Coverage closer = look_around(scene, crowd, planes, table, context);
     if (closer.pixels > seen.pixels) {
@@ -348,7 +337,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,
                                 const QualityOptions& options, const RunContext& context) {
-  Sphere sphere = bounding_sphere(scales.mesh);
+  BoundingSphere sphere = sphere_of(scales.mesh);
   const ShownPlanes shown = find_shown(materials, fragments);
   MeasuredQuality result;
   QualityTable& table = result.table;

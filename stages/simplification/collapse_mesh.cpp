@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "stages/geometry/morton.h"
 
@@ -36,11 +37,9 @@ void CollapseMesh::number_points(const ConditionedMesh& input,
                                  std::vector<std::uint32_t>& point_of_position) {
   const std::vector<Vec3f>& positions = input.mesh.positions;
   const std::size_t n = positions.size();
-  Vec3d lo = to_double(positions.at(0)), hi = lo;
-  for (Vec3f p : positions)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min<double>(lo[k], p[k]), hi[k] = std::max<double>(hi[k], p[k]);
-  diagonal_ = length(hi - lo) > 0 ? length(hi - lo) : 1;
-  const Vec3d centre = (lo + hi) * 0.5;
+  const Box3d box = to_double(bounding_box(positions));
+  diagonal_ = box.diagonal() > 0 ? box.diagonal() : 1;
+  const Vec3d centre = box.centre();
   auto local = [&](std::size_t p) { return (to_double(positions[p]) - centre) * (1 / diagonal_); };
 
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;  // code, position; one per group of twins

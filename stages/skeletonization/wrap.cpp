@@ -76,8 +76,8 @@ class SoupOracle {
 
   const Geom_traits& geom_traits() const { return traits_; }
   CGAL::Bbox_3 bbox() const {
-    const Vec3d lo = tree_.lo(), hi = tree_.hi();
-    return {lo.x, lo.y, lo.z, hi.x, hi.y, hi.z};
+    const auto& [min, max] = tree_.box();
+    return {min.x, min.y, min.z, max.x, max.y, max.z};
   }
 
   template <class K>

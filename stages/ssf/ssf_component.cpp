@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
@@ -30,16 +31,6 @@ constexpr std::size_t kGrain = 4096;
 constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
 
 Vec3d moved(Vec3d point, Vec3f by) { return point + to_double(by); }
-
-double extent(std::span<const Vec3d> points) {
-  Vec3d lo = points[0], hi = lo;
-  for (Vec3d p : points)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  return std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-}
 
 double rms(const std::vector<float>& values) {
   double squares = 0;
@@ -139,7 +130,7 @@ class ComponentFilter {
         options_(options),
         context_(context),
         scales_(static_cast<std::size_t>(options.scales)),
-        range_(extent(component_.points)) {}
+        range_(bounding_box(component_.points).longest_side()) {}
 
   ComponentScales run() {
     double sigma_max = options_.sigma_max * component_.diagonal / component_.mean_edge;
@@ -272,15 +263,9 @@ class ComponentFilter {
   }
 
   bool has_converged(const std::vector<Vec3d>& points, const HeatFlow& flow, std::size_t scale) {
-    Vec3d lo = moved(points[0], flow.moved[0]), hi = lo;
-    for (std::size_t v = 1; v < points.size(); ++v) {
-      const Vec3d p = moved(points[v], flow.moved[v]);
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min(lo[k], p[k]);
-        hi[k] = std::max(hi[k], p[k]);
-      }
-    }
-    const double now = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+    Box3d box;
+    for (std::size_t v = 0; v < points.size(); ++v) box.extend(moved(points[v], flow.moved[v]));
+    const double now = box.longest_side();
     out_.convergence[scale + 1] = static_cast<float>(now / range_);
     return scale > 0 && now / range_ < options_.convergence;
   }

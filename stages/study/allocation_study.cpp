@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "format/base/box.h"
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
@@ -243,24 +244,6 @@ void describe(const std::vector<const PlaneTables*>& tables, const Rungs& rungs,
   out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
 }
 
-struct Sphere {
-  Vec3d centre;
-  double radius = 0;
-};
-
-Sphere sphere_of(const Mesh& mesh) {
-  if (mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
-  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
-  for (const Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min<double>(lo[k], p[k]);
-      hi[k] = std::max<double>(hi[k], p[k]);
-    }
-  Sphere s{(lo + hi) * 0.5, 0};
-  for (const Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
-  return s;
-}
-
 Pixels picture_of(const Picture& picture) {
   Pixels out{picture.side_px, picture.side_px, 3, {}};
   out.data.reserve(picture.linear.size() * 3);
@@ -296,7 +279,8 @@ std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
   scene.emissive_plane.assign(materials.size(), -1);
   for (const std::size_t p : shown.planes)
     scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
-  const Sphere sphere = sphere_of(mesh.mesh);
+  if (mesh.mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(mesh.mesh.positions);
   const auto side = static_cast<std::uint32_t>(options.size_px);
   std::vector<ViewBuffer> views;
   for (int v = 0; v < options.views; ++v)
