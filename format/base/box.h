@@ -14,15 +14,12 @@ struct Box3 {
   static constexpr T kInfinity = std::numeric_limits<T>::infinity();
   Vec3<T> min{kInfinity, kInfinity, kInfinity}, max{-kInfinity, -kInfinity, -kInfinity};
 
-  void extend(Vec3<T> p) {
-    for (int k = 0; k < 3; ++k) {
-      min[k] = std::min(min[k], p[k]);
-      max[k] = std::max(max[k], p[k]);
-    }
-  }
+  void extend(Vec3<T> p) { extend(Box3{p, p}); }
   void extend(const Box3& other) {
-    extend(other.min);
-    extend(other.max);
+    for (int k = 0; k < 3; ++k) {
+      min[k] = std::min(min[k], other.min[k]);
+      max[k] = std::max(max[k], other.max[k]);
+    }
   }
   bool empty() const { return !(min.x <= max.x); }
   Vec3<T> size() const { return empty() ? Vec3<T>{} : max - min; }
