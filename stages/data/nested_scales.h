@@ -13,6 +13,7 @@ namespace texmesh {
 struct Collapse {
   std::uint32_t from = 0, to = 0;
   float error = 0;  // object units: square root of the quadric error
+  bool vanishes_with_component() const { return to == from; }
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.from, s.to, s.error);

@@ -1,5 +1,4 @@
 #include "stages/image/image_metadata.h"
-#include "format/base/bytes.h"
 
 #include <zlib.h>
 
@@ -10,6 +9,8 @@
 #include <map>
 #include <optional>
 #include <string_view>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 namespace {

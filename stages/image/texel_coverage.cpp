@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "format/base/portable_math.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
@@ -48,11 +49,11 @@ TexelCoverage::TexelCoverage(std::uint32_t width_px, std::uint32_t height_px, Wr
       height_(height_px),
       wrap_s_(wrap_s),
       wrap_t_(wrap_t),
-      bits_((std::size_t{width_px} + 7) / 8 * height_px),
+      bits_(coverage_size_bytes(width_px, height_px)),
       row_full_(height_px) {}
 
 void TexelCoverage::mark(std::uint32_t row, std::uint32_t first, std::uint32_t last) {
-  std::uint8_t* bytes = bits_.data() + (std::size_t{width_} + 7) / 8 * row;
+  std::uint8_t* bytes = bits_.data() + coverage_stride_bytes(width_) * row;
   const std::uint32_t a = first / 8, b = last / 8;
   const auto head = static_cast<std::uint8_t>(0xff >> (first % 8));
   const auto tail = static_cast<std::uint8_t>(0xff << (7 - last % 8));

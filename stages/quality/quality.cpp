@@ -161,13 +161,12 @@ MipTexture empty_texture(const TexturePlane& plane, std::uint32_t first_level) {
 }
 
 // A fragment of the source, cut out of the plane's pixels.
-Pixels cut(const Pixels& pixels, const TexturePlane& plane, std::uint32_t fragment) {
-  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
-  const std::uint32_t x = fragment % plane.columns * w, y = fragment / plane.columns * h;
-  Pixels out{w, h, pixels.channels, {}};
-  for (std::uint32_t row = 0; row < h; ++row)
-    out.data.insert(out.data.end(), pixels.at(x, y + row),
-                    pixels.at(x, y + row) + static_cast<std::size_t>(w) * pixels.channels);
+Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
+  Pixels out{r.width_px, r.height_px, pixels.channels, {}};
+  for (std::uint32_t y = r.top_px; y < r.bottom_px(); ++y) {
+    const std::uint8_t* row = pixels.at(r.left_px, y);
+    out.data.insert(out.data.end(), row, row + std::size_t{r.width_px} * pixels.channels);
+  }
   return out;
 }
 
@@ -181,11 +180,9 @@ MipTexture plane_texture(const TexturePlane& plane, const Pixels& pixels, const 
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       const bool stored = ladder && !fragment_stream(ladder->rungs[rung], f).empty();
-      const auto index = static_cast<std::uint32_t>(f);
-      const Pixels block =
-          stored ? decode_fragment(*ladder, rung, f, fragment_pixels) : cut(pixels, plane, index);
-      reduce_block(block, index % plane.columns * plane.fragment_width_px,
-                   index / plane.columns * plane.fragment_height_px, first_level, texture.levels[0]);
+      const TexelRectangle place = padded_fragment_rectangle(plane, f);
+      const Pixels block = stored ? decode_fragment(*ladder, rung, f, fragment_pixels) : cut(pixels, place);
+      reduce_block(block, place.left_px, place.top_px, first_level, texture.levels[0]);
     }
   });
   build_mips(texture);

@@ -1,8 +1,9 @@
 #include "stages/simplification/collapse_components.h"
-#include "format/base/box.h"
 
 #include <algorithm>
 #include <numeric>
+
+#include "format/base/box.h"
 
 namespace texmesh {
 

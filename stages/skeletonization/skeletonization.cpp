@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/local_radius.h"
 #include "stages/skeletonization/segment_tree.h"
 #include "stages/skeletonization/wrap.h"
@@ -44,21 +43,6 @@ CurveSkeleton centroid_of(const TriangleSoup& part) {
   return {{sum * (1 / static_cast<double>(part.points.size()))}, {}};
 }
 
-/// Errors that mean "not this way"; the others (Cancelled, a lack of memory: a limit of the machine must not
-/// decide about the result) pass through.
-template <class Try, class Else>
-void try_or(Try&& attempt, Else&& otherwise) {
-  try {
-    attempt();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception&) {
-    otherwise();
-  }
-}
-
 CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_contractions, Notes& notes,
                              const RunContext& context) {
   CurveSkeleton all;
@@ -66,7 +50,7 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
   for (const TriangleSoup& part : parts) {
     context.check_cancelled();
     CurveSkeleton skeleton;
-    try_or([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
+    try_geometry([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
     if (!is_finite(skeleton)) {
       skeleton = centroid_of(part);
       ++failed;
@@ -87,7 +71,7 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOp
   for (int attempt = 1;; ++attempt, alpha *= 2) {
     context.check_cancelled();
     std::vector<TriangleSoup> parts;
-    try_or(
+    try_geometry(
         [&] {
           parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
                                static_cast<std::size_t>(options.max_wrap_faces),
@@ -96,7 +80,7 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOp
         [&] {
           if (attempt == kWrapAttempts) throw;
         });
-    if (parts.empty() && attempt == kWrapAttempts) throw std::runtime_error("the wrap is empty");
+    if (parts.empty() && attempt == kWrapAttempts) throw GeometryFailure("the wrap is empty");
     if (parts.empty()) continue;
     if (attempt > 1)
       add_warning(notes, "skeleton-coarser-wrap", "",
@@ -187,13 +171,13 @@ Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& 
   const UnitFrame frame = unit_frame_of(mesh.mesh.positions);
   Skeleton out;
   CurveSkeleton skeleton;
-  try_or([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
-         [&] {
-           use_centroids(mesh, skeleton, out.distance);
-           out.fallback_centroid = true;
-           add_warning(out.notes, "skeleton-fallback", "",
-                       "no skeleton, distances are to the centroids of the components");
-         });
+  try_geometry([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
+               [&] {
+                 use_centroids(mesh, skeleton, out.distance);
+                 out.fallback_centroid = true;
+                 add_warning(out.notes, "skeleton-fallback", "",
+                             "no skeleton, distances are to the centroids of the components");
+               });
   for (const Vec3d& p : skeleton.nodes) out.nodes.push_back(to_float(p));
   out.segments = std::move(skeleton.segments);
   out.radius = floored(out.distance, options.radius_floor, frame.diagonal);

@@ -1,12 +1,13 @@
 #include "stages/skeletonization/wrap_soup.h"
-#include "format/base/box.h"
-#include "format/base/no_index.h"
 
 #include <meshoptimizer.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
+
+#include "format/base/box.h"
+#include "format/base/no_index.h"
+#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -125,7 +126,7 @@ TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame)
   close_holes(mesh, g);
   thin_out(g);
   TriangleSoup soup = used_part(g);
-  if (soup.triangles.empty()) throw std::runtime_error("no triangle has an area");
+  if (soup.triangles.empty()) throw GeometryFailure("no triangle has an area");
   return soup;
 }
 

@@ -101,12 +101,10 @@ Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadde
                const std::vector<std::int16_t>& rungs, const RunContext& context) {
   Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
   const Pixels preview = decode_jpeg(ladder.preview, kMaxPreviewPixels);
-  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       if (plane.covered_texels[f] == 0) continue;
-      const std::uint32_t left = static_cast<std::uint32_t>(f % plane.columns) * w,
-                          top = static_cast<std::uint32_t>(f / plane.columns) * h;
+      const auto [left, top, w, h] = padded_fragment_rectangle(plane, f);
       Pixels block;
       if (rungs[f] != kSkipped)
         block = decode_fragment(ladder, static_cast<std::size_t>(rungs[f]), f, std::uint64_t{w} * h);

@@ -1,9 +1,10 @@
+#include "stages/fill/fill.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/halve_pixels.h"
 #include "stages/image/png_writer.h"
