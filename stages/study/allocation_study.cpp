@@ -144,22 +144,22 @@ Rungs uniform_rungs(const std::vector<const PlaneTables*>& tables, int quality) 
 /// What whole rungs leave of the budget: fragment after fragment by falling eta of scale 0 (ties: plane,
 /// index) goes up by a rung where that fits, again and again until none does.
 void spend_rest(const std::vector<const PlaneTables*>& tables, std::uint64_t budget, Rungs& rungs) {
-  struct Place {
+  struct RankedFragment {
     float eta;
     std::size_t plane, fragment;
   };
-  std::vector<Place> places;
+  std::vector<RankedFragment> ranked;
   for (std::size_t p = 0; p < tables.size(); ++p) {
     const std::vector<float> eta = eta_of(*tables[p], 0);
     for (std::size_t f = 0; f < eta.size(); ++f)
-      if (rungs[p][f] != kSkipped) places.push_back({eta[f], p, f});
+      if (rungs[p][f] != kSkipped) ranked.push_back({eta[f], p, f});
   }
-  std::stable_sort(places.begin(), places.end(),
-                   [](const Place& a, const Place& b) { return a.eta > b.eta; });
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const RankedFragment& a, const RankedFragment& b) { return a.eta > b.eta; });
   std::uint64_t spent = bytes_of(tables, rungs);
   for (bool more = spent < budget; more;) {
     more = false;
-    for (const Place& at : places) {
+    for (const RankedFragment& at : ranked) {
       const PlaneTables& t = *tables[at.plane];
       std::int16_t& rung = rungs[at.plane][at.fragment];
       const auto next = static_cast<std::size_t>(rung) + 1;

@@ -11,7 +11,6 @@
 #include "format/base/srgb.h"
 #include "pipeline/io/text_table.h"
 #include "stages/geometry/component_boxes.h"
-#include "stages/ssf/heat_levels.h"
 #include "stages/ssf/ssf.h"
 
 namespace texmesh {
@@ -115,7 +114,7 @@ std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap&
     const std::uint8_t scale = map.persistence[feature];
     const double diagonal = to_double(boxes[mesh.component[feature]]).diagonal();
     const double sigma = std::min<double>(map.sigma.at(scale), usual.sigma_max * diagonal);
-    const double reach = 0.5 * seed_radius(sigma, usual.error_ratio);
+    const double reach = 0.5 * feature_spacing(sigma, usual);
     near.assign(1, feature);
     seen_from[feature] = feature;
     for (std::size_t i = 0; i < near.size(); ++i)
