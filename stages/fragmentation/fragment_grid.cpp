@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "stages/data/coverage.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {

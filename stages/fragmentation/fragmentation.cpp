@@ -12,7 +12,7 @@
 #include "stages/base/parallel.h"
 #include "stages/data/coverage.h"
 #include "stages/fragmentation/fragment_grid.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {

@@ -6,7 +6,7 @@
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/plane_pixels.h"
 #include "stages/fill/fill.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "stages/base/run_context.h"
 #include "stages/fragmentation/fragment_grid.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 #include <algorithm>
 #include <cmath>
