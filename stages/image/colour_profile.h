@@ -25,8 +25,7 @@ struct ColourProfile {
 inline constexpr std::size_t kByteCodes = 256, kWordCodes = 65536;
 
 /// Reads a profile for an image of `channels` (alpha included), its curves at `codes` points. Throws
-/// InputError{name, "colour profile",
-/// ...} when it is of another kind, damaged, or not for such an image.
+/// InputError{name, "colour profile", ...} when it is of another kind, damaged, or not for such an image.
 ColourProfile read_icc_profile(const std::string& name, std::span<const std::uint8_t> profile,
                                std::uint32_t channels, std::size_t codes = kByteCodes);
 

@@ -8,6 +8,7 @@
 #include "format/base/box.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
+#include "stages/ssf/heat_levels.h"
 #include "stages/ssf/ssf_component.h"
 
 namespace texmesh {
@@ -274,6 +275,10 @@ SurfaceComponent largest_surface(const ConditionedMesh& mesh) {
   for (std::size_t c = 1; c < layout.component_count(); ++c)
     if (layout.size(c) > layout.size(best)) best = c;
   return cut_out(mesh, layout, best);
+}
+
+double feature_spacing(double sigma, const SsfOptions& options) {
+  return seed_radius(sigma, options.error_ratio);
 }
 
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
