@@ -116,8 +116,8 @@ void punch_holes(Sphere& sphere, int holes, std::uint32_t seed) {
 }
 
 std::vector<std::array<std::uint32_t, 3>> neighbours(const Corners& triangles) {
-  std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>>
-      edges;  // vertex pair, triangle, corner
+  // Vertex pair, triangle, corner.
+  std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>> edges;
   edges.reserve(triangles.size() * 3);
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     for (std::uint32_t k = 0; k < 3; ++k) {

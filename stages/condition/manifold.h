@@ -18,8 +18,8 @@ struct Surface {
 
 struct ManifoldSplit {
   std::vector<std::uint32_t> corner_position;  // as Surface's, with new numbers for positions that were split
-  std::vector<std::uint32_t>
-      split_from;  // per new number (position_count, position_count + 1, ...): the old one
+  // Per new number (position_count, position_count + 1 and so on): the old one.
+  std::vector<std::uint32_t> split_from;
   std::uint64_t non_manifold_edges = 0;  // edges of more than two triangles, or of two that disagree on front
   std::uint64_t bow_ties = 0;            // positions split although none of their edges is non-manifold
 };

@@ -226,7 +226,7 @@ void measure_coverage(const Mesh& mesh, const Job& job, Measure& out) {
                                    coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
                                    coverage.add(texels);
                                  });
-  out.coverage = coverage.take();
+  out.coverage = coverage.release_bits();
 }
 
 /// Surface and features of the grid's fragments.
@@ -246,8 +246,8 @@ void measure_fragments(const ConditionedMesh& conditioned, const ScaleMap& scale
           std::uint32_t position = mesh.position_of(static_cast<std::uint32_t>(t), c);
           if (!conditioned.twin.empty()) position = conditioned.twin[position];
           const Vec2d corner = texels[static_cast<std::size_t>(c)];
-          const Vec2d inside =
-              corner + (centre - corner) * 1e-6;  // decides on which side of a border it lies
+          // Decides on which side of a border the corner lies.
+          const Vec2d inside = corner + (centre - corner) * 1e-6;
           const std::uint32_t fragment = fragment_at(out.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
           if (last_fragment[position] == fragment) continue;
           last_fragment[position] = fragment;

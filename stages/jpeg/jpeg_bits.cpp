@@ -20,8 +20,8 @@ namespace {
 
 constexpr int kParts = 8;                    // coefficients are eighths, as libjpeg's transform gives them
 constexpr std::size_t kWindowsPerTask = 32;  // whose blocks stay in the cache while qualities go by
-// What MaskedJpeg saves, in bits, when it leaves out a coefficient of 1: one that others follow, and the
-// last one with the zeros before it; and when it makes a larger one smaller. Fitted on four atlases of scans,
+// What MaskedJpeg saves, in bits, when it leaves out a coefficient of 1: one that others follow, and the last
+// one with the zeros before it; and when it makes a larger one smaller. Fitted on four atlases of scans,
 // whose bytes between rungs they give within .8 %; 3, 3 and 1: within 1.0, 4, 4 and 1: within 2.1.
 constexpr float kInnerBits = 2.5f, kLastBits = 3, kZeroBits = 1, kSmallerBits = 2;
 

@@ -73,8 +73,8 @@ Kernel sensitivity(double b, int radius) {
 struct Term {
   double a, b;
 };
-std::vector<float> seen(const std::vector<float>& channel, const PixelRectangle& box,
-                        std::initializer_list<Term> terms) {
+std::vector<float> eye_filtered(const std::vector<float>& channel, const PixelRectangle& box,
+                                std::initializer_list<Term> terms) {
   constexpr int kRadius = 10;  // three deviations of the widest term
   double whole = 0;
   for (const Term& t : terms) {
@@ -139,8 +139,8 @@ const FeatureKernels& feature_kernels() {
   return kernels;
 }
 
-std::vector<float> strength(const std::vector<float>& luma, const PixelRectangle& box,
-                            const Kernel& derivative) {
+std::vector<float> feature_strength(const std::vector<float>& luma, const PixelRectangle& box,
+                                    const Kernel& derivative) {
   const Kernel& smooth = feature_kernels().smooth;
   std::vector<float> out = filtered(luma, box, derivative, smooth);
   const std::vector<float> y = filtered(luma, box, smooth, derivative);
@@ -149,7 +149,7 @@ std::vector<float> strength(const std::vector<float>& luma, const PixelRectangle
 }
 
 /// What is not plain background, and so far around it that filters neither see it nor are seen by it.
-PixelRectangle busy_box(const Picture& picture) {
+PixelRectangle shown_rectangle(const Picture& picture) {
   constexpr int kReach = 24;
   const int side = static_cast<int>(picture.side_px);
   int x0 = side, y0 = side, x1 = 0, y1 = 0;
@@ -169,7 +169,7 @@ std::size_t plain_pixel(const PixelRectangle& box) { return box.x > 0 || box.y >
 
 /// Puts the values of a box into a whole picture, plain background around them.
 template <class T>
-std::vector<T> whole(const std::vector<T>& part, const PixelRectangle& box, std::uint32_t side) {
+std::vector<T> in_whole_picture(const std::vector<T>& part, const PixelRectangle& box, std::uint32_t side) {
   std::vector<T> out(std::size_t{side} * side, part[plain_pixel(box)]);
   for (int y = 0; y < box.height; ++y)
     std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(y) * box.width, box.width,
@@ -184,7 +184,7 @@ FlipPicture prepare_flip(const Picture& picture) {
   out.side_px = picture.side_px;
   out.covered = picture.covered;
   if (picture.linear.empty()) return out;
-  const PixelRectangle box = busy_box(picture);
+  const PixelRectangle box = shown_rectangle(picture);
   std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
   for (auto& channel : opponent) channel.resize(box.count());
   std::vector<float> luma(box.count());
@@ -196,17 +196,18 @@ FlipPicture prepare_flip(const Picture& picture) {
     for (int c = 0; c < 3; ++c) opponent[static_cast<std::size_t>(c)][i] = colour[c];
     luma[i] = static_cast<float>(xyz.y);
   }
-  opponent[0] = seen(opponent[0], box, {{1, 0.0047}});
-  opponent[1] = seen(opponent[1], box, {{1, 0.0053}});
-  opponent[2] = seen(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
+  opponent[0] = eye_filtered(opponent[0], box, {{1, 0.0047}});
+  opponent[1] = eye_filtered(opponent[1], box, {{1, 0.0053}});
+  opponent[2] = eye_filtered(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
   std::vector<Vec3f> lab(box.count());
   for (std::size_t i = 0; i < lab.size(); ++i) {
     const Vec3d xyz = xyz_of_opponent(to_double(Vec3f{opponent[0][i], opponent[1][i], opponent[2][i]}));
     lab[i] = hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), lab_curve());
   }
-  out.lab = whole(lab, box, picture.side_px);
-  out.detail[0] = whole(strength(luma, box, feature_kernels().edge), box, picture.side_px);
-  out.detail[1] = whole(strength(luma, box, feature_kernels().point), box, picture.side_px);
+  out.lab = in_whole_picture(lab, box, picture.side_px);
+  out.detail[0] = in_whole_picture(feature_strength(luma, box, feature_kernels().edge), box, picture.side_px);
+  out.detail[1] =
+      in_whole_picture(feature_strength(luma, box, feature_kernels().point), box, picture.side_px);
   return out;
 }
 

@@ -266,8 +266,8 @@ struct Coverage {
   LevelCount levels;
 };
 
-Coverage look_around(const ViewScene& scene, const BoundingSphere& sphere, std::size_t planes,
-                     const QualityTable& table, const RunContext& context) {
+Coverage coverage_of_views(const ViewScene& scene, const BoundingSphere& sphere, std::size_t planes,
+                           const QualityTable& table, const RunContext& context) {
   const int views = static_cast<int>(table.views);
   Coverage seen{0, LevelCount(planes)};
   for (int v = 0; v < views; ++v) {
@@ -288,14 +288,14 @@ std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
 
 /// The sphere that the pictures frame, and what they show: the object's, unless it shows next to nothing of
 /// the object and that of the crowd more.
-Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& table, BoundingSphere& sphere,
-               Notes& notes, const RunContext& context) {
+Coverage frame_object(const ViewScene& scene, std::size_t planes, const QualityTable& table,
+                      BoundingSphere& sphere, Notes& notes, const RunContext& context) {
   const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
-  Coverage seen = look_around(scene, sphere, planes, table, context);
+  Coverage seen = coverage_of_views(scene, sphere, planes, table, context);
   if (static_cast<double>(seen.pixels) >= kLeastCovered * all) return seen;
   const BoundingSphere crowd = crowd_sphere(*scene.mesh, sphere);
   if (crowd.radius < sphere.radius) {
-    Coverage closer = look_around(scene, crowd, planes, table, context);
+    Coverage closer = coverage_of_views(scene, crowd, planes, table, context);
     if (closer.pixels > seen.pixels) {
       sphere = crowd;
       add_warning(notes, "far-outliers", "",
@@ -347,7 +347,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
     scenes.push_back(scene_of(scales, scales.scales[k], materials, shown, fragments));
   }
 
-  const Coverage seen = frame(scenes[0], shown.planes.size(), table, sphere, result.notes, context);
+  const Coverage seen = frame_object(scenes[0], shown.planes.size(), table, sphere, result.notes, context);
   const Textures textures = decode_textures(shown, fragments, pixels, ladder, seen.levels.first_levels(),
                                             options.rung_samples, context);
   table.rungs = textures.quality;

@@ -11,8 +11,8 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kErrorSamples =
-    4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
+// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample.
+constexpr std::size_t kErrorSamples = 4000;
 
 /// A point of S_0 and the component that it lies on.
 struct Probe {

@@ -17,8 +17,8 @@ namespace {
 /// Components below this many vertices are solved whole by one thread each, many at a time.
 constexpr std::size_t kSmallComponent = 8192;
 
-/// Positions (lowest twins alone) and triangles, grouped by component: items of component c are
-/// [first[c], first[c + 1]).
+/// Positions (lowest twins alone) and triangles, grouped by component: items of component c are [first[c],
+/// first[c + 1]).
 struct Layout {
   std::vector<std::uint32_t> position, first_position;  // within a component in Morton order
   std::vector<std::uint32_t> triangle, first_triangle;
@@ -159,8 +159,8 @@ class MeshFilter {
   ScaleMap run() {
     const std::size_t largest = largest_component();
     if (!is_below_first_scale(largest)) {
-      take_whole(largest);
-      take_others(largest);
+      filter_largest(largest);
+      filter_others(largest);
     }
     for (std::size_t p = 0; p < map_.persistence.size(); ++p) {
       map_.persistence[p] = map_.persistence[mesh_.twin[p]];
@@ -184,7 +184,7 @@ class MeshFilter {
     return best;
   }
 
-  void take_whole(std::size_t c) {
+  void filter_largest(std::size_t c) {
     const ComponentScales s = filter_component(cut_out(mesh_, layout_, c), {}, options_, context_);
     whole_sigma_ = s.sigma;
     std::copy(s.sigma.begin(), s.sigma.end(), map_.sigma.begin() + 1);
@@ -194,7 +194,7 @@ class MeshFilter {
     count(s);
   }
 
-  void take_others(std::size_t largest) {
+  void filter_others(std::size_t largest) {
     std::vector<std::uint32_t> small;
     for (std::uint32_t c = 0; c < layout_.component_count(); ++c) {
       if (c == largest || is_below_first_scale(c)) continue;
@@ -208,11 +208,11 @@ class MeshFilter {
       place(c, s);
       count(s);
     }
-    take_small(small);
+    filter_small(small);
   }
 
   /// In batches, so that counts need not be kept per component.
-  void take_small(const std::vector<std::uint32_t>& small) {
+  void filter_small(const std::vector<std::uint32_t>& small) {
     constexpr std::size_t kBatch = 4096;
     RunContext alone = context_;
     alone.threads = 1;

@@ -58,14 +58,14 @@ class FeatureFinder {
   std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
     parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) found[v] = look_at(static_cast<std::uint32_t>(v));
+      for (std::size_t v = begin; v < end; ++v) found[v] = crossing_at(static_cast<std::uint32_t>(v));
     });
     for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
     return found;
   }
 
  private:
-  std::uint8_t look_at(std::uint32_t v) const {
+  std::uint8_t crossing_at(std::uint32_t v) const {
     const HeatOperator& graph = level_.laplacian;
     bool highest = true, lowest = true, crossing = false;
     double edges = 0, difference = 0;
@@ -136,15 +136,15 @@ class ComponentFilter {
     double sigma_max = options_.sigma_max * component_.diagonal / component_.mean_edge;
     // The ladder is laid anew up to the first scale that has converged, once.
     for (bool again = true;; again = false) {
-      start(sigma_max);
-      const std::size_t converged = climb(again);
+      start_ladder(sigma_max);
+      const std::size_t converged = filter_levels(again);
       if (converged >= scales_) return std::move(out_);
       sigma_max = ladder_.sigma[converged];
     }
   }
 
  private:
-  void start(double sigma_max) {
+  void start_ladder(double sigma_max) {
     ladder_ = make_sigma_ladder(sigma_max, options_);
     out_ = {};
     out_.persistence.assign(component_.points.size(), 0);
@@ -163,11 +163,11 @@ class ComponentFilter {
 
   /// All scales, level by level. Returns the scale to end at where one before the last has converged and
   /// `may_stop`.
-  std::size_t climb(bool may_stop) {
+  std::size_t filter_levels(bool may_stop) {
     LevelState state = first_state();
     for (std::size_t begin = 0; begin < last_;) {
       const std::size_t end = reach(state.level, begin);
-      const std::size_t converged = carry(state, begin, end);
+      const std::size_t converged = filter_on_level(state, begin, end);
       if (may_stop && converged + 1 < scales_) return converged;
       if (end < last_)
         state = next_state(std::move(state), seed_radius(ladder_.sigma[end], options_.error_ratio));
@@ -220,8 +220,8 @@ class ComponentFilter {
   /// Features of the scales [begin, end), whose subtrahends are taken on the same level: operators of
   /// different levels differ by more than shallow relief. Leaves `state` where the next level starts. Returns
   /// the first scale after the first one that has converged, or `scales`.
-  std::size_t carry(LevelState& state, std::size_t begin, std::size_t end) {
-    fit_work(state, ladder_.time[end - 1 + ladder_.band]);
+  std::size_t filter_on_level(LevelState& state, std::size_t begin, std::size_t end) {
+    limit_terms(state, ladder_.time[end - 1 + ladder_.band]);
     std::size_t converged = scales_;
     std::vector<std::vector<float>> curvature;
     LevelState walker{{}, {}, state.points, state.time, state.normals};
@@ -254,7 +254,7 @@ class ComponentFilter {
   }
 
   /// The work cap: rates are slowed down until the level's last time needs no more than max_terms.
-  void fit_work(LevelState& state, double last_time) {
+  void limit_terms(LevelState& state, double last_time) {
     HeatOperator& l = state.level.laplacian;
     const double allowed = options_.max_terms, needed = heat_terms(last_time - state.time, l.bound);
     if (needed <= allowed) return;

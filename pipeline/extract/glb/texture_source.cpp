@@ -151,7 +151,7 @@ std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Materi
       if (ref.image != image || ref.texcoord > 1) return;
       add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
     });
-  return coverage.take();
+  return coverage.release_bits();
 }
 
 }  // namespace texmesh

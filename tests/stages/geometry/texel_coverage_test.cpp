@@ -16,7 +16,7 @@ std::vector<std::uint8_t> coverage_of(const Corners& triangle, std::uint32_t w, 
                                       Wrap t) {
   TexelCoverage coverage(w, h, s, t);
   coverage.add(triangle);
-  return coverage.take();
+  return coverage.release_bits();
 }
 
 /// Separating axes: does the triangle meet the square of half-side `half` around (x, y)?
