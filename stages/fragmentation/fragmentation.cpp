@@ -115,7 +115,8 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
       for (const Slot& slot : slots_of(materials[m])) {
         if (slot.ref->image != static_cast<std::int32_t>(image)) continue;
         role_used[static_cast<int>(slot.role)] = true;
-        add_use(colour, m, *slot.ref);  // a number in alpha needs its image's colours, for it is one file
+        // A number in alpha uses the colours as well, since both are one file.
+        add_use(colour, m, *slot.ref);
         if (slot.channels != TextureChannels::kColour) add_use(alpha, m, *slot.ref);
       }
     if (colour.empty()) continue;
@@ -314,7 +315,7 @@ void complete_plane(const Measure& measured, double whole_surface, TexturePlane&
 }
 
 void note_faults(const TexturePlane& plane, const Measure& measured, const std::string& image, Notes& notes) {
-  if (plane.role == TextureRole::kAlpha || plane.mip > 0) return;  // said of the colours already
+  if (plane.role == TextureRole::kAlpha || plane.mip > 0) return;  // noted for the full-size colours
   if (measured.faults.missing_uvs)
     add_warning(notes, "missing-texture-coordinates", image,
                 "a material uses the image without texture coordinates");

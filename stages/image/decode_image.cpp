@@ -191,7 +191,8 @@ Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits) {
 }
 
 Pixels decode_image(const Image& image, FloatEncoding encoding) {
-  std::optional<ColourProfile> profile;  // found first: one that is refused need not wait for the pixels
+  // Before the pixels, since a profile may be refused.
+  std::optional<ColourProfile> profile;
   if (encoding == FloatEncoding::kSrgb && image.honour_profile) profile = honoured_profile(image);
   Pixels pixels = decode_stored(image, encoding, profile ? &*profile : nullptr);
   if (profile && image.bits_per_channel <= 8) convert_to_srgb(*profile, pixels);

@@ -27,7 +27,7 @@ BoundingSphere sphere_of(const Mesh& mesh) {
   return sphere;
 }
 
-/// Around the place where nearly all positions lie, whatever a few others do.
+/// The sphere around the place where nearly all positions lie, whatever a few others do.
 BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
   constexpr double kCrowd = 0.98, kMargin = 1.25;
   const std::size_t n = mesh.positions.size();
@@ -286,8 +286,8 @@ std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
   return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
 }
 
-/// The sphere that the pictures frame, and what they show: the object's, unless it shows next to nothing of
-/// the object and that of the crowd more.
+/// Chooses the sphere that the pictures frame, and returns what they show. It is the object's sphere, unless
+/// that one shows next to nothing of the object and the crowd's sphere shows more.
 Coverage frame_object(const ViewScene& scene, std::size_t planes, const QualityTable& table,
                       BoundingSphere& sphere, Notes& notes, const RunContext& context) {
   const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
@@ -312,7 +312,7 @@ Coverage frame_object(const ViewScene& scene, std::size_t planes, const QualityT
   return seen;
 }
 
-/// Means over all covered pixels of all views; none covered: equal.
+/// Means over all covered pixels of all views. Without a covered pixel the pictures count as equal.
 void fill_table(QualityTable& table, const std::vector<std::vector<PictureDifference>>& views) {
   for (std::size_t i = 0; i < views[0].size(); ++i) {
     PictureDifference sum;

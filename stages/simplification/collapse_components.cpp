@@ -31,7 +31,8 @@ CollapseComponents::CollapseComponents(const CollapseMesh& mesh, const Condition
   }
   for (std::size_t c = 0; c < count(); ++c) {
     size[c] = box[c].diagonal();
-    // As if all of it, which its three corners' quadrics hold three times, moved by half its size.
+    // What moving the whole component by half its size would cost. Every area stands in the quadrics of three
+    // corners, hence 3.
     cost[c] = 3 * area[c] * size[c] * size[c] / 4;
     if (area[c] > area[largest]) largest = static_cast<std::uint32_t>(c);
   }

@@ -62,9 +62,10 @@ void CollapseEngine::fill_queue(const RunContext& context) {
   queue_.order();
 }
 
-/// The cheapest collapses lie anywhere on the surface: on millions of triangles nearly all time would go in
-/// waiting for memory. What comes out next stands in the first places of the heap, the sooner the nearer to
-/// its top, so its data are asked for some collapses ahead, in the order in which one leads to the next.
+/// Asks for the data of the next collapses ahead of time. The cheapest collapses lie anywhere on the surface:
+/// on millions of triangles nearly all time would go in waiting for memory. What comes out next stands in the
+/// first places of the heap, the sooner the nearer to its top. Lists come first, then corners, then faces,
+/// since one leads to the next.
 void CollapseEngine::prefetch_next() const {
   constexpr std::size_t kFaces = 5, kCorners = 21, kLists = 85;  // ends of the levels of a 4-ary heap
   const std::size_t count = std::min(queue_.size(), kLists);
@@ -167,8 +168,8 @@ CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring, WedgeMap& map)
   }
 }
 
-/// Looks at a point whose key has come out first. Where nothing has changed around it, only whether its
-/// collapse is still legal.
+/// Looks at a point whose key has come out first. Where nothing has changed around the point, this only asks
+/// whether its collapse is still legal.
 CollapseEngine::Choice CollapseEngine::confirm(std::uint32_t u, WedgeMap& map) {
   ring_.gather(u);
   if (flags_[u] & kStale) return choose(ring_, map);
@@ -222,8 +223,9 @@ void CollapseEngine::apply_collapse(const WedgeMap& map) {
   });
 }
 
-/// After a collapse into v: its own key anew; the points around the one that is gone have v as neighbour now.
-/// Points without a legal collapse may have got one, those two edges away included.
+/// Brings the keys up to date after a collapse into v. The key of v is computed anew. The points around the
+/// one that is gone have v as a neighbour now. Points without a legal collapse, up to two edges away, may
+/// have got one.
 void CollapseEngine::update_around(std::uint32_t v) {
   const bool thesis = options_.order == CollapseOrder::kThesis;
   for (std::uint32_t x : around_) {
@@ -257,8 +259,8 @@ void CollapseEngine::remove_component(std::uint32_t component) {
   mesh_.remove(points);
 }
 
-/// Points without a legal collapse are looked at again when their own ring changes; changes farther away may
-/// free them as well, so before giving up all of them are tried once more.
+/// Tries all points without a legal collapse once more. They are looked at again whenever their own ring
+/// changes, but changes farther away may free them as well.
 bool CollapseEngine::retry_locked() {
   if (given_up_at_ == collapses_.size()) return false;
   given_up_at_ = collapses_.size();

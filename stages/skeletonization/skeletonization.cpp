@@ -16,9 +16,9 @@
 namespace texmesh {
 namespace {
 
-/// No radius is smaller than this fraction of the diagonal: R divides.
+/// No radius is smaller than this fraction of the diagonal, since R is a divisor.
 constexpr double kLeastRadius = 1e-6;
-/// A note about thin parts is worth reading from this share of the vertices on.
+/// Thin parts are noted from this share of the vertices on.
 constexpr double kWorthANote = 0.01;
 constexpr int kWrapAttempts = 3;
 
@@ -64,7 +64,7 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
   return all;
 }
 
-/// The wrap at the finest alpha that comes to an end within the cap.
+/// The wrap at the finest alpha at which it ends within the cap.
 std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOptions& options, Notes& notes,
                                const RunContext& context) {
   double alpha = 1.0 / options.alpha_divisor;
@@ -113,7 +113,7 @@ void note_limits(const LocalRadius& local, Notes& notes) {
                  " % of the vertices, which the skeleton does not reach");
 }
 
-/// Skeleton and R in the unit frame, then in the mesh's.
+/// Skeleton and R of a mesh. They are computed in the unit frame and then scaled back.
 CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
                       const SkeletonizationOptions& options, const RunContext& context,
                       std::vector<float>& distance, Notes& notes) {
@@ -134,7 +134,8 @@ CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
   return skeleton;
 }
 
-/// The mean of each component's positions; distances are to the own one, not to the closest.
+/// The fallback: the skeleton is the centroid of each component, and a position's distance is that to the
+/// centroid of its own component, not to the closest one.
 void use_centroids(const ConditionedMesh& mesh, CurveSkeleton& skeleton, std::vector<float>& distance) {
   skeleton = {};
   skeleton.nodes.resize(mesh.component_count);

@@ -88,7 +88,7 @@ class FeatureFinder {
     return static_cast<std::uint8_t>((extremum ? kExtremum : 0) | (crossing ? kCrossing : 0));
   }
 
-  /// In the order of the vertices, each keeps what is near from counting.
+  /// Keeps features apart: in the order of the vertices, each feature removes those that are too near to it.
   void thin_out(std::vector<std::uint8_t>& found, std::uint8_t kind, double apart) const {
     const HeatOperator& graph = level_.laplacian;
     std::vector<std::uint32_t> seen_from(found.size(), kNoIndex), near;
@@ -157,7 +157,7 @@ class ComponentFilter {
     while (last_ < scales_ && within(out_.sigma[last_]) &&
            (whole_sigma_.empty() || within(whole_sigma_[last_])))
       ++last_;
-    // The curve is the largest component's to tell: it goes through all scales.
+    // The notes give the convergence of the largest component, which therefore goes through all scales.
     if (whole_sigma_.empty()) last_ = scales_;
   }
 
