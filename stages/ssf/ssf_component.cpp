@@ -58,14 +58,14 @@ class FeatureFinder {
   std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
     parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) found[v] = crossing_at(static_cast<std::uint32_t>(v));
+      for (std::size_t v = begin; v < end; ++v) found[v] = feature_kind(static_cast<std::uint32_t>(v));
     });
     for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
     return found;
   }
 
  private:
-  std::uint8_t crossing_at(std::uint32_t v) const {
+  std::uint8_t feature_kind(std::uint32_t v) const {
     const HeatOperator& graph = level_.laplacian;
     bool highest = true, lowest = true, crossing = false;
     double edges = 0, difference = 0;

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "tests/stages/geometry/texel_triangles.h"
+#include "tests/support/coverage_bits.h"
 
 namespace texmesh {
 namespace {
@@ -52,29 +53,20 @@ TEST(FragmentGrid, FollowsItsRules) {
   EXPECT_EQ(grid(678, 2199), (std::array{5u, 14u, 144u, 160u}));
 }
 
-/// Coverage of w x h texels where covered(x, y).
-std::vector<std::uint8_t> bits_where(std::uint32_t w, std::uint32_t h, auto&& covered) {
-  std::vector<std::uint8_t> bits(coverage_size_bytes(w, h));
-  for (std::uint32_t y = 0; y < h; ++y)
-    for (std::uint32_t x = 0; x < w; ++x)
-      if (covered(x, y))
-        bits[coverage_stride_bytes(w) * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
-  return bits;
-}
-
 TEST(FragmentGrid, LeastOverheadOfWhatIsCovered) {
   // Everything covered: the largest fragments. Islands far apart: small ones skip what lies between.
-  const auto whole = bits_where(2048, 2048, [](auto, auto) { return true; });
+  const auto whole = coverage_where(2048, 2048, [](auto, auto) { return true; });
   EXPECT_EQ(choose_grid(2048, 2048, whole, 256, 128).fragment_width_px, 256u);
   EXPECT_EQ(choose_grid(2048, 2048, whole, 256, 128).reason, choose_grid(2048, 2048, {}, 256, 128).reason);
-  const auto islands = bits_where(4096, 4096, [](std::uint32_t x, std::uint32_t y) {
+  const auto islands = coverage_where(4096, 4096, [](std::uint32_t x, std::uint32_t y) {
     return x % 512 < 100 && y % 512 < 100 && x < 4000;
   });
   // 64 islands: 256 px fragments, 128 would be more than 256 in all but cost less; the limit holds.
   EXPECT_EQ(choose_grid(4096, 4096, islands, 256, 128).fragment_width_px, 256u);
   const FragmentGrid fine = choose_grid(
       2048, 2048,
-      bits_where(2048, 2048, [](std::uint32_t x, std::uint32_t y) { return x % 256 < 100 && y % 256 < 100; }),
+      coverage_where(2048, 2048,
+                     [](std::uint32_t x, std::uint32_t y) { return x % 256 < 100 && y % 256 < 100; }),
       256, 128);
   EXPECT_EQ(fine.fragment_width_px, 128u) << fine.reason;
   EXPECT_NE(fine.reason.find("64 stored"), std::string::npos) << fine.reason;
@@ -89,7 +81,7 @@ TEST(FragmentGrid, NoOtherGridOfTheCandidatesCostsLess) {
   Random random{21};
   for (int round = 0; round < 12; ++round) {
     const std::uint32_t w = 700 + random.next() % 1500, h = 700 + random.next() % 1500;
-    const auto bits = bits_where(w, h, [&, seed = round](std::uint32_t x, std::uint32_t y) {
+    const auto bits = coverage_where(w, h, [&, seed = round](std::uint32_t x, std::uint32_t y) {
       return ((x / 97) * 7 + (y / 61) * 13 + static_cast<std::uint32_t>(seed)) % 5 < 2;
     });
     // Cost by brute force over texels.
