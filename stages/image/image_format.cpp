@@ -7,37 +7,33 @@
 
 namespace texmesh {
 
-const char* image_format_name(ImageFormat format) {
+namespace {
+
+struct FormatWords {
+  const char *name, *extension;
+};
+
+FormatWords words_of(ImageFormat format) {
   switch (format) {
     case ImageFormat::kJpeg:
-      return "JPEG";
+      return {"JPEG", "jpg"};
     case ImageFormat::kPng:
-      return "PNG";
+      return {"PNG", "png"};
     case ImageFormat::kTiff:
-      return "TIFF";
+      return {"TIFF", "tif"};
     case ImageFormat::kWebp:
-      return "WebP";
+      return {"WebP", "webp"};
     case ImageFormat::kExr:
-      return "EXR";
+      return {"EXR", "exr"};
   }
-  return "";
+  return {"", ""};
 }
 
-const char* image_extension(ImageFormat format) {
-  switch (format) {
-    case ImageFormat::kJpeg:
-      return "jpg";
-    case ImageFormat::kPng:
-      return "png";
-    case ImageFormat::kTiff:
-      return "tif";
-    case ImageFormat::kWebp:
-      return "webp";
-    case ImageFormat::kExr:
-      return "exr";
-  }
-  return "";
-}
+}  // namespace
+
+const char* image_format_name(ImageFormat format) { return words_of(format).name; }
+
+const char* image_extension(ImageFormat format) { return words_of(format).extension; }
 
 std::optional<ImageFormat> sniff_image_format(ByteSpan bytes) {
   auto has = [bytes](std::size_t at, std::string_view magic) {
