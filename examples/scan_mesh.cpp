@@ -5,6 +5,7 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
@@ -115,8 +116,8 @@ void punch_holes(Sphere& sphere, int holes, std::uint32_t seed) {
 }
 
 std::vector<std::array<std::uint32_t, 3>> neighbours(const Corners& triangles) {
-  std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>>
-      edges;  // vertex pair, triangle, corner
+  // Vertex pair, triangle, corner.
+  std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>> edges;
   edges.reserve(triangles.size() * 3);
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -283,13 +284,7 @@ void lay_out_atlas(ScanMesh& scan, const Sphere& sphere, int texture_px, std::ui
 
 // Measuring noise along the normal: mostly white, partly in patches as depth maps have it.
 void measure(ScanMesh& scan, double noise_fraction, std::uint32_t seed) {
-  Vec3d lo = scan.surface[0], hi = lo;
-  for (Vec3d p : scan.surface)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  const double deviation = noise_fraction * length(hi - lo);
+  const double deviation = noise_fraction * bounding_box(scan.surface).diagonal();
   for (std::uint32_t p = 0; p < scan.surface.size(); ++p) {
     double white = -2;  // sum of four uniform numbers: bell-shaped, deviation 0.577
     for (std::uint32_t k = 0; k < 4; ++k) white += hash01(p, k, 41, seed);

@@ -168,8 +168,8 @@ ScanTextures paint_atlas(const ScanShape& shape, const ScanMesh& scan, const Sca
 std::vector<std::uint8_t> encode_scan_jpeg(const Pixels& pixels, int quality) {
   jpeg_compress_struct cinfo;
   jpeg_error_mgr errors;
-  cinfo.err =
-      jpeg_std_error(&errors);  // the default handler ends the program, which suits an example's own pixels
+  // The default handler ends the program, which suits an example's own pixels.
+  cinfo.err = jpeg_std_error(&errors);
   jpeg_create_compress(&cinfo);
   unsigned char* bytes = nullptr;
   unsigned long size = 0;

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "format/base/box.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 
@@ -100,12 +101,7 @@ Json primitive_of(GlbBuilder& glb, const Mesh& mesh) {
   for (std::uint32_t p : mesh.wedge_position) positions.push_back(mesh.positions[p]);
   Json attributes;
   const int at = glb.accessor(flat(positions), kFloat, "VEC3", positions.size(), kVertices);
-  Vec3f lo = positions[0], hi = lo;
-  for (Vec3f p : positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
+  const auto [lo, hi] = bounding_box(positions);
   glb.json["accessors"][static_cast<std::size_t>(at)]["min"] = {lo.x, lo.y, lo.z};
   glb.json["accessors"][static_cast<std::size_t>(at)]["max"] = {hi.x, hi.y, hi.z};
   attributes["POSITION"] = at;

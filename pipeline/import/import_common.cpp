@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "pipeline/import/import.h"
@@ -330,19 +331,15 @@ double float_exact(double x) {
 }
 
 Vec3d choose_origin(const std::vector<Vec3d>& positions) {
-  const double inf = std::numeric_limits<double>::infinity();
-  Vec3d lo{inf, inf, inf}, hi{-inf, -inf, -inf};
-  for (const Vec3d& p : positions) {
-    if (!usable(p)) continue;
-    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
-    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
-  }
-  if (lo.x > hi.x) return {};
+  Box3d box;
+  for (const Vec3d& p : positions)
+    if (usable(p)) box.extend(p);
+  if (box.empty()) return {};
   double farthest = 0;
-  for (int i = 0; i < 3; ++i) farthest = std::max({farthest, std::fabs(lo[i]), std::fabs(hi[i])});
+  for (int i = 0; i < 3; ++i) farthest = std::max({farthest, std::fabs(box.min[i]), std::fabs(box.max[i])});
   const double rounding = farthest / 16777216;  // half a unit in the last place of a float, at most
-  if (rounding <= 1e-7 * length(hi - lo)) return {};
-  const Vec3d centre = (lo + hi) * 0.5;
+  if (rounding <= 1e-7 * box.diagonal()) return {};
+  const Vec3d centre = box.centre();
   return {float_exact(centre.x), float_exact(centre.y), float_exact(centre.z)};
 }
 

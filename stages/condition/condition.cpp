@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/manifold.h"
@@ -330,15 +331,10 @@ Notes describe(const ConditionReport& r) {
 }
 
 double diagonal(const std::vector<Vec3f>& positions) {
-  Vec3d lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-  for (Vec3f p : positions) {
-    if (!finite(p.x) || !finite(p.y) || !finite(p.z)) continue;
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], double{p[k]});
-      hi[k] = std::max(hi[k], double{p[k]});
-    }
-  }
-  return lo.x <= hi.x ? length(hi - lo) : 0;
+  Box3f box;
+  for (const Vec3f p : positions)
+    if (finite(p.x) && finite(p.y) && finite(p.z)) box.extend(p);
+  return to_double(box).diagonal();
 }
 
 }  // namespace

@@ -8,8 +8,7 @@
 
 namespace texmesh {
 
-/// Raise when equal inputs may give other bytes; part of the cache key. (The same holds for every
-/// k...Version.)
+/// Part of the cache key: raised when equal inputs may give other bytes, as every k...Version is.
 inline constexpr int kConditionVersion = 2;
 
 enum class NormalsPolicy : std::uint8_t { kAuto, kKeep, kSmooth };
@@ -19,28 +18,29 @@ struct EnumNames<NormalsPolicy> {
 };
 
 struct ConditionOptions {
-  double weld_distance = 0;  // fraction of the bounding-box diagonal; 0 welds bit-equal positions only
+  double weld_distance = 0;
   NormalsPolicy normals = NormalsPolicy::kAuto;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("weld_distance", s.weld_distance, Range{0, 0.001},
       "positions closer than this fraction of the diagonal become one; 0 = only equal ones");
     v("normals", s.normals,
-      "keep = as in the source; smooth = area-weighted where the source has none; auto = keep for glTF (flat "
-      "without "
-      "normals, as its specification says), smooth for other formats");
+      "keep = as in the source; smooth = area-weighted where the source has none; auto = keep for glTF "
+      "(flat without normals, as its specification says), smooth for other formats");
   }
 };
 
 /// Cleans a mesh without changing what a viewer sees: every triangle that covers area keeps its three points
-/// and the attributes at its corners. Order of positions, wedges and triangles follows the input; what a
-/// split adds comes last. Triangles of opposite orientation on the same three points (two-sided sheets) are
-/// both kept and split apart, and so are triangles on the same three points with different attributes or
-/// materials (decals). A triangle with three different corners but no area stays where two of its edges have
-/// neighbours: dropped, it would leave a T-junction. Normals are made unit length; UVs that are not finite
-/// become 0, colours 1. `normals_by_specification`: the source format defines what absent normals mean
-/// (glTF), see ConditionOptions. Throws StageError when no triangle with an area is left, or an index or
-/// array length of `mesh` is wrong. Deterministic; O(n log n).
+/// and the attributes at its corners.
+/// - Positions, wedges and triangles stand in the order of the input; what a split adds comes last.
+/// - Triangles of opposite orientation on the same three points (two-sided sheets) are both kept and split
+///   apart. So are triangles on the same three points with different attributes or materials (decals).
+/// - A triangle with three different corners but no area stays where two of its edges have neighbours:
+///   without it there would be a T-junction.
+/// - Normals are made unit length. UVs that are not finite become 0, colours 1.
+/// `normals_by_specification`: the source format (glTF) defines what absent normals mean, see
+/// ConditionOptions. StageError when no triangle with an area is left, or an index or array length of `mesh`
+/// is wrong. Deterministic. O(n log n).
 ConditionedMesh condition_mesh(const Mesh& mesh, bool normals_by_specification,
                                const ConditionOptions& options, const RunContext& context);
 

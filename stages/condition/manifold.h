@@ -18,17 +18,20 @@ struct Surface {
 
 struct ManifoldSplit {
   std::vector<std::uint32_t> corner_position;  // as Surface's, with new numbers for positions that were split
-  std::vector<std::uint32_t>
-      split_from;  // per new number (position_count, position_count + 1, ...): the old one
+  // Per new number (position_count, position_count + 1 and so on): the old one.
+  std::vector<std::uint32_t> split_from;
   std::uint64_t non_manifold_edges = 0;  // edges of more than two triangles, or of two that disagree on front
   std::uint64_t bow_ties = 0;            // positions split although none of their edges is non-manifold
 };
 
-/// Gives every fan of triangles around a position a position of its own, so that the result is an oriented
-/// 2-manifold with boundary: an edge has one triangle, or two that run through it in opposite directions, and
-/// the triangles of a position form one fan. Where more triangles meet at an edge, those that share wedges,
-/// material and direction best stay together; the two triangles of a two-sided sheet are never joined to each
-/// other. The fan with the lowest triangle keeps the old number. Nothing moves. O(n log n).
+/// Gives every fan of triangles around a position a position of its own. The result is an oriented 2-manifold
+/// with boundary: an edge has one triangle, or two that run through it in opposite directions, and the
+/// triangles of a position form one fan.
+/// - Where more triangles meet at an edge, those stay together that share wedges, material and direction
+///   best.
+/// - The two triangles of a two-sided sheet are never joined to each other.
+/// - The fan with the lowest triangle keeps the old number. Nothing moves.
+/// O(n log n).
 ManifoldSplit split_non_manifold(const Surface& surface, const EdgeTable& edges);
 
 }  // namespace texmesh

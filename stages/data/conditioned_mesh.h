@@ -7,19 +7,22 @@
 
 namespace texmesh {
 
-/// What condition found and changed; but for the three counts marked (*), zero everywhere for a clean mesh.
+/// What condition found and changed. For a clean mesh all counts are 0 but the last three.
 struct ConditionReport {
   std::uint64_t welded_positions = 0, welded_wedges = 0, unused_positions = 0;
-  std::uint64_t degenerate_triangles = 0;  // dropped: two equal corners, or no area and no crack where it was
-  std::uint64_t slivers_kept = 0;          // no area, but between neighbours that would gape without it
-  std::uint64_t duplicate_triangles = 0;   // dropped: same wedges, direction, material and part as another
+  // Dropped: two corners are equal, or the triangle has no area and leaves no crack.
+  std::uint64_t degenerate_triangles = 0;
+  // Kept without an area, since its neighbours would gape without it.
+  std::uint64_t slivers_kept = 0;
+  // Dropped: another triangle has the same wedges, direction, material and part.
+  std::uint64_t duplicate_triangles = 0;
   std::uint64_t non_finite_triangles = 0;  // dropped
-  std::uint64_t repaired_wedges =
-      0;  // with a non-finite UV or colour, or a normal that is not finite or zero
+  // Of these wedges a UV or a colour was not finite, or a normal was not finite or zero.
+  std::uint64_t repaired_wedges = 0;
   std::uint64_t split_non_manifold_edges = 0, split_bow_ties = 0;
-  std::uint64_t components = 0;      // (*)
-  std::uint64_t boundary_edges = 0;  // (*) edges of one triangle, between welded positions, before splits
-  std::uint64_t non_manifold_edges_found = 0;  // (*) edges of more than two triangles, likewise
+  std::uint64_t components = 0;
+  // Edges of one triangle and of more than two, between welded positions, before splits.
+  std::uint64_t boundary_edges = 0, non_manifold_edges_found = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.welded_positions, s.welded_wedges, s.unused_positions, s.degenerate_triangles, s.slivers_kept,
@@ -28,19 +31,20 @@ struct ConditionReport {
   }
 };
 
-/// A mesh whose position graph is an orientable 2-manifold with boundary, edge by edge and vertex by vertex:
-/// positions welded, wedges unique, no degenerate or duplicate triangle, non-manifold edges and bow-ties
-/// split.
+/// A mesh whose position graph is an orientable 2-manifold with boundary. Positions are welded and wedges are
+/// unique. There is no degenerate or duplicate triangle. Non-manifold edges and bow-ties are split.
 struct ConditionedMesh {
   Mesh mesh;
   /// Per position: the lowest index of a position at the very same place (itself when there is no twin).
   /// Twins come from splits; they collapse together later so that no crack opens.
   std::vector<std::uint32_t> twin;
-  std::vector<std::uint32_t> component;  // per position: connected component over positions *and* twins
+  // Per position: its connected component, over which twins count as one.
+  std::vector<std::uint32_t> component;
   std::uint32_t component_count = 0;
   std::vector<std::uint32_t> position_source;  // per position: index in the input mesh
   std::vector<std::uint32_t> triangle_source;  // per triangle: index in the input mesh
-  std::vector<UvSets> uv_sets;                 // per material, or empty: the first set for all; the caller's
+  // Per material, as the caller has set it. Empty: all materials use the first set.
+  std::vector<UvSets> uv_sets;
   ConditionReport report;
   Notes notes;
   template <class S, class A>

@@ -1,4 +1,5 @@
 #include "stages/data/nested_scales.h"
+
 #include "format/base/no_index.h"
 
 namespace texmesh {

@@ -7,12 +7,13 @@
 
 namespace texmesh {
 
-/// One half-edge collapse: position `from` merges into its neighbour `to`, which does not move. Where a whole
-/// component vanishes, all positions it has left go at once, each with `to` == `from`, one record behind the
-/// other, and so do the triangles it has left.
+/// One half-edge collapse: position `from` merges into its neighbour `to`, which does not move. A component
+/// that vanishes whole has one record for each position that it has left, one behind the other, with `to` ==
+/// `from`; its triangles go with them.
 struct Collapse {
   std::uint32_t from = 0, to = 0;
-  float error = 0;  // object units: square root of the quadric error
+  float error = 0;  // square root of the quadric error, object units
+  bool vanishes_with_component() const { return to == from; }
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.from, s.to, s.error);
@@ -24,15 +25,17 @@ struct NestedScale {
   int scale = 0;                     // scale number, 0 = S_0
   std::uint32_t collapse_count = 0;  // how many of the collapses lead here
   std::vector<Triangle> triangles;
-  std::vector<std::uint32_t>
-      triangle_source;               // per triangle: index of the S_0 triangle it comes from (material, part)
+  // Per triangle: the index of the S_0 triangle that it comes from, whose material and part it has.
+  std::vector<std::uint32_t> triangle_source;
   std::uint32_t position_count = 0;  // positions in use
-  float error_max = 0, error_rms = 0;  // distance between S_0 and S_i, sampled both ways, object units
-  // What max_error bounds: as error_max, but what has vanished with its whole component counts as no farther
-  // from S_i than the component's diagonal: a pebble that is too small to be seen may be far from all others.
+  // The distance between S_0 and S_i, sampled both ways, object units.
+  float error_max = 0, error_rms = 0;
+  // What max_error bounds: error_max, but for components that have vanished whole. Of these no place counts
+  // as farther from S_i than the component's diagonal: a pebble that is too small to be seen may be far from
+  // all else.
   float deviation = 0;
-  std::string floor_reason;  // why the scale has more vertices than asked for, or is the coarsest although
-                             // more were asked for; "" when neither
+  // Why the scale has more vertices than asked for, or why no coarser scale follows; "" when neither is so.
+  std::string floor_reason;
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,
@@ -40,14 +43,14 @@ struct NestedScale {
   }
 };
 
-/// Nested scales: positions of a coarse scale are a subset of those of every finer one, and no UV is ever
-/// made.
+/// Nested scales: the positions of a coarse scale are a subset of those of every finer one, and no UV is new.
 struct NestedScales {
-  Mesh mesh;  // S_0; its wedge table may be longer than the conditioned mesh's (relaxed junctions)
+  Mesh mesh;  // S_0; the wedges of relaxed junctions stand behind the conditioned mesh's
   std::vector<std::uint32_t> twin;  // as ConditionedMesh::twin
   std::vector<Collapse> collapses;
-  std::vector<NestedScale> scales;  // S_0 first, then coarser; scales that would repeat a mesh (within 3 % of
-                                    // the triangles) or deviate by more than max_error are left out
+  // S_0 first, then coarser ones. Scales that would repeat a mesh (within 3 % of the triangles) or deviate by
+  // more than max_error are left out.
+  std::vector<NestedScale> scales;
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {
@@ -55,8 +58,8 @@ struct NestedScales {
   }
 };
 
-/// The mesh of one scale with unused positions and wedges dropped; materials, parts and attributes carried
-/// over.
+/// The mesh of one scale, without the positions and wedges that it does not use. Materials, parts and
+/// attributes are those of S_0.
 Mesh extract_scale(const NestedScales& scales, const NestedScale& scale);
 
 }  // namespace texmesh

@@ -13,8 +13,8 @@ struct Pixels {
   }
 };
 
-/// As Pixels, with the values of the file: integers keep their value (0..255, 0..65535), floats are as they
-/// are, NaN and infinities included.
+/// As Pixels, with the values of the file: integers keep their value (0..255, 0..65535), and floats stay as
+/// they are, NaN and infinities included.
 struct FloatPixels {
   std::uint32_t width_px = 0, height_px = 0, channels = 0;
   std::vector<float> data;

@@ -9,7 +9,7 @@ namespace texmesh {
 struct ScaleFile {
   int scale = 0;                              // scale number
   std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
-  std::uint32_t triangles = 0, vertices = 0;  // as stored: vertices counts wedges
+  std::uint32_t triangles = 0, vertices = 0;  // as stored: a vertex is a wedge
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.scale, s.glb, s.triangles, s.vertices);
@@ -17,9 +17,9 @@ struct ScaleFile {
 };
 
 struct ScaleFiles {
-  std::vector<ScaleFile> files;        // kept scales, S_0 first
+  std::vector<ScaleFile> files;        // the kept scales, S_0 first
   int position_bits = 0, uv_bits = 0;  // as used; 0 = float
-  double position_error = 0;           // largest rounding of a coordinate, object units
+  double position_error = 0;           // the largest rounding of a coordinate, object units
   std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
   Notes notes;
   template <class S, class A>

@@ -8,16 +8,16 @@
 
 namespace texmesh {
 
-/// The curve skeleton and the skeleton distance R(v) (thesis 6.2): alpha wrap, mean curvature flow, distance
-/// to segments, corrected by the local thickness where a curve is no skeleton (local_radius.h). Parts that
-/// contract to a point, and the centroids of the fallbacks, are segments of no length.
+/// The curve skeleton and the skeleton distance R(v) (thesis 6.2). Parts that contract to a point, and the
+/// centroids of the fallbacks, are segments of no length.
 struct Skeleton {
   std::vector<Vec3f> nodes;                            // mesh-local coordinates
   std::vector<std::array<std::uint32_t, 2>> segments;  // node indices
-  std::vector<float> distance;     // R(v) per position: distance to the closest segment, at most what the
-                                   // local thickness allows; object units, >= 0
+  // R(v) per position: the distance to the closest segment, at most what the local thickness allows; object
+  // units, >= 0.
+  std::vector<float> distance;
   std::vector<float> radius;       // R_eff(v) per position = max(R, floor * median R); > 0
-  bool fallback_centroid = false;  // no wrap: distance to the component's centroid
+  bool fallback_centroid = false;  // there was no wrap: distances are to the component's centroid
   Notes notes;
   template <class S, class A>
   static void archive(S& s, A& a) {

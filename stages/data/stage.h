@@ -1,6 +1,6 @@
 #pragma once
-// What the public header of every stage begins with: options are described by format/base/fields.h, and the
-// context in which a stage runs is known by name. Callers include stages/base/run_context.h.
+// What the public header of every stage needs: format/base/fields.h describes options, and the context in
+// which a stage runs is known by name. Callers include stages/base/run_context.h.
 #include "format/base/fields.h"
 
 namespace texmesh {

@@ -8,7 +8,7 @@ namespace texmesh {
 
 /// Which sets of texture coordinates a material's textures use (0 -> uv0, 1 -> uv1).
 struct UvSets {
-  std::uint8_t guide = 0;  // of the base colour; where that has no texture, of the first texture there is
+  std::uint8_t guide = 0;  // the base colour's set; where that has no texture, the first texture's
   std::uint8_t both = 0;   // 1 = some texture uses the other set
   friend bool operator==(const UvSets&, const UvSets&) = default;
   template <class S, class A>

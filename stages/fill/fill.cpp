@@ -1,9 +1,11 @@
+#include "stages/fill/fill.h"
+
 #include <algorithm>
 #include <cstring>
 #include <string>
 
 #include "stages/base/parallel.h"
-#include "stages/fill/fill.h"
+#include "stages/data/coverage.h"
 #include "stages/fill/fill_blocks.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/halve_pixels.h"
@@ -25,12 +27,12 @@ struct FillWay {
   PartBlocks part;
 };
 
-struct Neighbours {
+/// The coarse texels that a fine one lies between: it is three quarters of the near and one of the far one.
+struct CoarseTexels {
   std::uint32_t near, far;
 };
 
-/// The coarse texels that a fine one lies between, three quarters and one quarter.
-Neighbours neighbours(std::uint32_t fine, std::uint32_t coarse_size) {
+CoarseTexels coarse_texels(std::uint32_t fine, std::uint32_t coarse_size) {
   const std::uint32_t near = fine / 2;
   if (fine % 2) return {near, std::min(near + 1, coarse_size - 1)};
   return {near, near > 0 ? near - 1 : 0};
@@ -53,10 +55,7 @@ template <int C>
 class PushPull {
  public:
   PushPull(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context)
-      : pixels_(pixels),
-        coverage_(coverage),
-        stride_((std::size_t{pixels.width_px} + 7) / 8),
-        context_(context) {}
+      : pixels_(pixels), mask_(coverage, pixels.width_px, pixels.height_px), context_(context) {}
 
   void run() {
     std::vector<Level> levels;
@@ -68,10 +67,6 @@ class PushPull {
   }
 
  private:
-  bool covered(std::uint32_t x, std::uint32_t y) const {
-    return coverage_[y * stride_ + x / 8] >> (7 - x % 8) & 1;
-  }
-
   static Level half_of(std::uint32_t width, std::uint32_t height) {
     Level out{(width + 1) / 2, (height + 1) / 2, {}, {}};
     out.mask.resize(std::size_t{out.width} * out.height);
@@ -98,13 +93,13 @@ class PushPull {
 
   Level push_base() const {
     Level to = half_of(pixels_.width_px, pixels_.height_px);
-    const auto is_covered = [this](std::uint32_t u, std::uint32_t v) { return covered(u, v); };
+    const auto is_covered = [this](std::uint32_t u, std::uint32_t v) { return mask_.covered(u, v); };
     parallel_for(context_, to.height, kRowsPerPiece, [&](std::size_t begin, std::size_t end) {
       for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y)
-        for (std::uint32_t byte = 0; byte < stride_; ++byte) {
-          const std::size_t at = std::size_t{2 * y} * stride_ + byte;
+        for (std::uint32_t byte = 0; byte < mask_.stride_bytes; ++byte) {
           const bool second = 2 * y + 1 < pixels_.height_px;
-          if ((coverage_[at] | (second ? coverage_[at + stride_] : 0)) == 0) continue;
+          const std::uint8_t below = second ? mask_.byte_at(byte * 8, 2 * y + 1) : std::uint8_t{0};
+          if ((mask_.byte_at(byte * 8, 2 * y) | below) == 0) continue;
           for (std::uint32_t x = byte * 4; x < std::min(byte * 4 + 4, to.width); ++x)
             push_texel(pixels_.data.data(), pixels_.width_px, pixels_.height_px, x, y, is_covered, to);
         }
@@ -128,7 +123,7 @@ class PushPull {
   /// Bilinear interpolation of the coarse level at a fine texel, whose coarse rows are given.
   static void pull_texel(const Level& coarse, const std::uint8_t* near_row, const std::uint8_t* far_row,
                          std::uint32_t x, std::uint8_t* to) {
-    const Neighbours n = neighbours(x, coarse.width);
+    const CoarseTexels n = coarse_texels(x, coarse.width);
     const std::uint8_t *a = near_row + std::size_t{n.near} * C, *b = near_row + std::size_t{n.far} * C;
     const std::uint8_t *c = far_row + std::size_t{n.near} * C, *d = far_row + std::size_t{n.far} * C;
     for (int k = 0; k < C; ++k)
@@ -138,7 +133,7 @@ class PushPull {
   void pull(const Level& coarse, Level& fine) const {
     parallel_for(context_, fine.height, kRowsPerPiece, [&](std::size_t begin, std::size_t end) {
       for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y) {
-        const Neighbours n = neighbours(y, coarse.height);
+        const CoarseTexels n = coarse_texels(y, coarse.height);
         const std::uint8_t* near_row = coarse.data.data() + std::size_t{n.near} * coarse.width * C;
         const std::uint8_t* far_row = coarse.data.data() + std::size_t{n.far} * coarse.width * C;
         for (std::uint32_t x = 0; x < fine.width; ++x) {
@@ -152,22 +147,21 @@ class PushPull {
   void pull_base(const Level& coarse) {
     parallel_for(context_, pixels_.height_px, kRowsPerPiece, [&](std::size_t begin, std::size_t end) {
       for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y) {
-        const Neighbours n = neighbours(y, coarse.height);
+        const CoarseTexels n = coarse_texels(y, coarse.height);
         const std::uint8_t* near_row = coarse.data.data() + std::size_t{n.near} * coarse.width * C;
         const std::uint8_t* far_row = coarse.data.data() + std::size_t{n.far} * coarse.width * C;
         std::uint8_t* row = pixels_.data.data() + std::size_t{y} * pixels_.width_px * C;
-        for (std::uint32_t byte = 0; byte < stride_; ++byte) {
-          if (coverage_[y * stride_ + byte] == 0xff) continue;
+        for (std::uint32_t byte = 0; byte < mask_.stride_bytes; ++byte) {
+          if (mask_.byte_at(byte * 8, y) == 0xff) continue;
           for (std::uint32_t x = byte * 8; x < std::min(byte * 8 + 8, pixels_.width_px); ++x)
-            if (!covered(x, y)) pull_texel(coarse, near_row, far_row, x, row + std::size_t{x} * C);
+            if (!mask_.covered(x, y)) pull_texel(coarse, near_row, far_row, x, row + std::size_t{x} * C);
         }
       }
     });
   }
 
   Pixels& pixels_;
-  const std::vector<std::uint8_t>& coverage_;
-  std::size_t stride_;
+  CoverageMask mask_;
   const RunContext& context_;
 };
 
@@ -259,7 +253,7 @@ std::size_t check_planes(const std::vector<TexturePlane>& planes, std::size_t im
 }
 
 void check_coverage(const Pixels& pixels, const std::vector<std::uint8_t>& coverage) {
-  const std::size_t bytes = (std::size_t{pixels.width_px} + 7) / 8 * pixels.height_px;
+  const std::size_t bytes = coverage_size_bytes(pixels.width_px, pixels.height_px);
   if (coverage.size() != bytes || bytes == 0)
     throw StageError("fragmentation", "coverage", std::to_string(bytes) + " bytes",
                      std::to_string(coverage.size()));

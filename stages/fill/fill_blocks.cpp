@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 #include "stages/jpeg/block_transform.h"
 
 namespace texmesh {
@@ -50,11 +51,9 @@ class Mcu {
  public:
   Mcu(Pixels& pixels, const std::vector<std::uint8_t>& coverage, std::uint32_t left, std::uint32_t top)
       : pixels_(pixels), left_(left), top_(top) {
-    const std::size_t stride = (std::size_t{pixels.width_px} + 7) / 8;
-    for (std::uint32_t y = 0; y < kMcu; ++y) {
-      const std::uint8_t* row = coverage.data() + (top + y) * stride + left / 8;
-      rows_[y] = static_cast<std::uint32_t>(row[0]) << 8 | row[1];
-    }
+    const CoverageMask mask(coverage, pixels.width_px, pixels.height_px);
+    for (std::uint32_t y = 0; y < kMcu; ++y)
+      rows_[y] = std::uint32_t{mask.byte_at(left, top + y)} << 8 | mask.byte_at(left + 8, top + y);
   }
 
   bool covered(std::uint32_t x, std::uint32_t y) const { return rows_[y] >> (15 - x) & 1; }

@@ -4,7 +4,8 @@
 #include <bit>
 #include <cmath>
 
-#include "stages/image/texel_coverage.h"
+#include "stages/data/coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {
@@ -37,7 +38,7 @@ class Blocks {
       : columns_((width_px + 15) / 16),
         rows_((height_px + 15) / 16),
         covered_(std::size_t{columns_} * rows_) {
-    const std::size_t stride = (std::size_t{width_px} + 7) / 8;
+    const std::size_t stride = coverage_stride_bytes(width_px);
     for (std::uint32_t y = 0; y < height_px; ++y)
       for (std::size_t byte = 0; byte < stride; ++byte) {
         const auto width = std::min<std::size_t>(8, width_px - byte * 8);

@@ -16,18 +16,20 @@ struct FragmentGrid {
   std::string reason;
 };
 
-/// The grid with the least overhead for what is covered (`coverage` as TexturePlane::coverage; empty = all of
-/// it), of those with at most max_fragments, sides multiples of 16 up to 256 px, and at least min_px where
-/// the image allows. The overhead of a grid is 64 bytes for every stored fragment and 0.01 bytes for
-/// every texel of a stored fragment that is not covered; so small sides win where they skip more than they
-/// cost. Measured on scans cut into sides of 128 and 256 px: a fragment takes 7 bytes of a rung's streams (4
-/// are headers, the others for starting prediction and bytes anew), 15 in the tables for every rung and 61
-/// to 68 once, an uncovered texel 0.006 bytes at quality 18, 0.009 at 53, 0.011 at 86. A package of ten rungs
-/// thus has 28 bytes a fragment and rung, a load, which takes the tables whole and one rung, some 220: 64
-/// lies between, and three scans and their mips get the same grids from 30 to 64. Grids with fewer than 64
-/// stored fragments are taken only when there are none with more, because harmonic time compensation with 16
-/// misses its deadline by 0.8 %, with 64 by 0.1 %. Sides grow beyond 256 px where max_fragments asks for it,
-/// never above 65488 px (JPEG), so a larger image has more than max_fragments when that is 1.
+/// The grid with the least overhead for what is covered. `coverage` is as TexturePlane::coverage; empty
+/// stands for all of the image. Candidates have at most max_fragments fragments, whose sides are multiples of
+/// 16 up to 256 px and at least min_px where the image allows.
+/// - The overhead of a grid is 64 bytes for every stored fragment and 0.01 bytes for every texel of a stored
+///   fragment that is not covered. Small sides win where they skip more than they cost.
+/// - Grids with fewer than 64 stored fragments are taken only when there are none with more: harmonic time
+///   compensation with 16 fragments misses its deadline by 0.8 %, with 64 by 0.1 %.
+/// - Sides grow beyond 256 px where max_fragments asks for it, but not above 65488 px (JPEG). A larger image
+///   has more than max_fragments when that is 1.
+/// The numbers were measured on scans cut into sides of 128 and 256 px. A fragment takes 7 bytes of a rung's
+/// streams (4 are headers, the others for starting prediction and bytes anew), 15 bytes in the tables for
+/// every rung and 61 to 68 once. An uncovered texel takes 0.006 bytes at quality 18, 0.009 at 53, 0.011 at
+/// 86. A fragment thus costs a package of ten rungs 28 bytes a rung, and a load, which takes the tables whole
+///   and one rung, some 220: 64 lies between. Three scans and their mips get the same grids from 30 to 64.
 FragmentGrid choose_grid(std::uint32_t width_px, std::uint32_t height_px,
                          const std::vector<std::uint8_t>& coverage, std::uint32_t max_fragments,
                          std::uint32_t min_px);

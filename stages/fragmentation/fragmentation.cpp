@@ -10,8 +10,9 @@
 #include "format/base/no_index.h"
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 #include "stages/fragmentation/fragment_grid.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {
@@ -29,13 +30,18 @@ struct Job {
   std::vector<Use> uses;
 };
 
+/// Triangles that sample an image and cannot be placed on it.
+struct TriangleFaults {
+  std::uint64_t broken_triangles = 0;  // of texture coordinates that are not finite
+  bool missing_uvs = false;            // a material has triangles without texture coordinates
+};
+
 struct Measure {
   FragmentGrid grid;
   std::vector<std::uint8_t> coverage;
   std::vector<double> surface;          // absolute, per fragment
   std::vector<std::uint32_t> features;  // [scale * fragments + fragment]
-  std::uint64_t broken_triangles = 0;   // UVs not finite
-  bool missing_uvs = false;
+  TriangleFaults faults;
 };
 
 void check(const ConditionedMesh& conditioned, const std::vector<Material>& materials,
@@ -109,7 +115,8 @@ void list_planes(const std::vector<Material>& materials, const std::vector<Image
       for (const Slot& slot : slots_of(materials[m])) {
         if (slot.ref->image != static_cast<std::int32_t>(image)) continue;
         role_used[static_cast<int>(slot.role)] = true;
-        add_use(colour, m, *slot.ref);  // a number in alpha needs its image's colours, for it is one file
+        // A number in alpha uses the colours as well, since both are one file.
+        add_use(colour, m, *slot.ref);
         if (slot.channels != TextureChannels::kColour) add_use(alpha, m, *slot.ref);
       }
     if (colour.empty()) continue;
@@ -166,9 +173,11 @@ double area_in_space(const Mesh& mesh, std::size_t triangle) {
   return std::isfinite(area) ? area : 0;
 }
 
-/// Walks the triangles of every use and hands (triangle, corners in texels, first use of that material) on.
+/// Calls body(triangle, use, whether it is the first use of that material, corners in texels) for the
+/// triangles of every use, and returns what it had to leave out.
 template <class Body>
-void for_each_triangle(const Mesh& mesh, const Job& job, Measure& out, const Body& body) {
+TriangleFaults for_each_triangle(const Mesh& mesh, const Job& job, const Body& body) {
+  TriangleFaults faults;
   for (std::size_t u = 0; u < job.uses.size(); ++u) {
     const Use& use = job.uses[u];
     const std::vector<Vec2f>& uvs = use.ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
@@ -178,7 +187,7 @@ void for_each_triangle(const Mesh& mesh, const Job& job, Measure& out, const Bod
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       if (mesh.triangle_material[t] != use.material) continue;
       if (uvs.empty()) {
-        out.missing_uvs = true;
+        faults.missing_uvs = true;
         break;
       }
       std::array<Vec2d, 3> texels;
@@ -190,9 +199,10 @@ void for_each_triangle(const Mesh& mesh, const Job& job, Measure& out, const Bod
       if (finite)
         body(t, use, first, texels);
       else
-        ++out.broken_triangles;
+        ++faults.broken_triangles;
     }
   }
+  return faults;
 }
 
 /// (position, fragment) of every corner, each pair once, then f_i.
@@ -212,12 +222,12 @@ std::vector<std::uint32_t> count_features(std::vector<std::uint64_t>& corners, c
 
 void measure_coverage(const Mesh& mesh, const Job& job, Measure& out) {
   TexelCoverage coverage(job.width_px, job.height_px, Wrap::kRepeat, Wrap::kRepeat);
-  for_each_triangle(mesh, job, out,
-                    [&](std::size_t, const Use& use, bool, const std::array<Vec2d, 3>& texels) {
-                      coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
-                      coverage.add(texels);
-                    });
-  out.coverage = coverage.take();
+  out.faults = for_each_triangle(mesh, job,
+                                 [&](std::size_t, const Use& use, bool, const std::array<Vec2d, 3>& texels) {
+                                   coverage.set_wrap(use.ref.wrap_s, use.ref.wrap_t);
+                                   coverage.add(texels);
+                                 });
+  out.coverage = coverage.release_bits();
 }
 
 /// Surface and features of the grid's fragments.
@@ -229,17 +239,16 @@ void measure_fragments(const ConditionedMesh& conditioned, const ScaleMap& scale
   AreaSpreader spreader(out.grid);
   std::vector<std::uint64_t> corners;
   std::vector<std::uint32_t> last_fragment(mesh.positions.size(), kNoIndex);  // spares most of the sorting
-  Measure again;                                                              // faults are counted already
   for_each_triangle(
-      mesh, job, again, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
+      mesh, job, [&](std::size_t t, const Use& use, bool first, const std::array<Vec2d, 3>& texels) {
         if (first) spreader.add(texels, use.ref.wrap_s, use.ref.wrap_t, area_in_space(mesh, t), out.surface);
         const Vec2d centre = (texels[0] + texels[1] + texels[2]) * (1.0 / 3);
         for (int c = 0; c < 3; ++c) {
           std::uint32_t position = mesh.position_of(static_cast<std::uint32_t>(t), c);
           if (!conditioned.twin.empty()) position = conditioned.twin[position];
           const Vec2d corner = texels[static_cast<std::size_t>(c)];
-          const Vec2d inside =
-              corner + (centre - corner) * 1e-6;  // decides on which side of a border it lies
+          // Decides on which side of a border the corner lies.
+          const Vec2d inside = corner + (centre - corner) * 1e-6;
           const std::uint32_t fragment = fragment_at(out.grid, inside, use.ref.wrap_s, use.ref.wrap_t);
           if (last_fragment[position] == fragment) continue;
           last_fragment[position] = fragment;
@@ -262,12 +271,11 @@ Measure measure(const ConditionedMesh& conditioned, const ScaleMap& scale_map, c
 
 std::vector<std::uint32_t> count_covered(const TexturePlane& plane) {
   std::vector<std::uint32_t> out(plane.fragment_count());
-  const std::size_t stride = (std::size_t{plane.width_px} + 7) / 8;
+  const CoverageMask mask(plane);
   for (std::uint32_t y = 0; y < plane.height_px; ++y) {
     std::uint32_t* row = out.data() + std::size_t{y / plane.fragment_height_px} * plane.columns;
-    for (std::size_t byte = 0; byte < stride; ++byte)  // fragment sides are multiples of 8
-      row[byte * 8 / plane.fragment_width_px] +=
-          static_cast<std::uint32_t>(std::popcount(plane.coverage[y * stride + byte]));
+    for (std::uint32_t x = 0; x < plane.width_px; x += 8)  // fragment sides are multiples of 8
+      row[x / plane.fragment_width_px] += static_cast<std::uint32_t>(std::popcount(mask.byte_at(x, y)));
   }
   return out;
 }
@@ -307,13 +315,13 @@ void complete_plane(const Measure& measured, double whole_surface, TexturePlane&
 }
 
 void note_faults(const TexturePlane& plane, const Measure& measured, const std::string& image, Notes& notes) {
-  if (plane.role == TextureRole::kAlpha || plane.mip > 0) return;  // said of the colours already
-  if (measured.missing_uvs)
+  if (plane.role == TextureRole::kAlpha || plane.mip > 0) return;  // noted for the full-size colours
+  if (measured.faults.missing_uvs)
     add_warning(notes, "missing-texture-coordinates", image,
                 "a material uses the image without texture coordinates");
-  if (measured.broken_triangles > 0)
+  if (measured.faults.broken_triangles > 0)
     add_warning(notes, "non-finite-texture-coordinate", image,
-                std::to_string(measured.broken_triangles) +
+                std::to_string(measured.faults.broken_triangles) +
                     " triangles sample it at coordinates that are not finite");
   if (std::all_of(plane.covered_texels.begin(), plane.covered_texels.end(), [](auto n) { return n == 0; }))
     add_info(notes, "unused-image", image, "no triangle samples the image");

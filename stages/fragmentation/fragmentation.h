@@ -15,8 +15,8 @@ namespace texmesh {
 inline constexpr int kFragmentationVersion = 7;
 
 struct FragmentationOptions {
-  int max_fragments = 256;    // per texture plane
-  int min_fragment_px = 128;  // side, where the image allows
+  int max_fragments = 256;
+  int min_fragment_px = 128;
   Fill fill = Fill::kPushPull;
   bool mips = true;
   template <class S, class V>
@@ -31,25 +31,22 @@ struct FragmentationOptions {
   }
 };
 
-/// Cuts the images that materials use into planes and fragments (thesis 3.2):
-/// - An image used for several things gives one plane; the role that comes first in TextureRole wins, with a
-/// note.
-/// - Mips: halves down to, and without, the size of the preview: 1/2 and 1/4, and 1/8 where that has more
-/// than
-///   32768 texels (the preview may be 1/16 then), each while its longer side has at least 128 texels. Below
-///   that all of a mip's finest rung is no more than its tables.
-/// - Grid: at most max_fragments fragments, sides multiples of 16 and at least min_fragment_px where the
-/// image allows.
-/// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively and after the
-/// texture's
-///   transform and wrap modes. Triangles whose UVs are absent or not finite cover nothing (a note says so).
+/// Cuts the images that materials use into planes and fragments (thesis 3.2).
+/// - Planes: an image used for several things gives one plane. The role that comes first in TextureRole wins,
+///   with a note.
+/// - Mips: halves down to, and without, the size of the preview. These are 1/2 and 1/4, and 1/8 where that
+///   has more than 32768 texels (the preview may be 1/16 then), each while its longer side has at least 128
+///   texels. Below that all of a mip's finest rung is no more than its tables.
+/// - Grid: at most max_fragments fragments. Their sides are multiples of 16, and at least min_fragment_px
+///   where the image allows.
+/// - Coverage: the texels that bilinear sampling of the triangles can touch, conservatively, after the
+///   texture's transform and wrap modes. Triangles whose UVs are absent or not finite cover nothing; a note
+///   says so.
 /// - Surface: each triangle's area in space, spread over fragments by its area on the texture.
 /// - Features f_i: positions with ScaleMap::crossing >= i, twins as one, counted once in every fragment in
-/// which a
-///   corner lies (a corner on the border between two fragments lies where its triangle does).
-/// - eta_i (3.1) is 0 everywhere at a scale where all covered fragments have the same count.
-/// Throws StageError when the scale map or a triangle's material does not fit. Same result for any thread
-/// count.
+///   which a corner lies. A corner on the border between two fragments lies where its triangle does.
+/// - eta_i (3.1): 0 everywhere at a scale where all covered fragments have the same count.
+/// StageError when the scale map or a triangle's material does not fit. Same result for any thread count.
 Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Material>& materials,
                             const std::vector<Image>& images, const ScaleMap& scale_map,
                             const FragmentationOptions& options, const RunContext& context);

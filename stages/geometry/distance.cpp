@@ -12,9 +12,6 @@ namespace {
 
 constexpr std::uint32_t kLeafTriangles = 4;
 
-Vec3f least(Vec3f a, Vec3f b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
-Vec3f most(Vec3f a, Vec3f b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
-
 /// Sorts by code, keeping the order of equal ones: six passes over the items take a tenth of what comparing
 /// takes.
 void sort_by_code(std::vector<CurvedTriangle>& items) {
@@ -35,13 +32,13 @@ template <class Centre>
 std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
   std::vector<CurvedTriangle> order(count);
   if (count == 0) return order;
-  Vec3f lo = centre(0), hi = lo;
-  for (std::size_t t = 0; t < count; ++t) lo = least(lo, centre(t)), hi = most(hi, centre(t));
-  const Vec3d size = to_double(hi) - to_double(lo);
-  const double side = std::max({size.x, size.y, size.z});
+  Box3f centres;
+  for (std::size_t t = 0; t < count; ++t) centres.extend(centre(t));
+  const Box3d box = to_double(centres);
+  const double side = box.longest_side();
   const double scale = side > 0 ? 2097151.0 / side : 0;
   for (std::size_t t = 0; t < count; ++t) {
-    const Vec3d p = (to_double(centre(t)) - to_double(lo)) * scale;
+    const Vec3d p = (to_double(centre(t)) - box.min) * scale;
     order[t] = {morton_code(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
                             static_cast<std::uint32_t>(p.z)),
                 static_cast<std::uint32_t>(t)};
@@ -50,10 +47,11 @@ std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
   return order;
 }
 
-double box_distance2(Vec3d p, Vec3f lo, Vec3f hi) {
+double box_distance2(Vec3d p, const Box3f& box) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
-    const double below = static_cast<double>(lo[k]) - p[k], above = p[k] - static_cast<double>(hi[k]);
+    const double below = static_cast<double>(box.min[k]) - p[k];
+    const double above = p[k] - static_cast<double>(box.max[k]);
     const double d = std::max(std::max(below, above), 0.0);
     sum += d * d;
   }
@@ -102,15 +100,11 @@ SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions,
   for (std::size_t i = nodes_.size(); i-- > 0;) {
     Node& node = nodes_[i];
     if (node.count == 0) {
-      node.lo = least(nodes_[node.first].lo, nodes_[node.first + 1].lo);
-      node.hi = most(nodes_[node.first].hi, nodes_[node.first + 1].hi);
+      node.box = nodes_[node.first].box;
+      node.box.extend(nodes_[node.first + 1].box);
       continue;
     }
-    node.lo = node.hi = corners_[3 * node.first];
-    for (std::size_t c = 3 * node.first; c < 3 * (node.first + node.count); ++c) {
-      node.lo = least(node.lo, corners_[c]);
-      node.hi = most(node.hi, corners_[c]);
-    }
+    for (std::size_t c = 3 * node.first; c < 3 * (node.first + node.count); ++c) node.box.extend(corners_[c]);
   }
 }
 
@@ -159,7 +153,7 @@ double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_
   Open stack[128];  // 63 bits of the curve, and halves of what shares a cell
   int depth = 0;
   const double enough2 = enough * enough;
-  stack[depth++] = {0, box_distance2(p, nodes_[0].lo, nodes_[0].hi)};
+  stack[depth++] = {0, box_distance2(p, nodes_[0].box)};
   while (depth > 0) {
     const Open open = stack[--depth];
     if (open.distance2 >= best) continue;
@@ -174,8 +168,8 @@ double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_
       if (best <= enough2) break;
       continue;
     }
-    Open near{node.first, box_distance2(p, nodes_[node.first].lo, nodes_[node.first].hi)};
-    Open far{node.first + 1, box_distance2(p, nodes_[node.first + 1].lo, nodes_[node.first + 1].hi)};
+    Open near{node.first, box_distance2(p, nodes_[node.first].box)};
+    Open far{node.first + 1, box_distance2(p, nodes_[node.first + 1].box)};
     if (far.distance2 < near.distance2) std::swap(near, far);
     if (far.distance2 < best) stack[depth++] = far;
     if (near.distance2 < best) stack[depth++] = near;

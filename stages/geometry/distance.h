@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "format/base/vec.h"
 #include "format/model/model.h"
@@ -38,9 +39,10 @@ class SurfaceDistance {
 
  private:
   struct Node {
-    Vec3f lo, hi;
-    std::uint32_t first = 0,
-                  count = 0;  // leaf: corners_[3 * first ..]; inner (count 0): children at first, first + 1
+    Box3f box;
+    // Of a leaf: its triangles, whose corners stand at corners_[3 * first]. An inner node has count 0 and its
+    // children at first and first + 1.
+    std::uint32_t first = 0, count = 0;
   };
   void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
              const std::vector<CurvedTriangle>& order);

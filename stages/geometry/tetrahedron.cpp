@@ -19,19 +19,17 @@ struct Polygon {
 }  // namespace
 
 Tetrahedron::Tetrahedron(const std::array<Vec3d, 4>& corners)
-    : corners_(corners), lo_(corners[0]), hi_(corners[0]) {
+    : corners_(corners), box_(bounding_box(corners)) {
   for (std::size_t s = 0; s < 4; ++s) {
     const Vec3d at = corners[kSides[s][0]];
     planes_[s] = {cross(corners[kSides[s][1]] - at, corners[kSides[s][2]] - at), at};
   }
-  for (const Vec3d& p : corners)
-    for (int k = 0; k < 3; ++k) lo_[k] = std::min(lo_[k], p[k]), hi_[k] = std::max(hi_[k], p[k]);
 }
 
-bool Tetrahedron::may_meet_box(Vec3d lo, Vec3d hi) const {
-  if (lo.x > hi_.x || hi.x < lo_.x || lo.y > hi_.y || hi.y < lo_.y || lo.z > hi_.z || hi.z < lo_.z)
-    return false;
-  const Vec3d middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
+bool Tetrahedron::may_meet_box(const Box3d& box) const {
+  for (int k = 0; k < 3; ++k)
+    if (box.min[k] > box_.max[k] || box.max[k] < box_.min[k]) return false;
+  const Vec3d middle = box.centre(), half = (box.max - box.min) * 0.5;
   for (const Plane& s : planes_)
     if (s.height(middle) + std::fabs(s.inwards.x) * half.x + std::fabs(s.inwards.y) * half.y +
             std::fabs(s.inwards.z) * half.z <

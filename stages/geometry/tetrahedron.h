@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 
+#include "format/base/box.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
@@ -13,7 +14,7 @@ class Tetrahedron {
   explicit Tetrahedron(const std::array<Vec3d, 4>& corners);
 
   /// False when it surely meets no part of the box; true may be wrong.
-  bool may_meet_box(Vec3d lo, Vec3d hi) const;
+  bool may_meet_box(const Box3d& box) const;
   /// Whether it and a triangle, inside included, have a point in common.
   bool meets(const std::array<Vec3d, 3>& triangle) const;
 
@@ -27,7 +28,7 @@ class Tetrahedron {
 
   std::array<Vec3d, 4> corners_;
   std::array<Plane, 4> planes_;
-  Vec3d lo_, hi_;
+  Box3d box_;
 };
 
 }  // namespace texmesh

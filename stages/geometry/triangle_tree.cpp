@@ -11,24 +11,24 @@ namespace {
 constexpr std::uint32_t kLeaf = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-double box_distance2(Vec3d lo, Vec3d hi, Vec3d p) {
+double box_distance2(const Box3d& box, Vec3d p) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
-    const double d = std::max({lo[k] - p[k], p[k] - hi[k], 0.0});
+    const double d = std::max({box.min[k] - p[k], p[k] - box.max[k], 0.0});
     sum += d * d;
   }
   return sum;
 }
 
-/// Whether a ray meets a box before t = limit; inverse may hold infinities.
-bool meets_box(Vec3d lo, Vec3d hi, Vec3d origin, Vec3d direction, double limit) {
+/// Whether a ray meets a box before t = limit.
+bool meets_box(const Box3d& box, Vec3d origin, Vec3d direction, double limit) {
   double from = 0, to = limit;
   for (int k = 0; k < 3; ++k) {
     if (direction[k] == 0) {
-      if (origin[k] < lo[k] || origin[k] > hi[k]) return false;
+      if (origin[k] < box.min[k] || origin[k] > box.max[k]) return false;
       continue;
     }
-    double a = (lo[k] - origin[k]) / direction[k], b = (hi[k] - origin[k]) / direction[k];
+    double a = (box.min[k] - origin[k]) / direction[k], b = (box.max[k] - origin[k]) / direction[k];
     if (a > b) std::swap(a, b);
     from = std::max(from, a), to = std::min(to, b);
   }
@@ -97,32 +97,20 @@ TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triang
   // Children stand behind their parents, so one pass from the back fits all boxes.
   for (std::size_t n = nodes_.size(); n-- > 0;) {
     Node& node = nodes_[n];
-    Vec3d lo{kInfinity, kInfinity, kInfinity}, hi = lo * -1.0;
-    const auto take = [&](Vec3d p) {
-      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
-    };
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
-      for (const Vec3d& p : corners_[i]) take(p);
+      for (const Vec3d& p : corners_[i]) node.box.extend(p);
     if (node.count == 0)
-      for (const std::size_t child : {n + 1, std::size_t{node.first}})
-        take(nodes_[child].lo), take(nodes_[child].hi);
-    node.lo = lo, node.hi = hi;
+      for (const std::size_t child : {n + 1, std::size_t{node.first}}) node.box.extend(nodes_[child].box);
   }
 }
 
 void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres) {
   const std::size_t node = nodes_.size();
-  nodes_.push_back({{}, {}, first, count});
+  nodes_.push_back({{}, first, count});
   if (count <= kLeaf) return;
-  Vec3d lo = centres[order_[first]], hi = lo;
-  for (std::uint32_t i = first; i < first + count; ++i)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], centres[order_[i]][k]);
-      hi[k] = std::max(hi[k], centres[order_[i]][k]);
-    }
-  int axis = 0;
-  for (int k = 1; k < 3; ++k)
-    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  Box3d box;
+  for (std::uint32_t i = first; i < first + count; ++i) box.extend(centres[order_[i]]);
+  const int axis = box.longest_axis();
   const auto begin = order_.begin() + first;
   std::nth_element(begin, begin + count / 2, begin + count, [&](std::uint32_t a, std::uint32_t b) {
     return centres[a][axis] < centres[b][axis] || (centres[a][axis] == centres[b][axis] && a < b);
@@ -140,7 +128,7 @@ double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Node& n = nodes_[at];
-    if (!meets_box(n.lo, n.hi, origin, direction, best)) continue;
+    if (!meets_box(n.box, origin, direction, best)) continue;
     if (n.count == 0) {
       stack[depth++] = n.first;
       stack[depth++] = at + 1;
@@ -165,7 +153,7 @@ TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& 
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Node& n = nodes_[at];
-    if (box_distance2(n.lo, n.hi, p) >= best.on.distance2) continue;
+    if (box_distance2(n.box, p) >= best.on.distance2) continue;
     if (n.count > 0) {
       tried += n.count;
       for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
@@ -174,8 +162,7 @@ TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& 
       continue;
     }
     std::uint32_t nearer = at + 1, farther = n.first;
-    if (box_distance2(nodes_[farther].lo, nodes_[farther].hi, p) <
-        box_distance2(nodes_[nearer].lo, nodes_[nearer].hi, p))
+    if (box_distance2(nodes_[farther].box, p) < box_distance2(nodes_[nearer].box, p))
       std::swap(nearer, farther);
     stack[depth++] = farther;
     stack[depth++] = nearer;
@@ -204,7 +191,7 @@ bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Node& n = nodes_[at];
-    if (!solid.may_meet_box(n.lo, n.hi)) continue;
+    if (!solid.may_meet_box(n.box)) continue;
     if (n.count == 0) {
       stack[depth++] = n.first;
       stack[depth++] = at + 1;

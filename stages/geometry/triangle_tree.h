@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "format/base/box.h"
 #include "format/base/vec.h"
 #include "format/model/model.h"
 #include "stages/geometry/tetrahedron.h"
@@ -37,12 +38,11 @@ class TriangleTree {
   /// Whether any triangle meets the solid.
   bool meets(const Tetrahedron& solid, std::uint64_t& tried) const;
   /// The box around all triangles.
-  Vec3d lo() const { return nodes_[0].lo; }
-  Vec3d hi() const { return nodes_[0].hi; }
+  const Box3d& box() const { return nodes_[0].box; }
 
  private:
   struct Node {
-    Vec3d lo, hi;
+    Box3d box;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
   };
   struct Found;

@@ -1,5 +1,4 @@
 #include "stages/geometry/weld.h"
-#include "format/base/no_index.h"
 
 #include <algorithm>
 #include <array>
@@ -7,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+
+#include "format/base/no_index.h"
 
 namespace texmesh {
 namespace {

@@ -10,10 +10,10 @@
 
 namespace texmesh {
 
-// ICC profiles of textures, to sRGB. Own code for the two simple kinds that cameras, scanners and editors
-// embed (three primaries with curves; a grey curve), because a colour management library computes its tables
-// with libm, whose last bits differ between processors. Profiles made of lookup tables (printers, CMYK) are
-// refused with a word on what to do, never guessed.
+// ICC profiles of textures, to sRGB. This is own code for the two simple kinds that cameras, scanners and
+// editors embed: three primaries with curves, and a grey curve. A colour management library computes its
+// tables with libm, whose last bits differ between processors. Profiles made of lookup tables (printers,
+// CMYK) are refused, and the message says what to do; they are never guessed.
 
 /// How stored values become light: linear RGB with the primaries of sRGB, 0..1 within its gamut.
 struct ColourProfile {
@@ -25,8 +25,7 @@ struct ColourProfile {
 inline constexpr std::size_t kByteCodes = 256, kWordCodes = 65536;
 
 /// Reads a profile for an image of `channels` (alpha included), its curves at `codes` points. Throws
-/// InputError{name, "colour profile",
-/// ...} when it is of another kind, damaged, or not for such an image.
+/// InputError{name, "colour profile", ...} when it is of another kind, damaged, or not for such an image.
 ColourProfile read_icc_profile(const std::string& name, std::span<const std::uint8_t> profile,
                                std::uint32_t channels, std::size_t codes = kByteCodes);
 

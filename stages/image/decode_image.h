@@ -1,41 +1,25 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
+#include "format/base/bytes.h"
 #include "format/model/model.h"
 #include "stages/data/pixels.h"
+#include "stages/image/image_format.h"
 
 namespace texmesh {
 
 inline constexpr int kDecodeImageVersion = 3;
-
-struct ImageLimits {
-  std::uint32_t max_side_px = 65500;
-  std::uint64_t max_pixels = 20000ull * 20000ull;
-};
 
 /// What samples become: kAsIs for data (normals, roughness); kSrgb for colours: float files (EXR, float TIFF)
 /// hold linear light where every other image of a material is sRGB encoded, and images with
 /// Image::honour_profile go by their ICC profile or gamma (stages/image/colour_profile.h).
 enum class FloatEncoding : std::uint8_t { kAsIs, kSrgb };
 
-/// The allow-listed format that the first bytes show, nothing for any other content.
-std::optional<ImageFormat> sniff_image_format(std::span<const std::uint8_t> bytes);
-
-/// "JPEG", "PNG", "TIFF", "WebP", "EXR".
-const char* image_format_name(ImageFormat format);
-
-/// "jpg", "png", "tif", "webp", "exr".
-const char* image_extension(ImageFormat format);
-
 /// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and
 /// checks size and channels against the limits before any pixel is read. `name` is for messages. Throws
 /// InputError. Channels beyond the colour (depth, object ids in EXR and TIFF) are left out, but a TIFF's
 /// second or fourth that says nothing of itself is its alpha; CMYK becomes RGB, palettes RGB or RGBA.
-Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const ImageLimits& limits);
+Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits);
 
 /// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,
 /// NaN is 0), with the channel count of the file (1..4), top row first, no colour conversion beyond

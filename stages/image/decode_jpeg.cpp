@@ -16,8 +16,8 @@
 namespace texmesh {
 namespace {
 
-constexpr int kMaxScans =
-    500;  // a progressive file of endless scans is an attack on time; encoders write about 10
+// A progressive file of endless scans is an attack on time; encoders write about 10.
+constexpr int kMaxScans = 500;
 
 struct Decoder {
   jpeg_decompress_struct info{};

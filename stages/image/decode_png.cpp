@@ -99,8 +99,8 @@ std::string row_place(std::uint32_t row, std::uint32_t height) {
   return "row " + std::to_string(row) + " of " + std::to_string(height);
 }
 
-/// Deflate shrinks at most 1032-fold: what claims more lies about its size, and is told so before memory is
-/// taken for it.
+/// Deflate shrinks at most 1032-fold. A header that claims more lies about the size, and is refused before
+/// memory is taken.
 void check_plausible(const std::string& name, const Decoder& d, const PngHeader& h) {
   const std::uint64_t row_bits =
       std::uint64_t{h.width_px} * png_get_channels(d.png, d.info) * png_get_bit_depth(d.png, d.info);

@@ -18,9 +18,9 @@ enum class Halving : std::uint8_t {
 Halving halving_of(TextureRole role, std::uint32_t channels);
 
 /// The first width x height texels of `from`, reduced to (width + 1) / 2 x (height + 1) / 2 by exact box
-/// filtering: output texel i covers [i w / o, (i + 1) w / o), so that texture coordinates mean the same at
-/// every level whatever the size; with even sides that is the mean of 2 x 2. Rounded to nearest. Vectors that
-/// cancel out stay the mean that they are. The same bits on every machine.
+/// filtering. Output texel i covers [i w / o, (i + 1) w / o), so that texture coordinates mean the same at
+/// every level whatever the size; with even sides that is the mean of 2 x 2. Values are rounded to nearest.
+/// Normals that cancel out stay the mean that they are. The same bits on every machine.
 Pixels halved(const Pixels& from, std::uint32_t width_px, std::uint32_t height_px, Halving kind);
 
 /// The same to an eighth, sides rounded up. Same result for any thread count.

@@ -1,5 +1,4 @@
 #include "stages/image/image_metadata.h"
-#include "format/base/bytes.h"
 
 #include <zlib.h>
 
@@ -10,6 +9,8 @@
 #include <map>
 #include <optional>
 #include <string_view>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 namespace {
@@ -39,7 +40,7 @@ bool begins(ByteSpan bytes, std::string_view magic) {
 }
 
 /// Nothing, or too much, where one should be is a damaged one.
-void take_profile(ByteSpan profile, ImageMetadata& out) {
+void read_profile(ByteSpan profile, ImageMetadata& out) {
   if (profile.size() <= kMaxProfile) out.icc_profile.assign(profile.begin(), profile.end());
   out.damaged_profile = out.icc_profile.empty();
 }
@@ -144,7 +145,7 @@ void read_tiff(ByteSpan bytes, ImageMetadata& out) {
   const Tiff tiff(bytes);
   out.more_pictures = tiff.more();
   if (const std::size_t at = tiff.entry(kProfile)) {
-    take_profile(tiff.far_value(at), out);
+    read_profile(tiff.far_value(at), out);
   }
   if (const std::size_t at = tiff.entry(kPhotometric)) {
     const std::uint32_t colours = tiff.short_value(at);
@@ -224,7 +225,7 @@ void read_png(ByteSpan bytes, ImageMetadata& out) {
     if (body.size() != length && begins(type, "iCCP")) out.damaged_profile = true;
     if (body.size() != length || begins(type, "IDAT") || begins(type, "IEND")) break;
     if (begins(type, "sRGB")) srgb = true;
-    if (begins(type, "iCCP")) take_profile(inflate_profile(body), out);
+    if (begins(type, "iCCP")) read_profile(inflate_profile(body), out);
     if (begins(type, "eXIf")) read_exif(body, out);
     if (begins(type, "acTL") && length == 8) out.more_pictures = big(body.first(4)) > 1;
     if (begins(type, "cHRM") && length == 32) out.other_primaries = !srgb_primaries(body);
@@ -244,7 +245,7 @@ void read_webp(ByteSpan bytes, ImageMetadata& out) {
   for (std::size_t at = 12; at + 8 <= bytes.size();) {
     const std::size_t length = little(bytes.subspan(at + 4, 4));
     const ByteSpan type = bytes.subspan(at, 4), body = part(bytes, at + 8, length);
-    if (begins(type, "ICCP")) take_profile(body, out);
+    if (begins(type, "ICCP")) read_profile(body, out);
     if (body.size() != length) break;
     if (begins(type, "EXIF")) read_exif(body, out);
     at += 8 + length + length % 2;

@@ -23,7 +23,7 @@ struct Cosines {
   std::array<float, 15 * 8> of_frequency{};
   std::array<float, 8 * 24> of_sample{};
   std::array<float, 64> matrix{},
-      transposed{};      // the DCT's, [frequency * 8 + sample] and the other way round
+      transposed{};      // the DCT: [frequency * 8 + sample], [sample * 8 + frequency]
   BlockValues scales{};  // [8 * down + across]: of both, half each time
 
   Cosines() {

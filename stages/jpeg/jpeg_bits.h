@@ -9,11 +9,12 @@
 namespace texmesh {
 
 /// Bits of the entropy-coded data of all windows together at each of `qualities` 1..100, with the Huffman
-/// tables that are best for each. Sides of windows are multiples of 16; `kind.quality` does not matter, and
-/// progressive ones are not meant. 0 for no windows.
-/// Windows without coverage are quantised as libjpeg does it, to the bit but for its rounding in the
-/// transform. In the others blocks that have a covered texel count, as they are but for coefficients that
-/// MaskedJpeg would leave out: that is a model of it, within 1 % for ratios between qualities on average.
+/// tables that are best for each; 0 for no windows. Sides of windows are multiples of 16. `kind` is not
+/// progressive, and its quality does not matter.
+/// - Windows without a coverage mask are quantised as libjpeg does it, to the bit but for its rounding in the
+///   transform.
+/// - In the others only blocks that have a covered texel count, without the coefficients that MaskedJpeg
+///   would leave out. This is a model of MaskedJpeg: ratios between qualities are within 1 % on average.
 /// Same result for any thread count.
 std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow> windows,
                               std::span<const int> qualities, const RunContext& context);

@@ -239,9 +239,9 @@ void JpegCoder::use_tables(const HuffmanTables& tables) {
     throw StageError("jpeg", "Huffman tables", std::to_string(2 * state_->table_pairs()),
                      std::to_string(tables.size()));
   for (std::size_t k = 0; k < tables.size(); ++k) {
-    JHUFF_TBL* const* const kind =
-        k % 2 ? info.ac_huff_tbl_ptrs : info.dc_huff_tbl_ptrs;  // g++ 12's -fsanitize=bounds
-    JHUFF_TBL& to = *kind[k / 2];                               // breaks on one expression
+    // Two steps, since g++ 12's -fsanitize=bounds breaks on one expression.
+    JHUFF_TBL* const* const kind = k % 2 ? info.ac_huff_tbl_ptrs : info.dc_huff_tbl_ptrs;
+    JHUFF_TBL& to = *kind[k / 2];
     std::copy(tables[k].bits.begin(), tables[k].bits.end(), to.bits);
     std::memset(to.huffval, 0, sizeof to.huffval);
     std::copy(tables[k].symbols.begin(), tables[k].symbols.end(), to.huffval);

@@ -121,13 +121,13 @@ void emit(const CodedBlock& block, int dc_before, std::size_t component, Sink& s
   if (before < 63) sink.ac(0, 0);
 }
 
-/// What blocks are, by their weights.
-enum class Seen : std::uint8_t { kNothing, kPart, kAll };
+/// How much of a block is covered, by its weights.
+enum class BlockCoverage : std::uint8_t { kNothing, kPart, kAll };
 
-Seen seen(const BlockValues& weights) {
+BlockCoverage coverage_of(const BlockValues& weights) {
   bool all = true, any = false;
   for (const float w : weights) all &= w >= 1, any |= w > 0;
-  return all ? Seen::kAll : any ? Seen::kPart : Seen::kNothing;
+  return all ? BlockCoverage::kAll : any ? BlockCoverage::kPart : BlockCoverage::kNothing;
 }
 
 float mean_of(const BlockValues& samples) {
@@ -179,7 +179,7 @@ MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::u
 }
 
 bool wholly_covered(const PixelWindow& image) {
-  if (image.coverage.bits == nullptr) return true;
+  if (image.coverage.mask.empty()) return true;
   for (std::uint32_t y = 0; y < image.height_px; ++y)
     for (std::uint32_t x = 0; x < image.width_px; ++x)
       if (!image.coverage.covered(x, y)) return false;
@@ -232,7 +232,7 @@ void MaskedJpeg::load(const PixelWindow& image) {
   for (std::uint32_t y = 0; y < h; ++y)
     for (std::uint32_t x = 0; x < w; ++x)
       weights_[std::size_t{y} * w + x] =
-          image.coverage.bits == nullptr || image.coverage.covered(x, y) ? 1.0f : 0.0f;
+          image.coverage.mask.empty() || image.coverage.covered(x, y) ? 1.0f : 0.0f;
   if (halved_) weigh_halved(w, h);
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& component = components_[c];
@@ -253,25 +253,25 @@ void MaskedJpeg::code_block(std::size_t component, std::uint32_t left, std::uint
     std::memcpy(samples.data() + 8 * y, from.values.data() + at, 8 * sizeof(float));
     std::memcpy(weights.data() + 8 * y, from_weights.data() + at, 8 * sizeof(float));
   }
-  const Seen what = seen(weights);
+  const BlockCoverage what = coverage_of(weights);
   float level = 0, same_level = 0;
-  if (what == Seen::kNothing) {
+  if (what == BlockCoverage::kNothing) {
     level = mean_of(samples);
     same_level =
         beside_coverage(from_weights, from.width, from.height, left, top) ? kSameLevelBeside : kSameLevel;
   }
   BlockValues coefficients{};
-  if (what == Seen::kAll) coefficients = block_dct(samples);
-  if (what == Seen::kPart) {
+  if (what == BlockCoverage::kAll) coefficients = block_dct(samples);
+  if (what == BlockCoverage::kPart) {
     for (float& w : weights) w = std::max(w, kUncoveredWeight);
     block_.load(samples, weights);
   }
   for (std::size_t r = 0; r < rungs.size(); ++r) {
     const BlockCoding& coding = rungs[r][component];
     int& dc = dc_before_[r][component];
-    const CodedBlock block = what == Seen::kAll    ? quantise_whole(coefficients, coding)
-                             : what == Seen::kPart ? block_.quantise(coding, dc)
-                                                   : flat_block(level, same_level, coding, dc);
+    const CodedBlock block = what == BlockCoverage::kAll    ? quantise_whole(coefficients, coding)
+                             : what == BlockCoverage::kPart ? block_.quantise(coding, dc)
+                                                            : flat_block(level, same_level, coding, dc);
     emit(block, dc, component, sinks[r]);
     dc = block.values[0];
   }

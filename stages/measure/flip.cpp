@@ -5,14 +5,13 @@
 #include <functional>
 
 #include "format/base/portable_math.h"
+#include "stages/measure/cie_lab.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
 namespace {
 
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
-constexpr double kWhite[3] = {0.950428545, 1.0, 1.088900371};
-constexpr float kLabStart = 216.f / 24389;
 
 using Curve = SampledCurve<16384>;
 
@@ -20,7 +19,7 @@ using Curve = SampledCurve<16384>;
 using Kernel = std::vector<float>;  // [2 * radius + 1]
 
 /// A rectangle of pixels.
-struct Box {
+struct PixelRectangle {
   int x = 0, y = 0, width = 0, height = 0;
   std::size_t count() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
@@ -45,7 +44,7 @@ void filter_lines(const std::vector<float>& from, std::vector<float>& to, int le
   }
 }
 
-std::vector<float> filtered(const std::vector<float>& image, const Box& box, const Kernel& along_x,
+std::vector<float> filtered(const std::vector<float>& image, const PixelRectangle& box, const Kernel& along_x,
                             const Kernel& along_y) {
   const auto stride = static_cast<std::size_t>(box.width);
   std::vector<float> half(image.size()), out(image.size());
@@ -74,8 +73,8 @@ Kernel sensitivity(double b, int radius) {
 struct Term {
   double a, b;
 };
-std::vector<float> seen(const std::vector<float>& channel, const Box& box,
-                        std::initializer_list<Term> terms) {
+std::vector<float> eye_filtered(const std::vector<float>& channel, const PixelRectangle& box,
+                                std::initializer_list<Term> terms) {
   constexpr int kRadius = 10;  // three deviations of the widest term
   double whole = 0;
   for (const Term& t : terms) {
@@ -92,50 +91,21 @@ std::vector<float> seen(const std::vector<float>& channel, const Box& box,
   return out;
 }
 
-Vec3d xyz_of(Vec3f c) {
-  return {0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z,
-          0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z,
-          0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z};
-}
-Vec3f linear_of(double x, double y, double z) {
-  return {static_cast<float>(3.2404542 * x - 1.5371385 * y - 0.4985314 * z),
-          static_cast<float>(-0.9692660 * x + 1.8760108 * y + 0.0415560 * z),
-          static_cast<float>(0.0556434 * x - 0.2040259 * y + 1.0572252 * z)};
-}
-Vec3f clamped(Vec3f c) {
-  return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
-}
-
-/// L*a*b* with colours counting for less in the dark (Hunt).
-Vec3f hunt_lab(Vec3f rgb) {
-  static const Curve root([](double x) {
-    return x > static_cast<double>(kLabStart) ? portable::pow(x, 1.0 / 3) : (841.0 / 108) * x + 4.0 / 29;
-  });
-  const Vec3d xyz = xyz_of(rgb);
-  const float fx = root(static_cast<float>(xyz.x / kWhite[0])), fy = root(static_cast<float>(xyz.y)),
-              fz = root(static_cast<float>(xyz.z / kWhite[2]));
-  const float lightness = 116 * fy - 16, share = 0.01f * lightness;
-  return {lightness, share * 500 * (fx - fy), share * 200 * (fy - fz)};
-}
-
-float hyab(Vec3f a, Vec3f b) {
-  const Vec3f d = a - b;
-  return std::fabs(d.x) + std::sqrt(d.y * d.y + d.z * d.z);
+const Curve& lab_curve() {
+  static const Curve curve(lab_root);
+  return curve;
 }
 
 /// x^0.7 of 0 .. 256, which holds every HyAB distance of colours.
 float compressed(float distance) {
-  static const Curve power([](double x) { return x > 0 ? portable::pow(x * 256, 0.7) : 0; });
+  static const Curve power([](double x) { return x > 0 ? portable::pow(x * 256, kHyabExponent) : 0; });
   if (distance >= 0.5f) return power(distance / 256);
-  return distance > 0 ? static_cast<float>(portable::pow(static_cast<double>(distance), 0.7)) : 0;
+  return distance > 0 ? static_cast<float>(portable::pow(static_cast<double>(distance), kHyabExponent)) : 0;
 }
 
-/// Small differences get nearly all of 0 .. 1.
 float colour_difference(Vec3f a, Vec3f b) {
-  static const float largest = compressed(hyab(hunt_lab({0, 1, 0}), hunt_lab({0, 0, 1})));
-  constexpr float kKnee = 0.4f, kTop = 0.95f;
-  const float d = compressed(hyab(a, b)), knee = kKnee * largest;
-  return std::min(1.f, d < knee ? kTop / knee * d : kTop + (d - knee) / (largest - knee) * (1 - kTop));
+  static const float largest = compressed(largest_hyab<float>(lab_curve()));
+  return remapped_difference(compressed(hyab<float>(a, b)), largest);
 }
 
 /// Derivatives of a Gaussian as wide as features that the eye looks for: first (edges), second (points); the
@@ -169,7 +139,8 @@ const FeatureKernels& feature_kernels() {
   return kernels;
 }
 
-std::vector<float> strength(const std::vector<float>& luma, const Box& box, const Kernel& derivative) {
+std::vector<float> feature_strength(const std::vector<float>& luma, const PixelRectangle& box,
+                                    const Kernel& derivative) {
   const Kernel& smooth = feature_kernels().smooth;
   std::vector<float> out = filtered(luma, box, derivative, smooth);
   const std::vector<float> y = filtered(luma, box, smooth, derivative);
@@ -178,7 +149,7 @@ std::vector<float> strength(const std::vector<float>& luma, const Box& box, cons
 }
 
 /// What is not plain background, and so far around it that filters neither see it nor are seen by it.
-Box busy_box(const Picture& picture) {
+PixelRectangle shown_rectangle(const Picture& picture) {
   constexpr int kReach = 24;
   const int side = static_cast<int>(picture.side_px);
   int x0 = side, y0 = side, x1 = 0, y1 = 0;
@@ -194,11 +165,11 @@ Box busy_box(const Picture& picture) {
 }
 
 /// A pixel of the box that only sees background, where the box is not the whole picture.
-std::size_t plain_pixel(const Box& box) { return box.x > 0 || box.y > 0 ? 0 : box.count() - 1; }
+std::size_t plain_pixel(const PixelRectangle& box) { return box.x > 0 || box.y > 0 ? 0 : box.count() - 1; }
 
 /// Puts the values of a box into a whole picture, plain background around them.
 template <class T>
-std::vector<T> whole(const std::vector<T>& part, const Box& box, std::uint32_t side) {
+std::vector<T> in_whole_picture(const std::vector<T>& part, const PixelRectangle& box, std::uint32_t side) {
   std::vector<T> out(std::size_t{side} * side, part[plain_pixel(box)]);
   for (int y = 0; y < box.height; ++y)
     std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(y) * box.width, box.width,
@@ -213,33 +184,30 @@ FlipPicture prepare_flip(const Picture& picture) {
   out.side_px = picture.side_px;
   out.covered = picture.covered;
   if (picture.linear.empty()) return out;
-  const Box box = busy_box(picture);
+  const PixelRectangle box = shown_rectangle(picture);
   std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
   for (auto& channel : opponent) channel.resize(box.count());
   std::vector<float> luma(box.count());
   for (std::size_t i = 0; i < luma.size(); ++i) {
     const std::size_t x = i % static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.x),
                       y = i / static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.y);
-    const Vec3d xyz = xyz_of(clamped(picture.linear[y * picture.side_px + x]));
-    const double a = xyz.x / kWhite[0], b = xyz.y, c = xyz.z / kWhite[2];
-    opponent[0][i] = static_cast<float>(116 * b - 16);
-    opponent[1][i] = static_cast<float>(500 * (a - b));
-    opponent[2][i] = static_cast<float>(200 * (b - c));
-    luma[i] = static_cast<float>(b);
+    const Vec3d xyz = xyz_of_linear(clamped_colour(picture.linear[y * picture.side_px + x]));
+    const Vec3f colour = to_float(opponent_of_xyz(xyz));
+    for (int c = 0; c < 3; ++c) opponent[static_cast<std::size_t>(c)][i] = colour[c];
+    luma[i] = static_cast<float>(xyz.y);
   }
-  opponent[0] = seen(opponent[0], box, {{1, 0.0047}});
-  opponent[1] = seen(opponent[1], box, {{1, 0.0053}});
-  opponent[2] = seen(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
+  opponent[0] = eye_filtered(opponent[0], box, {{1, 0.0047}});
+  opponent[1] = eye_filtered(opponent[1], box, {{1, 0.0053}});
+  opponent[2] = eye_filtered(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
   std::vector<Vec3f> lab(box.count());
   for (std::size_t i = 0; i < lab.size(); ++i) {
-    const double y = (static_cast<double>(opponent[0][i]) + 16) / 116;
-    const double x = y + static_cast<double>(opponent[1][i]) / 500,
-                 z = y - static_cast<double>(opponent[2][i]) / 200;
-    lab[i] = hunt_lab(clamped(linear_of(x * kWhite[0], y, z * kWhite[2])));
+    const Vec3d xyz = xyz_of_opponent(to_double(Vec3f{opponent[0][i], opponent[1][i], opponent[2][i]}));
+    lab[i] = hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), lab_curve());
   }
-  out.lab = whole(lab, box, picture.side_px);
-  out.detail[0] = whole(strength(luma, box, feature_kernels().edge), box, picture.side_px);
-  out.detail[1] = whole(strength(luma, box, feature_kernels().point), box, picture.side_px);
+  out.lab = in_whole_picture(lab, box, picture.side_px);
+  out.detail[0] = in_whole_picture(feature_strength(luma, box, feature_kernels().edge), box, picture.side_px);
+  out.detail[1] =
+      in_whole_picture(feature_strength(luma, box, feature_kernels().point), box, picture.side_px);
   return out;
 }
 

@@ -1,8 +1,9 @@
 #include "stages/measure/fragment_meter.h"
-#include "stages/fragment_codec/decode_rung.h"
 
 #include <algorithm>
 #include <utility>
+
+#include "stages/fragment_codec/decode_rung.h"
 
 namespace texmesh {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
+#include "stages/measure/cie_lab.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
@@ -18,8 +19,7 @@ const Curve& srgb_curve() {
   return curve;
 }
 const Curve& lab_curve() {
-  static const Curve curve(
-      [](double x) { return x > 216.0 / 24389 ? portable::pow(x, 1.0 / 3) : (841.0 / 108) * x + 4.0 / 29; });
+  static const Curve curve(lab_root);
   return curve;
 }
 
@@ -62,56 +62,20 @@ const Gaussian& ssim_window() {
   return window;
 }
 
-constexpr double kWhite[3] = {0.950428545, 1.0, 1.088900371};  // D65, as FLIP has it
+double compressed(double distance) { return distance > 0 ? portable::pow(distance, kHyabExponent) : 0; }
 
-Vec3d xyz_from_linear(Vec3d c) {
-  return {0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z,
-          0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z,
-          0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z};
+double colour_difference(Vec3f a, Vec3f b) {
+  static const double largest = compressed(largest_hyab<double>(lab_curve()));
+  return remapped_difference(compressed(hyab<double>(a, b)), largest);
 }
-
-Vec3f hunt_lab(Vec3d xyz) {
-  const float fx = lab_curve()(static_cast<float>(xyz.x / kWhite[0]));
-  const float fy = lab_curve()(static_cast<float>(xyz.y / kWhite[1]));
-  const float fz = lab_curve()(static_cast<float>(xyz.z / kWhite[2]));
-  const float lightness = 116 * fy - 16;
-  // Colours count for less in the dark (Hunt).
-  return {lightness, 0.01f * lightness * 500 * (fx - fy), 0.01f * lightness * 200 * (fy - fz)};
-}
-
-double hyab(Vec3f a, Vec3f b) {
-  const Vec3f d = a - b;
-  return std::fabs(static_cast<double>(d.x)) + std::sqrt(static_cast<double>(d.y * d.y + d.z * d.z));
-}
-
-// FLIP's exponent, and the remapping that gives small differences nearly all of 0..1.
-class Remap {
- public:
-  Remap()
-      : largest_(power(hyab(hunt_lab(xyz_from_linear({0, 1, 0})), hunt_lab(xyz_from_linear({0, 0, 1}))))) {}
-  double operator()(double distance) const {
-    constexpr double kKnee = 0.4, kTop = 0.95;
-    const double p = power(distance), knee = kKnee * largest_;
-    return std::min(1.0, p < knee ? kTop / knee * p : kTop + (p - knee) / (largest_ - knee) * (1 - kTop));
-  }
-
- private:
-  static double power(double x) { return x > 0 ? portable::pow(x, 0.7) : 0; }
-  double largest_;
-};
 
 std::vector<Vec3f> eye_lab(const Picture& picture) {
   const std::size_t count = picture.linear.size();
   std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
   for (auto& channel : opponent) channel.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const Vec3f c = picture.linear[i];
-    const Vec3d xyz =
-        xyz_from_linear({std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)});
-    const double x = xyz.x / kWhite[0], y = xyz.y / kWhite[1], z = xyz.z / kWhite[2];
-    opponent[0][i] = static_cast<float>(116 * y - 16);
-    opponent[1][i] = static_cast<float>(500 * (x - y));
-    opponent[2][i] = static_cast<float>(200 * (y - z));
+    const Vec3f colour = to_float(opponent_of_xyz(xyz_of_linear(clamped_colour(picture.linear[i]))));
+    for (int c = 0; c < 3; ++c) opponent[static_cast<std::size_t>(c)][i] = colour[c];
   }
   static const Gaussian kAchromatic(1.03, 3), kRedGreen(1.10, 3), kBlueYellow(2.9, 8);
   kAchromatic.blur(opponent[0], picture.side_px);
@@ -119,10 +83,8 @@ std::vector<Vec3f> eye_lab(const Picture& picture) {
   kBlueYellow.blur(opponent[2], picture.side_px);
   std::vector<Vec3f> lab(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const double y = (static_cast<double>(opponent[0][i]) + 16) / 116;
-    const double x = y + static_cast<double>(opponent[1][i]) / 500,
-                 z = y - static_cast<double>(opponent[2][i]) / 200;
-    lab[i] = hunt_lab({x * kWhite[0], y * kWhite[1], z * kWhite[2]});
+    const Vec3f colour{opponent[0][i], opponent[1][i], opponent[2][i]};
+    lab[i] = hunt_lab(xyz_of_opponent(to_double(colour)), lab_curve());
   }
   return lab;
 }
@@ -148,7 +110,6 @@ ComparedPicture prepare_comparison(const Picture& picture) {
 }
 
 PictureDifference compare_pictures(const ComparedPicture& reference, const ComparedPicture& test) {
-  static const Remap kRemap;
   constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
   std::vector<float> product(reference.luma.size());
   for (std::size_t i = 0; i < product.size(); ++i) product[i] = reference.luma[i] * test.luma[i];
@@ -160,7 +121,7 @@ PictureDifference compare_pictures(const ComparedPicture& reference, const Compa
     const double va = reference.luma_square_mean[i] - a * a, vb = test.luma_square_mean[i] - b * b;
     const double covariance = product[i] - a * b;
     sum.ssim += (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (va + vb + kC2));
-    sum.difference += kRemap(hyab(reference.lab[i], test.lab[i]));
+    sum.difference += colour_difference(reference.lab[i], test.lab[i]);
     ++sum.pixels;
   }
   return sum;

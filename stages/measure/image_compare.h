@@ -16,9 +16,9 @@ struct Picture {
 /// What of a reference is computed once for many comparisons.
 struct ComparedPicture {
   std::uint32_t side_px = 0;
-  std::vector<float> luma, luma_mean,
-      luma_square_mean;    // luma: sRGB-encoded, 0..1; means: Gaussian, deviation 1.5 px
-  std::vector<Vec3f> lab;  // after the eye's blur, Hunt-adjusted
+  std::vector<float> luma;                         // sRGB-encoded, 0..1
+  std::vector<float> luma_mean, luma_square_mean;  // under a Gaussian of deviation 1.5 px
+  std::vector<Vec3f> lab;                          // after the eye's blur, Hunt-adjusted
   std::vector<std::uint8_t> covered;
 };
 ComparedPicture prepare_comparison(const Picture& picture);

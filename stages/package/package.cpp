@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "format/base/box.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
@@ -135,12 +136,9 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   m.origin = scales.mesh.origin;
   const auto& positions = scales.mesh.positions;
   if (positions.empty()) fail("mesh", "positions", "none");
-  m.bounds_min = m.bounds_max = to_double(positions.front());
-  for (const Vec3f& p : positions)
-    for (int i = 0; i < 3; ++i) {
-      m.bounds_min[i] = std::min(m.bounds_min[i], static_cast<double>(p[i]));
-      m.bounds_max[i] = std::max(m.bounds_max[i], static_cast<double>(p[i]));
-    }
+  const Box3d box = to_double(bounding_box(positions));
+  m.bounds_min = box.min;
+  m.bounds_max = box.max;
   m.object_height = static_cast<double>(perceptual.object_height);
   m.surface_area = surface_area(scales.mesh, scales.scales.front());
   m.jnd = jnd;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
@@ -87,8 +88,8 @@ std::vector<std::uint32_t> triangle_of_source(const NestedScale& scale, std::siz
   return of;
 }
 
-/// One scale j seen from the samples of finer ones. A sample's own triangle, where j still has it, is the
-/// place to begin the search at; the last answer's, where it has not.
+/// Distances of the samples of finer scales to one scale j. A search begins at the sample's own triangle
+/// where j still has it, and else at the triangle of the answer before.
 class ScaleComparison {
  public:
   ScaleComparison(const Mesh& mesh, const NestedScale& scale, std::size_t source_count)
@@ -150,9 +151,9 @@ void find_majors(const std::vector<float>& value, std::size_t n, double jnd,
   }
 }
 
-/// Of kept scales with nearly the same number of triangles the finest stays (and the coarsest of all): it is
-/// enough wherever the others are, majors too, and what each of them would add to the package buys nothing.
-/// Atlases at their floor make such rows.
+/// Of kept scales with nearly the same number of triangles only the finest stays, and the coarsest of all.
+/// The finest is enough wherever the others are, major ones too, and the others would only add bytes to the
+/// package. Atlases whose vertices are nearly all locked give rows of such scales.
 template <class LogTriangles>
 void drop_neighbours(std::size_t n, const LogTriangles& log_triangles, std::vector<std::uint8_t>& kept) {
   const double least = portable::log(1.5);
@@ -205,10 +206,7 @@ float height_px(double numerator, double denominator) {
 void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
                             const PerceptualValuesOptions& options, const std::vector<float>& value,
                             const RunContext& context, PerceptualValues& out) {
-  Vec3f lo = scales.mesh.positions.at(0), hi = lo;
-  for (Vec3f p : scales.mesh.positions)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
-  out.object_height = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  out.object_height = bounding_box(scales.mesh.positions).longest_side();
   std::vector<double> edge(scales.scales.size());
   parallel_for(context, edge.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k)

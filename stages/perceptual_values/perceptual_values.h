@@ -12,9 +12,8 @@ namespace texmesh {
 
 inline constexpr int kPerceptualValuesVersion = 3;
 
-/// Which table decides what is just noticeable. kP95 and kP99: the relative distance between two scales. The
-/// others are the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2):
-/// average, conservative = the largest change, aggressive = the smallest one.
+/// Which table decides what is just noticeable: the relative distance between two scales (kP95, kP99), or one
+/// of the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2).
 enum class PerceptualStatistic : std::uint8_t { kP95, kP99, kAverage, kConservative, kAggressive };
 template <>
 struct EnumNames<PerceptualStatistic> {
@@ -27,12 +26,12 @@ struct EnumNames<PerceptualStatistic> {
 inline constexpr double kJndReferencePx = 512;
 
 struct PerceptualValuesOptions {
-  double jnd = 0.10;                          // just-noticeable relative change of the skeleton distance
-  double jnd_reference_px = kJndReferencePx;  // displayed height at which that JND was found
+  double jnd = 0.10;
+  double jnd_reference_px = kJndReferencePx;
   PerceptualStatistic statistic = PerceptualStatistic::kP95;
-  int samples = 4000;   // points compared per pair of scales: the percentiles' ranks are within 0.5 % then
-  int kept_scales = 8;  // about how many scales a package holds beside S_0 and the major ones
-  double edge_percentile = 5;  // E_S of the O_V / E_S rule: this percentile of the edge lengths; 0 = shortest
+  int samples = 4000;          // the percentiles' ranks are within 0.5 % then
+  int kept_scales = 8;         // beside S_0 and the major ones
+  double edge_percentile = 5;  // gives E_S of the O_V / E_S rule; 0 = the shortest edge
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("jnd", s.jnd, Range{0.001, 1}, "just-noticeable relative change of the distance to the skeleton");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "format/base/box.h"
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
@@ -19,30 +20,18 @@ constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples o
 /// the whole picture, one pixel wide, covers 0.5 %.
 constexpr double kLeastCovered = 0.002;
 
-struct Sphere {
-  Vec3d centre;
-  double radius = 0;
-};
-
-Sphere bounding_sphere(const Mesh& mesh) {
+BoundingSphere sphere_of(const Mesh& mesh) {
   if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
-  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
-  for (Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min<double>(lo[k], p[k]);
-      hi[k] = std::max<double>(hi[k], p[k]);
-    }
-  Sphere s{(lo + hi) * 0.5, 0};
-  for (Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
-  if (!(s.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
-  return s;
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
+  return sphere;
 }
 
-/// Around the place where nearly all positions lie, whatever a few others do.
-Sphere crowd_sphere(const Mesh& mesh, const Sphere& bounds) {
+/// The sphere around the place where nearly all positions lie, whatever a few others do.
+BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
   constexpr double kCrowd = 0.98, kMargin = 1.25;
   const std::size_t n = mesh.positions.size();
-  Sphere s;
+  BoundingSphere s;
   std::vector<double> values(n);
   const auto at_rank = [&](std::size_t rank) {
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
@@ -172,13 +161,12 @@ MipTexture empty_texture(const TexturePlane& plane, std::uint32_t first_level) {
 }
 
 // A fragment of the source, cut out of the plane's pixels.
-Pixels cut(const Pixels& pixels, const TexturePlane& plane, std::uint32_t fragment) {
-  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
-  const std::uint32_t x = fragment % plane.columns * w, y = fragment / plane.columns * h;
-  Pixels out{w, h, pixels.channels, {}};
-  for (std::uint32_t row = 0; row < h; ++row)
-    out.data.insert(out.data.end(), pixels.at(x, y + row),
-                    pixels.at(x, y + row) + static_cast<std::size_t>(w) * pixels.channels);
+Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
+  Pixels out{r.width_px, r.height_px, pixels.channels, {}};
+  for (std::uint32_t y = r.top_px; y < r.bottom_px(); ++y) {
+    const std::uint8_t* row = pixels.at(r.left_px, y);
+    out.data.insert(out.data.end(), row, row + std::size_t{r.width_px} * pixels.channels);
+  }
   return out;
 }
 
@@ -192,11 +180,9 @@ MipTexture plane_texture(const TexturePlane& plane, const Pixels& pixels, const 
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       const bool stored = ladder && !fragment_stream(ladder->rungs[rung], f).empty();
-      const auto index = static_cast<std::uint32_t>(f);
-      const Pixels block =
-          stored ? decode_fragment(*ladder, rung, f, fragment_pixels) : cut(pixels, plane, index);
-      reduce_block(block, index % plane.columns * plane.fragment_width_px,
-                   index / plane.columns * plane.fragment_height_px, first_level, texture.levels[0]);
+      const TexelRectangle place = padded_fragment_rectangle(plane, f);
+      const Pixels block = stored ? decode_fragment(*ladder, rung, f, fragment_pixels) : cut(pixels, place);
+      reduce_block(block, place.left_px, place.top_px, first_level, texture.levels[0]);
     }
   });
   build_mips(texture);
@@ -280,8 +266,8 @@ struct Coverage {
   LevelCount levels;
 };
 
-Coverage look_around(const ViewScene& scene, const Sphere& sphere, std::size_t planes,
-                     const QualityTable& table, const RunContext& context) {
+Coverage coverage_of_views(const ViewScene& scene, const BoundingSphere& sphere, std::size_t planes,
+                           const QualityTable& table, const RunContext& context) {
   const int views = static_cast<int>(table.views);
   Coverage seen{0, LevelCount(planes)};
   for (int v = 0; v < views; ++v) {
@@ -293,23 +279,23 @@ Coverage look_around(const ViewScene& scene, const Sphere& sphere, std::size_t p
   return seen;
 }
 
-std::string count_outside(const Mesh& mesh, const Sphere& sphere) {
+std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
   const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
     return length(to_double(p) - sphere.centre) > sphere.radius;
   });
   return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
 }
 
-/// The sphere that the pictures frame, and what they show: the object's, unless it shows next to nothing of
-/// the object and that of the crowd more.
-Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& table, Sphere& sphere,
-               Notes& notes, const RunContext& context) {
+/// Chooses the sphere that the pictures frame, and returns what they show. It is the object's sphere, unless
+/// that one shows next to nothing of the object and the crowd's sphere shows more.
+Coverage frame_object(const ViewScene& scene, std::size_t planes, const QualityTable& table,
+                      BoundingSphere& sphere, Notes& notes, const RunContext& context) {
   const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
-  Coverage seen = look_around(scene, sphere, planes, table, context);
+  Coverage seen = coverage_of_views(scene, sphere, planes, table, context);
   if (static_cast<double>(seen.pixels) >= kLeastCovered * all) return seen;
-  const Sphere crowd = crowd_sphere(*scene.mesh, sphere);
+  const BoundingSphere crowd = crowd_sphere(*scene.mesh, sphere);
   if (crowd.radius < sphere.radius) {
-    Coverage closer = look_around(scene, crowd, planes, table, context);
+    Coverage closer = coverage_of_views(scene, crowd, planes, table, context);
     if (closer.pixels > seen.pixels) {
       sphere = crowd;
       add_warning(notes, "far-outliers", "",
@@ -326,7 +312,7 @@ Coverage frame(const ViewScene& scene, std::size_t planes, const QualityTable& t
   return seen;
 }
 
-/// Means over all covered pixels of all views; none covered: equal.
+/// Means over all covered pixels of all views. Without a covered pixel the pictures count as equal.
 void fill_table(QualityTable& table, const std::vector<std::vector<PictureDifference>>& views) {
   for (std::size_t i = 0; i < views[0].size(); ++i) {
     PictureDifference sum;
@@ -348,7 +334,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,
                                 const QualityOptions& options, const RunContext& context) {
-  Sphere sphere = bounding_sphere(scales.mesh);
+  BoundingSphere sphere = sphere_of(scales.mesh);
   const ShownPlanes shown = find_shown(materials, fragments);
   MeasuredQuality result;
   QualityTable& table = result.table;
@@ -361,7 +347,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
     scenes.push_back(scene_of(scales, scales.scales[k], materials, shown, fragments));
   }
 
-  const Coverage seen = frame(scenes[0], shown.planes.size(), table, sphere, result.notes, context);
+  const Coverage seen = frame_object(scenes[0], shown.planes.size(), table, sphere, result.notes, context);
   const Textures textures = decode_textures(shown, fragments, pixels, ladder, seen.levels.first_levels(),
                                             options.rung_samples, context);
   table.rungs = textures.quality;

@@ -13,12 +13,13 @@ namespace texmesh {
 inline constexpr int kQualityVersion = 2;
 
 struct QualityOptions {
-  int views = 4;         // fixed directions, spread over the sphere
-  int size_px = 192;     // of a rendered view
-  int rung_samples = 4;  // rungs that are rendered, spread over the ladder
+  int views = 4;
+  int size_px = 192;
+  int rung_samples = 4;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("views", s.views, Range{1, 64}, "directions from which every sample is rendered");
+    v("views", s.views, Range{1, 64},
+      "directions from which every sample is rendered, spread over the sphere");
     v("size_px", s.size_px, Range{32, 1024}, "side of a rendered view");
     v("rung_samples", s.rung_samples, Range{1, 16}, "rungs that are rendered, spread over the ladder");
   }
@@ -30,21 +31,23 @@ struct MeasuredQuality {
   Notes notes;
 };
 
-/// Renders kept scales x sampled rungs from fixed views and compares each picture with that of S_0 and the
+/// Renders kept scales x sampled rungs from fixed views. Compares each picture with that of S_0 and the
 /// source's texture, over the pixels that either covers: SSIM of luma, and a FLIP-like colour difference
-/// (image_compare.h). The pictures: orthographic, the object's bounding sphere fills 0.96 of the side, 2 x 2
-/// samples a pixel; base colour factor x vertex colour x base colour texture (filtered to the sample's
-/// footprint, in linear light) x a head-light, plus emission; both sides of a triangle show; alpha is
-/// ignored. Where S_0 covers next to nothing of them (a scan and a stray triangle a thousand times its size
-/// away), they show the place that nearly all positions lie in, and a warning says what they leave out.
-/// Rungs: `rung_samples` of the ladder, first and last among them, rising. Models whose base colour and
-/// emission have no texture get one column (rung quality 100). What shows in no picture at all (a thread
-/// thinner than a pixel, specks) has no measured difference: values of 1 and 0, and a warning. Same bytes for
-/// any thread count and machine. Throws StageError when S_0 has no extent.
+/// (image_compare.h).
+/// - Pictures: orthographic, 2 x 2 samples a pixel; the object's bounding sphere fills 0.96 of the side.
+///   Colour = base colour factor x vertex colour x base colour texture (filtered to the sample's footprint,
+///   in linear light) x a head-light, plus emission. Both sides of a triangle show. Alpha is ignored.
+/// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size
+///   away), they show the place in which nearly all positions lie, and a warning says what they leave out.
+/// - Rungs: `rung_samples` of the ladder, first and last among them, rising. A model whose base colour and
+///   emission have no texture gets one column (rung quality 100).
+/// - What shows in no picture at all (a thread thinner than a pixel, specks) has no measured difference:
+///   values of 1 and 0, and a warning.
+/// StageError when S_0 has no extent. Same bytes for any thread count and machine.
 ///
-/// Rasterised, not ray-cast by Embree: all rays of a view are parallel, which makes it the same question;
-/// Embree's kernels take reciprocals by rcpps, whose last bits differ between makers of processors, on every
-/// instruction set; and a hierarchy per scale costs more than one pass over its triangles.
+/// The pictures are rasterised, not ray-cast by Embree. All rays of a view are parallel, so the question is
+/// the same; Embree's kernels take reciprocals by rcpps, whose last bits differ between makers of processors
+/// on every instruction set; and a hierarchy per scale costs more than one pass over its triangles.
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "format/base/box.h"
+
 namespace texmesh {
 
 CollapseComponents::CollapseComponents(const CollapseMesh& mesh, const ConditionedMesh& input)
@@ -11,12 +13,11 @@ CollapseComponents::CollapseComponents(const CollapseMesh& mesh, const Condition
       size(input.component_count, 0),
       cost(input.component_count, 0) {
   auto component = [&](std::uint32_t p) { return input.component[mesh.members(p)[0]]; };
-  std::vector<Vec3d> lo(count(), {1, 1, 1}), hi(count(), {-1, -1, -1});
+  std::vector<Box3d> box(count());
   for (std::uint32_t p = 0; p < mesh.point_count(); ++p) {
     const std::uint32_t c = component(p);
     ++begin[c + 1];
-    const Vec3d at = mesh.point(p);
-    for (int k = 0; k < 3; ++k) lo[c][k] = std::min(lo[c][k], at[k]), hi[c][k] = std::max(hi[c][k], at[k]);
+    box[c].extend(mesh.point(p));
   }
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   std::vector<std::uint32_t> at(begin.begin(), begin.end() - 1);
@@ -29,8 +30,9 @@ CollapseComponents::CollapseComponents(const CollapseMesh& mesh, const Condition
         length(cross(mesh.point(face.point[1]) - a, mesh.point(face.point[2]) - a)) / 2;
   }
   for (std::size_t c = 0; c < count(); ++c) {
-    size[c] = length(hi[c] - lo[c]);
-    // As if all of it, which its three corners' quadrics hold three times, moved by half its size.
+    size[c] = box[c].diagonal();
+    // What moving the whole component by half its size would cost. Every area stands in the quadrics of three
+    // corners, hence 3.
     cost[c] = 3 * area[c] * size[c] * size[c] / 4;
     if (area[c] > area[largest]) largest = static_cast<std::uint32_t>(c);
   }

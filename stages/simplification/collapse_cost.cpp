@@ -185,12 +185,12 @@ AttributeQuadrics::Step CollapseCost::step(std::uint32_t from, std::uint32_t to)
 }
 
 CollapseCost::Distortion CollapseCost::distortion(const CollapseRing& ring,
-                                                  const CollapseRing::Neighbour& n) const {
-  const Vec3d move = mesh_.point(n.point) - mesh_.point(ring.centre());
+                                                  const CollapseRing::WedgeMap& map) const {
+  const Vec3d move = mesh_.point(ring.neighbours()[map.slot].point) - mesh_.point(ring.centre());
   Distortion d;
   double area = 0;
   for (std::size_t i = 0; i < ring.wedges().size(); ++i) {
-    const std::uint32_t wedge = ring.wedges()[i], target = ring.target()[i];
+    const std::uint32_t wedge = ring.wedges()[i], target = map.target[i];
     d.cost += attribute_quadric_.at(
         wedge, move, target == CollapseRing::kNone ? AttributeQuadrics::Step{} : step(wedge, target));
     area += attribute_quadric_.area(wedge);
@@ -199,22 +199,22 @@ CollapseCost::Distortion CollapseCost::distortion(const CollapseRing& ring,
   return d;
 }
 
-void CollapseCost::merge(const CollapseRing& ring, const CollapseRing::Neighbour& n,
-                         const std::vector<std::uint32_t>& target) {
-  quadric_[n.point].add(quadric_[ring.centre()]);
+void CollapseCost::merge(const CollapseRing& ring, const CollapseRing::WedgeMap& map) {
+  const std::uint32_t point = ring.neighbours()[map.slot].point;
+  quadric_[point].add(quadric_[ring.centre()]);
   if (!has_attributes()) return;
   const std::size_t channels = attribute_quadric_.channels();
-  const Vec3d move = mesh_.point(n.point) - mesh_.point(ring.centre());
+  const Vec3d move = mesh_.point(point) - mesh_.point(ring.centre());
   for (std::size_t i = 0; i < ring.wedges().size(); ++i) {
     const std::uint32_t wedge = ring.wedges()[i];
-    if (ring.target()[i] == CollapseRing::kNone) {
+    if (map.target[i] == CollapseRing::kNone) {
       attribute_quadric_.push_moved(wedge, move);
       for (std::size_t k = 0; k < channels; ++k) {
         const double value = attribute_[wedge * channels + k];
         attribute_.push_back(value);
       }
     } else {
-      attribute_quadric_.merge(target[i], wedge, move, step(wedge, target[i]));
+      attribute_quadric_.merge(map.target[i], wedge, move, step(wedge, map.target[i]));
     }
   }
 }

@@ -33,12 +33,12 @@ class CollapseCost {
     double cost = 0;
     double shift = 0;  // of the texture, root mean square over the area that the centre's wedges stand for
   };
-  /// Of the ring's centre moved into its neighbour, with the ring's wedge map.
-  Distortion distortion(const CollapseRing& ring, const CollapseRing::Neighbour& n) const;
-  /// Hands what the ring's centre carries to the neighbour, and what its wedges carry to `target` (one per
-  /// wedge of the ring); a target that is new, added to the mesh in the ring's order, is made here.
-  void merge(const CollapseRing& ring, const CollapseRing::Neighbour& n,
-             const std::vector<std::uint32_t>& target);
+  /// Of the ring's centre moved into the map's neighbour.
+  Distortion distortion(const CollapseRing& ring, const CollapseRing::WedgeMap& map) const;
+  /// Hands what the ring's centre carries to the map's neighbour, and what the ring's wedges carry to their
+  /// targets. A wedge without a target gets a new one behind all others, in the ring's order, as
+  /// CollapseMesh::add_wedge gives them.
+  void merge(const CollapseRing& ring, const CollapseRing::WedgeMap& map);
 
  private:
   void add_shape();

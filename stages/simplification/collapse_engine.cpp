@@ -28,7 +28,7 @@ CollapseEngine::CollapseEngine(const ConditionedMesh& input, const ScaleMap& sca
       persistence_(mesh_.point_count(), 0),
       flags_(mesh_.point_count(), 0),
       target_(mesh_.point_count(), kNone),
-      queue_(mesh_.point_count() + components_.count()) {
+      queue_(mesh_.point_count(), components_.count()) {
   for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
     for (std::uint32_t position : mesh_.members(p))
       persistence_[p] = std::max(persistence_[p], scale_map.persistence[position]);
@@ -44,8 +44,9 @@ void CollapseEngine::fill_queue(const RunContext& context) {
       context, count, std::max<std::size_t>(count / threads + 1, 4096),
       [&](std::size_t begin, std::size_t end) {
         CollapseRing ring(mesh_);
+        WedgeMap map;
         for (std::size_t p = begin; p < end; ++p) {
-          const Choice choice = evaluate(ring, static_cast<std::uint32_t>(p));
+          const Choice choice = evaluate(ring, static_cast<std::uint32_t>(p), map);
           flags_[p] = static_cast<std::uint8_t>((choice.exact ? kExact : 0) | (choice.too_far ? kTooFar : 0));
           if (!choice.found()) continue;
           target_[p] = ring.neighbours()[choice.slot].point;
@@ -53,33 +54,35 @@ void CollapseEngine::fill_queue(const RunContext& context) {
         }
       });
   for (std::uint32_t p = 0; p < count; ++p)
-    if (target_[p] != kNone) queue_.append(p, key[p]);
+    if (target_[p] != kNone) queue_.append(Removable::point(p), key[p]);
   if (options_.order != CollapseOrder::kThesis)
     for (std::uint32_t c = 0; c < components_.count(); ++c)
       if (c != components_.largest && components_.size[c] <= options_.max_error)
-        queue_.append(mesh_.point_count() + c, components_.cost[c]);
+        queue_.append(Removable::component(c), components_.cost[c]);
   queue_.order();
 }
 
-/// The cheapest collapses lie anywhere on the surface: on millions of triangles nearly all time would go in
-/// waiting for memory. What comes out next stands in the first places of the heap, the sooner the nearer to
-/// its top, so its data are asked for some collapses ahead, in the order in which one leads to the next.
-void CollapseEngine::look_ahead() const {
+/// Asks for the data of the next collapses ahead of time. The cheapest collapses lie anywhere on the surface:
+/// on millions of triangles nearly all time would go in waiting for memory. What comes out next stands in the
+/// first places of the heap, the sooner the nearer to its top. Lists come first, then corners, then faces,
+/// since one leads to the next.
+void CollapseEngine::prefetch_next() const {
   constexpr std::size_t kFaces = 5, kCorners = 21, kLists = 85;  // ends of the levels of a 4-ary heap
   const std::size_t count = std::min(queue_.size(), kLists);
-  const auto is_point = [&](std::size_t i) { return queue_.item(i) < mesh_.point_count(); };
+  const auto is_point = [&](std::size_t i) { return !queue_.item(i).is_component(); };
+  const auto point = [&](std::size_t i) { return queue_.item(i).index(); };
   for (std::size_t i = kCorners; i < count; ++i)
-    if (is_point(i)) mesh_.prefetch_list(queue_.item(i));
+    if (is_point(i)) mesh_.prefetch_list(point(i));
   for (std::size_t i = kFaces; i < std::min(count, kCorners); ++i)
-    if (is_point(i)) mesh_.prefetch_corners(queue_.item(i)), cost_.prefetch_point(queue_.item(i));
+    if (is_point(i)) mesh_.prefetch_corners(point(i)), cost_.prefetch_point(point(i));
   std::size_t next = 0;
   for (std::size_t i = 1; i < std::min(count, kFaces); ++i) {
     if (!is_point(i)) continue;
-    mesh_.prefetch_faces(queue_.item(i));
+    mesh_.prefetch_faces(point(i));
     if (next == 0 || queue_.less(i, next)) next = i;
   }
   if (next == 0) return;
-  for (std::uint32_t entry : mesh_.corners(queue_.item(next))) {
+  for (std::uint32_t entry : mesh_.corners(point(next))) {
     const CollapseMesh::Face& face = mesh_.faces()[entry / 4];
     if (!face.alive()) continue;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -105,18 +108,19 @@ double CollapseEngine::error_of(std::uint32_t u, std::uint32_t v) const {
   return q.weight > 0 ? std::sqrt(q.at(mesh_.point(v)) / q.weight) : 0;
 }
 
-/// The cheapest collapse of u that is allowed; the ring holds its wedge map afterwards.
-CollapseEngine::Choice CollapseEngine::evaluate(CollapseRing& ring, std::uint32_t u) const {
+/// The cheapest collapse of u that is allowed, and its wedge map.
+CollapseEngine::Choice CollapseEngine::evaluate(CollapseRing& ring, std::uint32_t u, WedgeMap& map) const {
   if (mesh_.corner_count(u) > kMostCorners) return {};
   ring.gather(u);
-  return choose(ring);
+  return choose(ring, map);
 }
 
-CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring) const {
+CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring, WedgeMap& map) const {
   using State = Neighbour::State;
   const std::uint32_t u = ring.centre();
   const bool thesis = options_.order == CollapseOrder::kThesis;
   Choice choice;
+  map.slot = kNone;
   for (Neighbour& n : ring.neighbours()) {
     n.state = State::kOut;
     if (!ring.allowed_by_borders(n) || mesh_.corner_count(n.point) > kMostCorners) continue;
@@ -139,21 +143,21 @@ CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring) const {
     }
     if (slot == kNone) return choice;
     Neighbour& n = ring.neighbours()[slot];
-    if (!ring.map_wedges(slot)) {
+    if (map.slot != slot && !ring.map_wedges(slot, map)) {
       n.state = State::kOut;
       choice.exact = false;
     } else if (n.state == State::kBounded && cost_.has_attributes()) {
       // The rest of the cost is only asked for where the shape's part is the least.
       const double weight =
           options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
-      const CollapseCost::Distortion d = cost_.distortion(ring, n);
+      const CollapseCost::Distortion d = cost_.distortion(ring, map);
       n.cost += fade_ * d.cost * (1 + weight);
       n.state = State::kPriced;
       if (d.shift <= options_.max_shift) continue;
       n.state = State::kOut;
       choice.exact = false;
       choice.too_far = true;
-    } else if (ring.keeps_topology(slot) && ring.keeps_orientation(slot)) {
+    } else if (ring.keeps_topology(slot) && ring.keeps_orientation(map)) {
       choice.slot = slot;
       choice.key = thesis ? persistence_[u] : n.cost;
       return choice;
@@ -164,51 +168,51 @@ CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring) const {
   }
 }
 
-/// Looks at a point whose key has come out first. Where nothing has changed around it, only whether its
-/// collapse is still legal.
-CollapseEngine::Choice CollapseEngine::confirm(std::uint32_t u) {
+/// Looks at a point whose key has come out first. Where nothing has changed around the point, this only asks
+/// whether its collapse is still legal.
+CollapseEngine::Choice CollapseEngine::confirm(std::uint32_t u, WedgeMap& map) {
   ring_.gather(u);
-  if (flags_[u] & kStale) return choose(ring_);
+  if (flags_[u] & kStale) return choose(ring_, map);
   for (std::uint32_t slot = 0; slot < ring_.neighbours().size(); ++slot) {
     Neighbour& n = ring_.neighbours()[slot];
     if (n.point != target_[u]) continue;
-    if (!ring_.allowed_by_borders(n) || !ring_.map_wedges(slot) || !ring_.keeps_topology(slot) ||
-        !ring_.keeps_orientation(slot))
+    if (!ring_.allowed_by_borders(n) || !ring_.map_wedges(slot, map) || !ring_.keeps_topology(slot) ||
+        !ring_.keeps_orientation(map))
       break;
     n.error = error_of(u, n.point);
-    return {.slot = slot, .key = queue_.key(u), .exact = (flags_[u] & kExact) != 0};
+    return {.slot = slot, .key = queue_.key(Removable::point(u)), .exact = (flags_[u] & kExact) != 0};
   }
-  return choose(ring_);
+  return choose(ring_, map);
 }
 
-void CollapseEngine::take(std::uint32_t u, std::uint32_t target_point, const Choice& choice) {
+void CollapseEngine::enqueue(std::uint32_t u, std::uint32_t target_point, const Choice& choice) {
   flags_[u] = static_cast<std::uint8_t>((choice.exact ? kExact : 0) | (choice.too_far ? kTooFar : 0));
   target_[u] = target_point;
   if (choice.found())
-    queue_.set(u, choice.key);
+    queue_.set(Removable::point(u), choice.key);
   else
-    queue_.erase(u);
+    queue_.erase(Removable::point(u));
 }
 
-void CollapseEngine::refresh(std::uint32_t u) {
-  const Choice choice = evaluate(ring_, u);
-  take(u, choice.found() ? ring_.neighbours()[choice.slot].point : kNone, choice);
+void CollapseEngine::reevaluate(std::uint32_t u) {
+  const Choice choice = evaluate(ring_, u, scratch_map_);
+  enqueue(u, choice.found() ? ring_.neighbours()[choice.slot].point : kNone, choice);
 }
 
-/// Merges the ring's centre as chosen.
-void CollapseEngine::apply(const Choice& choice) {
-  const Neighbour& n = ring_.neighbours()[choice.slot];
+/// Merges the ring's centre into the neighbour that the map is about.
+void CollapseEngine::apply_collapse(const WedgeMap& map) {
+  const Neighbour& n = ring_.neighbours()[map.slot];
   const std::uint32_t u = ring_.centre(), v = n.point;
   const auto error = static_cast<float>(n.error * mesh_.diagonal());
   for (std::uint32_t position : mesh_.members(u))
     collapses_.push_back({position, ring_.destination(n, position), error});
-  wedge_target_ = ring_.target();
+  wedge_target_ = map.target;
   for (std::size_t w = 0; w < wedge_target_.size(); ++w) {
     const std::uint32_t wedge = ring_.wedges()[w];
     if (wedge_target_[w] == kNone)
       wedge_target_[w] = mesh_.add_wedge(wedge, ring_.destination(n, mesh_.wedge_position(wedge)));
   }
-  cost_.merge(ring_, n, wedge_target_);
+  cost_.merge(ring_, map);
   around_.clear();
   for (const Neighbour& other : ring_.neighbours())
     if (other.point != v) around_.push_back(other.point);
@@ -219,47 +223,49 @@ void CollapseEngine::apply(const Choice& choice) {
   });
 }
 
-/// After a collapse into v: its own key anew; the points around the one that is gone have v as neighbour now.
-/// Points without a legal collapse may have got one, those two edges away included.
-void CollapseEngine::look_around(std::uint32_t v) {
+/// Brings the keys up to date after a collapse into v. The key of v is computed anew. The points around the
+/// one that is gone have v as a neighbour now. Points without a legal collapse, up to two edges away, may
+/// have got one.
+void CollapseEngine::update_around(std::uint32_t v) {
   const bool thesis = options_.order == CollapseOrder::kThesis;
   for (std::uint32_t x : around_) {
-    if (!queue_.contains(x)) continue;
+    const Removable item = Removable::point(x);
+    if (!queue_.contains(item)) continue;
     if (!(flags_[x] & kExact)) {
-      refresh(x);
+      reevaluate(x);
       continue;
     }
     flags_[x] |= kStale;
     if (thesis) continue;
     const double bound = shape_cost(x, v);
-    if (bound < queue_.key(x)) queue_.set(x, bound);
+    if (bound < queue_.key(item)) queue_.set(item, bound);
   }
   around_.clear();
-  refresh(v);
+  reevaluate(v);
   if (mesh_.corner_count(v) > kMostCorners) return;
   for (const Neighbour& n : ring_.neighbours())
-    if (!queue_.contains(n.point)) around_.push_back(n.point);
-  for (std::uint32_t x : around_) refresh(x);
+    if (!queue_.contains(Removable::point(n.point))) around_.push_back(n.point);
+  for (std::uint32_t x : around_) reevaluate(x);
 }
 
-void CollapseEngine::vanish(std::uint32_t component) {
+void CollapseEngine::remove_component(std::uint32_t component) {
   const auto points = components_.members(component);
   const auto error = static_cast<float>(components_.size[component] * mesh_.diagonal());
   for (std::uint32_t p : points) {
     if (!mesh_.is_alive(p)) continue;
     for (std::uint32_t position : mesh_.members(p)) collapses_.push_back({position, position, error});
-    queue_.erase(p);
+    queue_.erase(Removable::point(p));
   }
   mesh_.remove(points);
 }
 
-/// Points without a legal collapse are looked at again when their own ring changes; changes farther away may
-/// free them as well, so before giving up all of them are tried once more.
+/// Tries all points without a legal collapse once more. They are looked at again whenever their own ring
+/// changes, but changes farther away may free them as well.
 bool CollapseEngine::retry_locked() {
   if (given_up_at_ == collapses_.size()) return false;
   given_up_at_ = collapses_.size();
   for (std::uint32_t p = 0; p < mesh_.point_count(); ++p)
-    if (mesh_.is_alive(p) && !queue_.contains(p)) refresh(p);
+    if (mesh_.is_alive(p) && !queue_.contains(Removable::point(p))) reevaluate(p);
   return !queue_.empty();
 }
 
@@ -267,6 +273,7 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
   const bool thesis = options_.order == CollapseOrder::kThesis;
   constexpr int kRetries = 8;  // each costs a pass over all points; later ones free next to nothing
   int retries = 0;
+  WedgeMap map;  // of the choice in hand
   for (std::uint32_t step = 0; mesh_.alive_positions() > positions; ++step) {
     if (step % 4096 == 0) context.check_cancelled();
     if (mesh_.alive_faces() <= static_cast<std::uint32_t>(options_.min_triangles))
@@ -276,29 +283,30 @@ CollapseStop CollapseEngine::run_to(std::uint32_t positions, int scale, const Ru
         if (mesh_.is_alive(p) && flags_[p] & kTooFar) return CollapseStop::kTooFar;
       return CollapseStop::kLocked;
     }
-    const std::uint32_t u = queue_.top();
-    if (u >= mesh_.point_count()) {
-      queue_.erase(u);
-      vanish(u - mesh_.point_count());
+    const Removable first = queue_.top();
+    if (first.is_component()) {
+      queue_.erase(first);
+      remove_component(first.index());
       continue;
     }
+    const std::uint32_t u = first.index();
     if (thesis && persistence_[u] >= scale) return CollapseStop::kReached;
-    look_ahead();
+    prefetch_next();
     fade_ = std::min(1.0, mesh_.alive_positions() / (kFadeBelow * initial_positions_));
-    const Choice choice = confirm(u);
+    const Choice choice = confirm(u, map);
     if (!choice.found()) {
-      take(u, kNone, choice);
+      enqueue(u, kNone, choice);
       continue;
     }
     const std::uint32_t v = ring_.neighbours()[choice.slot].point;
-    if (choice.key > queue_.key(u)) {
-      take(u, v, choice);
-      if (queue_.top() != u) continue;
+    if (choice.key > queue_.key(first)) {
+      enqueue(u, v, choice);
+      if (queue_.top() != first) continue;
       // Still the cheapest; the ring in scratch is its own.
     }
-    apply(choice);
-    queue_.erase(u);
-    look_around(v);
+    apply_collapse(map);
+    queue_.erase(first);
+    update_around(v);
   }
   return CollapseStop::kReached;
 }

@@ -38,6 +38,7 @@ class CollapseEngine {
  private:
   static constexpr std::uint32_t kNone = kNoIndex;
   using Neighbour = CollapseRing::Neighbour;
+  using WedgeMap = CollapseRing::WedgeMap;
   /// What a look at a point's ring found.
   struct Choice {
     std::uint32_t slot = kNone;  // of the cheapest legal collapse, kNone = there is none
@@ -49,17 +50,17 @@ class CollapseEngine {
   enum Flag : std::uint8_t { kStale = 1, kExact = 2, kTooFar = 4 };
 
   void fill_queue(const RunContext& context);
-  void look_ahead() const;
+  void prefetch_next() const;
   double shape_cost(std::uint32_t u, std::uint32_t v) const;
   double error_of(std::uint32_t u, std::uint32_t v) const;
-  Choice evaluate(CollapseRing& ring, std::uint32_t u) const;
-  Choice choose(CollapseRing& ring) const;
-  Choice confirm(std::uint32_t u);
-  void take(std::uint32_t u, std::uint32_t target_point, const Choice& choice);
-  void refresh(std::uint32_t u);
-  void apply(const Choice& choice);
-  void look_around(std::uint32_t v);
-  void vanish(std::uint32_t component);
+  Choice evaluate(CollapseRing& ring, std::uint32_t u, WedgeMap& map) const;
+  Choice choose(CollapseRing& ring, WedgeMap& map) const;
+  Choice confirm(std::uint32_t u, WedgeMap& map);
+  void enqueue(std::uint32_t u, std::uint32_t target_point, const Choice& choice);
+  void reevaluate(std::uint32_t u);
+  void apply_collapse(const WedgeMap& map);
+  void update_around(std::uint32_t v);
+  void remove_component(std::uint32_t component);
   bool retry_locked();
 
   const SimplificationOptions& options_;
@@ -72,10 +73,13 @@ class CollapseEngine {
   std::vector<std::uint8_t> persistence_;  // per point: highest of its positions
   std::vector<std::uint8_t> flags_;        // per point
   std::vector<std::uint32_t> target_;      // per point in the queue: where its key takes it
-  CollapseQueue queue_;                    // points, then components
+  CollapseQueue queue_;
   std::vector<Collapse> collapses_;
   std::size_t given_up_at_ = static_cast<std::size_t>(-1);  // collapses when all had been tried in vain
-  std::vector<std::uint32_t> around_, wedge_target_;        // scratch
+  // Memory that is used again and holds nothing between two calls, but for around_: the points around the
+  // collapse in hand.
+  WedgeMap scratch_map_;
+  std::vector<std::uint32_t> around_, wedge_target_;
 };
 
 }  // namespace texmesh

@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "stages/geometry/morton.h"
 
@@ -26,7 +27,7 @@ CollapseMesh::CollapseMesh(const ConditionedMesh& input) {
   number_points(input, point_of_position);
   add_faces(input.mesh, point_of_position);
   number_wedges(input.mesh);
-  take_uv(input);
+  copy_uvs(input);
   build_lists();
   left_.resize(input.mesh.triangles.size());
   std::iota(left_.begin(), left_.end(), 0u);
@@ -36,11 +37,9 @@ void CollapseMesh::number_points(const ConditionedMesh& input,
                                  std::vector<std::uint32_t>& point_of_position) {
   const std::vector<Vec3f>& positions = input.mesh.positions;
   const std::size_t n = positions.size();
-  Vec3d lo = to_double(positions.at(0)), hi = lo;
-  for (Vec3f p : positions)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min<double>(lo[k], p[k]), hi[k] = std::max<double>(hi[k], p[k]);
-  diagonal_ = length(hi - lo) > 0 ? length(hi - lo) : 1;
-  const Vec3d centre = (lo + hi) * 0.5;
+  const Box3d box = to_double(bounding_box(positions));
+  diagonal_ = box.diagonal() > 0 ? box.diagonal() : 1;
+  const Vec3d centre = box.centre();
   auto local = [&](std::size_t p) { return (to_double(positions[p]) - centre) * (1 / diagonal_); };
 
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;  // code, position; one per group of twins
@@ -94,8 +93,8 @@ void CollapseMesh::add_faces(const Mesh& mesh, const std::vector<std::uint32_t>&
 void CollapseMesh::number_wedges(const Mesh& mesh) {
   input_wedges_ = static_cast<std::uint32_t>(mesh.wedge_count());
   std::vector<std::uint32_t> first(input_wedges_, kNoIndex), group(input_wedges_, 0);
-  std::map<std::array<std::uint32_t, 2>, std::uint32_t>
-      others;  // wedges that more than one material or part uses
+  // Wedges that more than one material or part uses.
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t> others;
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     const std::size_t t = face_source_[f];
     const std::uint32_t use = std::uint32_t{mesh.triangle_material[t]} << 16 | mesh.triangle_part[t];
@@ -120,7 +119,7 @@ void CollapseMesh::number_wedges(const Mesh& mesh) {
   }
 }
 
-void CollapseMesh::take_uv(const ConditionedMesh& input) {
+void CollapseMesh::copy_uvs(const ConditionedMesh& input) {
   const Mesh& mesh = input.mesh;
   const std::vector<Vec2f>* sets[2] = {&mesh.uv0, &mesh.uv1};
   if (mesh.uv0.empty() && (mesh.uv1.empty() || input.uv_sets.empty())) return;

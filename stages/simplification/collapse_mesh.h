@@ -113,7 +113,7 @@ class CollapseMesh {
   void number_points(const ConditionedMesh& input, std::vector<std::uint32_t>& point_of_position);
   void add_faces(const Mesh& mesh, const std::vector<std::uint32_t>& point_of_position);
   void number_wedges(const Mesh& mesh);
-  void take_uv(const ConditionedMesh& input);
+  void copy_uvs(const ConditionedMesh& input);
   void build_lists();
   void remove_face(std::uint32_t face, std::uint32_t except_point);
   void append(std::uint32_t to);

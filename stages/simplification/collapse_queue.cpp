@@ -1,13 +1,14 @@
 #include "stages/simplification/collapse_queue.h"
-#include "format/base/no_index.h"
 
 #include <algorithm>
 
+#include "format/base/no_index.h"
+
 namespace texmesh {
 
-void CollapseQueue::append(std::uint32_t item, double key) {
+void CollapseQueue::append(Removable item, double key) {
   heap_.push_back({key, item});
-  at_[item] = static_cast<std::uint32_t>(heap_.size() - 1);
+  at(item) = static_cast<std::uint32_t>(heap_.size() - 1);
 }
 
 void CollapseQueue::order() {
@@ -15,8 +16,8 @@ void CollapseQueue::order() {
     if (i < heap_.size()) sift_down(i);
 }
 
-void CollapseQueue::set(std::uint32_t item, double key) {
-  const std::uint32_t i = at_[item];
+void CollapseQueue::set(Removable item, double key) {
+  const std::uint32_t i = at(item);
   if (i == kNoIndex) {
     append(item, key);
     sift_up(heap_.size() - 1);
@@ -30,16 +31,16 @@ void CollapseQueue::set(std::uint32_t item, double key) {
     sift_down(i);
 }
 
-void CollapseQueue::erase(std::uint32_t item) {
-  const std::uint32_t i = at_[item];
+void CollapseQueue::erase(Removable item) {
+  const std::uint32_t i = at(item);
   if (i == kNoIndex) return;
-  at_[item] = kNoIndex;
+  at(item) = kNoIndex;
   const Entry last = heap_.back();
   heap_.pop_back();
   if (last.item == item) return;
   place(i, last);
   sift_up(i);
-  sift_down(at_[last.item]);
+  sift_down(at(last.item));
 }
 
 void CollapseQueue::sift_up(std::size_t i) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -7,39 +8,62 @@
 
 namespace texmesh {
 
-/// 4-ary heap of items with changeable keys; equal keys come out by rising item number. The keys stand in the
-/// heap itself, so that a sift touches no other memory but the places it writes.
+/// What can be removed from a mesh at once: a point, by a collapse, or a whole component. Points are less
+/// than components; among themselves both stand by their index, which is below 2^31.
+class Removable {
+ public:
+  static Removable point(std::uint32_t index) { return Removable(index); }
+  static Removable component(std::uint32_t index) { return Removable(index | kComponent); }
+  bool is_component() const { return (value_ & kComponent) != 0; }
+  std::uint32_t index() const { return value_ & ~kComponent; }
+  friend auto operator<=>(Removable, Removable) = default;
+
+ private:
+  static constexpr std::uint32_t kComponent = 0x80000000;
+  explicit Removable(std::uint32_t value) : value_(value) {}
+  std::uint32_t value_;
+};
+
+/// 4-ary heap of points and components with changeable keys; of equal keys the lesser item comes out first.
+/// The keys stand in the heap itself, so that a sift touches no other memory but the places it writes.
 class CollapseQueue {
  public:
-  explicit CollapseQueue(std::size_t items) : at_(items, kNoIndex) {}
+  CollapseQueue(std::size_t points, std::size_t components)
+      : points_(points), at_(points + components, kNoIndex) {}
   bool empty() const { return heap_.empty(); }
-  std::uint32_t top() const { return heap_[0].item; }
+  Removable top() const { return heap_[0].item; }
   /// The heap itself: what comes out after top() is among items 1 to 4, what comes next among 1 to 20.
   std::size_t size() const { return heap_.size(); }
-  std::uint32_t item(std::size_t i) const { return heap_[i].item; }
-  bool contains(std::uint32_t item) const { return at_[item] != kNoIndex; }
-  double key(std::uint32_t item) const { return heap_[at_[item]].key; }  // of one that it contains
+  Removable item(std::size_t i) const { return heap_[i].item; }
+  bool contains(Removable item) const { return at(item) != kNoIndex; }
+  /// Of an item that the queue contains.
+  double key(Removable item) const { return heap_[at(item)].key; }
   bool less(std::size_t i, std::size_t j) const { return heap_[i] < heap_[j]; }
   /// For an empty queue: all items at once, in linear time; call order() behind the last.
-  void append(std::uint32_t item, double key);
+  void append(Removable item, double key);
   void order();
-  void set(std::uint32_t item, double key);  // inserts or moves
-  void erase(std::uint32_t item);
+  /// Inserts the item, or moves it to where its new key belongs.
+  void set(Removable item, double key);
+  void erase(Removable item);
 
  private:
   struct Entry {
     double key;
-    std::uint32_t item;
+    Removable item;
     bool operator<(const Entry& o) const { return key < o.key || (key == o.key && item < o.item); }
   };
   void place(std::size_t i, const Entry& entry) {
     heap_[i] = entry;
-    at_[entry.item] = static_cast<std::uint32_t>(i);
+    at(entry.item) = static_cast<std::uint32_t>(i);
   }
+  std::size_t number(Removable item) const { return (item.is_component() ? points_ : 0) + item.index(); }
+  std::uint32_t& at(Removable item) { return at_[number(item)]; }
+  std::uint32_t at(Removable item) const { return at_[number(item)]; }
   void sift_up(std::size_t i);
   void sift_down(std::size_t i);
   std::vector<Entry> heap_;
-  std::vector<std::uint32_t> at_;
+  std::size_t points_;
+  std::vector<std::uint32_t> at_;  // per point, then per component: its place in the heap
 };
 
 }  // namespace texmesh

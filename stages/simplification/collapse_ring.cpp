@@ -1,7 +1,8 @@
 #include "stages/simplification/collapse_ring.h"
-#include "format/base/no_index.h"
 
 #include <algorithm>
+
+#include "format/base/no_index.h"
 
 namespace texmesh {
 namespace {
@@ -24,7 +25,6 @@ std::uint32_t CollapseRing::slot_of(std::uint32_t point) {
 void CollapseRing::gather(std::uint32_t u) {
   ++now_;
   centre_ = u;
-  mapped_slot_ = kNone;
   corners_.clear();
   neighbours_.clear();
   wedges_.clear();
@@ -59,15 +59,13 @@ void CollapseRing::gather(std::uint32_t u) {
     }
 }
 
-bool CollapseRing::map_wedges(std::uint32_t slot) {
-  if (slot == mapped_slot_) return mapped_;
-  mapped_slot_ = slot;
-  mapped_ = false;
+bool CollapseRing::map_wedges(std::uint32_t slot, WedgeMap& map) const {
+  map.slot = kNone;
+  map.target.assign(wedges_.size(), kNone);
   const Neighbour& n = neighbours_[slot];
-  target_.assign(wedges_.size(), kNone);
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < n.pairs; ++i) {
-    std::uint32_t& target = target_[n.pair[i].from];
+    std::uint32_t& target = map.target[n.pair[i].from];
     if (target == kNone) {
       target = n.pair[i].to;
       ++count;
@@ -76,8 +74,9 @@ bool CollapseRing::map_wedges(std::uint32_t slot) {
     }
   }
   if (count < wedges_.size() && count < 2 && n.valence == usual_valence_) return false;
-  mapped_ = (!mesh_.is_multiple(centre_) && !mesh_.is_multiple(n.point)) || positions_agree(n);
-  return mapped_;
+  if ((mesh_.is_multiple(centre_) || mesh_.is_multiple(n.point)) && !positions_agree(n)) return false;
+  map.slot = slot;
+  return true;
 }
 
 /// Twins: every position of the group must go to one position of the other group.
@@ -174,15 +173,16 @@ bool CollapseRing::keeps_positions(std::uint32_t slot) const {
 
 /// Texture triangles without area may become anything.
 template <class Uv>
-bool CollapseRing::turns_over(const Corner& c, Uv&& uv) const {
+bool CollapseRing::turns_over(const Corner& c, const WedgeMap& map, Uv&& uv) const {
   const CollapseMesh::Face& face = mesh_.faces()[c.face];
   const Vec2d a = uv(face.wedge[(c.corner + 1) % 3]), b = uv(face.wedge[(c.corner + 2) % 3]);
-  const Vec2d from = uv(wedges_[c.wedge]), to = uv(target_[c.wedge]);
+  const Vec2d from = uv(wedges_[c.wedge]), to = uv(map.target[c.wedge]);
   const double before = cross(a - from, b - from);
   return before != 0 && !(before * cross(a - to, b - to) > 0);
 }
 
-bool CollapseRing::keeps_orientation(std::uint32_t slot) const {
+bool CollapseRing::keeps_orientation(const WedgeMap& map) const {
+  const std::uint32_t slot = map.slot;
   const Vec3d from = mesh_.point(centre_), to = mesh_.point(neighbours_[slot].point);
   for (const Corner& c : corners_) {
     if (c.a == slot || c.b == slot) continue;
@@ -192,9 +192,10 @@ bool CollapseRing::keeps_orientation(std::uint32_t slot) const {
     if (dot(before, before) > 0 &&
         (along <= 0 || along * along <= kLeastNormalCosine * kLeastNormalCosine * square))
       return false;
-    if (target_[c.wedge] == kNone) continue;
-    if (mesh_.has_uv() && turns_over(c, [&](std::uint32_t w) { return mesh_.wedge_uv(w); })) return false;
-    if (mesh_.has_other_uv() && turns_over(c, [&](std::uint32_t w) { return mesh_.wedge_other_uv(w); }))
+    if (map.target[c.wedge] == kNone) continue;
+    if (mesh_.has_uv() && turns_over(c, map, [&](std::uint32_t w) { return mesh_.wedge_uv(w); }))
+      return false;
+    if (mesh_.has_other_uv() && turns_over(c, map, [&](std::uint32_t w) { return mesh_.wedge_other_uv(w); }))
       return false;
   }
   return true;

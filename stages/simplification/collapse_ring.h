@@ -15,9 +15,10 @@ class CollapseRing {
  public:
   static constexpr std::uint32_t kNone = kNoIndex;
   static constexpr std::uint32_t kMaxValence = 4;  // faces at an edge; an edge with more locks
+  /// `from`: index into wedges(); `to`: wedge of the neighbour.
   struct Pair {
     std::uint32_t from = 0, to = 0;
-  };  // index into wedges() -> wedge of the neighbour
+  };
   struct Neighbour {
     std::uint32_t point = 0, valence = 0, pairs = 0, faces = 0, far_valence = 0;
     std::array<Pair, kMaxValence> pair;
@@ -26,9 +27,15 @@ class CollapseRing {
     double cost = 0, error = 0;
     bool is_seam() const { return pairs == 2 && (pair[0].from != pair[1].from || pair[0].to != pair[1].to); }
   };
+  /// `a`, `b`: the face's other two points as indices into neighbours(); `wedge`: index into wedges().
   struct Corner {
     std::uint32_t face = 0, corner = 0, a = 0, b = 0, wedge = 0;
-  };  // a, b: the face's other two points as indices into neighbours(); wedge: index into wedges()
+  };
+  /// Where the collapse into one neighbour takes the centre's wedges.
+  struct WedgeMap {
+    std::uint32_t slot = kNone;         // of the neighbour
+    std::vector<std::uint32_t> target;  // per wedge of wedges(); kNone = keeps its attributes
+  };
 
   explicit CollapseRing(const CollapseMesh& mesh) : mesh_(mesh), mark_(mesh.point_count()) {}
 
@@ -47,20 +54,18 @@ class CollapseRing {
     if (odd_edges_ == 0) return true;
     return odd_edges_ == 2 && !odd_mixed_ && n.valence == odd_valence_;
   }
-  /// Sets target() from the faces that the collapse removes. Every wedge must be mapped, to one wedge. A
-  /// junction of charts may move along a seam or border all the same: the wedges of the charts that are not
-  /// beside the edge then keep their attributes.
-  bool map_wedges(std::uint32_t slot);
-  /// Where the collapse that was mapped last takes each of wedges(); kNone = keeps its attributes.
-  const std::vector<std::uint32_t>& target() const { return target_; }
+  /// Fills `map` from the faces that the collapse into the neighbour removes. False, and `map` for no
+  /// neighbour, when not every wedge is mapped to one wedge. A junction of charts may move along a seam or
+  /// border all the same: the wedges of the charts that are not beside the edge then keep their attributes.
+  bool map_wedges(std::uint32_t slot, WedgeMap& map) const;
   /// The position of the neighbour's group that a position of the centre's group goes to.
   std::uint32_t destination(const Neighbour& n, std::uint32_t position) const;
   /// The link condition on the welded surface, twins as one: no new non-manifold edge, no new hole, nothing
   /// vanishes.
   bool keeps_topology(std::uint32_t slot);
   /// No face turns by more than about 78 degrees or loses its area, and no texture triangle turns over, in no
-  /// set of texture coordinates that its material uses. For the collapse that was mapped last.
-  bool keeps_orientation(std::uint32_t slot) const;
+  /// set of texture coordinates that its material uses.
+  bool keeps_orientation(const WedgeMap& map) const;
 
  private:
   struct Mark {
@@ -70,14 +75,13 @@ class CollapseRing {
   bool positions_agree(const Neighbour& n) const;
   bool keeps_positions(std::uint32_t slot) const;
   template <class Uv>
-  bool turns_over(const Corner& c, Uv&& uv) const;
+  bool turns_over(const Corner& c, const WedgeMap& map, Uv&& uv) const;
 
   const CollapseMesh& mesh_;
-  std::uint32_t centre_ = kNone, now_ = 0, mapped_slot_ = kNone;
-  bool mapped_ = false;
+  std::uint32_t centre_ = kNone, now_ = 0;
   std::vector<Corner> corners_;
   std::vector<Neighbour> neighbours_;
-  std::vector<std::uint32_t> wedges_, target_;
+  std::vector<std::uint32_t> wedges_;
   std::vector<Mark> mark_;  // per point: the neighbour's slot where the stamp is now_
   // Edges that are not inside a surface of two faces per edge (or of four where two sheets lie on each
   // other):

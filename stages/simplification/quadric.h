@@ -35,9 +35,9 @@ struct Quadric {
 };
 
 /// Per wedge, how far K attributes (texture coordinates, normals, colours) at a point are from the linear
-/// functions that the wedge's triangles carry (Hoppe 1999): sum over triangles t and channels k of
-/// area_t (g_tk . p + d_tk - s_k)^2. Kept relative to the wedge's own place and attributes, so that single
-/// precision is enough: what is left in there are differences over a few edges.
+/// functions that the wedge's triangles carry (Hoppe 1999): sum over triangles t and channels k of area_t
+/// (g_tk . p + d_tk - s_k)^2. Kept relative to the wedge's own place and attributes, so that single precision
+/// is enough: what is left in there are differences over a few edges.
 class AttributeQuadrics {
  public:
   static constexpr std::size_t kMaxChannels = 9;  // 2 + 3 + 4

@@ -5,13 +5,14 @@
 #include <limits>
 
 #include "stages/base/parallel.h"
+#include "stages/geometry/component_boxes.h"
 #include "stages/geometry/distance.h"
 
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kErrorSamples =
-    4000;  // per scale and direction; rms within 2 %, the largest is a sampled one
+// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample.
+constexpr std::size_t kErrorSamples = 4000;
 
 /// A point of S_0 and the component that it lies on.
 struct Probe {
@@ -27,16 +28,10 @@ Vec3d place(const Mesh& mesh, const std::vector<Triangle>& triangles, const Surf
 }
 
 std::vector<double> component_diagonals(const std::vector<std::uint32_t>& component, const Mesh& mesh) {
-  std::vector<Vec3f> lo, hi;
-  for (std::size_t p = 0; p < component.size(); ++p) {
-    const std::uint32_t c = component[p];
-    const Vec3f at = mesh.positions[p];
-    if (c >= lo.size()) lo.resize(c + 1, at), hi.resize(c + 1, at);
-    for (int k = 0; k < 3; ++k) lo[c][k] = std::min(lo[c][k], at[k]), hi[c][k] = std::max(hi[c][k], at[k]);
-  }
-  std::vector<double> diagonal(lo.size());
-  for (std::size_t c = 0; c < lo.size(); ++c) diagonal[c] = length(to_double(hi[c]) - to_double(lo[c]));
-  return diagonal;
+  std::vector<double> diagonals;
+  for (const Box3f& box : component_boxes(component, mesh.positions))
+    diagonals.push_back(to_double(box).diagonal());
+  return diagonals;
 }
 
 class ErrorMeter {

@@ -70,7 +70,7 @@ std::string stop_reason(CollapseStop stop, const SimplificationOptions& options)
   return "";
 }
 
-NestedScale take_scale(CollapseEngine& engine, int scale, std::string reason) {
+NestedScale scale_at_this_point(CollapseEngine& engine, int scale, std::string reason) {
   NestedScale s;
   s.scale = scale;
   s.collapse_count = static_cast<std::uint32_t>(engine.collapses().size());
@@ -123,8 +123,8 @@ void drop_far_scales(NestedScales& result, double limit) {
   std::uint32_t last = 0;
   for (const NestedScale& scale : scales)
     for (const Triangle& t : scale.triangles) last = std::max({last, t[0], t[1], t[2]});
-  Mesh& m =
-      result.mesh;  // new wedges stand behind the input's, in the order of the scales that need them first
+  // New wedges stand behind the input's, in the order of the scales that need them first.
+  Mesh& m = result.mesh;
   auto cut = [last](auto& values) {
     if (values.size() > last + 1) values.resize(last + 1);
   };
@@ -143,7 +143,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   result.twin = mesh.twin;
   const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
   CollapseEngine engine(mesh, scale_map, options, context);
-  result.scales.push_back(take_scale(engine, 0, ""));
+  result.scales.push_back(scale_at_this_point(engine, 0, ""));
   std::string floor;
   for (std::size_t i = 1; i < target.size(); ++i) {
     floor = stop_reason(engine.run_to(target[i], static_cast<int>(i), context), options);
@@ -151,7 +151,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
     const bool repeated = !floor.empty() && engine.mesh().alive_faces() >
                                                 kRepeatedShare * static_cast<double>(finer.triangles.size());
     if (engine.collapses().size() > finer.collapse_count && !repeated)
-      result.scales.push_back(take_scale(engine, static_cast<int>(i), floor));
+      result.scales.push_back(scale_at_this_point(engine, static_cast<int>(i), floor));
     context.report(0.7 * (1 - static_cast<double>(engine.mesh().alive_positions()) /
                                   static_cast<double>(mesh.mesh.positions.size())));
   }

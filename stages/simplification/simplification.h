@@ -24,24 +24,23 @@ struct SimplificationOptions {
   // Cost x (1 + weight * p). At 0.05 one model of twelve is worse than meshoptimizer's at 10 % of the
   // vertices.
   double persistence_weight = 0.035;
-  double uv_weight = 0.06;      // of the UV quadric against the geometric one
-  double normal_weight = 0.01;  // of the normals' quadric; one radian counts as a mean edge
-  double colour_weight = 0.1;  // of the vertex colours' quadric; a full step counts as a 20th of the diagonal
-  double boundary_weight = 3;  // of the border quadrics
-  double seam_weight = 1;      // of the same at seams of the texture
-  // Of the diagonal: no collapse with a larger quadric error, no scale that deviates more
-  // (NestedScale::deviation). At half of it
-  // scans cut into scraps keep no scale but S_0.
+  double uv_weight = 0.06;
+  double normal_weight = 0.01;  // one radian counts as a mean edge
+  double colour_weight = 0.1;   // a full step counts as a 20th of the diagonal
+  double boundary_weight = 3;
+  double seam_weight = 1;
+  // Bounds the quadric error of every collapse, too. At half of it scans cut into scraps keep no scale but
+  // S_0.
   double max_error = 0.05;
-  double max_shift = 0.05;  // of the diagonal: no collapse that shifts the texture by more
-  int min_triangles = 100;  // no scale is asked to go below
+  double max_shift = 0.05;
+  int min_triangles = 100;
   // Where much persists (many small components: a saxophone keeps 15 % at S_20) the scale map alone gives no
-  // scale small enough for a first picture; targets are then scaled down geometrically so that the coarsest
-  // is asked for this share.
-  double coarsest = 0.03;  // of S_0's vertices; 1 = the scale map's counts as they are; not for order thesis
-  // A scale below this would be good for a thumbnail of 50..100 px and save 2..4 kB; as a first picture it
-  // shows corners for outlines and blurs faces.
-  int coarsest_vertices = 400;  // no scale is asked for fewer where S_0 has 20 times as many; else 1 / 20
+  // scale small enough for a first picture. The targets are then scaled down geometrically so that the
+  // coarsest one is this share. 1 = the scale map's counts as they are, which order thesis always takes.
+  double coarsest = 0.03;
+  // A smaller scale would be good for a thumbnail of 50..100 px and save 2..4 kB. As a first picture it shows
+  // corners for outlines and blurs faces.
+  int coarsest_vertices = 400;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("order", s.order,
@@ -55,8 +54,7 @@ struct SimplificationOptions {
     v("seam_weight", s.seam_weight, Range{0, 1000}, "weight of seams of the texture");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
-      "no scale deviates more than this fraction of the diagonal; of what vanishes as a whole the size "
-      "counts");
+      "no scale deviates more than this fraction of the diagonal; of what vanishes whole the size counts");
     v("max_shift", s.max_shift, Range{0.0001, 1},
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
@@ -67,13 +65,14 @@ struct SimplificationOptions {
   }
 };
 
-/// Half-edge collapse towards the vertex targets that the scale map gives (target of S_i = #{p >= i}, see
-/// SimplificationOptions::coarsest), seam- and
-/// border-safe: a collapse needs a consistent wedge map, the link condition, no flipped normal or UV
-/// triangle (in every set of texture coordinates that its material uses; the set of the base colour has the
-/// quadric and max_shift); border vertices move along the border only, seams along the seam, twins together.
-/// Deterministic: ties by place along a space-filling curve. About 5 us per
-/// removed vertex on one core. Throws StageError when the scale map is of another mesh.
+/// Half-edge collapses down to the numbers of vertices that the scale map gives: target of S_i = #{p >= i},
+/// see SimplificationOptions::coarsest.
+/// - A collapse needs a consistent wedge map and the link condition, and turns no normal or UV triangle over,
+///   in every set of texture coordinates that its material uses. The set of the base colour has the quadric
+///   and max_shift.
+/// - Border vertices move along the border only, seams along the seam, twins together.
+/// About 5 us per removed vertex on one core. StageError when the scale map is of another mesh.
+/// Deterministic: among equals the place along a space-filling curve decides.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
                       const SimplificationOptions& options, const RunContext& context);
 

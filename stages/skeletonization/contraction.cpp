@@ -7,8 +7,9 @@
 
 #include <cstddef>
 #include <memory>
-#include <stdexcept>
 #include <utility>
+
+#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -30,7 +31,7 @@ class Arena {
       return p;
     }
     // Not bad_alloc: the capacity depends on the input alone, a machine's memory does not.
-    if (capacity_ - used_ < size) throw std::runtime_error("contraction needs too much memory");
+    if (capacity_ - used_ < size) throw GeometryFailure("contraction needs too much memory");
     void* p = bytes_.get() + used_;
     used_ += size;
     return p;
@@ -119,7 +120,7 @@ struct CountingKernel : Kernel {
     Kernel::Ray_3 operator()(const Kernel::Point_3& from, const Kernel::Vector_3& along) const {
       rays_in_a_row = from == last ? rays_in_a_row + 1 : 0;
       last = from;
-      if (rays_in_a_row > kMaxRays) throw std::runtime_error("contraction cannot tell inside from outside");
+      if (rays_in_a_row > kMaxRays) throw GeometryFailure("contraction cannot tell inside from outside");
       return Kernel::Ray_3(from, along);
     }
     static thread_local Kernel::Point_3 last;
@@ -132,17 +133,19 @@ using Contraction = CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh, Count
 
 static_assert(std::is_same_v<Contraction::Meso_skeleton::Allocator, ContractionAllocator<int>>);
 
-}  // namespace
-
-CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions) {
+SurfaceMesh closed_mesh(const TriangleSoup& closed) {
   SurfaceMesh mesh;
   for (const Vec3d& p : closed.points) mesh.add_vertex({p.x, p.y, p.z});
   using Vertex = SurfaceMesh::Vertex_index;
   for (const Triangle& t : closed.triangles)
     if (mesh.add_face(Vertex(t[0]), Vertex(t[1]), Vertex(t[2])) == SurfaceMesh::null_face())
-      throw std::runtime_error("wrap is not a manifold");
-  if (!CGAL::is_closed(mesh)) throw std::runtime_error("wrap is not closed");
+      throw GeometryFailure("wrap is not a manifold");
+  if (!CGAL::is_closed(mesh)) throw GeometryFailure("wrap is not closed");
+  return mesh;
+}
 
+CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
+  const SurfaceMesh mesh = closed_mesh(closed);
   // A triangle and its share of edges and vertices take about 400 bytes; the contraction splits edges as it
   // goes.
   Arena arena((std::size_t{16} << 20) + closed.triangles.size() * 4096);
@@ -162,6 +165,19 @@ CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contracti
     out.segments.push_back(
         {static_cast<std::uint32_t>(source(e, graph)), static_cast<std::uint32_t>(target(e, graph))});
   return out;
+}
+
+}  // namespace
+
+CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions) {
+  // CGAL derives its failures from std::logic_error: nothing above could tell them from our own mistakes.
+  try {
+    return contract(closed, max_contractions);
+  } catch (const CGAL::Failure_exception& e) {
+    throw GeometryFailure(e.what());
+  } catch (const CGAL::Uncertain_conversion_exception& e) {
+    throw GeometryFailure(e.what());
+  }
 }
 
 }  // namespace texmesh

@@ -35,8 +35,8 @@ JoinedParts join(const std::vector<TriangleSoup>& parts) {
   return all;
 }
 
-std::vector<Local> look_up(const JoinedParts& wrap, std::span<const Vec3d> points, double offset,
-                           const RunContext& context) {
+std::vector<Local> nearest_parts(const JoinedParts& wrap, std::span<const Vec3d> points, double offset,
+                                 const RunContext& context) {
   const TriangleTree tree(wrap.soup.points, wrap.soup.triangles);
   const std::vector<double> thickness = half_thickness(wrap.soup, tree, context);
   std::vector<Local> local(points.size());
@@ -85,7 +85,7 @@ std::vector<PartKind> sort_parts(const std::vector<Local>& local, std::span<cons
 LocalRadius limit_by_thickness(const std::vector<TriangleSoup>& parts, std::span<const Vec3d> points,
                                std::span<const double> distance, const LocalRadiusOptions& options,
                                const RunContext& context) {
-  const std::vector<Local> local = look_up(join(parts), points, options.offset, context);
+  const std::vector<Local> local = nearest_parts(join(parts), points, options.offset, context);
   const std::vector<PartKind> kind = sort_parts(local, distance, parts.size(), options.plate_ratio);
   LocalRadius out;
   out.parts = parts.size();

@@ -20,12 +20,13 @@ struct LocalRadius {
   std::size_t limited = 0;  // points whose skeleton distance the thickness has lowered
 };
 
-/// The skeleton distance, corrected by the local thickness of the wrap where a curve cannot be a skeleton: on
-/// plates (a medial *sheet*), R is half the thickness; on extremities that the contraction has swallowed, R
-/// is at most limb_ratio half thicknesses. A wrap whose walls are little farther apart than its own offsets
-/// tells nothing of a shape: it runs around a sheet, and there the skeleton distance stays (between half an
-/// offset and one and a half the two are blended). `parts` = the wrap's, `points` and `distance` = what R is
-/// asked for, in the same frame. Same bits for any thread count.
+/// The skeleton distance, corrected by the local thickness of the wrap where a curve cannot be a skeleton.
+/// - On plates, whose medial shape is a sheet, R is half the thickness.
+/// - On extremities that the contraction has swallowed, R is at most limb_ratio half thicknesses.
+/// - Where the wrap's walls are little farther apart than its own offsets, it runs around a sheet and tells
+///   nothing of a shape: the skeleton distance stays. Between half an offset and one and a half the two are
+///   blended. `parts` are the wrap's; `points` and `distance` are what R is asked for, in the same frame.
+///   Same bits for any thread count.
 LocalRadius limit_by_thickness(const std::vector<TriangleSoup>& parts, std::span<const Vec3d> points,
                                std::span<const double> distance, const LocalRadiusOptions& options,
                                const RunContext& context);

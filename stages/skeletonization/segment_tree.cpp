@@ -27,19 +27,13 @@ SegmentTree::SegmentTree(std::span<const Vec3d> nodes,
 }
 
 void SegmentTree::build(std::uint32_t first, std::uint32_t count) {
-  Box box{segments_[first].a, segments_[first].a};
+  Box3d box;
   for (std::uint32_t i = first; i < first + count; ++i)
-    for (const Vec3d& p : {segments_[i].a, segments_[i].b})
-      for (int k = 0; k < 3; ++k) {
-        box.lo[k] = std::min(box.lo[k], p[k]);
-        box.hi[k] = std::max(box.hi[k], p[k]);
-      }
+    for (const Vec3d& p : {segments_[i].a, segments_[i].b}) box.extend(p);
   const std::size_t node = nodes_.size();
   nodes_.push_back({box, first, count});
   if (count <= kLeaf) return;
-  int axis = 0;
-  for (int k = 1; k < 3; ++k)
-    if (box.hi[k] - box.lo[k] > box.hi[axis] - box.lo[axis]) axis = k;
+  const int axis = box.longest_axis();
   const auto begin = segments_.begin() + first, end = begin + count;
   std::stable_sort(begin, end, [axis](const Segment& s, const Segment& t) {
     return s.a[axis] + s.b[axis] < t.a[axis] + t.b[axis];
@@ -51,9 +45,9 @@ void SegmentTree::build(std::uint32_t first, std::uint32_t count) {
 }
 
 double SegmentTree::distance(Vec3d p) const {
-  const auto box_distance = [&](const Box& b) {
+  const auto box_distance = [&](const Box3d& b) {
     double sum = 0;
-    for (int k = 0; k < 3; ++k) sum += square(std::max({b.lo[k] - p[k], 0.0, p[k] - b.hi[k]}));
+    for (int k = 0; k < 3; ++k) sum += square(std::max({b.min[k] - p[k], 0.0, p[k] - b.max[k]}));
     return sum;
   };
   double best = std::numeric_limits<double>::infinity();

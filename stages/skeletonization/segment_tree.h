@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "format/base/box.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
@@ -18,16 +19,13 @@ class SegmentTree {
   double distance(Vec3d p) const;
 
  private:
-  struct Box {
-    Vec3d lo, hi;
-  };
   struct Segment {
     Vec3d a, b;
   };
   struct Node {
-    Box box;
-    std::uint32_t first,
-        count;  // segments of a leaf; count 0 = inner node, children at index + 1 and `first`
+    Box3d box;
+    // Of a leaf: its segments. An inner node has count 0 and its children at its index + 1 and at `first`.
+    std::uint32_t first, count;
   };
   void build(std::uint32_t first, std::uint32_t count);
 

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/local_radius.h"
 #include "stages/skeletonization/segment_tree.h"
 #include "stages/skeletonization/wrap.h"
@@ -17,9 +16,9 @@
 namespace texmesh {
 namespace {
 
-/// No radius is smaller than this fraction of the diagonal: R divides.
+/// No radius is smaller than this fraction of the diagonal, since R is a divisor.
 constexpr double kLeastRadius = 1e-6;
-/// A note about thin parts is worth reading from this share of the vertices on.
+/// Thin parts are noted from this share of the vertices on.
 constexpr double kWorthANote = 0.01;
 constexpr int kWrapAttempts = 3;
 
@@ -44,21 +43,6 @@ CurveSkeleton centroid_of(const TriangleSoup& part) {
   return {{sum * (1 / static_cast<double>(part.points.size()))}, {}};
 }
 
-/// Errors that mean "not this way"; the others (Cancelled, a lack of memory: a limit of the machine must not
-/// decide about the result) pass through.
-template <class Try, class Else>
-void try_or(Try&& attempt, Else&& otherwise) {
-  try {
-    attempt();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception&) {
-    otherwise();
-  }
-}
-
 CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_contractions, Notes& notes,
                              const RunContext& context) {
   CurveSkeleton all;
@@ -66,7 +50,7 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
   for (const TriangleSoup& part : parts) {
     context.check_cancelled();
     CurveSkeleton skeleton;
-    try_or([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
+    try_geometry([&] { skeleton = contract_to_skeleton(part, max_contractions); }, [&] { skeleton = {}; });
     if (!is_finite(skeleton)) {
       skeleton = centroid_of(part);
       ++failed;
@@ -80,14 +64,14 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
   return all;
 }
 
-/// The wrap at the finest alpha that comes to an end within the cap.
+/// The wrap at the finest alpha at which it ends within the cap.
 std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOptions& options, Notes& notes,
                                const RunContext& context) {
   double alpha = 1.0 / options.alpha_divisor;
   for (int attempt = 1;; ++attempt, alpha *= 2) {
     context.check_cancelled();
     std::vector<TriangleSoup> parts;
-    try_or(
+    try_geometry(
         [&] {
           parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
                                static_cast<std::size_t>(options.max_wrap_faces),
@@ -96,7 +80,7 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOp
         [&] {
           if (attempt == kWrapAttempts) throw;
         });
-    if (parts.empty() && attempt == kWrapAttempts) throw std::runtime_error("the wrap is empty");
+    if (parts.empty() && attempt == kWrapAttempts) throw GeometryFailure("the wrap is empty");
     if (parts.empty()) continue;
     if (attempt > 1)
       add_warning(notes, "skeleton-coarser-wrap", "",
@@ -129,7 +113,7 @@ void note_limits(const LocalRadius& local, Notes& notes) {
                  " % of the vertices, which the skeleton does not reach");
 }
 
-/// Skeleton and R in the unit frame, then in the mesh's.
+/// Skeleton and R of a mesh. They are computed in the unit frame and then scaled back.
 CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
                       const SkeletonizationOptions& options, const RunContext& context,
                       std::vector<float>& distance, Notes& notes) {
@@ -150,7 +134,8 @@ CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
   return skeleton;
 }
 
-/// The mean of each component's positions; distances are to the own one, not to the closest.
+/// The fallback: the skeleton is the centroid of each component, and a position's distance is that to the
+/// centroid of its own component, not to the closest one.
 void use_centroids(const ConditionedMesh& mesh, CurveSkeleton& skeleton, std::vector<float>& distance) {
   skeleton = {};
   skeleton.nodes.resize(mesh.component_count);
@@ -187,13 +172,13 @@ Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& 
   const UnitFrame frame = unit_frame_of(mesh.mesh.positions);
   Skeleton out;
   CurveSkeleton skeleton;
-  try_or([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
-         [&] {
-           use_centroids(mesh, skeleton, out.distance);
-           out.fallback_centroid = true;
-           add_warning(out.notes, "skeleton-fallback", "",
-                       "no skeleton, distances are to the centroids of the components");
-         });
+  try_geometry([&] { skeleton = extract(mesh, frame, options, context, out.distance, out.notes); },
+               [&] {
+                 use_centroids(mesh, skeleton, out.distance);
+                 out.fallback_centroid = true;
+                 add_warning(out.notes, "skeleton-fallback", "",
+                             "no skeleton, distances are to the centroids of the components");
+               });
   for (const Vec3d& p : skeleton.nodes) out.nodes.push_back(to_float(p));
   out.segments = std::move(skeleton.segments);
   out.radius = floored(out.distance, options.radius_floor, frame.diagonal);

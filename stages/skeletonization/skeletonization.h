@@ -13,13 +13,13 @@ inline constexpr int kSkeletonizationVersion = 4;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
-  int alpha_divisor = 80;      // alpha = diagonal / this
-  int offset_divisor = 600;    // offset = diagonal / this
-  int max_wrap_faces = 8000;   // the wrap is decimated to this before contraction
+  int alpha_divisor = 80;
+  int offset_divisor = 600;
+  int max_wrap_faces = 8000;
   double radius_floor = 0.25;  // R_eff = max(R, floor * median R)
-  double plate_ratio = 5;      // median R / half thickness above which a part is a plate
-  double limb_ratio = 3;       // R <= this * half thickness
-  // Work caps: what CGAL does not end on is given up there, with the fallback that skeletonize() tells.
+  double plate_ratio = 5;
+  double limb_ratio = 3;
+  // Where CGAL would not end, the caps do, and a note names the fallback.
   int max_wrap_steps = 1000000;
   int max_contractions = 500;
   template <class S, class V>
@@ -31,9 +31,8 @@ struct SkeletonizationOptions {
       "faces of the wrap that is contracted to the skeleton");
     v("radius_floor", s.radius_floor, Range{0, 1}, "least skeleton distance, as a fraction of its median");
     v("plate_ratio", s.plate_ratio, Range{1, 1e9},
-      "a part whose median distance to the skeleton is more than this many half thicknesses is a plate: its "
-      "R "
-      "is half the local thickness");
+      "a part whose median distance to the skeleton is more than this many half thicknesses is a plate: "
+      "its R is half the local thickness");
     v("limb_ratio", s.limb_ratio, Range{1, 1e9},
       "R is at most this many half thicknesses (thin parts that the skeleton does not reach)");
     v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9},
@@ -42,14 +41,16 @@ struct SkeletonizationOptions {
   }
 };
 
-/// Works for any conditioned mesh (open, several components, one triangle); it never fails (but for Cancelled
-/// and bad_alloc). What falls back says so with a warning: a wrap that takes more than max_wrap_steps (or
-/// looks at 50 times as many triangles: thousands of needles around one point) is
-/// tried with twice and four times its alpha ("skeleton-coarser-wrap"); a part of the wrap that cannot be
-/// contracted has its centroid for a skeleton ("skeleton-part-centroid"); where there is no wrap, R is the
-/// distance to the component's centroid ("skeleton-fallback"). Plates and thin limbs give notes
-/// ("skeleton-plates", "skeleton-thin-parts"). Meshes of more than 100,000 triangles are clustered to that
-/// first. Wrap and contraction run on one thread. Deterministic.
+/// The skeleton of any conditioned mesh (open, several components, one triangle): an alpha wrap, its mean
+/// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
+/// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. No mesh
+/// makes it fail. Every fallback gives a warning:
+/// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
+///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
+/// - "skeleton-part-centroid": a part of the wrap that cannot be contracted has its centroid for a skeleton.
+/// - "skeleton-fallback": where there is no wrap, R is the distance to the component's centroid.
+/// Plates and thin limbs give notes ("skeleton-plates", "skeleton-thin-parts"). Wrap and contraction run on
+/// one thread. Deterministic.
 Skeleton skeletonize(const ConditionedMesh& mesh, const SkeletonizationOptions& options,
                      const RunContext& context);
 

@@ -14,11 +14,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
 #include "format/base/no_index.h"
 #include "stages/geometry/triangle_tree.h"
+#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -39,7 +39,7 @@ class WorkCap {
 
   void count_step() {
     context_.check_cancelled();
-    if (steps_-- == 0 || tried > triangles_) throw std::runtime_error("the wrap takes too many steps");
+    if (steps_-- == 0 || tried > triangles_) throw GeometryFailure("the wrap takes too many steps");
   }
 
   std::uint64_t tried = 0;
@@ -76,8 +76,8 @@ class SoupOracle {
 
   const Geom_traits& geom_traits() const { return traits_; }
   CGAL::Bbox_3 bbox() const {
-    const Vec3d lo = tree_.lo(), hi = tree_.hi();
-    return {lo.x, lo.y, lo.z, hi.x, hi.y, hi.z};
+    const auto& [min, max] = tree_.box();
+    return {min.x, min.y, min.z, max.x, max.y, max.z};
   }
 
   template <class K>
@@ -156,9 +156,16 @@ std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, d
   const SoupOracle oracle(soup, cap);
   SurfaceMesh wrap;
   StepCounter counter(cap);
-  aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
-  wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
-  decimate(wrap, max_faces);
+  // CGAL derives its failures from std::logic_error: nothing above could tell them from our own mistakes.
+  try {
+    aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
+    wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
+    decimate(wrap, max_faces);
+  } catch (const CGAL::Failure_exception& e) {
+    throw GeometryFailure(e.what());
+  } catch (const CGAL::Uncertain_conversion_exception& e) {
+    throw GeometryFailure(e.what());
+  }
   return split_parts(wrap);
 }
 

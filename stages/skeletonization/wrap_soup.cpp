@@ -1,11 +1,13 @@
 #include "stages/skeletonization/wrap_soup.h"
-#include "format/base/no_index.h"
 
 #include <meshoptimizer.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
+
+#include "format/base/box.h"
+#include "format/base/no_index.h"
+#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -111,13 +113,8 @@ TriangleSoup used_part(const Gathered& g) {
 }  // namespace
 
 UnitFrame unit_frame_of(const std::vector<Vec3f>& positions) {
-  Vec3d lo = to_double(positions.at(0)), hi = lo;
-  for (Vec3f p : positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], double{p[k]});
-      hi[k] = std::max(hi[k], double{p[k]});
-    }
-  return {(lo + hi) * 0.5, length(hi - lo)};
+  const Box3d box = to_double(bounding_box(positions));
+  return {box.centre(), box.diagonal()};
 }
 
 TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame) {
@@ -129,7 +126,7 @@ TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame)
   close_holes(mesh, g);
   thin_out(g);
   TriangleSoup soup = used_part(g);
-  if (soup.triangles.empty()) throw std::runtime_error("no triangle has an area");
+  if (soup.triangles.empty()) throw GeometryFailure("no triangle has an area");
   return soup;
 }
 

@@ -16,8 +16,8 @@ UnitFrame unit_frame_of(const std::vector<Vec3f>& positions);
 /// What is wrapped of a mesh, in the unit frame: the triangles that have an area, clustered to 100,000 when
 /// there are more (a wrap looks at nothing finer than its alpha), every point in use. Holes are closed by
 /// fans around their middle where that adds less than a quarter to the component's area, so that a bust that
-/// is open at its base is wrapped as a solid, not as a bowl; a sheet stays a sheet. Throws std::runtime_error
-/// when no triangle has an area. Deterministic.
+/// is open at its base is wrapped as a solid, not as a bowl; a sheet stays a sheet. GeometryFailure when no
+/// triangle has an area. Deterministic.
 TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame);
 
 }  // namespace texmesh

@@ -115,8 +115,8 @@ struct Response {
 
 /// Two 1-D passes each (the filters are separable): smoothed along alpha then y; LoG = G''(alpha) G(y) +
 /// G(alpha) G''(y).
-Response respond(const Grid& grid, const Axis& alpha, const Axis& y, double sigma, double window,
-                 const RunContext& context) {
+Response response_at(const Grid& grid, const Axis& alpha, const Axis& y, double sigma, double window,
+                     const RunContext& context) {
   const Kernel a = make_kernel(sigma, alpha.step, window, grid.columns),
                b = make_kernel(sigma, y.step, window, grid.rows);
   const Grid along = filter(grid, alpha, a.gauss, true, context);
@@ -127,11 +127,11 @@ Response respond(const Grid& grid, const Axis& alpha, const Axis& y, double sigm
 }
 
 /// The response as meshes have it: t (H(sigma) - H(band sigma)), the base shape's curvature taken off.
-void take_band_off(const Grid& grid, const Axis& alpha, const Axis& y, double sigma,
-                   const SsfOptions& options, Response& r, const RunContext& context) {
+void subtract_wide_band(const Grid& grid, const Axis& alpha, const Axis& y, double sigma,
+                        const SsfOptions& options, Response& r, const RunContext& context) {
   const double band = options.range_band;
   if (band <= 1) return;
-  const Response wide = respond(grid, alpha, y, sigma * band, options.window, context);
+  const Response wide = response_at(grid, alpha, y, sigma * band, options.window, context);
   for (std::size_t i = 0; i < r.curvature.value.size(); ++i)
     r.curvature.value[i] -= wide.curvature.value[i] / (band * band);
 }
@@ -215,20 +215,20 @@ class RangeFilter {
                      options_.scales > 1 ? portable::log(sigma_max_ / sigma_min_) / (options_.scales - 1) : 0;
     // The original's own curvature: second differences, the narrowest window there is.
     const double narrow = 0.5 * sigma_min_;
-    take_crossings(0, respond(grid_, alpha_, y_, narrow, 1, context_).curvature);
+    mark_crossings(0, response_at(grid_, alpha_, y_, narrow, 1, context_).curvature);
     for (int i = 1; i <= options_.scales; ++i) {
       const double sigma = sigma_min_ * portable::exp(step * (i - 1));
-      Response r = respond(grid_, alpha_, y_, sigma, options_.window, context_);
-      take_band_off(grid_, alpha_, y_, sigma, options_, r, context_);
+      Response r = response_at(grid_, alpha_, y_, sigma, options_.window, context_);
+      subtract_wide_band(grid_, alpha_, y_, sigma, options_, r, context_);
       const auto s = static_cast<std::size_t>(i);
       map_.sigma[s] = static_cast<float>(sigma);
       map_.convergence[s] = whole > 0 ? static_cast<float>(value_range(r.smooth) / whole) : 0;
-      take_crossings(i, r.curvature);
+      mark_crossings(i, r.curvature);
       context_.report(static_cast<double>(i) / options_.scales);
     }
   }
 
-  void take_crossings(int scale, const Grid& curvature) {
+  void mark_crossings(int scale, const Grid& curvature) {
     const std::vector<std::uint8_t> found = find_crossings(curvature, kNoise * largest_);
     std::uint32_t count = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {

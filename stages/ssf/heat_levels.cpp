@@ -44,7 +44,7 @@ class CellGrower {
   void grow_from(std::uint32_t seed) {
     const auto cell = static_cast<std::uint32_t>(cells_.seed.size());
     cells_.seed.push_back(seed);
-    take(seed, 0, cell);
+    assign_to_cell(seed, 0, cell);
     const HeatOperator& l = fine_.laplacian;
     while (!heap_.empty()) {
       std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
@@ -54,12 +54,12 @@ class CellGrower {
       for (std::uint32_t k = l.first[v]; k < l.first[v + 1]; ++k) {
         const std::uint32_t u = l.column[k];
         const double through = d + length(fine_.points[u] - fine_.points[v]);
-        if (through <= radius_ && through < distance_[u]) take(u, through, cell);
+        if (through <= radius_ && through < distance_[u]) assign_to_cell(u, through, cell);
       }
     }
   }
 
-  void take(std::uint32_t v, double distance, std::uint32_t cell) {
+  void assign_to_cell(std::uint32_t v, double distance, std::uint32_t cell) {
     distance_[v] = distance;
     cells_.of[v] = cell;
     heap_.emplace_back(distance, v);

@@ -20,20 +20,23 @@ struct HeatLevel {
 HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> corners, double spacing,
                        double rate_cap);
 
-/// The next coarser level. Vertices become seeds in order, each unless one is within `radius` along the
-/// edges; every vertex joins its nearest seed (Voronoi cells by Dijkstra). Seeds are the new vertices, areas
-/// of the cells the masses; between cells that touch the same heat passes as through the fine edges between
-/// them under a constant gradient. Fine triangles of three cells become the new triangles, one per three
-/// cells and direction; only normals need them. Deterministic: ties go to the earlier seed. O(n log n).
+/// The next coarser level.
+/// - Seeds: the vertices in order, each unless a seed is within `radius` along the edges. Every vertex joins
+///   its nearest seed (Voronoi cells by Dijkstra); ties go to the earlier seed.
+/// - Seeds are the new vertices, and the areas of their cells the masses. Between cells that touch the same
+///   heat passes as through the fine edges between them under a constant gradient.
+/// - Fine triangles of three cells become the new triangles, one per three cells and direction; only normals
+///   need them.
+/// Deterministic. O(n log n).
 HeatLevel coarsen(const HeatLevel& fine, double radius, double rate_cap);
 
-/// Whether heat that has flowed as far as sigma is smooth enough for a level: up to 2.4 error_ratio spacings
-/// of it the level below is nearer to the truth. Levels of few vertices carry everything.
+/// Whether the level is still the right one for heat that has flowed as far as sigma: up to 2.4 error_ratio
+/// spacings it is nearer to the truth than the next coarser one. Levels of few vertices carry everything.
 bool carries(const HeatLevel& level, double sigma, double error_ratio);
 /// Radius to coarsen by for a level whose first sigma this is.
 double seed_radius(double sigma, double error_ratio);
-/// Largest sigma of the state that a level whose first sigma this is should start from. What its operator
-/// makes of points that another one smoothed is roughest at first and gone by then.
+/// Largest sigma of the state that a level should start from whose first sigma this is. What the level's
+/// operator makes of points that another operator smoothed is roughest at first, and gone by then.
 double handover_sigma(double first_sigma);
 
 }  // namespace texmesh

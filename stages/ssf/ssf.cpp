@@ -5,8 +5,10 @@
 #include <string>
 #include <utility>
 
+#include "format/base/box.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
+#include "stages/ssf/heat_levels.h"
 #include "stages/ssf/ssf_component.h"
 
 namespace texmesh {
@@ -15,28 +17,25 @@ namespace {
 /// Components below this many vertices are solved whole by one thread each, many at a time.
 constexpr std::size_t kSmallComponent = 8192;
 
-/// Positions (lowest twins alone) and triangles, grouped by component: items of component c are
-/// [first[c], first[c + 1]).
+/// Positions (lowest twins alone) and triangles, grouped by component: items of component c are [first[c],
+/// first[c + 1]).
 struct Layout {
   std::vector<std::uint32_t> position, first_position;  // within a component in Morton order
   std::vector<std::uint32_t> triangle, first_triangle;
-  std::vector<std::uint32_t> vertex;        // per lowest twin: its index within the component
-  std::vector<double> diagonal, mean_edge;  // per component, object units
-  std::size_t component_count() const { return diagonal.size(); }
+  std::vector<std::uint32_t> vertex;  // per lowest twin: its index within the component
+  std::vector<Box3d> box;             // per component, object units
+  std::vector<double> mean_edge;      // per component, object units
+  std::size_t component_count() const { return box.size(); }
   std::size_t size(std::size_t c) const { return first_position[c + 1] - first_position[c]; }
 };
 
 /// Places of positions along a Morton curve: neighbours in space are neighbours in memory.
 class MortonCode {
  public:
-  explicit MortonCode(const std::vector<Vec3f>& positions) : lo_(to_double(positions[0])) {
-    Vec3d hi = lo_;
-    for (Vec3f p : positions)
-      for (int k = 0; k < 3; ++k) {
-        lo_[k] = std::min(lo_[k], double{p[k]});
-        hi[k] = std::max(hi[k], double{p[k]});
-      }
-    side_ = std::max({hi.x - lo_.x, hi.y - lo_.y, hi.z - lo_.z, 1e-300});
+  explicit MortonCode(const std::vector<Vec3f>& positions) {
+    const Box3d box = to_double(bounding_box(positions));
+    lo_ = box.min;
+    side_ = std::max(box.longest_side(), 1e-300);
   }
   std::uint64_t operator()(Vec3f p) const {
     std::uint64_t bits = 0;
@@ -87,19 +86,15 @@ void group_triangles(const ConditionedMesh& mesh, Layout& layout) {
 
 void measure(const Mesh& m, Layout& layout) {
   for (std::size_t c = 0; c + 1 < layout.first_position.size(); ++c) {
-    Vec3d lo = to_double(m.positions[layout.position[layout.first_position[c]]]), hi = lo;
+    Box3f box;
     for (std::uint32_t i = layout.first_position[c]; i < layout.first_position[c + 1]; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const double x = m.positions[layout.position[i]][k];
-        lo[k] = std::min(lo[k], x);
-        hi[k] = std::max(hi[k], x);
-      }
+      box.extend(m.positions[layout.position[i]]);
     double sum = 0;
     for (std::uint32_t i = layout.first_triangle[c]; i < layout.first_triangle[c + 1]; ++i)
       for (int k = 0; k < 3; ++k)
         sum += length(to_double(m.positions[m.position_of(layout.triangle[i], k)]) -
                       to_double(m.positions[m.position_of(layout.triangle[i], (k + 1) % 3)]));
-    layout.diagonal.push_back(length(hi - lo));
+    layout.box.push_back(to_double(box));
     layout.mean_edge.push_back(sum / (3.0 * (layout.first_triangle[c + 1] - layout.first_triangle[c])));
   }
 }
@@ -116,18 +111,12 @@ SurfaceComponent cut_out(const ConditionedMesh& mesh, const Layout& layout, std:
   const Mesh& m = mesh.mesh;
   SurfaceComponent out;
   out.mean_edge = layout.mean_edge[c];
-  out.diagonal = layout.diagonal[c];
+  out.diagonal = layout.box[c].diagonal();
   const std::uint32_t* position = layout.position.data() + layout.first_position[c];
-  Vec3d lo = to_double(m.positions[position[0]]), hi = lo;
+  const Box3d& box = layout.box[c];
+  const Vec3d centre = box.centre();
   double largest = 0;
-  for (std::size_t v = 0; v < layout.size(c); ++v)
-    for (int k = 0; k < 3; ++k) {
-      const double x = m.positions[position[v]][k];
-      lo[k] = std::min(lo[k], x);
-      hi[k] = std::max(hi[k], x);
-      largest = std::max(largest, std::fabs(x));
-    }
-  const Vec3d centre = (lo + hi) * 0.5;
+  for (int k = 0; k < 3; ++k) largest = std::max({largest, std::fabs(box.min[k]), std::fabs(box.max[k])});
   out.points.reserve(layout.size(c));
   for (std::size_t v = 0; v < layout.size(c); ++v)
     out.points.push_back((to_double(m.positions[position[v]]) - centre) * (1 / out.mean_edge));
@@ -170,8 +159,8 @@ class MeshFilter {
   ScaleMap run() {
     const std::size_t largest = largest_component();
     if (!is_below_first_scale(largest)) {
-      take_whole(largest);
-      take_others(largest);
+      filter_largest(largest);
+      filter_others(largest);
     }
     for (std::size_t p = 0; p < map_.persistence.size(); ++p) {
       map_.persistence[p] = map_.persistence[mesh_.twin[p]];
@@ -184,7 +173,7 @@ class MeshFilter {
 
  private:
   bool is_below_first_scale(std::size_t c) const {
-    return below_first_scale(layout_.diagonal[c], layout_.mean_edge[c], options_);
+    return below_first_scale(layout_.box[c].diagonal(), layout_.mean_edge[c], options_);
   }
 
   std::size_t largest_component() const {
@@ -195,7 +184,7 @@ class MeshFilter {
     return best;
   }
 
-  void take_whole(std::size_t c) {
+  void filter_largest(std::size_t c) {
     const ComponentScales s = filter_component(cut_out(mesh_, layout_, c), {}, options_, context_);
     whole_sigma_ = s.sigma;
     std::copy(s.sigma.begin(), s.sigma.end(), map_.sigma.begin() + 1);
@@ -205,7 +194,7 @@ class MeshFilter {
     count(s);
   }
 
-  void take_others(std::size_t largest) {
+  void filter_others(std::size_t largest) {
     std::vector<std::uint32_t> small;
     for (std::uint32_t c = 0; c < layout_.component_count(); ++c) {
       if (c == largest || is_below_first_scale(c)) continue;
@@ -219,11 +208,11 @@ class MeshFilter {
       place(c, s);
       count(s);
     }
-    take_small(small);
+    filter_small(small);
   }
 
   /// In batches, so that counts need not be kept per component.
-  void take_small(const std::vector<std::uint32_t>& small) {
+  void filter_small(const std::vector<std::uint32_t>& small) {
     constexpr std::size_t kBatch = 4096;
     RunContext alone = context_;
     alone.threads = 1;
@@ -286,6 +275,10 @@ SurfaceComponent largest_surface(const ConditionedMesh& mesh) {
   for (std::size_t c = 1; c < layout.component_count(); ++c)
     if (layout.size(c) > layout.size(best)) best = c;
   return cut_out(mesh, layout, best);
+}
+
+double feature_spacing(double sigma, const SsfOptions& options) {
+  return seed_radius(sigma, options.error_ratio);
 }
 
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,

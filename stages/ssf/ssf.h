@@ -12,20 +12,17 @@ namespace texmesh {
 inline constexpr int kSsfVersion = 3;
 
 struct SsfOptions {
-  int scales = 20;          // smoothed copies beside the original
-  double sigma_max = 0.15;  // of a component's diagonal
-  double convergence =
-      0.3;                // eps_conv: sigma stops growing where the signal's range falls below this fraction
-  double band = 2.75;     // C_i = t_i (H(sigma_i) - H(band * sigma_i))
-  double contrast = 0.3;  // tau: of the response's rms
-  double component_cap =
-      0.25;                // persistence ends where sigma exceeds this fraction of the component's diagonal
+  int scales = 20;
+  double sigma_max = 0.15;
+  double convergence = 0.3;  // eps_conv
+  double band = 2.75;        // C_i = t_i (H(sigma_i) - H(band * sigma_i))
+  double contrast = 0.3;     // tau
+  double component_cap = 0.25;
   double rate_cap = 10;    // w_ij <= cap * min(M_i, M_j) / h^2
-  double error_ratio = 5;  // sigma / vertex spacing below which no level of the pyramid goes: more = nearer
-                           // to the full resolution, and slower
-  int max_terms = 3000;  // work cap: Chebyshev terms of a level; heat flows slower where more would be needed
-  double window = 1.4;   // range scans: half-width of the Gaussian's window, in sigma
-  double range_band = 0;  // range scans: as `band`; 0 = the Laplacian of Gaussian alone, as the thesis has it
+  double error_ratio = 5;  // more is nearer to the full resolution, and slower
+  int max_terms = 3000;
+  double window = 1.4;
+  double range_band = 0;  // the thesis has the Laplacian of Gaussian alone
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
@@ -47,28 +44,36 @@ struct SsfOptions {
   }
 };
 
-/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel (of the positions that
-/// the heat flow smooths), over the position graph (twins joined). Independent of skeletonization. Every
-/// component has a sigma ladder of its own, from its mean edge to sigma_max of its diagonal or the first
-/// sigma at which the smoothed component has shrunk to `convergence` of its extent. A scale counts for a
-/// component only while its sigma, there and on the largest component (most positions), is within
-/// component_cap of the component's diagonal: small parts are detail of the whole. Large sigmas are solved on
-/// coarser levels, whose vertices are positions of the mesh: feature points of a scale are no closer than
-/// 0.8 sigma / error_ratio to one another on any of them. O(n log n); deterministic for any thread count.
+/// Scale-space filtering of a mesh: the band-passed mean curvature on the heat kernel, of the positions that
+/// the heat flow smooths. It runs over the position graph, in which twins are one.
+/// - Every component has a sigma ladder of its own. It begins at the component's mean edge, and ends at
+///   sigma_max of its diagonal or at the first sigma at which the smoothed component has shrunk to
+///   `convergence` of its extent.
+/// - Small parts are detail of the whole: a scale counts for a component only while its sigma, there and on
+///   the largest component (most positions), is within component_cap of the component's diagonal.
+/// - Large sigmas are solved on coarser levels, whose vertices are positions of the mesh. Feature points of a
+///   scale are there no closer to one another than feature_spacing().
+/// O(n log n). Deterministic for any thread count.
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context);
 
+/// The distance that feature points of a scale keep from one another on the coarser levels: 0.8 sigma /
+/// error_ratio, in the unit of sigma.
+double feature_spacing(double sigma, const SsfOptions& options);
+
 /// Faithful filtering of a cylindrical range scan (thesis 2.2-2.4): separable Gaussian and LoG on r(alpha,
-/// y), periodic in alpha when the grid is a full turn, windows cut off at `window` sigma. Sigma is a length
-/// on the surface, so that unequal spacing along alpha and y counts (phi, psi); it runs from the mean spacing
-/// to sigma_max of the object's diagonal or the first sigma at which max - min of the smoothed radius falls
-/// below `convergence` of S_0's. Feature points are zero crossings alone and have no contrast rule:
-/// persistence equals crossing. Samples that are missing take no part. A Gaussian cut off at 1.4 sigma is one
-/// of 0.71 sigma, and a LoG keeps the base shape's curvature, which the mesh's signal has not: on equal terms
-/// (window >= 3, range_band = band) both filters mark the same places up to sigmas of a fifth of the radius,
-/// where heat begins to round the cross-section itself. `position_count` sizes the maps;
-/// positions without a sample get 0. Throws StageError for a grid whose arrays or steps are wrong.
-/// Deterministic for any thread count.
+/// y), periodic in alpha when the grid is a full turn, windows cut off at `window` sigma.
+/// - Sigma is a length on the surface, so that unequal spacing along alpha and y counts (phi, psi). It runs
+///   from the mean spacing to sigma_max of the object's diagonal, or to the first sigma at which max - min of
+///   the smoothed radius falls below `convergence` of S_0's.
+/// - Feature points are zero crossings alone and have no contrast rule: persistence equals crossing.
+/// - Samples that are missing take no part.
+/// - The two filters differ by default: a Gaussian cut off at 1.4 sigma is one of 0.71 sigma, and a LoG keeps
+///   the base shape's curvature, which the mesh's signal has not. On equal terms (window >= 3, range_band =
+///   band) both mark the same places up to sigmas of a fifth of the radius, where heat begins to round the
+///   cross-section.
+/// `position_count` sizes the maps; positions without a sample get 0. StageError for a grid whose arrays or
+/// steps are wrong. Deterministic for any thread count.
 ScaleMap filter_range_scan(const RangeGrid& range, std::size_t position_count, const SsfOptions& options,
                            const RunContext& context);
 

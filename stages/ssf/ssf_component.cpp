@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
@@ -31,16 +32,6 @@ constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
 
 Vec3d moved(Vec3d point, Vec3f by) { return point + to_double(by); }
 
-double extent(std::span<const Vec3d> points) {
-  Vec3d lo = points[0], hi = lo;
-  for (Vec3d p : points)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  return std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-}
-
 double rms(const std::vector<float>& values) {
   double squares = 0;
   for (float x : values) squares += double{x} * x;
@@ -67,14 +58,14 @@ class FeatureFinder {
   std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
     parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) found[v] = look_at(static_cast<std::uint32_t>(v));
+      for (std::size_t v = begin; v < end; ++v) found[v] = feature_kind(static_cast<std::uint32_t>(v));
     });
     for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
     return found;
   }
 
  private:
-  std::uint8_t look_at(std::uint32_t v) const {
+  std::uint8_t feature_kind(std::uint32_t v) const {
     const HeatOperator& graph = level_.laplacian;
     bool highest = true, lowest = true, crossing = false;
     double edges = 0, difference = 0;
@@ -97,7 +88,7 @@ class FeatureFinder {
     return static_cast<std::uint8_t>((extremum ? kExtremum : 0) | (crossing ? kCrossing : 0));
   }
 
-  /// In the order of the vertices, each keeps what is near from counting.
+  /// Keeps features apart: in the order of the vertices, each feature removes those that are too near to it.
   void thin_out(std::vector<std::uint8_t>& found, std::uint8_t kind, double apart) const {
     const HeatOperator& graph = level_.laplacian;
     std::vector<std::uint32_t> seen_from(found.size(), kNoIndex), near;
@@ -139,21 +130,21 @@ class ComponentFilter {
         options_(options),
         context_(context),
         scales_(static_cast<std::size_t>(options.scales)),
-        range_(extent(component_.points)) {}
+        range_(bounding_box(component_.points).longest_side()) {}
 
   ComponentScales run() {
     double sigma_max = options_.sigma_max * component_.diagonal / component_.mean_edge;
     // The ladder is laid anew up to the first scale that has converged, once.
     for (bool again = true;; again = false) {
-      start(sigma_max);
-      const std::size_t converged = climb(again);
+      start_ladder(sigma_max);
+      const std::size_t converged = filter_levels(again);
       if (converged >= scales_) return std::move(out_);
       sigma_max = ladder_.sigma[converged];
     }
   }
 
  private:
-  void start(double sigma_max) {
+  void start_ladder(double sigma_max) {
     ladder_ = make_sigma_ladder(sigma_max, options_);
     out_ = {};
     out_.persistence.assign(component_.points.size(), 0);
@@ -166,17 +157,17 @@ class ComponentFilter {
     while (last_ < scales_ && within(out_.sigma[last_]) &&
            (whole_sigma_.empty() || within(whole_sigma_[last_])))
       ++last_;
-    // The curve is the largest component's to tell: it goes through all scales.
+    // The notes give the convergence of the largest component, which therefore goes through all scales.
     if (whole_sigma_.empty()) last_ = scales_;
   }
 
   /// All scales, level by level. Returns the scale to end at where one before the last has converged and
   /// `may_stop`.
-  std::size_t climb(bool may_stop) {
+  std::size_t filter_levels(bool may_stop) {
     LevelState state = first_state();
     for (std::size_t begin = 0; begin < last_;) {
       const std::size_t end = reach(state.level, begin);
-      const std::size_t converged = carry(state, begin, end);
+      const std::size_t converged = filter_on_level(state, begin, end);
       if (may_stop && converged + 1 < scales_) return converged;
       if (end < last_)
         state = next_state(std::move(state), seed_radius(ladder_.sigma[end], options_.error_ratio));
@@ -229,8 +220,8 @@ class ComponentFilter {
   /// Features of the scales [begin, end), whose subtrahends are taken on the same level: operators of
   /// different levels differ by more than shallow relief. Leaves `state` where the next level starts. Returns
   /// the first scale after the first one that has converged, or `scales`.
-  std::size_t carry(LevelState& state, std::size_t begin, std::size_t end) {
-    fit_work(state, ladder_.time[end - 1 + ladder_.band]);
+  std::size_t filter_on_level(LevelState& state, std::size_t begin, std::size_t end) {
+    limit_terms(state, ladder_.time[end - 1 + ladder_.band]);
     std::size_t converged = scales_;
     std::vector<std::vector<float>> curvature;
     LevelState walker{{}, {}, state.points, state.time, state.normals};
@@ -263,7 +254,7 @@ class ComponentFilter {
   }
 
   /// The work cap: rates are slowed down until the level's last time needs no more than max_terms.
-  void fit_work(LevelState& state, double last_time) {
+  void limit_terms(LevelState& state, double last_time) {
     HeatOperator& l = state.level.laplacian;
     const double allowed = options_.max_terms, needed = heat_terms(last_time - state.time, l.bound);
     if (needed <= allowed) return;
@@ -272,15 +263,9 @@ class ComponentFilter {
   }
 
   bool has_converged(const std::vector<Vec3d>& points, const HeatFlow& flow, std::size_t scale) {
-    Vec3d lo = moved(points[0], flow.moved[0]), hi = lo;
-    for (std::size_t v = 1; v < points.size(); ++v) {
-      const Vec3d p = moved(points[v], flow.moved[v]);
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min(lo[k], p[k]);
-        hi[k] = std::max(hi[k], p[k]);
-      }
-    }
-    const double now = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+    Box3d box;
+    for (std::size_t v = 0; v < points.size(); ++v) box.extend(moved(points[v], flow.moved[v]));
+    const double now = box.longest_side();
     out_.convergence[scale + 1] = static_cast<float>(now / range_);
     return scale > 0 && now / range_ < options_.convergence;
   }

@@ -14,8 +14,8 @@ namespace texmesh {
 struct SurfaceComponent {
   std::vector<Vec3d> points;           // centred, in units of the mean edge
   std::vector<std::uint32_t> corners;  // three vertices per triangle
-  std::vector<bool> fan_of_position;   // per corner: the triangle belongs to the vertex's own position, not a
-                                       // twin's
+  // Per corner: whether its triangle belongs to the vertex's own position, and not to a twin's.
+  std::vector<bool> fan_of_position;
   double mean_edge = 0, diagonal = 0;  // object units
   double noise = 0;                    // rounding of the stored coordinates, in units of the mean edge
 };

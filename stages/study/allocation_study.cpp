@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "format/base/box.h"
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
@@ -100,12 +101,10 @@ Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadde
                const std::vector<std::int16_t>& rungs, const RunContext& context) {
   Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
   const Pixels preview = decode_jpeg(ladder.preview, kMaxPreviewPixels);
-  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       if (plane.covered_texels[f] == 0) continue;
-      const std::uint32_t left = static_cast<std::uint32_t>(f % plane.columns) * w,
-                          top = static_cast<std::uint32_t>(f / plane.columns) * h;
+      const auto [left, top, w, h] = padded_fragment_rectangle(plane, f);
       Pixels block;
       if (rungs[f] != kSkipped)
         block = decode_fragment(ladder, static_cast<std::size_t>(rungs[f]), f, std::uint64_t{w} * h);
@@ -144,23 +143,23 @@ Rungs uniform_rungs(const std::vector<const PlaneTables*>& tables, int quality) 
 
 /// What whole rungs leave of the budget: fragment after fragment by falling eta of scale 0 (ties: plane,
 /// index) goes up by a rung where that fits, again and again until none does.
-void spend_rest(const std::vector<const PlaneTables*>& tables, std::uint64_t budget, Rungs& rungs) {
-  struct Place {
+void spend_remainder(const std::vector<const PlaneTables*>& tables, std::uint64_t budget, Rungs& rungs) {
+  struct RankedFragment {
     float eta;
     std::size_t plane, fragment;
   };
-  std::vector<Place> places;
+  std::vector<RankedFragment> ranked;
   for (std::size_t p = 0; p < tables.size(); ++p) {
     const std::vector<float> eta = eta_of(*tables[p], 0);
     for (std::size_t f = 0; f < eta.size(); ++f)
-      if (rungs[p][f] != kSkipped) places.push_back({eta[f], p, f});
+      if (rungs[p][f] != kSkipped) ranked.push_back({eta[f], p, f});
   }
-  std::stable_sort(places.begin(), places.end(),
-                   [](const Place& a, const Place& b) { return a.eta > b.eta; });
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const RankedFragment& a, const RankedFragment& b) { return a.eta > b.eta; });
   std::uint64_t spent = bytes_of(tables, rungs);
   for (bool more = spent < budget; more;) {
     more = false;
-    for (const Place& at : places) {
+    for (const RankedFragment& at : ranked) {
       const PlaneTables& t = *tables[at.plane];
       std::int16_t& rung = rungs[at.plane][at.fragment];
       const auto next = static_cast<std::size_t>(rung) + 1;
@@ -189,7 +188,7 @@ Rungs variable_rungs(const std::vector<const PlaneTables*>& tables, std::uint8_t
     }
     if (bytes_of(tables, rungs) <= budget) best = std::move(rungs);
   }
-  spend_rest(tables, budget, best);
+  spend_remainder(tables, budget, best);
   return best;
 }
 
@@ -243,24 +242,6 @@ void describe(const std::vector<const PlaneTables*>& tables, const Rungs& rungs,
   out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
 }
 
-struct Sphere {
-  Vec3d centre;
-  double radius = 0;
-};
-
-Sphere sphere_of(const Mesh& mesh) {
-  if (mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
-  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
-  for (const Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min<double>(lo[k], p[k]);
-      hi[k] = std::max<double>(hi[k], p[k]);
-    }
-  Sphere s{(lo + hi) * 0.5, 0};
-  for (const Vec3f p : mesh.positions) s.radius = std::max(s.radius, length(to_double(p) - s.centre));
-  return s;
-}
-
 Pixels picture_of(const Picture& picture) {
   Pixels out{picture.side_px, picture.side_px, 3, {}};
   out.data.reserve(picture.linear.size() * 3);
@@ -268,6 +249,78 @@ Pixels picture_of(const Picture& picture) {
     for (int c = 0; c < 3; ++c)
       out.data.push_back(picture.covered[k] ? encode(picture.linear[k][c]) : std::uint8_t{255});
   return out;
+}
+
+/// The budget is what one quality everywhere takes.
+std::vector<Chosen> choices_of(const std::vector<const PlaneTables*>& tables,
+                               const AllocationStudyOptions& options) {
+  std::vector<Chosen> out{{"source", {}}, {"uniform", uniform_rungs(tables, options.quality)}};
+  const std::uint64_t budget = bytes_of(tables, out[1].rungs);
+  out.push_back({"variable (3.2)", variable_rungs(tables, 0, options.width, budget)});
+  out.push_back({"variable (log)", variable_rungs(tables, 1, options.width, budget)});
+  out.push_back({"rate-distortion", bought_rungs(tables, budget)});
+  return out;
+}
+
+std::vector<ViewBuffer> views_of(const Mesh& mesh, const std::vector<Material>& materials, const Shown& shown,
+                                 const Fragments& fragments, const AllocationStudyOptions& options) {
+  if (mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
+  std::vector<std::uint32_t> source(mesh.triangles.size());
+  std::iota(source.begin(), source.end(), 0u);
+  ViewScene scene;
+  scene.mesh = &mesh, scene.triangles = &mesh.triangles, scene.triangle_source = &source;
+  scene.materials = &materials;
+  scene.base_plane = shown.of_material;
+  scene.emissive_plane.assign(materials.size(), -1);
+  for (const std::size_t p : shown.planes)
+    scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  const auto side = static_cast<std::uint32_t>(options.size_px);
+  std::vector<ViewBuffer> views;
+  for (int v = 0; v < options.views; ++v)
+    views.push_back(look_at(scene, camera_of(v, options.views, sphere.centre, sphere.radius), side));
+  return views;
+}
+
+/// What is the same for all choices.
+struct StudyScene {
+  const Shown& shown;
+  const Fragments& fragments;
+  const std::vector<Pixels>& pixels;
+  const Ladder& ladder;
+};
+
+std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choice,
+                                    const RunContext& context) {
+  std::vector<MipTexture> textures;
+  for (std::size_t p = 0; p < scene.shown.planes.size(); ++p) {
+    const std::size_t index = scene.shown.planes[p];
+    const TexturePlane& plane = scene.fragments.planes[index];
+    const Pixels& whole = scene.pixels.at(index);
+    textures.push_back(texture_of(
+        choice.rungs.empty() ? whole
+                             : compose(plane, whole, scene.ladder.planes.at(index), choice.rungs[p], context),
+        plane));
+  }
+  return textures;
+}
+
+/// Compares the views with the originals, which the first choice, the source, sets.
+void measure_views(const std::vector<ViewBuffer>& views, const std::vector<MipTexture>& textures,
+                   int picture_view, std::vector<ComparedPicture>& original, StudiedChoice& result) {
+  const bool first = original.empty();
+  PictureDifference sum;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Picture picture = draw(views[v], textures);
+    if (static_cast<int>(v) == picture_view) result.picture = picture_of(picture);
+    const ComparedPicture compared = prepare_comparison(picture);
+    if (first) original.push_back(compared);
+    const PictureDifference d = compare_pictures(original[v], compared);
+    sum.ssim += d.ssim, sum.difference += d.difference, sum.pixels += d.pixels;
+  }
+  if (sum.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
+  result.ssim = sum.ssim / static_cast<double>(sum.pixels);
+  result.difference = sum.difference / static_cast<double>(sum.pixels);
 }
 
 }  // namespace
@@ -281,55 +334,16 @@ std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
   const Shown shown = shown_planes(materials, fragments);
   std::vector<const PlaneTables*> shown_tables;
   for (const std::size_t p : shown.planes) shown_tables.push_back(&tables.planes.at(p));
-  std::vector<Chosen> choices{{"source", {}}, {"uniform", uniform_rungs(shown_tables, options.quality)}};
-  const std::uint64_t budget = bytes_of(shown_tables, choices[1].rungs);
-  choices.push_back({"variable (3.2)", variable_rungs(shown_tables, 0, options.width, budget)});
-  choices.push_back({"variable (log)", variable_rungs(shown_tables, 1, options.width, budget)});
-  choices.push_back({"rate-distortion", bought_rungs(shown_tables, budget)});
-
-  std::vector<std::uint32_t> source(mesh.mesh.triangles.size());
-  std::iota(source.begin(), source.end(), 0u);
-  ViewScene scene;
-  scene.mesh = &mesh.mesh, scene.triangles = &mesh.mesh.triangles, scene.triangle_source = &source;
-  scene.materials = &materials;
-  scene.base_plane = shown.of_material;
-  scene.emissive_plane.assign(materials.size(), -1);
-  for (const std::size_t p : shown.planes)
-    scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
-  const Sphere sphere = sphere_of(mesh.mesh);
-  const auto side = static_cast<std::uint32_t>(options.size_px);
-  std::vector<ViewBuffer> views;
-  for (int v = 0; v < options.views; ++v)
-    views.push_back(look_at(scene, camera_of(v, options.views, sphere.centre, sphere.radius), side));
-
+  const std::vector<Chosen> choices = choices_of(shown_tables, options);
+  const std::vector<ViewBuffer> views = views_of(mesh.mesh, materials, shown, fragments, options);
   std::vector<ComparedPicture> original;
   std::vector<StudiedChoice> out;
   for (const Chosen& choice : choices) {
-    std::vector<MipTexture> textures;
-    for (std::size_t p = 0; p < shown.planes.size(); ++p) {
-      const TexturePlane& plane = fragments.planes[shown.planes[p]];
-      const Pixels& whole = pixels.at(shown.planes[p]);
-      textures.push_back(
-          texture_of(choice.rungs.empty()
-                         ? whole
-                         : compose(plane, whole, ladder.planes.at(shown.planes[p]), choice.rungs[p], context),
-                     plane));
-    }
     StudiedChoice& result = out.emplace_back();
     result.name = choice.name;
     if (!choice.rungs.empty()) describe(shown_tables, choice.rungs, result);
-    PictureDifference sum;
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      const Picture picture = draw(views[v], textures);
-      if (static_cast<int>(v) == options.picture_view) result.picture = picture_of(picture);
-      const ComparedPicture compared = prepare_comparison(picture);
-      if (choice.rungs.empty()) original.push_back(compared);
-      const PictureDifference d = compare_pictures(original[v], compared);
-      sum.ssim += d.ssim, sum.difference += d.difference, sum.pixels += d.pixels;
-    }
-    if (sum.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
-    result.ssim = sum.ssim / static_cast<double>(sum.pixels);
-    result.difference = sum.difference / static_cast<double>(sum.pixels);
+    measure_views(views, textures_of({shown, fragments, pixels, ladder}, choice, context),
+                  options.picture_view, original, result);
     context.report(static_cast<double>(out.size()) / static_cast<double>(choices.size()));
   }
   return out;

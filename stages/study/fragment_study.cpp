@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/ladder/ladder.h"
 
@@ -48,7 +49,7 @@ CutImage cut_image(const Pixels& pixels, std::uint32_t grid) {
   plane.rows = (pixels.height_px + plane.fragment_height_px - 1) / plane.fragment_height_px;
   plane.width_px = plane.fragment_width_px * plane.columns;
   plane.height_px = plane.fragment_height_px * plane.rows;
-  plane.coverage.assign(std::size_t{plane.width_px} / 8 * plane.height_px, 0xff);
+  plane.coverage.assign(coverage_size_bytes(plane.width_px, plane.height_px), 0xff);
   const std::size_t count = plane.fragment_count();
   plane.covered_texels.assign(count, plane.fragment_width_px * plane.fragment_height_px);
   plane.surface_fraction.assign(count, 1.0f / static_cast<float>(count));
@@ -69,9 +70,9 @@ CutImage cut_image(const Pixels& pixels, std::uint32_t grid) {
   return out;
 }
 
-PixelWindow window_of(const Pixels& pixels, std::uint32_t x, std::uint32_t y, std::uint32_t width,
-                      std::uint32_t height) {
-  return {pixels.at(x, y), std::size_t{pixels.width_px} * pixels.channels, width, height};
+PixelWindow window_of(const Pixels& pixels, const TexelRectangle& r) {
+  return {pixels.at(r.left_px, r.top_px), std::size_t{pixels.width_px} * pixels.channels, r.width_px,
+          r.height_px};
 }
 
 struct FileSizes {
@@ -103,10 +104,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   std::vector<FileSizes> files(count * qualities);
   parallel_for(context, files.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const auto fragment = static_cast<std::uint32_t>(k % count);
-      const PixelWindow window = window_of(cut.pixels[0], fragment % plane.columns * plane.fragment_width_px,
-                                           fragment / plane.columns * plane.fragment_height_px,
-                                           plane.fragment_width_px, plane.fragment_height_px);
+      const PixelWindow window = window_of(cut.pixels[0], padded_fragment_rectangle(plane, k % count));
       files[k] = file_sizes(cut.pixels[0], window, options.qualities[k / count], options.subsampling);
     }
   });
@@ -142,7 +140,7 @@ std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const Fragme
   std::vector<FileSizes> whole(options.qualities.size());
   parallel_for(context, whole.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t q = begin; q < end; ++q)
-      whole[q] = file_sizes(pixels, window_of(pixels, 0, 0, pixels.width_px, pixels.height_px),
+      whole[q] = file_sizes(pixels, window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}),
                             options.qualities[q], options.subsampling);
   });
   std::vector<FragmentStudyRow> out;

@@ -14,6 +14,7 @@
 #include <jpeglib.h>
 
 #include "stages/base/run_context.h"
+#include "stages/data/coverage.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
 
@@ -80,7 +81,7 @@ inline Scene make_scene(Pixels image, std::uint32_t side) {
   p.rows = std::max(1u, image.height_px / side);
   p.width_px = p.columns * side;
   p.height_px = p.rows * side;
-  p.coverage.assign(std::size_t{(p.width_px + 7) / 8} * p.height_px, 0xff);
+  p.coverage.assign(coverage_size_bytes(p.width_px, p.height_px), 0xff);
   p.covered_texels.assign(p.fragment_count(), side * side);
   p.surface_fraction.assign(p.fragment_count(), 1.0f / static_cast<float>(p.fragment_count()));
   p.features.assign(p.fragment_count(), 1);

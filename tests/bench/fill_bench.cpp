@@ -8,6 +8,7 @@
 #include <iostream>
 #include <utility>
 
+#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/ladder/ladder.h"
@@ -24,7 +25,7 @@ using testing::fill_curve;
 using testing::FillPoint;
 
 bool covered(const TexturePlane& plane, std::uint32_t x, std::uint32_t y) {
-  return plane.coverage[(std::size_t{plane.width_px} + 7) / 8 * y + x / 8] >> (7 - x % 8) & 1;
+  return CoverageMask(plane).covered(x, y);
 }
 
 /// Every uncovered texel becomes the covered one that a brush fire reaches it from first.
@@ -85,11 +86,10 @@ std::vector<double> mixed_means(const Fragments& fragments, const std::vector<st
     const TexturePlane& plane = fragments.planes[p];
     for (std::uint32_t f = 0; f < plane.fragment_count(); ++f) {
       if (plane.covered_texels[f] == 0) continue;
-      const std::uint32_t left = f % plane.columns * plane.fragment_width_px,
-                          top = f / plane.columns * plane.fragment_height_px;
+      const auto [left, top, width, height] = padded_fragment_rectangle(plane, f);
       const Pixels shows = decode_fragment(ladder.planes[p], rung, f, std::uint64_t{1} << 20);
-      for (std::uint32_t y = 0; y < plane.fragment_height_px; y += kSide)
-        for (std::uint32_t x = 0; x < plane.fragment_width_px; x += kSide) {
+      for (std::uint32_t y = 0; y < height; y += kSide)
+        for (std::uint32_t x = 0; x < width; x += kSide) {
           if (left + x + kSide > plane.width_px || top + y + kSide > plane.height_px) continue;
           std::uint32_t count = 0;
           for (std::uint32_t k = 0; k < kSide * kSide; ++k)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/box.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/import/import.h"
@@ -23,13 +24,8 @@ class NoFiles : public Resolver {
 };
 
 double longest_side(const Mesh& mesh) {
-  double out = 0;
-  for (int k = 0; k < 3; ++k) {
-    float low = mesh.positions.at(0)[k], high = low;
-    for (const Vec3f p : mesh.positions) low = std::min(low, p[k]), high = std::max(high, p[k]);
-    out = std::max(out, static_cast<double>(high) - static_cast<double>(low));
-  }
-  return out > 0 ? out : 1;
+  const double side = to_double(bounding_box(mesh.positions)).longest_side();
+  return side > 0 ? side : 1;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "format/base/portable_math.h"
 #include "pipeline/extract/budget/quality_search.h"
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
@@ -24,7 +25,7 @@ std::vector<std::uint8_t> coverage_by(const Model& model, std::uint32_t image, s
   for (std::size_t k = 0; k < model.images.size(); ++k)
     if (model.images[k].name == image_name(image))
       return coverage_of(model.mesh, model.materials, static_cast<std::int32_t>(k), width, height);
-  return std::vector<std::uint8_t>((std::size_t{width} + 7) / 8 * height);
+  return std::vector<std::uint8_t>(coverage_size_bytes(width, height));
 }
 
 /// Texels of colours that S_0 shows, at full size, over the pixels that its whole surface has on the screen:

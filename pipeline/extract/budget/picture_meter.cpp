@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
@@ -76,15 +77,7 @@ MipTexture mip_texture(const Pixels& pixels) {
 
 std::vector<ViewCamera> cameras_around(const Mesh& mesh, int count) {
   if (mesh.positions.empty()) throw StageError("extract", "S_0", "positions", "none");
-  Vec3d lo = to_double(mesh.positions[0]), hi = lo;
-  for (const Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min<double>(lo[k], p[k]);
-      hi[k] = std::max<double>(hi[k], p[k]);
-    }
-  const Vec3d centre = (lo + hi) * 0.5;
-  double radius = 0;
-  for (const Vec3f p : mesh.positions) radius = std::max(radius, length(to_double(p) - centre));
+  const auto [centre, radius] = bounding_sphere(mesh.positions);
   if (!(radius > 0)) throw StageError("extract", "S_0", "an extent above 0", "one point");
   std::vector<ViewCamera> out;
   for (int v = 0; v < count; ++v) out.push_back(camera_of(v, count, centre, radius));

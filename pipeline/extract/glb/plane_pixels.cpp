@@ -8,6 +8,7 @@
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
 
@@ -42,7 +43,7 @@ void require_fragment(const Pixels& pixels, const TextureInfo& info, const std::
 
 /// Coverage bits (TexturePlane::coverage) of the texels that some fragment has given.
 std::vector<std::uint8_t> known_texels(const TextureInfo& info, const std::vector<bool>& known) {
-  const std::size_t stride = (std::size_t{info.width_px} + 7) / 8;
+  const std::size_t stride = coverage_stride_bytes(info.width_px);
   std::vector<std::uint8_t> bits(stride * info.height_px);
   for (std::uint32_t y = 0; y < info.height_px; ++y)
     for (std::uint32_t x = 0; x < info.width_px; ++x)

@@ -5,8 +5,9 @@
 
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/plane_pixels.h"
+#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
 namespace {
@@ -117,7 +118,7 @@ Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::u
   const Pixels& p = from[level];
   Pixels out = reduced(p, p.width_px, p.height_px, std::min(width_px, p.width_px),
                        std::min(height_px, p.height_px), kind, images_[index].colours ? sharpening : 0.f);
-  if (coverage.size() == (std::size_t{out.width_px} + 7) / 8 * out.height_px)
+  if (coverage.size() == coverage_size_bytes(out.width_px, out.height_px))
     fill_uncovered(out, coverage, context_);
   return out;
 }
@@ -151,7 +152,7 @@ std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Materi
       if (ref.image != image || ref.texcoord > 1) return;
       add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
     });
-  return coverage.take();
+  return coverage.release_bits();
 }
 
 }  // namespace texmesh

@@ -1,5 +1,6 @@
 #include <cstring>
 
+#include "format/base/box.h"
 #include "pipeline/inspect/debug/debug_view.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
@@ -23,9 +24,7 @@ std::size_t add_attribute(GlbWriter& glb, const std::vector<T>& values, const ch
 }
 
 std::size_t add_positions(GlbWriter& glb, const std::vector<Vec3f>& points) {
-  Vec3f lo = points[0], hi = lo;
-  for (Vec3f p : points)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+  const Box3f box = bounding_box(points);
   const std::size_t view = glb.add_view(bytes_of(points), 0, kArrayBuffer);
   const auto list = [](Vec3f p) {
     return Json::array({GlbWriter::shortest(p.x), GlbWriter::shortest(p.y), GlbWriter::shortest(p.z)});
@@ -34,8 +33,8 @@ std::size_t add_positions(GlbWriter& glb, const std::vector<Vec3f>& points) {
                            {"componentType", kFloat},
                            {"count", points.size()},
                            {"type", "VEC3"},
-                           {"min", list(lo)},
-                           {"max", list(hi)}});
+                           {"min", list(box.min)},
+                           {"max", list(box.max)}});
 }
 
 std::size_t add_indices(GlbWriter& glb, const std::vector<std::uint32_t>& indices) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "pipeline/inspect/debug/debug_view.h"
@@ -14,25 +15,7 @@ constexpr double kTube = 0.004, kPoint = 0.01;  // half width of lines and point
 constexpr std::uint32_t kBar = 16;              // width of the bar of colours, px
 constexpr double kElevation = 0.35;             // sine of the angle the views look down at
 
-struct Bounds {
-  Vec3d centre;
-  double radius = 1;
-};
-
-Bounds bounds_of(const Mesh& mesh) {
-  Vec3d lo = to_double(mesh.positions.at(0)), hi = lo;
-  for (Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], double{p[k]});
-      hi[k] = std::max(hi[k], double{p[k]});
-    }
-  const Vec3d centre = (lo + hi) * 0.5;
-  double radius = 0;
-  for (Vec3f p : mesh.positions) radius = std::max(radius, length(to_double(p) - centre));
-  return {centre, radius > 0 ? radius : 1};
-}
-
-ViewCamera camera_at(double angle, const Bounds& bounds) {
+ViewCamera camera_at(double angle, const BoundingSphere& bounds) {
   const double ring = std::sqrt(1 - kElevation * kElevation);
   ViewCamera camera;
   camera.z = {ring * portable::sin(angle), kElevation, ring * portable::cos(angle)};
@@ -134,7 +117,8 @@ void paste_bar(Pixels& out) {
 }  // namespace
 
 std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px) {
-  const Bounds bounds = bounds_of(view.mesh);
+  BoundingSphere bounds = bounding_sphere(view.mesh.positions);
+  if (!(bounds.radius > 0)) bounds.radius = 1;
   Mesh mesh = view.mesh;
   mesh.normals.clear();  // flat: what the triangles are like is to be seen
   const Mesh bars = bars_of(view, 2 * bounds.radius);

@@ -10,7 +10,7 @@
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "pipeline/io/text_table.h"
-#include "stages/ssf/heat_levels.h"
+#include "stages/geometry/component_boxes.h"
 #include "stages/ssf/ssf.h"
 
 namespace texmesh {
@@ -86,23 +86,6 @@ void require_same(std::size_t positions, std::size_t values, const char* what) {
 
 std::string share(double count, double of) { return fixed(of > 0 ? 100 * count / of : 0, 1) + " %"; }
 
-std::vector<double> component_diagonals(const ConditionedMesh& mesh) {
-  std::vector<Vec3f> lo(mesh.component_count), hi(mesh.component_count);
-  std::vector<bool> seen(mesh.component_count, false);
-  for (std::size_t p = 0; p < mesh.component.size(); ++p) {
-    const std::uint32_t c = mesh.component[p];
-    const Vec3f at = mesh.mesh.positions[p];
-    for (int k = 0; k < 3; ++k) {
-      lo[c][k] = seen[c] ? std::min(lo[c][k], at[k]) : at[k];
-      hi[c][k] = seen[c] ? std::max(hi[c][k], at[k]) : at[k];
-    }
-    seen[c] = true;
-  }
-  std::vector<double> diagonal;
-  for (std::size_t c = 0; c < lo.size(); ++c) diagonal.push_back(length(to_double(hi[c]) - to_double(lo[c])));
-  return diagonal;
-}
-
 /// Neighbours along the edges, [first[p], first[p + 1]) of `list`; with repetitions.
 struct Neighbours {
   std::vector<std::uint32_t> first, list;
@@ -123,15 +106,15 @@ struct Neighbours {
 std::vector<double> spread_features(const ConditionedMesh& mesh, const ScaleMap& map) {
   const Mesh& m = mesh.mesh;
   const Neighbours neighbours(m);
-  const std::vector<double> diagonal = component_diagonals(mesh);
+  const std::vector<Box3f> boxes = component_boxes(mesh.component, m.positions);
   const SsfOptions usual;
   std::vector<double> value(map.persistence.begin(), map.persistence.end());
   std::vector<std::uint32_t> seen_from(value.size(), kNoIndex), near;
   for (std::uint32_t feature = 0; feature < value.size(); ++feature) {
     const std::uint8_t scale = map.persistence[feature];
-    const double sigma =
-        std::min<double>(map.sigma.at(scale), usual.sigma_max * diagonal[mesh.component[feature]]);
-    const double reach = 0.5 * seed_radius(sigma, usual.error_ratio);
+    const double diagonal = to_double(boxes[mesh.component[feature]]).diagonal();
+    const double sigma = std::min<double>(map.sigma.at(scale), usual.sigma_max * diagonal);
+    const double reach = 0.5 * feature_spacing(sigma, usual);
     near.assign(1, feature);
     seen_from[feature] = feature;
     for (std::size_t i = 0; i < near.size(); ++i)

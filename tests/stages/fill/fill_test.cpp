@@ -1,28 +1,22 @@
+#include "stages/fill/fill.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/halve_pixels.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
+#include "tests/support/coverage_bits.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
 namespace {
 
+using testing::coverage_where;
 using testing::Random;
-
-std::vector<std::uint8_t> coverage_where(std::uint32_t w, std::uint32_t h, auto&& covered) {
-  std::vector<std::uint8_t> bits((std::size_t{w} + 7) / 8 * h);
-  for (std::uint32_t y = 0; y < h; ++y)
-    for (std::uint32_t x = 0; x < w; ++x)
-      if (covered(x, y))
-        bits[(std::size_t{w} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
-  return bits;
-}
 
 Pixels noise(std::uint32_t w, std::uint32_t h, std::uint32_t channels) {
   Pixels out{w, h, channels, {}};
@@ -261,7 +255,7 @@ Fragments with_mips(std::uint32_t w, std::uint32_t h, TextureRole role) {
     p.fragment_width_px = (p.width_px + 15) / 16 * 16;
     p.fragment_height_px = (p.height_px + 15) / 16 * 16;
     p.columns = p.rows = 1;
-    p.coverage.assign((std::size_t{p.width_px} + 7) / 8 * p.height_px, 0xf0);
+    p.coverage.assign(coverage_size_bytes(p.width_px, p.height_px), 0xf0);
     out.planes.push_back(p);
   }
   return out;
@@ -302,12 +296,7 @@ TEST(Fill, MipsDoNotInheritFlatBlocks) {
   Image image = probe_image("a.png", write_png(source), {});
   Fragments fragments = with_mips(128, 128, TextureRole::kData);
   const auto cover_left = [](TexturePlane& p, std::uint32_t texels) {
-    for (std::uint32_t y = 0; y < p.height_px; ++y)
-      for (std::uint32_t x = 0; x < p.width_px; ++x) {
-        std::uint8_t& bits = p.coverage[std::size_t{y} * ((p.width_px + 7) / 8) + x / 8];
-        const auto bit = static_cast<std::uint8_t>(0x80 >> x % 8);
-        bits = static_cast<std::uint8_t>(x < texels ? bits | bit : bits & ~bit);
-      }
+    p.coverage = coverage_where(p.width_px, p.height_px, [=](auto x, auto) { return x < texels; });
   };
   cover_left(fragments.planes[0], 40);
   cover_left(fragments.planes[1], 28);

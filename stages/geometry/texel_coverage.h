@@ -39,7 +39,7 @@ class TexelCoverage {
   /// More triangles with other wrap modes.
   void set_wrap(Wrap wrap_s, Wrap wrap_t) { wrap_s_ = wrap_s, wrap_t_ = wrap_t; }
   const std::vector<std::uint8_t>& bits() const { return bits_; }
-  std::vector<std::uint8_t> take() { return std::move(bits_); }
+  std::vector<std::uint8_t> release_bits() { return std::move(bits_); }
 
  private:
   struct Extent {

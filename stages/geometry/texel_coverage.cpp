@@ -1,10 +1,11 @@
-#include "stages/image/texel_coverage.h"
+#include "stages/geometry/texel_coverage.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
@@ -48,11 +49,11 @@ TexelCoverage::TexelCoverage(std::uint32_t width_px, std::uint32_t height_px, Wr
       height_(height_px),
       wrap_s_(wrap_s),
       wrap_t_(wrap_t),
-      bits_((std::size_t{width_px} + 7) / 8 * height_px),
+      bits_(coverage_size_bytes(width_px, height_px)),
       row_full_(height_px) {}
 
 void TexelCoverage::mark(std::uint32_t row, std::uint32_t first, std::uint32_t last) {
-  std::uint8_t* bytes = bits_.data() + (std::size_t{width_} + 7) / 8 * row;
+  std::uint8_t* bytes = bits_.data() + coverage_stride_bytes(width_) * row;
   const std::uint32_t a = first / 8, b = last / 8;
   const auto head = static_cast<std::uint8_t>(0xff >> (first % 8));
   const auto tail = static_cast<std::uint8_t>(0xff << (7 - last % 8));
@@ -104,7 +105,7 @@ void TexelCoverage::trace(const std::array<Vec2d, 3>& triangle, std::int64_t fir
   const auto slab_of = [&](double y) {
     return std::clamp(static_cast<std::int64_t>(std::floor(y + 0.5)), first, last);
   };
-  const auto put = [&](std::int64_t slab, double x) {
+  const auto widen_slab = [&](std::int64_t slab, double x) {
     Extent& e = slabs_[static_cast<std::size_t>(slab - first)];
     e.lo = std::min(e.lo, x);
     e.hi = std::max(e.hi, x);
@@ -114,14 +115,14 @@ void TexelCoverage::trace(const std::array<Vec2d, 3>& triangle, std::int64_t fir
           b = triangle[static_cast<std::size_t>((edge + 1) % 3)];
     if (a.y > b.y) std::swap(a, b);
     const std::int64_t from = slab_of(a.y), to = slab_of(b.y);
-    put(from, a.x);
-    put(to, b.x);
+    widen_slab(from, a.x);
+    widen_slab(to, b.x);
     for (std::int64_t k = from; k < to; ++k) {
       const double y = static_cast<double>(k) + 0.5;
       const double x =
           std::clamp(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)), std::min(a.x, b.x), std::max(a.x, b.x));
-      put(k, x);
-      put(k + 1, x);
+      widen_slab(k, x);
+      widen_slab(k + 1, x);
     }
   }
 }

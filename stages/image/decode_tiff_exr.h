@@ -1,0 +1,25 @@
+#pragma once
+// Inside stages: TIFF and EXR by OpenImageIO.
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "format/base/bytes.h"
+#include "stages/image/image_format.h"
+
+namespace texmesh {
+
+/// Interleaved samples as the file stores them: 8 or 16 bits, or floats, which wider integers become, too.
+using StoredSamples = std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>>;
+
+/// Channels beyond colour and alpha do not count. `name` is for messages. InputError for a header that cannot
+/// be read, for images outside the limits, and for volumes and deep data.
+ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
+                                 const ImageLimits& limits);
+
+/// InputError when the file is damaged or truncated (with the rows), when it cannot hold what its header
+/// claims, and when its header is not the one that `image` was made from.
+StoredSamples decode_tiff_exr(const Image& image);
+
+}  // namespace texmesh

@@ -1,0 +1,52 @@
+#include "stages/image/decode_webp.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/stages/image/image_files.h"
+
+namespace texmesh {
+namespace {
+
+using namespace testing;  // NOLINT: fixtures
+
+TEST(DecodeWebp, WebpLossless) {
+  for (int channels : {3, 4}) {
+    const Bytes samples = test_picture(40, 30, channels);  // alpha 0 with colour under it included
+    const Bytes file = webp_bytes(40, 30, channels, samples);
+    const Image image = probe(file);
+    EXPECT_EQ(image.format, ImageFormat::kWebp);
+    EXPECT_EQ(image.width_px, 40u);
+    EXPECT_EQ(image.height_px, 30u);
+    const Pixels pixels = decode_image(image);
+    ASSERT_EQ(pixels.channels, static_cast<std::uint32_t>(channels));
+    EXPECT_EQ(pixels.data, samples) << channels;
+    ImageLimits small;
+    small.max_side_px = 39;
+    EXPECT_THROW(probe_image("w", file, small), InputError);
+  }
+}
+
+TEST(DecodeWebp, WebpThatClaimsMoreThanItHasNamesTheRow) {
+  Bytes webp = webp_bytes(8, 8, 3, test_picture(8, 8, 3));
+  ASSERT_EQ(webp[20], 0x2f);
+  const std::uint32_t sides = 16382u | 16382u << 14;  // less 1, 14 bits each
+  for (int i = 0; i < 4; ++i)
+    webp[21 + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(
+        (i == 3 ? webp[24] & 0xf0u : 0u) | (sides >> (8 * i) & (i == 3 ? 0x0fu : 0xffu)));
+  const Image image = probe(webp);
+  ASSERT_EQ(image.width_px, 16383u);
+  const std::string error = error_of([&] { decode_image(image); });
+  EXPECT_NE(error.find("row "), std::string::npos) << error;
+  EXPECT_NE(error.find("of 16383"), std::string::npos) << error;
+}
+
+TEST(DecodeWebp, WebpOfOneColourIsSmallAndWhole) {
+  Bytes samples;
+  for (int i = 0; i < 512 * 512; ++i) samples.insert(samples.end(), {10, 20, 30});
+  const Bytes webp = webp_bytes(512, 512, 3, samples);
+  ASSERT_LT(webp.size(), samples.size() / 1000);
+  EXPECT_EQ(decode_image(probe(webp)).data, samples);
+}
+
+}  // namespace
+}  // namespace texmesh
