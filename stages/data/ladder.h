@@ -39,16 +39,12 @@ struct PlaneLadder {
       false;  // the last rung holds the coefficients of the source, see stages/ladder/lossless_top.h
   SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
-  std::vector<std::uint8_t>
-      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
-                // mips are means of (stages/image/halve_pixels.h); mips have none
-  std::uint32_t preview_width_px = 0, preview_height_px = 0;
   // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
   // of its source's quantisers away
   SizeKnots knots;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px, s.knots);
+    a(s.codec, s.lossless, s.source, s.rungs, s.knots);
   }
 };
 

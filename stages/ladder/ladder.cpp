@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "stages/base/parallel.h"
-#include "stages/image/halve_pixels.h"
-#include "stages/jpeg/jpeg.h"
+#include "stages/image/check_pixels.h"
 #include "stages/ladder/rung_hull.h"
 #include "stages/ladder/size_knots.h"
 
@@ -21,7 +20,6 @@ namespace {
 // rungs gain 0.1 dB over 10).
 constexpr std::size_t kMaxRungs = 16;
 constexpr std::size_t kFragmentsPerTask = 1;
-constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
 
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
   throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
@@ -43,22 +41,22 @@ void check_rungs(const std::vector<int>& rungs, const char* name) {
   }
 }
 
-void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const LadderOptions& options) {
+void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
+           const LadderOptions& options) {
   check_rungs(options.rungs, "rungs");
   check_rungs(options.normal_rungs, "normal_rungs");
   check_rungs(options.data_rungs, "data_rungs");
   check_rungs(options.alpha_rungs, "alpha_rungs");
-  if (pixels.size() != fragments.planes.size())
-    fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
+  check_pixels("ladder", fragments, pixels);
   for (std::size_t p = 0; p < pixels.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
-    const std::uint64_t width = std::uint64_t{plane.columns} * plane.fragment_width_px;
-    const std::uint64_t height = std::uint64_t{plane.rows} * plane.fragment_height_px;
-    if (pixels[p].width_px != width || pixels[p].height_px != height ||
-        pixels[p].channels != plane.channels || pixels[p].data.size() != width * height * plane.channels ||
-        plane.covered_texels.size() != plane.fragment_count())
-      fail("plane " + std::to_string(p), std::to_string(width) + " x " + std::to_string(height),
-           std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
+    const std::string place = "plane " + std::to_string(p);
+    if (plane.covered_texels.size() != plane.fragment_count())
+      fail(place + ": covered texels", std::to_string(plane.fragment_count()) + " fragments",
+           std::to_string(plane.covered_texels.size()));
+    if (plane.mip > 0 && options.hull_gain >= 0 &&
+        (plane.base >= previews.planes.size() || previews.planes[plane.base].file.empty()))
+      fail(place, "a preview of the full size", "none");
   }
 }
 
@@ -182,22 +180,6 @@ std::vector<PixelWindow> size_sample(const TexturePlane& plane, const Pixels& pi
     sample.push_back(window);
   }
   return sample;
-}
-
-void encode_preview(const TexturePlane& plane, const Pixels& pixels, const LadderOptions& options,
-                    const RunContext& context, PlaneLadder& out) {
-  if (plane.mip > 0) return;  // its full-size plane's preview serves
-  const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
-  const Halving kind = halving_of(plane.role, plane.channels);
-  const auto encode = [&](const Pixels& small) {
-    out.preview = encode_jpeg(small, options.preview_quality, subsampling);
-    out.preview_width_px = small.width_px;
-    out.preview_height_px = small.height_px;
-  };
-  const Pixels eighth = eighth_of(pixels, plane.width_px, plane.height_px, kind, context);
-  encode(eighth);
-  if (out.preview.size() >= kPreviewLimitBytes)
-    encode(halved(eighth, eighth.width_px, eighth.height_px, kind));
 }
 
 /// What is encoded of one plane.
@@ -365,9 +347,9 @@ std::vector<PlaneWork> remaining_work(const std::vector<PlaneWork>& before,
 
 }  // namespace
 
-Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
+Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
                      const LadderOptions& options, const RunContext& context) {
-  check(fragments, pixels, options);
+  check(fragments, pixels, previews, options);
   const std::size_t planes = fragments.planes.size();
   Ladder ladder;
   ladder.planes.resize(planes);
@@ -385,19 +367,12 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
       out.knots = measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
     context.report(0.15 * static_cast<double>(p + 1) / static_cast<double>(planes));
   }
-  RunContext inner = context;
-  inner.progress = nullptr;
-  parallel_for(context, planes, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p)
-      encode_preview(fragments.planes[p], pixels[p], options, inner, ladder.planes[p]);
-  });
-  context.report(0.2);
   const auto encode = [&](const std::vector<PlaneWork>& work, Progress progress) {
     encode_planes(fragments, pixels, options.uncovered, codecs, work, ladder.planes, progress, context);
   };
   const std::vector<PlaneWork> first = first_work(fragments, options.hull_gain);
-  encode(first, {0.2, 0.85});
-  auto kept = drop_rungs_off_hull(fragments, pixels, options.hull_gain, ladder, context);
+  encode(first, {0.15, 0.85});
+  auto kept = drop_rungs_off_hull(fragments, pixels, previews, options.hull_gain, ladder, context);
   encode(remaining_work(first, std::move(kept), ladder.planes), {0.9, 1});
   return ladder;
 }

@@ -7,12 +7,13 @@
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 #include "stages/data/subsampling.h"
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 10;
+inline constexpr int kLadderVersion = 11;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.
@@ -41,7 +42,7 @@ struct LadderOptions {
   Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
   Uncovered uncovered = Uncovered::kFree;
   int training_fragments = 64;
-  int preview_quality = 60;
+  int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
   double hull_gain = 0.05;
   bool lossless_top = false;
   template <class S, class V>
@@ -77,13 +78,13 @@ struct LadderOptions {
 /// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
 /// with uncovered texels, when those are free, by stages/jpeg/masked_jpeg.h, so that only covered texels cost
 /// bytes. Tables are trained on covered fragments spread over the plane and have a code for every symbol, so
-/// that no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment
-/// has tables and a preview but no data. Works on the pixels as they stand: beside the result it takes some
-/// fragments' streams per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for
-/// pixels that do not fit the planes. Same bytes for any thread count. Of mips a few
-/// fragments are encoded at every rung, which decide what rungs are worth storing
+/// that no fragment needs tables of its own. `pixels` are fill_planes()'s; `previews`, make_previews()'s, are
+/// read where planes have mips. A plane without a covered fragment has tables but no data. Works on the
+/// pixels as they stand: beside the result it takes some fragments' streams per thread. Throws StageError for
+/// rungs that do not rise or lie outside 1..100 and for pixels that do not fit the planes. Same bytes for any
+/// thread count. Of mips a few fragments are encoded at every rung, which decide what rungs are worth storing
 /// (stages/ladder/rung_hull.h), and then the others at these.
-Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
+Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
                      const LadderOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -433,7 +433,8 @@ std::vector<RungPair> measure_own(const TexturePlane& plane, const Pixels& pixel
 }
 
 std::vector<std::vector<std::size_t>> drop_rungs_off_hull(const Fragments& fragments,
-                                                          const std::vector<Pixels>& pixels, double gain,
+                                                          const std::vector<Pixels>& pixels,
+                                                          const Previews& previews, double gain,
                                                           Ladder& ladder, const RunContext& context) {
   RunContext inner = context;
   inner.progress = nullptr;
@@ -457,7 +458,7 @@ std::vector<std::vector<std::size_t>> drop_rungs_off_hull(const Fragments& fragm
       first = last;
       if (level > 0)
         keep_for_display(
-            measure_own(fragments.planes[p], pixels[p], plane, ladder.planes[base].preview, inner),
+            measure_own(fragments.planes[p], pixels[p], plane, previews.planes[base].file, inner),
             is_colour(fragments.planes[p].role) ? kShownWell : kDataShownWell, kOwnGain, of_rung);
       kept[p] = keep_rungs(std::move(of_rung), plane);
     }

@@ -6,6 +6,7 @@
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 
 namespace texmesh {
 
@@ -55,7 +56,8 @@ void keep_for_display(const std::vector<RungPair>& own, double shown_well, doubl
 /// on those below, so there only rungs above the highest kept are removed. A negative gain keeps all. The
 /// ladder needs only the fragments of hull_sample(). Returns the indices of the rungs that stay, by plane.
 std::vector<std::vector<std::size_t>> drop_rungs_off_hull(const Fragments& fragments,
-                                                          const std::vector<Pixels>& pixels, double gain,
+                                                          const std::vector<Pixels>& pixels,
+                                                          const Previews& previews, double gain,
                                                           Ladder& ladder, const RunContext& context);
 
 }  // namespace texmesh

@@ -6,6 +6,7 @@
 
 #include "format/base/sha256.h"
 #include "stages/base/parallel.h"
+#include "stages/image/check_pixels.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/lut/size_model.h"
 #include "stages/measure/fragment_meter.h"
@@ -16,25 +17,20 @@ namespace {
 constexpr int kGammas = 21;  // 0, 0.05 .. 1
 
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
-           const Ladder& ladder, const LutOptions& options) {
+           const Ladder& ladder, const Previews& previews, const LutOptions& options) {
   const auto fail = [](std::string place, std::string expected, std::string found) {
     throw StageError("lut", std::move(place), std::move(expected), std::move(found));
   };
   const std::size_t planes = fragments.planes.size();
-  if (pixels.size() != planes || predictors.planes.size() != planes || ladder.planes.size() != planes)
-    fail("planes", std::to_string(planes) + " of each kind",
-         std::to_string(pixels.size()) + ", " + std::to_string(predictors.planes.size()) + " and " +
-             std::to_string(ladder.planes.size()));
+  check_pixels("lut", fragments, pixels);
+  for (const std::size_t found : {predictors.planes.size(), ladder.planes.size(), previews.planes.size()})
+    if (found != planes) fail("planes", std::to_string(planes) + " of each kind", std::to_string(found));
   for (std::size_t p = 0; p < planes; ++p) {
     const TexturePlane& plane = fragments.planes[p];
     const std::string place = "plane " + std::to_string(p);
     if (predictors.planes[p].vqp.size() != plane.fragment_count())
       fail(place + ": predictors", std::to_string(plane.fragment_count()),
            std::to_string(predictors.planes[p].vqp.size()));
-    if (pixels[p].width_px != plane.columns * plane.fragment_width_px ||
-        pixels[p].height_px != plane.rows * plane.fragment_height_px || pixels[p].channels != plane.channels)
-      fail(place + ": pixels", "whole fragments",
-           std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
     for (const LadderRung& rung : ladder.planes[p].rungs)
       if (rung.offset.size() != plane.fragment_count() + 1 || rung.offset.back() != rung.data.size())
         fail(place + ": rung " + std::to_string(rung.quality),
@@ -232,14 +228,14 @@ std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
 }  // namespace
 
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
-                           const RunContext& context) {
-  check(fragments, pixels, predictors, ladder, options);
+                           const Predictors& predictors, const Ladder& ladder, const Previews& previews,
+                           const LutOptions& options, const RunContext& context) {
+  check(fragments, pixels, predictors, ladder, previews, options);
   PackageTables out;
-  std::vector<PreviewSamples> previews;
+  std::vector<PreviewSamples> skipped;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];  // a mip is skipped for its full-size plane's preview
-    previews.emplace_back(plane, ladder.planes[plane.mip > 0 ? plane.base : p].preview);
+    skipped.emplace_back(plane, previews.planes[plane.mip > 0 ? plane.base : p].file);
   }
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
@@ -252,7 +248,7 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto [p, f] = tasks[t];
-      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], previews[p], f, out.planes[p]);
+      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, out.planes[p]);
       context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
     }
   });

@@ -7,6 +7,7 @@
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
 #include "stages/data/predictors.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -57,7 +58,7 @@ struct LutOptions {
 /// (stages/lut/size_model.h). `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each
 /// other, FormatError for a stream that does not decode. Same result for any thread count.
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
-                           const RunContext& context);
+                           const Predictors& predictors, const Ladder& ladder, const Previews& previews,
+                           const LutOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -5,9 +5,9 @@
 
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
-#include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
@@ -72,7 +72,7 @@ struct ScalesOptions {
 /// bounds. Throws StageError when nothing is left on the grid. Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
-                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context);
 
 }  // namespace texmesh

@@ -97,9 +97,10 @@ std::uint8_t preview_value(const Pixels& preview, const TexturePlane& plane, std
 
 /// A plane as a client puts it together from the chosen rungs.
 Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadder& ladder,
-               const std::vector<std::int16_t>& rungs, const RunContext& context) {
+               const PlanePreview& preview_file, const std::vector<std::int16_t>& rungs,
+               const RunContext& context) {
   Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
-  const Pixels preview = decode_jpeg(ladder.preview, kMaxPreviewPixels);
+  const Pixels preview = decode_jpeg(preview_file.file, kMaxPreviewPixels);
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
@@ -272,12 +273,10 @@ Pixels picture_of(const Picture& picture) {
 
 }  // namespace
 
-std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
-                                            const std::vector<Material>& materials,
-                                            const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                            const Ladder& ladder, const PackageTables& tables,
-                                            const AllocationStudyOptions& options,
-                                            const RunContext& context) {
+std::vector<StudiedChoice> study_allocation(
+    const ConditionedMesh& mesh, const std::vector<Material>& materials, const Fragments& fragments,
+    const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
+    const PackageTables& tables, const AllocationStudyOptions& options, const RunContext& context) {
   const Shown shown = shown_planes(materials, fragments);
   std::vector<const PlaneTables*> shown_tables;
   for (const std::size_t p : shown.planes) shown_tables.push_back(&tables.planes.at(p));
@@ -309,11 +308,11 @@ std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
     for (std::size_t p = 0; p < shown.planes.size(); ++p) {
       const TexturePlane& plane = fragments.planes[shown.planes[p]];
       const Pixels& whole = pixels.at(shown.planes[p]);
-      textures.push_back(
-          texture_of(choice.rungs.empty()
-                         ? whole
-                         : compose(plane, whole, ladder.planes.at(shown.planes[p]), choice.rungs[p], context),
-                     plane));
+      textures.push_back(texture_of(
+          choice.rungs.empty() ? whole
+                               : compose(plane, whole, ladder.planes.at(shown.planes[p]),
+                                         previews.planes.at(shown.planes[p]), choice.rungs[p], context),
+          plane));
     }
     StudiedChoice& result = out.emplace_back();
     result.name = choice.name;

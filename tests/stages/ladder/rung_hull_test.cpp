@@ -8,6 +8,7 @@
 
 #include "stages/image/halve_pixels.h"
 #include "stages/ladder/ladder.h"
+#include "stages/previews/previews.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -92,6 +93,7 @@ TEST(KeepForDisplay, NothingOfNothing) {
 struct Chain {
   Fragments fragments;
   std::vector<Pixels> pixels;
+  Previews previews() const { return make_previews(fragments, pixels, {}, RunContext{}); }
 };
 
 Pixels shades(std::uint32_t width, std::uint32_t height, bool noise) {
@@ -136,7 +138,7 @@ Ladder encode(const Chain& chain, double gain, int threads = 1, LadderMode mode 
   options.normal_rungs = options.rungs;  // as low as those of colours
   RunContext context;
   context.threads = threads;
-  return encode_ladder(chain.fragments, chain.pixels, options, context);
+  return encode_ladder(chain.fragments, chain.pixels, chain.previews(), options, context);
 }
 
 constexpr double kKeepAll = -1;
@@ -209,8 +211,8 @@ TEST(RungHull, TheSampleShowsAllThatIsMeasuredAndItsBytesStandForThePlanes) {
     return measure_pairs(chain.fragments, chain.pixels, ladder, 0, RunContext{});
   };
   const auto own_of = [&](const Ladder& ladder) {
-    return measure_own(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1], ladder.planes[0].preview,
-                       RunContext{});
+    return measure_own(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1],
+                       chain.previews().planes[0].file, RunContext{});
   };
   for (const auto& [want, got] : {std::pair{pairs_of(all), pairs_of(some)}, {own_of(all), own_of(some)}}) {
     ASSERT_EQ(want.size(), got.size());
@@ -238,7 +240,7 @@ TEST(RungHull, AMipHasARungThatShowsItWellAndNoneWorseThanThePreview) {
   const Ladder ladder = encode(chain, LadderOptions{}.hull_gain);
   ASSERT_LT(ladder.planes[1].rungs.size(), LadderOptions{}.rungs.size());
   const auto own = measure_own(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1],
-                               ladder.planes[0].preview, RunContext{});
+                               chain.previews().planes[0].file, RunContext{});
   ASSERT_EQ(own.size(), ladder.planes[1].rungs.size() + 1);
   EXPECT_LE(own.back().loss, 0.02);
   for (std::size_t k = 1; k < own.size(); ++k) EXPECT_LT(own[k].loss, own[0].loss);
@@ -251,7 +253,7 @@ TEST(RungHull, ColoursAndDataHaveTheirOwnLimitOfWhatShowsAMipWell) {
     for (TexturePlane& plane : chain.fragments.planes) plane.role = role;
     const Ladder all = encode(chain, kKeepAll), some = encode(chain, 1e9);
     const auto own = measure_own(chain.fragments.planes[1], chain.pixels[1], all.planes[1],
-                                 all.planes[0].preview, RunContext{});
+                                 chain.previews().planes[0].file, RunContext{});
     std::size_t first = 1;
     while (first + 1 < own.size() && own[first].loss > limit) ++first;
     ASSERT_GT(first, 1u);
@@ -275,10 +277,10 @@ TEST(RungHull, WindowsWeighAsTheSurfaceOfTheirFragments) {
   const auto losses = [&](std::size_t seen) {
     std::fill(plane.surface_fraction.begin(), plane.surface_fraction.end(), 0.0f);
     plane.surface_fraction[seen] = 1;
-    return std::array{
-        measure_pairs(chain.fragments, chain.pixels, ladder, 0, RunContext{})[0].loss,
-        measure_own(plane, chain.pixels[0], ladder.planes[0], ladder.planes[0].preview, RunContext{})[0]
-            .loss};
+    return std::array{measure_pairs(chain.fragments, chain.pixels, ladder, 0, RunContext{})[0].loss,
+                      measure_own(plane, chain.pixels[0], ladder.planes[0], chain.previews().planes[0].file,
+                                  RunContext{})[0]
+                          .loss};
   };
   for (const double loss : losses(kNoisy)) EXPECT_GT(loss, 0.3);
   for (const double loss : losses(kOther)) EXPECT_LT(loss, 0.01);
