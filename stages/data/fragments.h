@@ -1,4 +1,6 @@
 #pragma once
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -56,6 +58,30 @@ struct TexturePlane {
       s.surface_fraction, s.features, s.eta);
   }
 };
+
+/// A part of an image, in texels from its left upper corner.
+struct TexelRectangle {
+  std::uint32_t left_px = 0, top_px = 0, width_px = 0, height_px = 0;
+  constexpr std::uint32_t right_px() const { return left_px + width_px; }
+  constexpr std::uint32_t bottom_px() const { return top_px + height_px; }
+  friend bool operator==(const TexelRectangle&, const TexelRectangle&) = default;
+};
+
+/// Where the fragment lies in the plane's pixels, which are padded to whole fragments: the last column and
+/// row may reach beyond the plane. `fragment` < fragment_count().
+constexpr TexelRectangle padded_fragment_rectangle(const TexturePlane& plane, std::size_t fragment) {
+  return {static_cast<std::uint32_t>(fragment % plane.columns) * plane.fragment_width_px,
+          static_cast<std::uint32_t>(fragment / plane.columns) * plane.fragment_height_px,
+          plane.fragment_width_px, plane.fragment_height_px};
+}
+
+/// The part of the fragment that lies on the plane. `fragment` < fragment_count().
+constexpr TexelRectangle fragment_rectangle(const TexturePlane& plane, std::size_t fragment) {
+  TexelRectangle out = padded_fragment_rectangle(plane, fragment);
+  out.width_px = std::min(out.right_px(), plane.width_px) - std::min(out.left_px, plane.width_px);
+  out.height_px = std::min(out.bottom_px(), plane.height_px) - std::min(out.top_px, plane.height_px);
+  return out;
+}
 
 struct Fragments {
   int scales = 0;  // as ScaleMap::scales

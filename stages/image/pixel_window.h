@@ -2,17 +2,18 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stages/data/coverage.h"
+
 namespace texmesh {
 
-/// Which texels of a window are covered, as TexturePlane::coverage has them; without bits all are.
+/// Which texels of a window into an image are covered; with an empty mask all are.
 struct CoverageWindow {
-  const std::uint8_t* bits = nullptr;
-  std::size_t stride_bytes = 0;
-  std::uint32_t left_px = 0, top_px = 0;      // of the window
-  std::uint32_t width_px = 0, height_px = 0;  // of the plane proper: what lies beyond is not covered
+  CoverageMask mask;  // of the image: what lies beyond it is not covered
+  std::uint32_t left_px = 0, top_px = 0;
+  /// Whether the texel at (x, y) of the window is covered; only for a mask that is not empty.
   bool covered(std::uint32_t x, std::uint32_t y) const {
     const std::uint32_t u = left_px + x, v = top_px + y;
-    return u < width_px && v < height_px && bits[v * stride_bytes + u / 8] >> (7 - u % 8) & 1;
+    return u < mask.width_px && v < mask.height_px && mask.covered(u, v);
   }
 };
 

@@ -61,7 +61,7 @@ std::vector<float> halved_samples(const std::vector<float>& samples, std::uint32
 }
 
 bool any_covered(const CoverageWindow& coverage, std::uint32_t left, std::uint32_t top, std::uint32_t side) {
-  if (coverage.bits == nullptr) return true;
+  if (coverage.mask.empty()) return true;
   for (std::uint32_t y = top; y < top + side; ++y)
     for (std::uint32_t x = left; x < left + side; ++x)
       if (coverage.covered(x, y)) return true;
@@ -209,7 +209,7 @@ void count_window(const PixelWindow& window, const JpegKind& kind, std::span<con
     const Blocks blocks = blocks_of(window, kind, c);
     const std::size_t table = 2 * table_pair(kind, c);
     for (std::size_t q = 0; q < quantisers.size(); ++q) {
-      const auto& set = window.coverage.bits == nullptr ? quantisers[q].plain : quantisers[q].masked;
+      const auto& set = window.coverage.mask.empty() ? quantisers[q].plain : quantisers[q].masked;
       count_blocks(blocks, set[c], counts[q][table], counts[q][table + 1]);
     }
   }

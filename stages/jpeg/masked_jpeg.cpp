@@ -179,7 +179,7 @@ MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::u
 }
 
 bool wholly_covered(const PixelWindow& image) {
-  if (image.coverage.bits == nullptr) return true;
+  if (image.coverage.mask.empty()) return true;
   for (std::uint32_t y = 0; y < image.height_px; ++y)
     for (std::uint32_t x = 0; x < image.width_px; ++x)
       if (!image.coverage.covered(x, y)) return false;
@@ -232,7 +232,7 @@ void MaskedJpeg::load(const PixelWindow& image) {
   for (std::uint32_t y = 0; y < h; ++y)
     for (std::uint32_t x = 0; x < w; ++x)
       weights_[std::size_t{y} * w + x] =
-          image.coverage.bits == nullptr || image.coverage.covered(x, y) ? 1.0f : 0.0f;
+          image.coverage.mask.empty() || image.coverage.covered(x, y) ? 1.0f : 0.0f;
   if (halved_) weigh_halved(w, h);
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& component = components_[c];

@@ -69,8 +69,7 @@ PixelWindow window_of(const TexturePlane& plane, const Pixels& pixels, Uncovered
   CoverageWindow coverage;
   const bool some = plane.covered_texels[fragment] < plane.fragment_width_px * plane.fragment_height_px;
   if (some && uncovered == Uncovered::kFree && !plane.coverage.empty())
-    coverage = {plane.coverage.data(), (std::size_t{plane.width_px} + 7) / 8, left, top, plane.width_px,
-                plane.height_px};
+    coverage = {CoverageMask(plane), left, top};
   return {pixels.at(left, top), std::size_t{pixels.width_px} * pixels.channels, plane.fragment_width_px,
           plane.fragment_height_px, coverage};
 }

@@ -28,7 +28,7 @@ Pixels picture(std::uint32_t channels) {
 
 PixelWindow window_of(const Pixels& p, const std::vector<std::uint8_t>* coverage = nullptr) {
   PixelWindow out{p.data.data(), std::size_t{p.width_px} * p.channels, p.width_px, p.height_px, {}};
-  if (coverage) out.coverage = {coverage->data(), kSide / 8, 0, 0, kSide, kSide};
+  if (coverage) out.coverage = {{*coverage, kSide, kSide}, 0, 0};
   return out;
 }
 

@@ -28,7 +28,7 @@ struct Picture {
   }
   PixelWindow window(bool masked) const {
     PixelWindow out{pixels.data.data(), std::size_t{kWidth} * pixels.channels, kWidth, kHeight};
-    if (masked) out.coverage = {coverage.data(), kWidth / 8, 0, 0, kWidth, kHeight};
+    if (masked) out.coverage = {{coverage, kWidth, kHeight}, 0, 0};
     return out;
   }
 };
