@@ -18,6 +18,9 @@ struct SizeKnots {
   }
 };
 
+/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
+inline constexpr int kLosslessQuality = 100;
+
 /// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
 struct LadderRung {
   int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
@@ -35,8 +38,7 @@ enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
 
 struct PlaneLadder {
   Codec codec = Codec::kJpeg;
-  bool lossless =
-      false;  // the last rung holds the coefficients of the source, see stages/ladder/lossless_top.h
+  bool lossless = false;  // the last rung holds the coefficients of the source
   SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
   // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces

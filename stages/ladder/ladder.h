@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
@@ -74,17 +75,22 @@ struct LadderOptions {
   }
 };
 
-/// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
-/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
-/// with uncovered texels, when those are free, by stages/jpeg/masked_jpeg.h, so that only covered texels cost
-/// bytes. Tables are trained on covered fragments spread over the plane and have a code for every symbol, so
-/// that no fragment needs tables of its own. `pixels` are fill_planes()'s; `previews`, make_previews()'s, are
-/// read where planes have mips. A plane without a covered fragment has tables but no data. Works on the
-/// pixels as they stand: beside the result it takes some fragments' streams per thread. Throws StageError for
-/// rungs that do not rise or lie outside 1..100 and for pixels that do not fit the planes. Same bytes for any
-/// thread count. Of mips a few fragments are encoded at every rung, which decide what rungs are worth storing
-/// (stages/ladder/rung_hull.h), and then the others at these.
+/// Encodes every covered fragment at the rungs of its plane's role.
+/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
+///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
+///   such texels are free, so that only covered texels cost bytes.
+/// - Tables are trained on covered fragments spread over the plane. They have a code for every symbol, so
+/// that
+///   no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
+/// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
+///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
+/// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).
+/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read where planes have mips; `images`
+/// are the model's and read with `lossless_top`. Beside the result it takes some fragments' streams per
+/// thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for inputs that do not fit
+/// each other. Same bytes for any thread count.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
-                     const LadderOptions& options, const RunContext& context);
+                     const std::vector<Image>& images, const LadderOptions& options,
+                     const RunContext& context);
 
 }  // namespace texmesh

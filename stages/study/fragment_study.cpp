@@ -98,7 +98,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   ladder_options.subsampling = options.subsampling;
   RunContext quiet = context;
   quiet.progress = nullptr;
-  const Ladder ladder = encode_ladder(cut.fragments, cut.pixels, {}, ladder_options, quiet);
+  const Ladder ladder = encode_ladder(cut.fragments, cut.pixels, {}, {}, ladder_options, quiet);
   const std::size_t count = plane.fragment_count(), qualities = options.qualities.size();
   std::vector<FileSizes> files(count * qualities);
   parallel_for(context, files.size(), 1, [&](std::size_t begin, std::size_t end) {

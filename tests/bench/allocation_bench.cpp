@@ -82,8 +82,8 @@ void print_sizes(const std::string& path) {
   LadderOptions between;
   between.rungs = {6, 9, 12, 15, 22, 27, 32, 38, 43, 48, 57, 63, 69, 80, 90, 94};  // none of the ladder's
   const Previews previews = make_previews(model.fragments, pixels, {}, context);
-  const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, context);
-  const Ladder other = encode_ladder(model.fragments, pixels, previews, between, context);
+  const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, {}, context);
+  const Ladder other = encode_ladder(model.fragments, pixels, previews, {}, between, context);
   const Predictors predictors = predict_quality(model.fragments, pixels, {}, context);
   const PackageTables tables =
       build_tables(model.fragments, pixels, predictors, ladder, previews, {}, context);

@@ -128,7 +128,7 @@ void add_texture(PackageParts& p) {
   LadderOptions options;
   options.rungs = {20, 70};
   const std::vector<Pixels> pixels{picture(64, 64)};
-  const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, options, {}).planes.at(0);
+  const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, {}, options, {}).planes.at(0);
   const PlanePreview preview = make_previews(fragments, pixels, {}, {}).planes.at(0);
   p.tables.planes = {make_tables(plane, ladder)};
   p.streams[preview_path(0)] = preview.file;

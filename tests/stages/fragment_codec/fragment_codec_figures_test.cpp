@@ -95,7 +95,7 @@ TEST(TextureFigures, FreeTexelsAgainstTheBackgroundAtEqualErrorOfWhatIsCovered) 
     options.uncovered = uncovered;
     const PackageTables tables =
         build_tables(scene.fragments, pixels, predict_quality(scene.fragments, pixels, {}, context),
-                     encode_ladder(scene.fragments, pixels, {}, options, context),
+                     encode_ladder(scene.fragments, pixels, {}, {}, options, context),
                      make_previews(scene.fragments, pixels, {}, context), {}, context);
     return testing::fill_curve(tables, {0});
   };
@@ -117,7 +117,7 @@ TEST(TextureFigures, AllocationsAgainstOneQualityEverywhereAtEqualLossOfTheSurfa
   const auto pixels = filled(scene, context);
   const testing::Planes planes{build_tables(scene.fragments, pixels,
                                             predict_quality(scene.fragments, pixels, {}, context),
-                                            encode_ladder(scene.fragments, pixels, {}, {}, context),
+                                            encode_ladder(scene.fragments, pixels, {}, {}, {}, context),
                                             make_previews(scene.fragments, pixels, {}, context), {}, context)
                                    .planes};
   testing::Curve all;

@@ -274,7 +274,7 @@ Ladder encode(const Plane& p, LadderMode mode, int threads = 1) {
   options.mode = mode;
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, {}, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 TEST(LadderModes, ProgressiveRungsAreCutsOfOneFile) {

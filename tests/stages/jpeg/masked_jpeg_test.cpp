@@ -352,7 +352,7 @@ Ladder ladder_of(const Scene& s, Uncovered uncovered, int threads = 1) {
   options.uncovered = uncovered;
   RunContext context;
   context.threads = threads;
-  return encode_ladder(s.fragments, s.pixels, {}, options, context);
+  return encode_ladder(s.fragments, s.pixels, {}, {}, options, context);
 }
 
 std::vector<std::uint8_t> stream(const LadderRung& rung, std::size_t f) {

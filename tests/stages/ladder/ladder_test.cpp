@@ -63,7 +63,7 @@ Plane make_plane(std::uint32_t columns, std::uint32_t rows, std::uint32_t side, 
 Ladder encode(const Plane& p, LadderOptions options = {}, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, {}, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 Pixels decode_baseline(const LadderRung& rung, std::size_t fragment) {

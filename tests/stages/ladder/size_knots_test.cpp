@@ -54,7 +54,7 @@ Plane make_plane() {
 Ladder encode(const Plane& p, const LadderOptions& options, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, {}, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 LadderOptions rungs(std::vector<int> qualities) {

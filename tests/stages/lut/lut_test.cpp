@@ -71,7 +71,7 @@ Scene make_scene(LadderOptions ladder_options = {}) {
     s.pixels.push_back(pixels);
   }
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, ladder_options, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder_options, {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
   return s;
 }
@@ -132,7 +132,7 @@ TEST(Lut, NoChannelOfDataStandsForAnother) {
     s.pixels[0].data[k] = s.pixels[0].data[k + 1] = 128;
   const auto measured = [&](TextureRole role) {  // only blue varies: luma has 1/77 of its square error
     s.fragments.planes[0].role = role;
-    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {});
+    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
     s.previews = make_previews(s.fragments, s.pixels, {}, {});
     return build(s).planes[0];
   };
@@ -196,7 +196,7 @@ TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
   // A flat texture is as good in the preview.
   Scene flat = make_scene();
   for (Pixels& pixels : flat.pixels) std::fill(pixels.data.begin(), pixels.data.end(), std::uint8_t{97});
-  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {}, {});
+  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {}, {}, {});
   flat.previews = make_previews(flat.fragments, flat.pixels, {}, {});
   const PlaneTables t = build(flat).planes[0];
   for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
@@ -232,7 +232,7 @@ TEST(Lut, SkippedFragmentsShowThePreviewOfTheirOwnImageBilinearly) {
     }
   LadderOptions ladder;
   ladder.hull_gain = -1;
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, ladder, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder, {});
   s.previews = make_previews(s.fragments, s.pixels, {.quality = 95}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables tables = build(s);
@@ -356,7 +356,7 @@ TEST(Lut, SizeModelHoldsForBlurredTextures) {  // whose blocks' shortest codes a
         for (std::uint32_t c = 0; c < pixels.channels; ++c)
           pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
               static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
   const PackageTables tables = build(s);
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
@@ -432,7 +432,7 @@ TEST(Lut, EmptyAndUnfitInput) {
     std::fill(p.covered_texels.begin(), p.covered_texels.end(), 0u);
     std::fill(p.coverage.begin(), p.coverage.end(), std::uint8_t{0});
   }
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables none = build(s);
