@@ -5,7 +5,6 @@
 #include "format/base/no_index.h"
 #include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
-#include "stages/ladder/lossless_top.h"
 #include "stages/previews/previews.h"
 
 namespace texmesh {
@@ -117,12 +116,9 @@ StageOutputs run_previews(const StageInputs& in) {
 }
 
 StageOutputs run_ladder(const StageInputs& in) {
-  const Fragments& fragments = in.get<Fragments>("fragmentation");
-  Ladder ladder = encode_ladder(fragments, in.get<Planes>("fill"), in.get<Previews>("previews"),
-                                ladder_options(in), in.context);
-  if (in.options.ladder.lossless_top)
-    add_lossless_top(fragments, in.get<Images>("import.images"), ladder, in.context);
-  return with_notes(std::move(ladder));
+  return with_notes(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
+                                  in.get<Previews>("previews"), in.get<Images>("import.images"),
+                                  ladder_options(in), in.context));
 }
 
 StageOutputs run_lut(const StageInputs& in) {
