@@ -23,13 +23,13 @@ inline constexpr int kLosslessQuality = 100;
 
 /// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
 struct LadderRung {
-  int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
-  std::vector<std::uint8_t> tables;  // what the rung's streams share
-  std::vector<std::uint8_t> data;    // the fragments' streams, in fragment order
-  std::vector<std::uint64_t> offset;  // [fragments + 1] into data; empty range = fragment not stored
+  int quality = 0;  // IJG's scale; of the baseline JPEG of equal error for progressive files
+  std::vector<std::uint8_t> table_stream;  // what the rung's streams share: Huffman and quantiser tables
+  std::vector<std::uint8_t> data;          // the fragments' streams, in fragment order
+  std::vector<std::uint64_t> offset;       // [fragments + 1] into data; empty range = fragment not stored
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.quality, s.tables, s.data, s.offset);
+    a(s.quality, s.table_stream, s.data, s.offset);
   }
 };
 

@@ -107,7 +107,7 @@ std::vector<PlaneLadder> empty_ladders(const std::vector<TrainedPlane>& trained,
       continue;
     }
     for (const std::size_t r : work[p].rungs)
-      planes[p].rungs.push_back({trained[p].rungs[r].quality, trained[p].rungs[r].tables, {}, {0}});
+      planes[p].rungs.push_back({trained[p].rungs[r].quality, trained[p].rungs[r].table_stream, {}, {0}});
   }
   return planes;
 }

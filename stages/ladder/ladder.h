@@ -49,9 +49,9 @@ struct LadderOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
-      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, where "
-      "fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = lossy WebP "
-      "for colours");
+      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, "
+      "where fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = "
+      "lossy WebP for colours");
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");
@@ -60,16 +60,15 @@ struct LadderOptions {
       "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
     v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
     v("uncovered", s.uncovered,
-      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks cheap; "
-      "kept = what the fill, or the source with --fill none, has there");
+      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks "
+      "cheap; kept = what the fill, or the source with --fill none, has there");
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
     v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
       "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
-      "that "
-      "rises by more than this share without it, or where displays of the mip's size need it; -1 = store "
-      "all");
+      "that rises by more than this share without it, or where displays of the mip's size need it; -1 = "
+      "store all");
     v("lossless_top", s.lossless_top,
       "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }

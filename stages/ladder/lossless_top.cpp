@@ -62,13 +62,11 @@ class FragmentScan {
   /// for DC and 2 t + 1 for AC.
   template <class Put>
   void for_each_symbol(std::size_t fragment, const Put& put) const {
-    const std::uint32_t mcus_across = plane_.fragment_width_px / (8 * most_across_);
-    const std::uint32_t mcus_down = plane_.fragment_height_px / (8 * most_down_);
-    const auto left = static_cast<std::uint32_t>(fragment % plane_.columns) * mcus_across;
-    const auto top = static_cast<std::uint32_t>(fragment / plane_.columns) * mcus_down;
+    const TexelRectangle at = padded_fragment_rectangle(plane_, fragment);
+    const std::uint32_t mcu_width = 8 * most_across_, mcu_height = 8 * most_down_;
     std::array<int, 3> dc{};
-    for (std::uint32_t y = top; y < top + mcus_down; ++y)
-      for (std::uint32_t x = left; x < left + mcus_across; ++x)
+    for (std::uint32_t y = at.top_px / mcu_height; y < at.bottom_px() / mcu_height; ++y)
+      for (std::uint32_t x = at.left_px / mcu_width; x < at.right_px() / mcu_width; ++x)
         for (std::size_t c = 0; c < components_.size(); ++c)
           for (std::uint32_t v = 0; v < components_[c].down; ++v)
             for (std::uint32_t u = 0; u < components_[c].across; ++u)

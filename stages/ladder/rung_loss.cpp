@@ -137,7 +137,7 @@ std::vector<std::uint64_t> bytes_by_rung(const TexturePlane& plane, const PlaneL
   std::vector<std::uint64_t> out;
   for (const LadderRung& rung : ladder.rungs) {
     std::uint64_t bytes = static_cast<std::uint64_t>(static_cast<double>(rung.data.size()) * times);
-    bytes += rung.tables.size();
+    bytes += rung.table_stream.size();
     if (codec_traits(ladder.codec).incremental && !out.empty()) bytes += out.back();
     out.push_back(bytes);
   }

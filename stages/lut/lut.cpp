@@ -85,7 +85,7 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.incremental = codec_traits(ladder.codec).incremental;
   for (const LadderRung& rung : ladder.rungs) {
     out.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
-    out.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
+    out.table_bytes.push_back(static_cast<std::uint32_t>(rung.table_stream.size()));
   }
   // A lossless last rung came after the knots were measured, perhaps instead of another one.
   const std::size_t measured = out.rung_quality.size() - (ladder.lossless ? 1 : 0);

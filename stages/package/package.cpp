@@ -212,10 +212,10 @@ void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview,
   Bytes streams;
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const LadderRung& rung = ladder.rungs[r];
-    if (rung.tables.size() != tables.table_bytes[r] || rung.quality != tables.rung_quality[r])
+    if (rung.table_stream.size() != tables.table_bytes[r] || rung.quality != tables.rung_quality[r])
       fail(plane_place(plane) + ", rung " + std::to_string(r), "size and quality as the tables say",
            "others");
-    streams.insert(streams.end(), rung.tables.begin(), rung.tables.end());
+    streams.insert(streams.end(), rung.table_stream.begin(), rung.table_stream.end());
     entries.push_back({rung_path(p, static_cast<std::uint32_t>(r)), pack_rung(rung, tables, r, plane)});
   }
   entries.push_back({table_streams_path(p), std::move(streams)});

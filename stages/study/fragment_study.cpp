@@ -128,7 +128,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
       row.sum_optimised += files[q * count + f].optimised;
     }
     const LadderRung& rung = ladder.planes[0].rungs[q];
-    row.sum_shared = rung.data.size() + rung.tables.size();
+    row.sum_shared = rung.data.size() + rung.table_stream.size();
     rows.push_back(row);
   }
   return rows;

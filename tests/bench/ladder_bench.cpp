@@ -56,7 +56,7 @@ void encode_ladder_bench(benchmark::State& state) {
       const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(1));
       our_bytes = 0;
       for (const LadderRung& rung : ladder.planes[0].rungs)
-        our_bytes += rung.data.size() + rung.tables.size();
+        our_bytes += rung.data.size() + rung.table_stream.size();
     });
     two = best(two, [&] {
       benchmark::DoNotOptimize(encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(2)));

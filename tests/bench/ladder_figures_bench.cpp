@@ -40,7 +40,7 @@ double status_mb(const std::string& field) {
 std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlane& plane) {
   std::string why_not;
   const auto rung = cut_coefficients(plane, probe_image("whole", file, {}), why_not, threads(2));
-  return rung ? rung->data.size() + rung->tables.size() : 0;
+  return rung ? rung->data.size() + rung->table_stream.size() : 0;
 }
 
 double percent(std::size_t part, std::size_t whole) {
@@ -57,7 +57,7 @@ void print_sizes(const std::string& name, const Scene& scene) {
   std::string least = "\n  least possible";
   std::size_t ours_sum = 0, plain_sum = 0;
   for (const LadderRung& rung : ladder.planes[0].rungs) {
-    const std::size_t ours = rung.data.size() + rung.tables.size();
+    const std::size_t ours = rung.data.size() + rung.table_stream.size();
     const std::size_t plain = plain_encode(scene.pixels[0], rung.quality, false);
     const std::vector<std::uint8_t> optimised = plain_file(scene.pixels[0], rung.quality, true);
     char text[3][16];
@@ -84,7 +84,7 @@ void print_memory(const Scene& scene, int count) {
   const double peak = status_mb("VmHWM") - before;
   double result = static_cast<double>(previews.planes[0].file.size());
   for (const LadderRung& rung : ladder.planes[0].rungs)
-    result += static_cast<double>(rung.data.size() + rung.tables.size());
+    result += static_cast<double>(rung.data.size() + rung.table_stream.size());
   result /= 1 << 20;
   std::printf(
       "  %d thread(s): memory grows by %.1f MB, of which the result is %.1f MB; the image has %.1f MB\n",

@@ -87,7 +87,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {
     t.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
-    t.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
+    t.table_bytes.push_back(static_cast<std::uint32_t>(rung.table_stream.size()));
     for (std::uint32_t f = 0; f < kFragments; ++f) {
       const std::span stream(rung.data.data() + rung.offset[f], rung.offset[f + 1] - rung.offset[f]);
       t.size_bytes.push_back(static_cast<std::uint32_t>(stream.size()));
@@ -135,7 +135,7 @@ void add_texture(PackageParts& p) {
   for (std::uint32_t r = 0; r < 2; ++r) {
     const LadderRung& rung = ladder.rungs[r];
     Bytes& tables = p.streams[table_streams_path(0)];
-    tables.insert(tables.end(), rung.tables.begin(), rung.tables.end());
+    tables.insert(tables.end(), rung.table_stream.begin(), rung.table_stream.end());
     Bytes& pack = p.streams[rung_path(0, r)];
     for (const std::uint16_t f : p.tables.planes[0].order)
       pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f]),

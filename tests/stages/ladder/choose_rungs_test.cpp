@@ -77,7 +77,7 @@ TEST(ChooseRungs, LossFallsAlongTheFullSizeAndBytesAreWhatIsStored) {
   ASSERT_EQ(pairs.size(), 20u);
   for (const RungPair& pair : pairs) {
     const LadderRung& rung = ladder.planes[pair.level].rungs[pair.rung];
-    EXPECT_EQ(pair.bytes, rung.data.size() + rung.tables.size());
+    EXPECT_EQ(pair.bytes, rung.data.size() + rung.table_stream.size());
   }
   EXPECT_GT(pairs[0].loss, pairs[9].loss);
   EXPECT_LT(pairs[9].loss, 0.02);
@@ -103,7 +103,7 @@ TEST(ChooseRungs, KeptRungsAreTheirWholeSelves) {
                                      [&](const LadderRung& r) { return r.quality == rung.quality; });
       ASSERT_NE(same, all.planes[p].rungs.end());
       EXPECT_EQ(same->data, rung.data);
-      EXPECT_EQ(same->tables, rung.tables);
+      EXPECT_EQ(same->table_stream, rung.table_stream);
     }
   }
   EXPECT_GT(dropped, 0u);

@@ -67,7 +67,8 @@ Ladder encode(const Plane& p, LadderOptions options = {}, int threads = 1) {
 }
 
 Pixels decode_baseline(const LadderRung& rung, std::size_t fragment) {
-  return decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, fragment_stream(rung, fragment)), 1 << 24);
+  return decode_jpeg(join_fragment(Codec::kJpeg, rung.table_stream, fragment_stream(rung, fragment)),
+                     1 << 24);
 }
 
 /// The pixels of one fragment as an image of its own.
@@ -177,10 +178,10 @@ TEST(Ladder, StreamsHoldTheirDataAloneAndRise) {
   for (const LadderRung& rung : ladder.planes[0].rungs) {
     EXPECT_GT(rung.data.size(), last);
     last = rung.data.size();
-    EXPECT_EQ(rung.tables[2], 0xff);
-    EXPECT_EQ(rung.tables[3], 0xdb);  // DQT right after SOI
-    EXPECT_EQ(rung.tables[rung.tables.size() - 16], 0xff);
-    EXPECT_EQ(rung.tables[rung.tables.size() - 15], 0xda);  // SOS right before EOI: data follow
+    EXPECT_EQ(rung.table_stream[2], 0xff);
+    EXPECT_EQ(rung.table_stream[3], 0xdb);  // DQT right after SOI
+    EXPECT_EQ(rung.table_stream[rung.table_stream.size() - 16], 0xff);
+    EXPECT_EQ(rung.table_stream[rung.table_stream.size() - 15], 0xda);  // SOS right before EOI: data follow
     for (std::size_t f = 0; f < 4; ++f) {
       const auto stream = fragment_stream(rung, f);
       EXPECT_EQ(stream[1], 0xd8);
@@ -237,7 +238,7 @@ TEST(Ladder, UncoveredFragmentsAreNotStored) {
   p.fragments.planes[0].covered_texels = {0, 0, 0};
   const Ladder none = encode(p);
   EXPECT_TRUE(none.planes[0].rungs[0].data.empty());
-  EXPECT_FALSE(none.planes[0].rungs[0].tables.empty());
+  EXPECT_FALSE(none.planes[0].rungs[0].table_stream.empty());
 }
 
 TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
@@ -246,7 +247,7 @@ TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
   const auto tables = [&] {
     std::vector<std::vector<std::uint8_t>> out;
     const Ladder ladder = encode(p);
-    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.tables);
+    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.table_stream);
     return out;
   };
   const auto before = tables();
@@ -264,7 +265,7 @@ TEST(Ladder, SameBytesForAnyNumberOfThreads) {
   const Ladder one = encode(p, {}, 1), eight = encode(p, {}, 8);
   for (std::size_t r = 0; r < one.planes[0].rungs.size(); ++r) {
     EXPECT_TRUE(one.planes[0].rungs[r].data == eight.planes[0].rungs[r].data);
-    EXPECT_TRUE(one.planes[0].rungs[r].tables == eight.planes[0].rungs[r].tables);
+    EXPECT_TRUE(one.planes[0].rungs[r].table_stream == eight.planes[0].rungs[r].table_stream);
     EXPECT_EQ(one.planes[0].rungs[r].offset, eight.planes[0].rungs[r].offset);
   }
 }
@@ -292,12 +293,13 @@ TEST(Ladder, EveryTruncationIsRefused) {
   const LadderRung& rung = ladder.planes[0].rungs[0];
   const auto whole = fragment_stream(rung, 0);
   for (std::size_t n = 0; n < whole.size(); ++n)
-    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, whole.first(n)), 1 << 20), FormatError)
+    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, rung.table_stream, whole.first(n)), 1 << 20),
+                 FormatError)
         << n;
-  const std::span<const std::uint8_t> tables(rung.tables);
+  const std::span<const std::uint8_t> tables(rung.table_stream);
   for (std::size_t n = 0; n < tables.size(); ++n)
     EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, tables.first(n), whole), 1 << 20), FormatError) << n;
-  const auto complete = join_fragment(Codec::kJpeg, rung.tables, whole);
+  const auto complete = join_fragment(Codec::kJpeg, rung.table_stream, whole);
   for (std::size_t n = 0; n < complete.size(); ++n)
     EXPECT_THROW(decode_jpeg(std::span(complete).first(n), 1 << 20), FormatError) << n;
 }

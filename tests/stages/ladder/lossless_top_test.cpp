@@ -247,7 +247,7 @@ TEST(LosslessTop, ThreadsMakeNoDifference) {
   const auto first = cut_coefficients(plane, image, why_not, with_threads(1));
   const auto second = cut_coefficients(plane, image, why_not, with_threads(8));
   ASSERT_TRUE(first && second);
-  EXPECT_EQ(first->tables, second->tables);
+  EXPECT_EQ(first->table_stream, second->table_stream);
   EXPECT_EQ(first->data, second->data);
   EXPECT_EQ(first->offset, second->offset);
 }

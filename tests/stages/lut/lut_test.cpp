@@ -90,7 +90,7 @@ TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
     const PlaneTables& t = tables.planes[p];
     ASSERT_EQ(t.rung_count(), 10u);
     for (std::size_t r = 0; r < 10; ++r) {
-      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].tables.size());
+      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].table_stream.size());
       for (std::size_t f = 0; f < t.fragment_count(); ++f) {
         const auto stream = fragment_stream(s.ladder.planes[p].rungs[r], f);
         const std::size_t at = r * t.fragment_count() + f;
@@ -325,7 +325,7 @@ TEST(Lut, ConstantBytesAreTheCodecs) {
   other.codec = Codec::kJpegProgressive;
   EXPECT_EQ(constant_bytes(other, 32, 48), 0);
   other = s.ladder.planes[0];
-  std::vector<std::uint8_t>& tables = other.rungs[0].tables;
+  std::vector<std::uint8_t>& tables = other.rungs[0].table_stream;
   while (!tables.empty()) {  // cut anywhere: some number of blocks, nothing read beyond the end
     tables.pop_back();
     EXPECT_GE(constant_bytes(other, 32, 48), 4);

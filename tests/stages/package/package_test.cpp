@@ -64,7 +64,7 @@ struct Inputs {
     for (std::size_t r = 0; r < 2; ++r) {
       LadderRung rung;
       rung.quality = t.rung_quality[r];
-      rung.tables = fake_jpeg(t.table_bytes[r], 't');
+      rung.table_stream = fake_jpeg(t.table_bytes[r], 't');
       rung.offset.push_back(0);
       for (std::size_t f = 0; f < 6; ++f) {
         const std::size_t bytes = t.size_bytes[r * 6 + f];
@@ -330,7 +330,7 @@ TEST(Package, InputsThatDoNotBelongTogetherAreRefused) {
   refused([](Inputs& i) { i.ladder.planes[0].rungs.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset[3] += 1; });
-  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].tables.pop_back(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].table_stream.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].quality += 1; });
   refused([](Inputs& i) { i.images.clear(); });
   Inputs long_title(1);
