@@ -17,12 +17,19 @@ using Json = nlohmann::ordered_json;
 
 /// Shares of a model's time that the stages took on the sample scans; they only shape the progress bar.
 double share(const std::string& stage) {
-  static const std::map<std::string, double> shares{{"import", .03},         {"condition", .04},
-                                                    {"skeletonization", .2}, {"ssf", .2},
-                                                    {"simplification", .15}, {"perceptual_values", .05},
-                                                    {"fragmentation", .03},  {"zim", .02},
-                                                    {"ladder", .08},         {"lut", .08},
-                                                    {"scales", .05},         {"quality", .06},
+  static const std::map<std::string, double> shares{{"import", .03},
+                                                    {"condition", .04},
+                                                    {"skeletonization", .2},
+                                                    {"ssf", .2},
+                                                    {"simplification", .15},
+                                                    {"perceptual_values", .05},
+                                                    {"fragmentation", .03},
+                                                    {"zim", .02},
+                                                    {"previews", .01},
+                                                    {"ladder", .07},
+                                                    {"lut", .08},
+                                                    {"scales", .05},
+                                                    {"quality", .06},
                                                     {"package", .01}};
   const auto it = shares.find(stage);
   return it == shares.end() ? 0 : it->second;

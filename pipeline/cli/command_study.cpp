@@ -224,7 +224,7 @@ using Choices = std::vector<StudiedChoice>;
 Choices study_model(const QualityArguments& args) {
   Stage study;
   study.name = "study";
-  study.inputs = {"condition", "import.materials", "fragmentation", "fill", "ladder", "lut"};
+  study.inputs = {"condition", "import.materials", "fragmentation", "fill", "ladder", "previews", "lut"};
   study.outputs = {{"study", nullptr, nullptr}};
   study.stored = false;
   study.run = [&args](const StageInputs& in) {
@@ -232,7 +232,7 @@ Choices study_model(const QualityArguments& args) {
         {object(study_allocation(
             in.get<ConditionedMesh>("condition"), in.get<std::vector<Material>>("import.materials"),
             in.get<Fragments>("fragmentation"), in.get<std::vector<Pixels>>("fill"), in.get<Ladder>("ladder"),
-            in.get<PackageTables>("lut"), args.options, in.context))},
+            in.get<Previews>("previews"), in.get<PackageTables>("lut"), args.options, in.context))},
         {}};
   };
   const std::vector<Stage> graph = graph_towards(std::move(study));

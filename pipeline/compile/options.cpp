@@ -297,11 +297,9 @@ void check_options(const CompileOptions& o, const std::string& source) {
     throw InputError(source, "lut.quality_fine",
                      ">= lut.quality_coarse (" + number_text(o.lut.quality_coarse) + ")",
                      number_text(o.lut.quality_fine));
-  try {
-    parse_weights(PredictorRegistry::standard(), o.zim.weights);
-  } catch (const StageError& e) {
-    throw InputError(source, "zim.weights", e.expected(), e.found());
-  }
+  if (!(o.zim.weight_eta + o.zim.weight_z + o.zim.weight_i + o.zim.weight_m > 0))
+    throw InputError(source, "zim.weight_eta", "> 0, or weight_z, weight_i or weight_m > 0",
+                     number_text(o.zim.weight_eta));
 }
 
 }  // namespace texmesh

@@ -5,7 +5,7 @@
 #include "format/base/no_index.h"
 #include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
-#include "stages/ladder/lossless_top.h"
+#include "stages/previews/previews.h"
 
 namespace texmesh {
 namespace {
@@ -109,24 +109,29 @@ StageOutputs run_zim(const StageInputs& in) {
                                in.context));
 }
 
+StageOutputs run_previews(const StageInputs& in) {
+  const LadderOptions& ladder = in.options.ladder;
+  return plain(make_previews(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
+                             {ladder.preview_quality, ladder.subsampling}, in.context));
+}
+
 StageOutputs run_ladder(const StageInputs& in) {
-  const Fragments& fragments = in.get<Fragments>("fragmentation");
-  Ladder ladder = encode_ladder(fragments, in.get<Planes>("fill"), ladder_options(in), in.context);
-  if (in.options.ladder.lossless_top)
-    add_lossless_top(fragments, in.get<Images>("import.images"), ladder, in.context);
-  return with_notes(std::move(ladder));
+  return with_notes(encode_ladder(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
+                                  in.get<Previews>("previews"), in.get<Images>("import.images"),
+                                  ladder_options(in), in.context));
 }
 
 StageOutputs run_lut(const StageInputs& in) {
   return plain(build_tables(in.get<Fragments>("fragmentation"), in.get<Planes>("fill"),
-                            in.get<Predictors>("zim"), in.get<Ladder>("ladder"), in.options.lut, in.context));
+                            in.get<Predictors>("zim"), in.get<Ladder>("ladder"), in.get<Previews>("previews"),
+                            in.options.lut, in.context));
 }
 
 StageOutputs run_scales(const StageInputs& in) {
   return with_notes(write_scales(
       in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
       in.get<Materials>("import.materials"), in.get<Images>("import.images"),
-      in.get<Fragments>("fragmentation"), in.get<Ladder>("ladder"), in.options.scales, in.context));
+      in.get<Fragments>("fragmentation"), in.get<Previews>("previews"), in.options.scales, in.context));
 }
 
 StageOutputs run_quality(const StageInputs& in) {
@@ -141,8 +146,9 @@ StageOutputs run_package(const StageInputs& in) {
   return plain(assemble_package(
       in.get<NestedScales>("simplification"), in.get<PerceptualValues>("perceptual_values"),
       in.get<Images>("import.images"), in.get<Fragments>("fragmentation"), in.get<Ladder>("ladder"),
-      in.get<PackageTables>("lut"), in.get<ScaleFiles>("scales"), in.get<QualityTable>("quality"),
-      in.options.perceptual_values.jnd, in.get<std::string>("provenance"), in.options.package, in.context));
+      in.get<Previews>("previews"), in.get<PackageTables>("lut"), in.get<ScaleFiles>("scales"),
+      in.get<QualityTable>("quality"), in.options.perceptual_values.jnd, in.get<std::string>("provenance"),
+      in.options.package, in.context));
 }
 
 Artefact derived(std::string name) { return {std::move(name), nullptr, nullptr}; }
@@ -231,10 +237,19 @@ std::vector<Stage> make_table() {
        {},
        true,
        run_zim},
+      {"previews",
+       kPreviewsVersion,
+       "fragments -> a small JPEG of every texture",
+       {"fragmentation", "fill"},
+       {artefact<Previews>("previews")},
+       {"ladder.preview_quality", "ladder.subsampling"},
+       {"libjpeg-turbo"},
+       true,
+       run_previews},
       {"ladder",
        kLadderVersion,
-       "fragments -> rungs of streams in the chosen codec, previews",
-       {"fragmentation", "fill", "import.images"},
+       "fragments, previews -> rungs of streams in the chosen codec",
+       {"fragmentation", "fill", "previews", "import.images"},
        {artefact<Ladder>("ladder")},
        {"ladder", "fragmentation.fill"},
        {"libjpeg-turbo", "libwebp"},
@@ -242,8 +257,8 @@ std::vector<Stage> make_table() {
        run_ladder},
       {"lut",
        kLutVersion,
-       "fragments, predictors, ladder -> quality and size tables",
-       {"fragmentation", "fill", "zim", "ladder"},
+       "fragments, predictors, ladder, previews -> quality and size tables",
+       {"fragmentation", "fill", "zim", "ladder", "previews"},
        {artefact<PackageTables>("lut")},
        {"lut"},
        {"libjpeg-turbo", "libwebp"},
@@ -253,7 +268,7 @@ std::vector<Stage> make_table() {
        kScalesVersion,
        "kept scales -> standalone GLB files",
        {"simplification", "perceptual_values", "import.materials", "import.images", "fragmentation",
-        "ladder"},
+        "previews"},
        {artefact<ScaleFiles>("scales")},
        {"scales"},
        {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
@@ -271,8 +286,8 @@ std::vector<Stage> make_table() {
       {"package",
        kPackageVersion,
        "everything -> the container",
-       {"simplification", "perceptual_values", "import.images", "fragmentation", "ladder", "lut", "scales",
-        "quality", "provenance"},
+       {"simplification", "perceptual_values", "import.images", "fragmentation", "ladder", "previews", "lut",
+        "scales", "quality", "provenance"},
        {artefact<PackageBytes>("package")},
        {"package", "perceptual_values.jnd"},
        {},

@@ -18,15 +18,18 @@ struct SizeKnots {
   }
 };
 
+/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
+inline constexpr int kLosslessQuality = 100;
+
 /// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
 struct LadderRung {
-  int quality = 0;                   // IJG's scale; of the baseline JPEG of equal error for progressive files
-  std::vector<std::uint8_t> tables;  // what the rung's streams share
-  std::vector<std::uint8_t> data;    // the fragments' streams, in fragment order
-  std::vector<std::uint64_t> offset;  // [fragments + 1] into data; empty range = fragment not stored
+  int quality = 0;  // IJG's scale; of the baseline JPEG of equal error for progressive files
+  std::vector<std::uint8_t> table_stream;  // what the rung's streams share: Huffman and quantiser tables
+  std::vector<std::uint8_t> data;          // the fragments' streams, in fragment order
+  std::vector<std::uint64_t> offset;       // [fragments + 1] into data; empty range = fragment not stored
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.quality, s.tables, s.data, s.offset);
+    a(s.quality, s.table_stream, s.data, s.offset);
   }
 };
 
@@ -35,20 +38,15 @@ enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
 
 struct PlaneLadder {
   Codec codec = Codec::kJpeg;
-  bool lossless =
-      false;  // the last rung holds the coefficients of the source, see stages/ladder/lossless_top.h
+  bool lossless = false;  // the last rung holds the coefficients of the source
   SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
-  std::vector<std::uint8_t>
-      preview;  // a complete JPEG of the whole plane, 1/16, or 1/8 where that stays < 16 KB, means of what
-                // mips are means of (stages/image/halve_pixels.h); mips have none
-  std::uint32_t preview_width_px = 0, preview_height_px = 0;
   // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
   // of its source's quantisers away
   SizeKnots knots;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.codec, s.lossless, s.source, s.rungs, s.preview, s.preview_width_px, s.preview_height_px, s.knots);
+    a(s.codec, s.lossless, s.source, s.rungs, s.knots);
   }
 };
 

@@ -8,9 +8,8 @@ namespace texmesh {
 ///   w_zeta zeta), zeta = share of the pairs of neighbours, east and south, that differ (of 2 (w-1)(h-1)
 ///   pairs in a whole fragment).
 /// Where a fragment is covered in part only its covered texels count, and pairs of them: what fills the rest
-/// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of the predictors
-/// that ZimOptions::weights names, each min-max over the covered fragments of the plane (0 where all are
-/// equal).
+/// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of eta,
+/// z, i and m, each min-max over the covered fragments of the plane (0 where all are equal).
 struct PlanePredictors {
   std::vector<float> z, i, zeta, m, vqp;
   template <class S, class A>

@@ -15,15 +15,6 @@ namespace {
 // every such symbol needs a code, because libjpeg-turbo writes a damaged stream for one that has none.
 constexpr std::uint64_t kSampleWeight = 16;
 
-JpegKind kind_of(const PlaneCoding& plane, int quality) {
-  JpegKind kind;
-  kind.channels = plane.channels;
-  kind.quality = quality;
-  kind.subsampling = plane.colour ? plane.subsampling : Subsampling::k444;
-  kind.rgb = plane.channels == 3 && !plane.colour;
-  return kind;
-}
-
 HuffmanTable table_for(const std::array<std::uint64_t, 256>& count,
                        const std::vector<std::uint8_t>& symbols) {
   std::vector<std::uint64_t> weights;
@@ -38,16 +29,16 @@ class JpegCodec : public TextureCodec {
 
   std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
     std::vector<CodecRung> rungs(plane_.qualities.size());
-    tables_.resize(rungs.size());
+    huffman_tables_.resize(rungs.size());
     std::vector<PixelWindow> whole, part;
     for (const PixelWindow& window : sample) (wholly_covered(window) ? whole : part).push_back(window);
     std::vector<Training> training(rungs.size());
     for_each(context, rungs.size(), [&](std::size_t r) { training[r] = train_plainly(r, whole, part); });
     if (!part.empty()) count_masked(part, context, training);
     for_each(context, rungs.size(), [&](std::size_t r) {
-      JpegCoder coder(kind_of(plane_, plane_.qualities[r]));
-      tables_[r] = sample.empty() ? coder.tables() : tables_for(coder, training[r].counts);
-      coder.use_tables(tables_[r]);
+      JpegCoder coder(jpeg_kind(plane_, plane_.qualities[r]));
+      huffman_tables_[r] = sample.empty() ? coder.tables() : tables_for(coder, training[r].counts);
+      coder.use_tables(huffman_tables_[r]);
       rungs[r] = {plane_.qualities[r],
                   coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px)};
     });
@@ -83,7 +74,7 @@ class JpegCodec : public TextureCodec {
   /// symbols: those of plain blocks for a start.
   Training train_plainly(std::size_t r, std::span<const PixelWindow> whole,
                          std::span<const PixelWindow> part) const {
-    const JpegKind kind = kind_of(plane_, plane_.qualities[r]);
+    const JpegKind kind = jpeg_kind(plane_, plane_.qualities[r]);
     JpegCoder coder(kind);
     Training out;
     out.counts.resize(coder.tables().size());
@@ -103,7 +94,7 @@ class JpegCodec : public TextureCodec {
     std::vector<std::vector<SymbolCounts>> counts(part.size());
     for_each(context, part.size(), [&](std::size_t w) {
       counts[w].assign(rungs.size(), SymbolCounts(training[0].counts.size()));
-      MaskedJpeg(kind_of(plane_, plane_.qualities[0])).count_symbols(part[w], rungs, counts[w]);
+      MaskedJpeg(jpeg_kind(plane_, plane_.qualities[0])).count_symbols(part[w], rungs, counts[w]);
     });
     for (const auto& window : counts)
       for (std::size_t r = 0; r < window.size(); ++r)
@@ -114,13 +105,13 @@ class JpegCodec : public TextureCodec {
   class Encoder : public FragmentEncoder {
    public:
     Encoder(const JpegCodec& codec, std::span<const std::size_t> rungs)
-        : masked_(kind_of(codec.plane_, codec.plane_.qualities[0])) {
-      for (std::size_t k = 0; k < (rungs.empty() ? codec.tables_.size() : rungs.size()); ++k) {
+        : masked_(jpeg_kind(codec.plane_, codec.plane_.qualities[0])) {
+      for (std::size_t k = 0; k < (rungs.empty() ? codec.huffman_tables_.size() : rungs.size()); ++k) {
         const std::size_t r = rungs.empty() ? k : rungs[k];
-        const JpegKind kind = kind_of(codec.plane_, codec.plane_.qualities[r]);
+        const JpegKind kind = jpeg_kind(codec.plane_, codec.plane_.qualities[r]);
         coders_.push_back(std::make_unique<JpegCoder>(kind));
-        coders_.back()->use_tables(codec.tables_[r]);
-        rungs_.push_back(masked_rung(kind, coders_.back()->quantisers(), codec.tables_[r]));
+        coders_.back()->use_tables(codec.huffman_tables_[r]);
+        rungs_.push_back(masked_rung(kind, coders_.back()->quantisers(), codec.huffman_tables_[r]));
       }
     }
     // Rung after rung of one fragment, so that its pixels stay in the cache; rung by rung costs a quarter
@@ -137,7 +128,7 @@ class JpegCodec : public TextureCodec {
   };
 
   PlaneCoding plane_;
-  std::vector<HuffmanTables> tables_;
+  std::vector<HuffmanTables> huffman_tables_;
 };
 
 }  // namespace

@@ -1,14 +1,18 @@
 #pragma once
-// Inside stages only: one maker per codec_*.cpp.
+// Inside this room only: one maker per codec_*.cpp.
 #include <memory>
 
 #include "stages/fragment_codec/fragment_codec.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 
 std::unique_ptr<TextureCodec> make_jpeg_codec(const PlaneCoding& plane);
 std::unique_ptr<TextureCodec> make_progressive_codec(const PlaneCoding& plane);
 std::unique_ptr<TextureCodec> make_webp_codec(const PlaneCoding& plane);
+/// How a plane's baseline JPEGs are coded.
+JpegKind jpeg_kind(const PlaneCoding& plane, int quality);
+
 Pixels decode_webp(std::span<const std::uint8_t> file, std::uint64_t max_pixels);
 
 }  // namespace texmesh

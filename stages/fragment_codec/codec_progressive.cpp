@@ -22,13 +22,9 @@ std::vector<std::size_t> scans_of_rungs(std::uint32_t channels) {
   return {2, 4, 6, 8, 10, 12, 14, 16, 17, 19};
 }
 
-JpegKind kind_of(const PlaneCoding& plane, int quality, bool progressive) {
-  JpegKind kind;
-  kind.channels = plane.channels;
-  kind.quality = quality;
-  kind.subsampling = plane.colour ? plane.subsampling : Subsampling::k444;
-  kind.rgb = plane.channels == 3 && !plane.colour;
-  kind.progressive = progressive;
+JpegKind progressive_kind(const PlaneCoding& plane, int quality) {
+  JpegKind kind = jpeg_kind(plane, quality);
+  kind.progressive = true;
   return kind;
 }
 
@@ -55,8 +51,8 @@ class ProgressiveCodec : public TextureCodec {
 
   std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
     std::vector<CodecRung> rungs(scans_.size());
-    JpegCoder coder(kind_of(plane_, quality_, true));
-    rungs[0].tables = coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px);
+    JpegCoder coder(progressive_kind(plane_, quality_));
+    rungs[0].table_stream = coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px);
     const auto measured = sample.first(std::min(sample.size(), kMeasuredWindows));
     const std::vector<double> errors = errors_of_rungs(measured);
     parallel_for(context, rungs.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -76,7 +72,7 @@ class ProgressiveCodec : public TextureCodec {
   std::vector<double> errors_of_rungs(std::span<const PixelWindow> sample) const {
     std::vector<double> errors(scans_.size());
     Encoder encoder(*this, scans_.size());
-    JpegCoder coder(kind_of(plane_, quality_, true));
+    JpegCoder coder(progressive_kind(plane_, quality_));
     for (const PixelWindow& window : sample) {
       std::vector<std::vector<std::uint8_t>> streams(scans_.size());
       encoder.encode(window, streams);
@@ -96,7 +92,7 @@ class ProgressiveCodec : public TextureCodec {
     int low = 1, high = quality_;
     while (low < high) {
       const int middle = (low + high) / 2;
-      JpegCoder coder(kind_of(plane_, middle, false));
+      JpegCoder coder(jpeg_kind(plane_, middle));
       double sum = 0;
       for (const PixelWindow& window : sample)
         sum += squared_error(window, decode_jpeg(coder.complete(window), area(window)));
@@ -119,7 +115,7 @@ class ProgressiveCodec : public TextureCodec {
   class Encoder : public FragmentEncoder {
    public:
     Encoder(const ProgressiveCodec& codec, std::size_t rungs)
-        : scans_(codec.scans_), rungs_(rungs), coder_(kind_of(codec.plane_, codec.quality_, true)) {}
+        : scans_(codec.scans_), rungs_(rungs), coder_(progressive_kind(codec.plane_, codec.quality_)) {}
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
       body_.clear();
       coder_.append_body(fragment, body_);

@@ -9,7 +9,7 @@ std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t ru
   std::vector<std::span<const std::uint8_t>> streams;
   for (std::size_t r = incremental ? 0 : rung; r <= rung; ++r)
     streams.push_back(fragment_stream(plane.rungs[r], fragment));
-  return join_fragment(plane.codec, plane.rungs[incremental ? 0 : rung].tables, streams);
+  return join_fragment(plane.codec, plane.rungs[incremental ? 0 : rung].table_stream, streams);
 }
 
 Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,

@@ -8,6 +8,15 @@
 
 namespace texmesh {
 
+JpegKind jpeg_kind(const PlaneCoding& plane, int quality) {
+  JpegKind kind;
+  kind.channels = plane.channels;
+  kind.quality = quality;
+  kind.subsampling = plane.colour ? plane.subsampling : Subsampling::k444;
+  kind.rgb = plane.channels == 3 && !plane.colour;
+  return kind;
+}
+
 std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding& plane) {
   if (plane.channels != 1 && plane.channels != 3)
     throw StageError("ladder", "channels", "1 or 3", std::to_string(plane.channels));

@@ -21,11 +21,10 @@ struct PlaneCoding {
   std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
 };
 
-/// A rung as the package describes it: its quality on IJG's scale and the table stream that its fragments
-/// share.
+/// A rung as the package describes it.
 struct CodecRung {
-  int quality = 0;
-  std::vector<std::uint8_t> tables;
+  int quality = 0;                         // IJG's scale
+  std::vector<std::uint8_t> table_stream;  // what its fragments' streams share
 };
 
 /// Encodes fragments, one thread's at a time.
@@ -42,7 +41,7 @@ class TextureCodec {
  public:
   virtual ~TextureCodec() = default;
   virtual Codec id() const = 0;
-  /// Chooses rungs and makes their shared tables from a sample of the plane; once, before encoder(). The
+  /// Chooses rungs and makes their table streams from a sample of the plane; once, before encoder(). The
   /// sample may be empty. Same result for any thread count.
   virtual std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) = 0;
   /// Encoders of several threads may run at once. The codec must outlive them. `rungs`: rising indices of

@@ -58,4 +58,16 @@ HuffmanTable make_huffman_table(const std::vector<std::uint8_t>& symbols,
   return out;
 }
 
+SymbolCodes symbol_codes(const HuffmanTable& table) {
+  SymbolCodes out;
+  unsigned code = 0;
+  std::size_t index = 0;
+  for (std::size_t l = 1; l <= 16; ++l, code <<= 1)
+    for (unsigned n = table.bits[l]; n > 0; --n, ++code, ++index) {
+      out.code[table.symbols[index]] = static_cast<std::uint16_t>(code);
+      out.bits[table.symbols[index]] = static_cast<std::uint8_t>(l);
+    }
+  return out;
+}
+
 }  // namespace texmesh

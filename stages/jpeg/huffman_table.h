@@ -12,6 +12,13 @@ struct HuffmanTable {
   std::vector<std::uint8_t> symbols;
 };
 
+/// Codes of one Huffman table by symbol; bits = 0: the table has none.
+struct SymbolCodes {
+  std::array<std::uint16_t, 256> code{};
+  std::array<std::uint8_t, 256> bits{};
+};
+SymbolCodes symbol_codes(const HuffmanTable& table);
+
 /// The tables of one kind of stream: DC and AC of the first kind of component and, for three channels, DC and
 /// AC of the second.
 using HuffmanTables = std::vector<HuffmanTable>;

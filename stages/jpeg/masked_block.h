@@ -4,14 +4,9 @@
 #include <cstdint>
 
 #include "stages/jpeg/block_transform.h"
+#include "stages/jpeg/huffman_table.h"
 
 namespace texmesh {
-
-/// Codes of one Huffman table by symbol; bits = 0: the table has none.
-struct SymbolCodes {
-  std::array<std::uint16_t, 256> code{};
-  std::array<std::uint8_t, 256> bits{};
-};
 
 /// How the blocks of one component are coded at one rung.
 struct BlockCoding {

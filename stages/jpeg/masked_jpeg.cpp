@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "stages/jpeg/bit_writer.h"
 #include "stages/jpeg/jpeg_samples.h"
 #include "stages/jpeg/jpeg_stream.h"
 
@@ -25,65 +26,29 @@ constexpr float kUncoveredWeight = 0.003f;
 // beside them: 0.7 % more bytes.
 constexpr float kSameLevelBeside = 24, kSameLevel = 64;
 
-SymbolCodes codes_of(const HuffmanTable& table) {
-  SymbolCodes out;
-  unsigned code = 0;
-  std::size_t index = 0;
-  for (std::size_t l = 1; l <= 16; ++l, code <<= 1)
-    for (unsigned n = table.bits[l]; n > 0; --n, ++code, ++index) {
-      out.code[table.symbols[index]] = static_cast<std::uint16_t>(code);
-      out.bits[table.symbols[index]] = static_cast<std::uint8_t>(l);
-    }
-  return out;
-}
-
 // What a block takes at most: 64 symbols of 16 + 11 bits, each byte perhaps with a zero behind it.
 constexpr std::size_t kMostBlockBytes = 512;
 
-/// Writes entropy-coded bits, with a zero behind every 0xFF.
+/// Writes the blocks of one rung.
 class BitSink {
  public:
-  BitSink(std::vector<std::uint8_t>& out, const MaskedRung& rung)
-      : out_(&out), rung_(&rung), used_(out.size()) {}
+  BitSink(std::vector<std::uint8_t>& out, const MaskedRung& rung) : writer_(out), rung_(&rung) {}
   void begin_block(std::size_t component) {
     coding_ = &(*rung_)[component];
-    if (out_->size() - used_ < kMostBlockBytes) out_->resize(2 * out_->size() + kMostBlockBytes);
+    writer_.reserve(kMostBlockBytes);
   }
   void dc(unsigned symbol, unsigned value) { put(coding_->dc, symbol, value, symbol); }
   void ac(unsigned symbol, unsigned value) { put(coding_->ac, symbol, value, symbol & 15u); }
-  /// The last byte is filled with ones.
-  void finish() {
-    if (count_ > 0) {
-      const unsigned fill = (8 - count_ % 8) % 8;
-      add((1u << fill) - 1, fill);
-    }
-    while (count_ > 0) write(static_cast<std::uint8_t>(held_ >> (count_ -= 8)));
-    out_->resize(used_);
-  }
+  void finish() { writer_.finish(); }
 
  private:
   void put(const SymbolCodes& codes, unsigned symbol, unsigned value, unsigned size) {
-    add(unsigned{codes.code[symbol]} << size | (value & ((1u << size) - 1)), codes.bits[symbol] + size);
+    writer_.put(unsigned{codes.code[symbol]} << size | (value & ((1u << size) - 1)),
+                codes.bits[symbol] + size);
   }
-  void add(unsigned value, unsigned count) {
-    held_ = held_ << count | value;
-    count_ += count;
-    while (count_ >= 32) {
-      count_ -= 32;
-      const auto word = static_cast<std::uint32_t>(held_ >> count_);
-      for (unsigned shift = 32; shift > 0;) write(static_cast<std::uint8_t>(word >> (shift -= 8)));
-    }
-  }
-  void write(std::uint8_t byte) {
-    (*out_)[used_++] = byte;
-    if (byte == 0xff) (*out_)[used_++] = 0;
-  }
-  std::vector<std::uint8_t>* out_;
+  BitWriter writer_;
   const MaskedRung* rung_;
   const BlockCoding* coding_ = nullptr;
-  std::size_t used_;
-  std::uint64_t held_ = 0;
-  unsigned count_ = 0;
 };
 
 class CountSink {
@@ -172,8 +137,8 @@ MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::u
       if (k > 0 && k < 10) square += q * q / 9;
     }
     coding.bit_cost = (c == 0 && !kind.rgb ? kLumaBitCost : kOtherBitCost) * square;
-    coding.dc = codes_of(tables[2 * table_pair(kind, c)]);
-    coding.ac = codes_of(tables[2 * table_pair(kind, c) + 1]);
+    coding.dc = symbol_codes(tables[2 * table_pair(kind, c)]);
+    coding.ac = symbol_codes(tables[2 * table_pair(kind, c) + 1]);
   }
   return out;
 }

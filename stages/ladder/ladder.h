@@ -4,15 +4,17 @@
 #include <string_view>
 #include <vector>
 
+#include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 #include "stages/data/subsampling.h"
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 10;
+inline constexpr int kLadderVersion = 11;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.
@@ -41,15 +43,15 @@ struct LadderOptions {
   Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
   Uncovered uncovered = Uncovered::kFree;
   int training_fragments = 64;
-  int preview_quality = 60;
+  int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
   double hull_gain = 0.05;
   bool lossless_top = false;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
-      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, where "
-      "fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = lossy WebP "
-      "for colours");
+      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, "
+      "where fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = "
+      "lossy WebP for colours");
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");
@@ -58,32 +60,36 @@ struct LadderOptions {
       "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
     v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
     v("uncovered", s.uncovered,
-      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks cheap; "
-      "kept = what the fill, or the source with --fill none, has there");
+      "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks "
+      "cheap; kept = what the fill, or the source with --fill none, has there");
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
     v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
       "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
-      "that "
-      "rises by more than this share without it, or where displays of the mip's size need it; -1 = store "
-      "all");
+      "that rises by more than this share without it, or where displays of the mip's size need it; -1 = "
+      "store all");
     v("lossless_top", s.lossless_top,
       "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }
 };
 
-/// Encodes every covered fragment at every rung of its plane's role. JPEGs by libjpeg-turbo, ISLOW DCT;
-/// colours as YCbCr with the chroma resolution of `subsampling`, data with their channels apart; fragments
-/// with uncovered texels, when those are free, by stages/jpeg/masked_jpeg.h, so that only covered texels cost
-/// bytes. Tables are trained on covered fragments spread over the plane and have a code for every symbol, so
-/// that no fragment needs tables of its own. `pixels` are fill_planes()'s. A plane without a covered fragment
-/// has tables and a preview but no data. Works on the pixels as they stand: beside the result it takes some
-/// fragments' streams per thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for
-/// pixels that do not fit the planes. Same bytes for any thread count. Of mips a few
-/// fragments are encoded at every rung, which decide what rungs are worth storing
-/// (stages/ladder/rung_hull.h), and then the others at these.
-Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                     const LadderOptions& options, const RunContext& context);
+/// Encodes every covered fragment at the rungs of its plane's role.
+/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
+///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
+///   such texels are free, so that only covered texels cost bytes.
+/// - Tables are trained on covered fragments spread over the plane. They have a code for every symbol, so
+/// that
+///   no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
+/// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
+///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
+/// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).
+/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read where planes have mips; `images`
+/// are the model's and read with `lossless_top`. Beside the result it takes some fragments' streams per
+/// thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for inputs that do not fit
+/// each other. Same bytes for any thread count.
+Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
+                     const std::vector<Image>& images, const LadderOptions& options,
+                     const RunContext& context);
 
 }  // namespace texmesh

@@ -10,6 +10,7 @@
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
+#include "stages/jpeg/bit_writer.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_stream.h"
 
@@ -33,7 +34,7 @@ std::vector<Component> plain_components(const JpegCoefficients& source) {
   return out;
 }
 
-/// One coded block in fragment after fragment: the next one's DC is coded as a difference from it.
+/// A number as entropy-coded data have it.
 struct Coded {
   unsigned bits;       // of the magnitude
   std::uint32_t tail;  // those bits, of a negative number less one
@@ -45,8 +46,7 @@ Coded coded(int value) {
   return {bits, tail};
 }
 
-/// Walks the blocks of a fragment in a baseline scan's order and hands every symbol with its bits on:
-/// put(table, symbol, tail, tail bits), where table is 2 t for DC and 2 t + 1 for AC.
+/// The symbols of fragments in the order of a baseline scan.
 class FragmentScan {
  public:
   FragmentScan(const JpegCoefficients& source, const TexturePlane& plane)
@@ -58,15 +58,15 @@ class FragmentScan {
   }
   const std::vector<Component>& components() const { return components_; }
 
+  /// Calls put(table, symbol, tail, tail bits) for every symbol, with the bits that follow it; table is 2 t
+  /// for DC and 2 t + 1 for AC.
   template <class Put>
-  void walk(std::size_t fragment, const Put& put) const {
-    const std::uint32_t mcus_across = plane_.fragment_width_px / (8 * most_across_);
-    const std::uint32_t mcus_down = plane_.fragment_height_px / (8 * most_down_);
-    const auto left = static_cast<std::uint32_t>(fragment % plane_.columns) * mcus_across;
-    const auto top = static_cast<std::uint32_t>(fragment / plane_.columns) * mcus_down;
+  void for_each_symbol(std::size_t fragment, const Put& put) const {
+    const TexelRectangle at = padded_fragment_rectangle(plane_, fragment);
+    const std::uint32_t mcu_width = 8 * most_across_, mcu_height = 8 * most_down_;
     std::array<int, 3> dc{};
-    for (std::uint32_t y = top; y < top + mcus_down; ++y)
-      for (std::uint32_t x = left; x < left + mcus_across; ++x)
+    for (std::uint32_t y = at.top_px / mcu_height; y < at.bottom_px() / mcu_height; ++y)
+      for (std::uint32_t x = at.left_px / mcu_width; x < at.right_px() / mcu_width; ++x)
         for (std::size_t c = 0; c < components_.size(); ++c)
           for (std::uint32_t v = 0; v < components_[c].down; ++v)
             for (std::uint32_t u = 0; u < components_[c].across; ++u)
@@ -108,43 +108,6 @@ class FragmentScan {
   std::vector<Component> components_;
   std::uint32_t most_across_ = 1, most_down_ = 1;
 };
-
-/// Entropy-coded data, 0xff followed by 0.
-class BitWriter {
- public:
-  explicit BitWriter(Bytes& out) : out_(out) {}
-  void put(std::uint32_t value, unsigned bits) {
-    held_ = held_ << bits | value;
-    for (count_ += bits; count_ >= 8; count_ -= 8) put_byte(static_cast<std::uint8_t>(held_ >> (count_ - 8)));
-  }
-  /// Fills the last byte with ones.
-  void finish() {
-    if (count_ > 0) put((1u << (8 - count_)) - 1, 8 - count_);
-  }
-
- private:
-  void put_byte(std::uint8_t byte) {
-    out_.push_back(byte);
-    if (byte == 0xff) out_.push_back(0);
-  }
-  Bytes& out_;
-  std::uint64_t held_ = 0;
-  unsigned count_ = 0;
-};
-
-struct Code {
-  std::uint32_t value = 0;
-  unsigned bits = 0;
-};
-
-std::array<Code, 256> codes_of(const HuffmanTable& table) {
-  std::array<Code, 256> out{};
-  std::uint32_t code = 0;
-  std::size_t k = 0;
-  for (unsigned bits = 1; bits <= 16; ++bits, code <<= 1)
-    for (unsigned n = 0; n < table.bits[bits]; ++n) out[table.symbols[k++]] = {code++, bits};
-  return out;
-}
 
 /// Tables of exactly the symbols that the stored fragments have.
 HuffmanTables tables_for(const SymbolCounts& counts) {
@@ -223,20 +186,20 @@ std::string obstacle(const JpegCoefficients& source, const TexturePlane& plane) 
 /// Counts of one fragment's symbols; false when baseline JPEG has no symbol for one of its numbers.
 bool count_fragment(const FragmentScan& scan, std::size_t fragment, SymbolCounts& counts) {
   bool fits = true;
-  scan.walk(fragment, [&](std::size_t table, unsigned symbol, std::uint32_t, unsigned bits) {
+  scan.for_each_symbol(fragment, [&](std::size_t table, unsigned symbol, std::uint32_t, unsigned bits) {
     fits = fits && bits <= (table % 2 ? kMostAcBits : kMostDcBits);
     ++counts[table][symbol & 0xff];
   });
   return fits;
 }
 
-Bytes code_fragment(const FragmentScan& scan, std::size_t fragment,
-                    const std::vector<std::array<Code, 256>>& codes) {
+Bytes code_fragment(const FragmentScan& scan, std::size_t fragment, const std::vector<SymbolCodes>& codes) {
+  constexpr std::size_t kMostSymbolBytes = 8;  // a code of 16 bits and a tail of 11, each byte escaped
   Bytes out{0xff, 0xd8};
   BitWriter writer(out);
-  scan.walk(fragment, [&](std::size_t table, unsigned symbol, std::uint32_t tail, unsigned bits) {
-    const Code& code = codes[table][symbol];
-    writer.put(code.value, code.bits);
+  scan.for_each_symbol(fragment, [&](std::size_t table, unsigned symbol, std::uint32_t tail, unsigned bits) {
+    writer.reserve(kMostSymbolBytes);
+    writer.put(codes[table].code[symbol], codes[table].bits[symbol]);
     writer.put(tail, bits);
   });
   writer.finish();
@@ -244,11 +207,14 @@ Bytes code_fragment(const FragmentScan& scan, std::size_t fragment,
   return out;
 }
 
-void add_rung(LadderRung rung, PlaneLadder& plane) {
-  if (plane.rungs.back().quality >= kLosslessQuality && plane.rungs.size() > 1) plane.rungs.pop_back();
-  if (plane.rungs.back().quality >= kLosslessQuality) plane.rungs.back().quality = kLosslessQuality - 1;
-  plane.rungs.push_back(std::move(rung));
-  plane.lossless = true;
+/// A rung of quality 100 makes room: it is left out, or renamed where it is the only one.
+PlaneLadder with_rung(PlaneLadder ladder, LadderRung rung) {
+  std::vector<LadderRung>& rungs = ladder.rungs;
+  if (rungs.back().quality >= kLosslessQuality && rungs.size() > 1) rungs.pop_back();
+  if (rungs.back().quality >= kLosslessQuality) rungs.back().quality = kLosslessQuality - 1;
+  rungs.push_back(std::move(rung));
+  ladder.lossless = true;
+  return ladder;
 }
 
 }  // namespace
@@ -278,8 +244,8 @@ std::optional<LadderRung> cut_coefficients(const TexturePlane& plane, const Imag
     for (std::size_t t = 0; t < one.size(); ++t)
       for (std::size_t s = 0; s < one[t].size(); ++s) counts[t][s] += one[t][s];
   const HuffmanTables tables = tables_for(counts);
-  std::vector<std::array<Code, 256>> codes;
-  for (const HuffmanTable& table : tables) codes.push_back(codes_of(table));
+  std::vector<SymbolCodes> codes;
+  for (const HuffmanTable& table : tables) codes.push_back(symbol_codes(table));
   std::vector<Bytes> streams(fragments);
   parallel_for(context, fragments, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f)
@@ -293,28 +259,21 @@ std::optional<LadderRung> cut_coefficients(const TexturePlane& plane, const Imag
   return rung;
 }
 
-void add_lossless_top(const Fragments& fragments, const std::vector<Image>& images, Ladder& ladder,
-                      const RunContext& context) {
-  RunContext inner = context;
-  inner.progress = nullptr;
-  for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-    const TexturePlane& plane = fragments.planes[p];
-    if (plane.mip > 0) break;
-    if (plane.role == TextureRole::kAlpha) continue;
-    const Image& image = images.at(plane.image);
-    PlaneLadder& to = ladder.planes[p];
-    const bool changed =
-        changes_colours(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
-    std::string why_not;
-    if (image.format == ImageFormat::kJpeg && to.codec == Codec::kJpeg && !changed)
-      if (auto rung = cut_coefficients(plane, image, why_not, inner)) {
-        add_rung(std::move(*rung), to);
-        continue;
-      }
-    to.source = changed ? SourceFile::kOtherColours : SourceFile::kSameColours;
-    if (!why_not.empty())
-      add_info(ladder.notes, "jpeg-kept-whole", image.name, "the file is stored as it is, since " + why_not);
-  }
+PlaneLadder with_lossless_top(PlaneLadder ladder, const TexturePlane& plane, const Image& image, Notes& notes,
+                              const RunContext& context) {
+  if (plane.mip > 0 || plane.role == TextureRole::kAlpha) return ladder;
+  RunContext quiet = context;
+  quiet.progress = nullptr;
+  const bool changed =
+      changes_colours(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
+  std::string why_not;
+  if (image.format == ImageFormat::kJpeg && ladder.codec == Codec::kJpeg && !changed)
+    if (auto rung = cut_coefficients(plane, image, why_not, quiet))
+      return with_rung(std::move(ladder), std::move(*rung));
+  ladder.source = changed ? SourceFile::kOtherColours : SourceFile::kSameColours;
+  if (!why_not.empty())
+    add_info(notes, "jpeg-kept-whole", image.name, "the file is stored as it is, since " + why_not);
+  return ladder;
 }
 
 }  // namespace texmesh

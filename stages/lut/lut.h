@@ -7,6 +7,7 @@
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
 #include "stages/data/predictors.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -24,15 +25,14 @@ struct LutOptions {
   double quality_fine = 80, quality_coarse = 40;  // Q_i falls linearly from S_0 to S_max
   double quality_width = 60;                      // dQ of (3.2)
   double log_width = 0.42;                        // dg of the log-quantiser form
-  double quality_min = 5, quality_max = 97;       // clip
+  double quality_min = 5, quality_max = 97;       // q_i is clipped to them
   double normal_quality_min = 30, data_quality_min = 18, alpha_quality_min = 18;  // beside quality_min
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("allocate", s.allocate,
       "how bytes are shared among fragments: thesis = equation 3.2 in quality; log = the same in the "
-      "logarithm "
-      "of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - SSIM x "
-      "surface)");
+      "logarithm of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - "
+      "SSIM x surface)");
     v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
     v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
     v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
@@ -49,15 +49,19 @@ struct LutOptions {
   }
 };
 
-/// Quality and size tables (thesis 3.3, 8.4), from streams that are decoded again: per rung and fragment the
-/// exact bytes, the digest, MSE and 1 - SSIM of luma, for data of every channel, over covered texels, and 1 -
-/// SSIM of the preview, scaled up bilinearly, where no rung is shown; Q_i, D_i over 21 values of Gamma (bytes
-/// of the fragments' streams, tables not counted; with `allocate = rd` the bytes of log, which rungs_of()
-/// spends); the order of falling importance: eta of scale 0, then surface, then index; and the size model
-/// (stages/lut/size_model.h). `pixels` are fill_planes()'s. Throws StageError for parts that do not fit each
-/// other, FormatError for a stream that does not decode. Same result for any thread count.
+/// The document `tables` of the package: quality and size of every fragment (thesis 3.3, 8.4). Streams are
+/// decoded again for it.
+/// - Per rung and fragment: the exact bytes, the digest, MSE and 1 - SSIM over covered texels, of luma, or of
+///   every channel of data.
+/// - Per fragment 1 - SSIM of the preview, scaled up bilinearly, for where no rung is shown.
+/// - Q_i, and D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not counted. With
+///   `allocate = rd` they are the bytes of log, which rungs_of() spends.
+/// - The order of falling importance: eta of scale 0, then surface, then index.
+/// - The size model (stages/lut/size_model.h).
+/// `pixels` are fill_planes()'s, `previews` make_previews()'s. Throws StageError for parts that do not fit
+/// each other, FormatError for a stream that does not decode. Same result for any thread count.
 PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const Predictors& predictors, const Ladder& ladder, const LutOptions& options,
-                           const RunContext& context);
+                           const Predictors& predictors, const Ladder& ladder, const Previews& previews,
+                           const LutOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -81,7 +81,7 @@ double constant_bytes(const PlaneLadder& ladder, std::uint32_t width_px, std::ui
   constexpr double kMarkers = 4, kBytesOfBlock = 0.25, kWebpHeaders = 30;
   if (ladder.codec == Codec::kWebp) return kWebpHeaders;
   if (ladder.codec == Codec::kJpegProgressive || ladder.rungs.empty()) return 0;
-  return kMarkers + kBytesOfBlock * blocks_of(ladder.rungs[0].tables, width_px, height_px);
+  return kMarkers + kBytesOfBlock * blocks_of(ladder.rungs[0].table_stream, width_px, height_px);
 }
 
 void fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std::uint32_t height_px,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/data/coverage.h"
 #include "stages/fragment_codec/decode_rung.h"
 
 namespace texmesh {
@@ -22,6 +23,30 @@ bool varies(const std::vector<std::uint8_t>& values, const std::vector<std::uint
 
 std::size_t measured_channels(const TexturePlane& plane) {
   return is_colour(plane.role) ? 1 : plane.channels;
+}
+
+Samples rectangle_samples(const TexturePlane& plane, const Pixels& pixels, const TexelRectangle& rectangle) {
+  const std::size_t measured = measured_channels(plane);
+  Samples out(measured);
+  for (std::size_t c = 0; c < measured; ++c) {
+    out[c].reserve(std::size_t{rectangle.width_px} * rectangle.height_px);
+    for (std::uint32_t y = rectangle.top_px; y < rectangle.bottom_px(); ++y) {
+      const std::uint8_t* texel = pixels.at(rectangle.left_px, y);
+      for (std::uint32_t x = 0; x < rectangle.width_px; ++x, texel += pixels.channels)
+        out[c].push_back(measured_value(texel, pixels.channels, measured, c));
+    }
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> coverage_samples(const TexturePlane& plane, const TexelRectangle& rectangle) {
+  const CoverageMask mask(plane);
+  std::vector<std::uint8_t> out(std::size_t{rectangle.width_px} * rectangle.height_px);
+  for (std::uint32_t v = 0; v < rectangle.height_px && rectangle.top_px + v < plane.height_px; ++v)
+    for (std::uint32_t u = 0; u < rectangle.width_px && rectangle.left_px + u < plane.width_px; ++u)
+      if (mask.covered(rectangle.left_px + u, rectangle.top_px + v))
+        out[std::size_t{v} * rectangle.width_px + u] = 255;
+  return out;
 }
 
 Samples split_samples(const Pixels& pixels, std::size_t measured) {

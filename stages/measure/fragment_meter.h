@@ -24,6 +24,12 @@ inline std::uint8_t measured_value(const std::uint8_t* texel, std::uint32_t chan
   return static_cast<std::uint8_t>((19595 * texel[0] + 38470 * texel[1] + 7471 * texel[2] + 32768) >> 16);
 }
 
+/// The measured channels of a rectangle of the plane's padded pixels.
+Samples rectangle_samples(const TexturePlane& plane, const Pixels& pixels, const TexelRectangle& rectangle);
+
+/// 255 for the rectangle's covered texels, 0 for the others and for texels beyond the plane.
+std::vector<std::uint8_t> coverage_samples(const TexturePlane& plane, const TexelRectangle& rectangle);
+
 /// The measured channels of pixels that have as many, or 1 or 3.
 Samples split_samples(const Pixels& pixels, std::size_t measured);
 

@@ -52,7 +52,7 @@ std::string clean_text(const std::string& text, std::size_t max_bytes) {
 /// Stage results must belong together before anything is read from them by index.
 void check_inputs(const NestedScales& scales, const PerceptualValues& perceptual,
                   const std::vector<Image>& images, const Fragments& fragments, const Ladder& ladder,
-                  const PackageTables& tables, const ScaleFiles& files) {
+                  const Previews& previews, const PackageTables& tables, const ScaleFiles& files) {
   const std::size_t n = scales.scales.size(), planes = fragments.planes.size();
   const auto require = [](const std::string& what, std::size_t expected, std::size_t found) {
     if (expected != found) fail(what, std::to_string(expected), std::to_string(found));
@@ -66,15 +66,16 @@ void check_inputs(const NestedScales& scales, const PerceptualValues& perceptual
        {&perceptual.display_px_edge, &perceptual.display_px_error, &perceptual.display_px_jnd})
     require("displayed sizes", n, v->size());
   require("planes of the ladder", planes, ladder.planes.size());
+  require("planes of the previews", planes, previews.planes.size());
   require("planes of the tables", planes, tables.planes.size());
   if (files.files.empty()) fail("scale files", "at least one", "none");
   for (std::size_t p = 0; p < planes; ++p) {
     if (fragments.planes[p].image >= images.size()) fail(plane_place(p), "an image of the model", "none");
     if (fragments.planes[p].mip > 0 && fragments.planes[p].base >= p)
       fail(plane_place(p), "a mip of a plane before it", std::to_string(fragments.planes[p].base));
-    if ((fragments.planes[p].mip > 0) != ladder.planes[p].preview.empty())
+    if ((fragments.planes[p].mip > 0) != previews.planes[p].file.empty())
       fail(plane_place(p), "a preview for full-size planes, none for mips",
-           std::to_string(ladder.planes[p].preview.size()) + " bytes");
+           std::to_string(previews.planes[p].file.size()) + " bytes");
     const PlaneTables& t = tables.planes[p];
     require(plane_place(p) + ": rungs of the ladder", t.rung_count(), ladder.planes[p].rungs.size());
     require(plane_place(p) + ": fragments", fragments.planes[p].fragment_count(), t.fragment_count());
@@ -148,9 +149,9 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   return m;
 }
 
-/// `base` is the ladder of the full-size plane.
-TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladder, const PlaneLadder& base,
-                             const std::vector<Image>& images) {
+/// `preview` is that of the full-size plane.
+TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladder,
+                             const PlanePreview& preview, const std::vector<Image>& images) {
   TextureInfo t;
   t.image = plane.image;
   t.mip = plane.mip;
@@ -167,8 +168,8 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.columns = plane.columns;
   t.rows = plane.rows;
   t.grid_reason = clean_text(plane.grid_reason, 1000);
-  t.preview_width_px = base.preview_width_px;
-  t.preview_height_px = base.preview_height_px;
+  t.preview_width_px = preview.width_px;
+  t.preview_height_px = preview.height_px;
   for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
   t.lossless = ladder.lossless;
   if (ladder.source != SourceFile::kNone) t.source_extension = image_extension(images[plane.image].format);
@@ -202,17 +203,17 @@ Bytes pack_rung(const LadderRung& rung, const PlaneTables& tables, std::size_t r
   return pack;
 }
 
-void add_texture_entries(const PlaneLadder& ladder, const PlaneTables& tables, std::size_t plane,
-                         std::vector<PackageEntry>& entries) {
+void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview, const PlaneTables& tables,
+                         std::size_t plane, std::vector<PackageEntry>& entries) {
   const auto p = static_cast<std::uint32_t>(plane);
-  if (!ladder.preview.empty()) entries.push_back({preview_path(p), ladder.preview});
+  if (!preview.file.empty()) entries.push_back({preview_path(p), preview.file});
   Bytes streams;
   for (std::size_t r = 0; r < ladder.rungs.size(); ++r) {
     const LadderRung& rung = ladder.rungs[r];
-    if (rung.tables.size() != tables.table_bytes[r] || rung.quality != tables.rung_quality[r])
+    if (rung.table_stream.size() != tables.table_bytes[r] || rung.quality != tables.rung_quality[r])
       fail(plane_place(plane) + ", rung " + std::to_string(r), "size and quality as the tables say",
            "others");
-    streams.insert(streams.end(), rung.tables.begin(), rung.tables.end());
+    streams.insert(streams.end(), rung.table_stream.begin(), rung.table_stream.end());
     entries.push_back({rung_path(p, static_cast<std::uint32_t>(r)), pack_rung(rung, tables, r, plane)});
   }
   entries.push_back({table_streams_path(p), std::move(streams)});
@@ -222,11 +223,12 @@ void add_texture_entries(const PlaneLadder& ladder, const PlaneTables& tables, s
 
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const PackageTables& tables,
-                                           const ScaleFiles& files, const QualityTable& quality, double jnd,
+                                           const Ladder& ladder, const Previews& previews,
+                                           const PackageTables& tables, const ScaleFiles& files,
+                                           const QualityTable& quality, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
-  check_inputs(scales, perceptual, images, fragments, ladder, tables, files);
+  check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
   Manifest manifest = describe_model(scales, perceptual, files, fragments, jnd, options.title);
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
@@ -240,8 +242,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
     context.check_cancelled();
     const TexturePlane& plane = fragments.planes[p];
     const std::size_t base = plane.mip > 0 ? plane.base : p;
-    textures.push_back(describe_texture(plane, ladder.planes[p], ladder.planes[base], images));
-    add_texture_entries(ladder.planes[p], tables.planes[p], p, entries);
+    textures.push_back(describe_texture(plane, ladder.planes[p], previews.planes[base], images));
+    add_texture_entries(ladder.planes[p], previews.planes[p], tables.planes[p], p, entries);
     if (const std::string& extension = textures.back().source_extension; !extension.empty())
       entries.push_back({source_path(static_cast<std::uint32_t>(p), extension), images[plane.image].bytes});
   }

@@ -8,6 +8,7 @@
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
@@ -30,8 +31,9 @@ struct PackageOptions {
 /// no dates, hosts or paths).
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const PackageTables& tables,
-                                           const ScaleFiles& files, const QualityTable& quality, double jnd,
+                                           const Ladder& ladder, const Previews& previews,
+                                           const PackageTables& tables, const ScaleFiles& files,
+                                           const QualityTable& quality, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context);
 

@@ -155,19 +155,19 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
 
 }  // namespace
 
-std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladder& ladder) {
+std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previews& previews) {
   std::vector<PreviewImage> out;
   for (std::size_t i = 0; i < fragments.planes.size(); ++i) {
     const TexturePlane& plane = fragments.planes[i];
     if (plane.role == TextureRole::kAlpha || plane.mip > 0) continue;
-    PreviewImage image{plane.image, "image/jpeg", ladder.planes[i].preview};
+    PreviewImage image{plane.image, "image/jpeg", previews.planes.at(i).file};
     for (std::size_t j = 0; j < fragments.planes.size(); ++j) {
       if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha ||
           fragments.planes[j].mip > 0)
         continue;
       image.mime_type = "image/png";
-      image.bytes = combine(decode_jpeg(ladder.planes[i].preview, kMaxPreviewPixels),
-                            decode_jpeg(ladder.planes[j].preview, kMaxPreviewPixels));
+      image.bytes = combine(decode_jpeg(previews.planes.at(i).file, kMaxPreviewPixels),
+                            decode_jpeg(previews.planes.at(j).file, kMaxPreviewPixels));
     }
     out.push_back(std::move(image));
   }

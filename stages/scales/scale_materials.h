@@ -3,7 +3,7 @@
 
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
-#include "stages/data/ladder.h"
+#include "stages/data/previews.h"
 #include "stages/gltf/glb_writer.h"
 
 namespace texmesh {
@@ -17,7 +17,7 @@ struct PreviewImage {
 
 /// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane
 /// stands beside it.
-std::vector<PreviewImage> preview_images(const Fragments& fragments, const Ladder& ladder);
+std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previews& previews);
 
 /// Materials, textures, samplers and images of the document. Textures whose texture coordinates or previews
 /// do not exist are left out. Factors are clipped to the ranges of glTF.

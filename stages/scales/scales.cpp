@@ -298,10 +298,10 @@ bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
 
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
-                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context) {
   const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
-  const std::vector<PreviewImage> previews = preview_images(fragments, ladder);
+  const std::vector<PreviewImage> preview_files = preview_images(fragments, previews);
   std::vector<std::size_t> kept;
   for (std::size_t k = 0; k < scales.scales.size(); ++k)
     if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
@@ -313,7 +313,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   result.files.resize(kept.size());
   parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, previews);
+      result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, preview_files);
       context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
     }
   });

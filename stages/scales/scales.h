@@ -5,9 +5,9 @@
 
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
-#include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
@@ -39,12 +39,11 @@ struct ScalesOptions {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
     v("position_bits", s.position_bits, Range{0, 24},
-      "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at most "
-      "16");
+      "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at "
+      "most 16");
     v("uv_bits", s.uv_bits, Range{0, 24},
       "bits per texture coordinate; 0 = so that the error is under 1/8 texel; quantized and meshopt: 16 "
-      "where "
-      "that is so fine, or floats");
+      "where that is so fine, or floats");
     v("least_position_bits", s.least_position_bits, Range{1, 24},
       "fewest bits per position coordinate where they follow from the edge lengths");
     v("least_uv_bits", s.least_uv_bits, Range{1, 24},
@@ -57,22 +56,26 @@ struct ScalesOptions {
   }
 };
 
-/// Writes every kept scale as a GLB: one node per part, one primitive per material in it (above 256 parts one
-/// node for all, whose mesh lists the names of those that are left in extras.partNames and whose vertices
-/// have feature ids), the source's materials with the previews of the planes as images (RGBA PNG where a
-/// material needs alpha). GLB image k is named "texture/<k>" for source image k. Positions are quantised on
-/// one grid for all scales, so shared vertices are bit-equal between scales; triangles with two corners in
-/// one place of the grid are left out, and a note says how many of S_0's. Texture coordinates of unused sets
-/// are left out, and textures whose coordinates the mesh does not have. Tangents of the source are kept where
-/// a normal map needs them; none are made, since glTF says how a viewer makes them (MikkTSpace). Positions
-/// stay in the local frame (Mesh::origin is the manifest's). draco = KHR_draco_mesh_compression; quantized =
-/// KHR_mesh_quantization; meshopt = the same under EXT_meshopt_compression; none = plain floats. The stream
-/// (format/split/split_stream.h) holds the same scales on the same grid, or on one of 24 bits where the files
-/// have floats; there is none, and a note says so, when only one scale is kept or it would break the format's
-/// bounds. Throws StageError when nothing is left on the grid. Same bytes for any thread count.
+/// Writes every kept scale as a GLB.
+/// - A node per part, a primitive per material in it. Above 256 parts there is one node for all: its mesh
+///   lists the names of those that are left in extras.partNames, and its vertices have feature ids.
+/// - The source's materials, with the previews of the planes as images (RGBA PNG where a material needs
+///   alpha). GLB image k is named "texture/<k>" for source image k.
+/// - Positions are quantised on one grid for all scales, so shared vertices are bit-equal between scales.
+///   Triangles with two corners in one place of the grid are left out, and a note says how many of S_0's.
+///   Positions stay in the local frame (Mesh::origin is the manifest's).
+/// - Texture coordinates of unused sets are left out, and textures whose coordinates the mesh does not have.
+/// - Tangents of the source are kept where a normal map needs them; none are made, since glTF says how a
+///   viewer makes them (MikkTSpace).
+/// - draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same under
+///   EXT_meshopt_compression; none = plain floats.
+/// - The stream (format/split/split_stream.h) holds the same scales on the same grid, or on one of 24 bits
+///   where the files have floats. There is none, and a note says so, when only one scale is kept or it would
+///   break the format's bounds.
+/// Throws StageError when nothing is left on the grid. Same bytes for any thread count.
 ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                         const std::vector<Material>& materials, const std::vector<Image>& images,
-                        const Fragments& fragments, const Ladder& ladder, const ScalesOptions& options,
+                        const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context);
 
 }  // namespace texmesh

@@ -179,12 +179,12 @@ class CollapseReplay {
       const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
       if (u != v && head_[u] != kNoIndex) replay(u, v);
     }
-    take_leftovers();
+    patch_leftovers();
     reverse(chapter);
     return chapter;
   }
   /// All faces there are now.
-  SplitSource::Chapter rest(int scale) {
+  SplitSource::Chapter remaining_faces(int scale) {
     SplitSource::Chapter chapter;
     chapter.scale = scale;
     for (std::uint32_t f = 0; f < faces_.size(); ++f)
@@ -295,7 +295,7 @@ class CollapseReplay {
   }
 
   /// Faces that the coarse scale does not have although no collapse removed them become the chapter's patch.
-  void take_leftovers() {
+  void patch_leftovers() {
     for (std::uint32_t f = 0; f < faces_.size(); ++f) {
       if (!alive_[f]) continue;
       if (final_[f][0] == kNoIndex) {
@@ -359,7 +359,7 @@ SplitSource make_vertex_splits(const NestedScales& scales, const std::vector<std
     context.check_cancelled();
     source.chapters.push_back(replay.run(scales.scales.at(kept[i - 1]), scales.scales.at(kept[i])));
   }
-  source.chapters.push_back(replay.rest(scales.scales.at(kept.back()).scale));
+  source.chapters.push_back(replay.remaining_faces(scales.scales.at(kept.back()).scale));
   std::reverse(source.chapters.begin(), source.chapters.end());
   rounded.move_to(source);
   return source;

@@ -98,9 +98,10 @@ std::uint8_t preview_value(const Pixels& preview, const TexturePlane& plane, std
 
 /// A plane as a client puts it together from the chosen rungs.
 Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadder& ladder,
-               const std::vector<std::int16_t>& rungs, const RunContext& context) {
+               const PlanePreview& preview_file, const std::vector<std::int16_t>& rungs,
+               const RunContext& context) {
   Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
-  const Pixels preview = decode_jpeg(ladder.preview, kMaxPreviewPixels);
+  const Pixels preview = decode_jpeg(preview_file.file, kMaxPreviewPixels);
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       if (plane.covered_texels[f] == 0) continue;
@@ -288,6 +289,7 @@ struct StudyScene {
   const Fragments& fragments;
   const std::vector<Pixels>& pixels;
   const Ladder& ladder;
+  const Previews& previews;
 };
 
 std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choice,
@@ -299,7 +301,7 @@ std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choic
     const Pixels& whole = scene.pixels.at(index);
     textures.push_back(texture_of(
         choice.rungs.empty() ? whole
-                             : compose(plane, whole, scene.ladder.planes.at(index), choice.rungs[p], context),
+                             : compose(plane, whole, scene.ladder.planes.at(index), scene.previews.planes.at(index), choice.rungs[p], context),
         plane));
   }
   return textures;
@@ -325,12 +327,10 @@ void measure_views(const std::vector<ViewBuffer>& views, const std::vector<MipTe
 
 }  // namespace
 
-std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
-                                            const std::vector<Material>& materials,
-                                            const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                            const Ladder& ladder, const PackageTables& tables,
-                                            const AllocationStudyOptions& options,
-                                            const RunContext& context) {
+std::vector<StudiedChoice> study_allocation(
+    const ConditionedMesh& mesh, const std::vector<Material>& materials, const Fragments& fragments,
+    const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
+    const PackageTables& tables, const AllocationStudyOptions& options, const RunContext& context) {
   const Shown shown = shown_planes(materials, fragments);
   std::vector<const PlaneTables*> shown_tables;
   for (const std::size_t p : shown.planes) shown_tables.push_back(&tables.planes.at(p));
@@ -342,7 +342,7 @@ std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
     StudiedChoice& result = out.emplace_back();
     result.name = choice.name;
     if (!choice.rungs.empty()) describe(shown_tables, choice.rungs, result);
-    measure_views(views, textures_of({shown, fragments, pixels, ladder}, choice, context),
+    measure_views(views, textures_of({shown, fragments, pixels, ladder, previews}, choice, context),
                   options.picture_view, original, result);
     context.report(static_cast<double>(out.size()) / static_cast<double>(choices.size()));
   }

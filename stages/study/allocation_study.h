@@ -8,6 +8,7 @@
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 
 namespace texmesh {
 
@@ -30,15 +31,16 @@ struct StudiedChoice {
   Pixels picture;                               // sRGB, size_px x size_px
 };
 
-/// Renders S_0 with each choice's textures. `tables`, `ladder` and `pixels` are those of `fragments`.
-/// Variable choices take the highest Q_i whose bytes fit the budget, Gamma = mean eta of scale 0, and spend
-/// what is left on one rung more of the fragments with the highest eta, until nothing fits;
+/// Renders S_0 with each choice's textures. `tables`, `ladder`, `previews` and `pixels` are those of
+/// `fragments`. Variable choices take the highest Q_i whose bytes fit the budget, Gamma = mean eta of scale
+/// 0, and spend what is left on one rung more of the fragments with the highest eta, until nothing fits;
 /// rate-distortion spends the budget over all base-colour planes at once and may skip fragments, which then
 /// show the preview. Throws StageError when no base colour has a texture. Same result for any thread count.
 std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
                                             const std::vector<Material>& materials,
                                             const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                            const Ladder& ladder, const PackageTables& tables,
+                                            const Ladder& ladder, const Previews& previews,
+                                            const PackageTables& tables,
                                             const AllocationStudyOptions& options, const RunContext& context);
 
 }  // namespace texmesh

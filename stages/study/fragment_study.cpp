@@ -99,7 +99,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   ladder_options.subsampling = options.subsampling;
   RunContext quiet = context;
   quiet.progress = nullptr;
-  const Ladder ladder = encode_ladder(cut.fragments, cut.pixels, ladder_options, quiet);
+  const Ladder ladder = encode_ladder(cut.fragments, cut.pixels, {}, {}, ladder_options, quiet);
   const std::size_t count = plane.fragment_count(), qualities = options.qualities.size();
   std::vector<FileSizes> files(count * qualities);
   parallel_for(context, files.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -126,7 +126,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
       row.sum_optimised += files[q * count + f].optimised;
     }
     const LadderRung& rung = ladder.planes[0].rungs[q];
-    row.sum_shared = rung.data.size() + rung.tables.size();
+    row.sum_shared = rung.data.size() + rung.table_stream.size();
     rows.push_back(row);
   }
   return rows;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "stages/base/parallel.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
@@ -15,7 +16,14 @@ namespace {
   throw StageError("zim", std::move(place), std::move(expected), std::move(found));
 }
 
-void check(const Fragments& fragments, const std::vector<Pixels>& pixels) {
+double sum_of_weights(const ZimOptions& options) {
+  const double sum = options.weight_eta + options.weight_z + options.weight_i + options.weight_m;
+  if (!(sum > 0)) fail("weights of VQP", "at least one above 0", std::to_string(sum));
+  return sum;
+}
+
+void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const ZimOptions& options) {
+  sum_of_weights(options);
   if (pixels.size() != fragments.planes.size())
     fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
   for (std::size_t p = 0; p < pixels.size(); ++p) {
@@ -24,7 +32,7 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels) {
         pixels[p].channels != plane.channels ||
         pixels[p].data.size() != std::size_t{pixels[p].width_px} * pixels[p].height_px * plane.channels ||
         plane.covered_texels.size() != plane.fragment_count() || plane.eta.size() < plane.fragment_count() ||
-        plane.coverage.size() != (std::size_t{plane.width_px} + 7) / 8 * plane.height_px)
+        plane.coverage.size() != coverage_size_bytes(plane.width_px, plane.height_px))
       fail("plane " + std::to_string(p), "pixels, coverage and counts that fit each other",
            std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
   }
@@ -39,22 +47,16 @@ struct Sums {
 class FragmentReader {
  public:
   FragmentReader(const TexturePlane& plane, const Pixels& pixels, int difference)
-      : plane_(plane),
-        pixels_(pixels),
-        stride_((std::size_t{plane.width_px} + 7) / 8),
-        difference_(difference) {}
+      : plane_(plane), mask_(plane), pixels_(pixels), difference_(difference) {}
 
   Sums read(std::size_t fragment) const {
-    const auto column = static_cast<std::uint32_t>(fragment % plane_.columns);
-    const auto row = static_cast<std::uint32_t>(fragment / plane_.columns);
-    const std::uint32_t left = column * plane_.fragment_width_px, top = row * plane_.fragment_height_px;
-    const std::uint32_t right = std::min(plane_.width_px, left + plane_.fragment_width_px);
-    const std::uint32_t bottom = std::min(plane_.height_px, top + plane_.fragment_height_px);
+    const TexelRectangle at = fragment_rectangle(plane_, fragment);
+    const std::uint32_t right = at.right_px(), bottom = at.bottom_px();
     Sums out;
-    for (std::uint32_t y = top; y < bottom; ++y)
-      for (std::uint32_t x = left; x < right; ++x) {
-        if (!covered(x, y)) {
-          if (coverage_byte(x, y) == 0) x |= 7;  // on to the next byte
+    for (std::uint32_t y = at.top_px; y < bottom; ++y)
+      for (std::uint32_t x = at.left_px; x < right; ++x) {
+        if (!mask_.covered(x, y)) {
+          if (mask_.byte_at(x, y) == 0) x |= 7;  // on to the next byte
           continue;
         }
         add_texel(x, y, out);
@@ -67,11 +69,6 @@ class FragmentReader {
   }
 
  private:
-  std::uint8_t coverage_byte(std::uint32_t x, std::uint32_t y) const {
-    return plane_.coverage[y * stride_ + x / 8];
-  }
-  bool covered(std::uint32_t x, std::uint32_t y) const { return coverage_byte(x, y) >> (7 - x % 8) & 1; }
-
   void add_texel(std::uint32_t x, std::uint32_t y, Sums& out) const {
     ++out.count;
     const std::uint8_t* p = pixels_.at(x, y);
@@ -81,7 +78,7 @@ class FragmentReader {
     }
   }
   void add_pair(std::uint32_t x, std::uint32_t y, std::uint32_t u, std::uint32_t v, Sums& out) const {
-    if (!covered(u, v)) return;
+    if (!mask_.covered(u, v)) return;
     ++out.pairs;
     const std::uint8_t *a = pixels_.at(x, y), *b = pixels_.at(u, v);
     for (std::uint32_t c = 0; c < pixels_.channels; ++c)
@@ -92,8 +89,8 @@ class FragmentReader {
   }
 
   const TexturePlane& plane_;
+  CoverageMask mask_;
   const Pixels& pixels_;
-  std::size_t stride_;
   int difference_;
 };
 
@@ -116,54 +113,49 @@ void predict_fragment(const Sums& sums, std::uint32_t channels, const ZimOptions
   out.m[f] = static_cast<float>(std::clamp(m, 0.0, 1.0));
 }
 
-void add_spread(const TexturePlane& plane, const std::vector<double>& values, double weight,
+/// Adds `weight` times where each covered fragment's value stands between the least and largest of them; 0
+/// where all are alike.
+void add_spread(const TexturePlane& plane, const std::vector<float>& values, double weight,
                 std::vector<double>& to) {
   double lo = 0, hi = 0;
   bool first = true;
   for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
     if (plane.covered_texels[f] == 0) continue;
-    lo = first ? values[f] : std::min(lo, values[f]);
-    hi = first ? values[f] : std::max(hi, values[f]);
+    const auto value = static_cast<double>(values[f]);
+    lo = first ? value : std::min(lo, value);
+    hi = first ? value : std::max(hi, value);
     first = false;
   }
-  if (!(hi > lo)) return;  // all alike: 0, as eta
+  if (!(hi > lo)) return;
   for (std::size_t f = 0; f < plane.fragment_count(); ++f)
-    if (plane.covered_texels[f] > 0) to[f] += weight * (values[f] - lo) / (hi - lo);
+    if (plane.covered_texels[f] > 0) to[f] += weight * (static_cast<double>(values[f]) - lo) / (hi - lo);
 }
 
 /// (8.4)
-void combine(const TexturePlane& plane, const Pixels& pixels, const std::vector<WeightedPredictor>& weights,
-             const RunContext& context, PlanePredictors& out) {
-  std::vector<double> vqp(plane.fragment_count()), values(plane.fragment_count());
-  for (const WeightedPredictor& w : weights) {
-    parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t f = begin; f < end; ++f) {
-        if (plane.covered_texels[f] == 0) continue;
-        values[f] = w.predictor->value({plane, pixels, f, static_cast<double>(out.z[f]),
-                                        static_cast<double>(out.i[f]), static_cast<double>(out.zeta[f]),
-                                        static_cast<double>(out.m[f])});
-        if (!std::isfinite(values[f]))
-          fail("predictor " + w.predictor->name, "finite numbers", std::to_string(values[f]));
-      }
-    });
-    add_spread(plane, values, w.weight, vqp);
-  }
-  for (std::size_t f = 0; f < vqp.size(); ++f) out.vqp[f] = static_cast<float>(std::min(vqp[f], 1.0));
+std::vector<float> visual_quality(const TexturePlane& plane, const PlanePredictors& predictors,
+                                  const ZimOptions& options) {
+  const double sum = sum_of_weights(options);
+  std::vector<double> vqp(plane.fragment_count());
+  add_spread(plane, plane.eta, options.weight_eta / sum, vqp);
+  add_spread(plane, predictors.z, options.weight_z / sum, vqp);
+  add_spread(plane, predictors.i, options.weight_i / sum, vqp);
+  add_spread(plane, predictors.m, options.weight_m / sum, vqp);
+  std::vector<float> out;
+  for (const double value : vqp) out.push_back(static_cast<float>(std::min(value, 1.0)));
+  return out;
 }
 
 }  // namespace
 
 Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const ZimOptions& options, const RunContext& context,
-                           const PredictorRegistry& registry) {
-  check(fragments, pixels);
-  const std::vector<WeightedPredictor> weights = parse_weights(registry, options.weights);
+                           const ZimOptions& options, const RunContext& context) {
+  check(fragments, pixels, options);
   Predictors out;
   out.planes.resize(fragments.planes.size());
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     PlanePredictors& predictors = out.planes[p];
-    for (auto* values : {&predictors.z, &predictors.i, &predictors.zeta, &predictors.m, &predictors.vqp})
+    for (auto* values : {&predictors.z, &predictors.i, &predictors.zeta, &predictors.m})
       values->resize(plane.fragment_count());
     const FragmentReader reader(plane, pixels[p], options.difference);
     parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
@@ -176,7 +168,7 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
         predict_fragment(sums, plane.channels, options, f, predictors);
       }
     });
-    combine(plane, pixels[p], weights, context, predictors);
+    predictors.vqp = visual_quality(plane, predictors, options);
     context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));
   }
   return out;

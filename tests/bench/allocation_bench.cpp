@@ -17,6 +17,7 @@
 #include "stages/fill/fill.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
 #include "tests/support/allocation_curves.h"
@@ -80,10 +81,12 @@ void print_sizes(const std::string& path) {
   const std::vector<Pixels> pixels = fill_planes(model.fragments, model.images, Fill::kPushPull, context);
   LadderOptions between;
   between.rungs = {6, 9, 12, 15, 22, 27, 32, 38, 43, 48, 57, 63, 69, 80, 90, 94};  // none of the ladder's
-  const Ladder ladder = encode_ladder(model.fragments, pixels, {}, context);
-  const Ladder other = encode_ladder(model.fragments, pixels, between, context);
+  const Previews previews = make_previews(model.fragments, pixels, {}, context);
+  const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, {}, context);
+  const Ladder other = encode_ladder(model.fragments, pixels, previews, {}, between, context);
   const Predictors predictors = predict_quality(model.fragments, pixels, {}, context);
-  const PackageTables tables = build_tables(model.fragments, pixels, predictors, ladder, {}, context);
+  const PackageTables tables =
+      build_tables(model.fragments, pixels, predictors, ladder, previews, {}, context);
   Errors at_rungs, inside, whole, without_knots;
   double correlation = 1, model_error = 0;
   for (const std::size_t p : shown) {

@@ -13,6 +13,7 @@
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
 #include "tests/support/fill_curves.h"
@@ -124,8 +125,9 @@ Measured measure(const Fragments& fragments, const std::vector<std::size_t>& sho
   LadderOptions options;
   options.uncovered = uncovered;
   const Predictors predictors = predict_quality(fragments, pixels, {}, context);
-  const Ladder ladder = encode_ladder(fragments, pixels, options, context);
-  const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, {}, context);
+  const Previews previews = make_previews(fragments, pixels, {}, context);
+  const Ladder ladder = encode_ladder(fragments, pixels, previews, {}, options, context);
+  const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, previews, {}, context);
   return {fill_curve(tables, shown), mixed_means(fragments, shown, ladder, kMiddleRung),
           mixed_means(fragments, shown, ladder, kTopRung)};
 }

@@ -17,6 +17,7 @@
 #include "stages/fragmentation/fragmentation.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_texture.h"
 
@@ -52,13 +53,13 @@ void encode_ladder_bench(benchmark::State& state) {
       for (int quality : options.rungs) plain_bytes += plain_encode(scene.pixels[0], quality, false);
     });
     one = best(one, [&] {
-      const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, options, threads(1));
+      const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(1));
       our_bytes = 0;
       for (const LadderRung& rung : ladder.planes[0].rungs)
-        our_bytes += rung.data.size() + rung.tables.size();
+        our_bytes += rung.data.size() + rung.table_stream.size();
     });
     two = best(two, [&] {
-      benchmark::DoNotOptimize(encode_ladder(scene.fragments, scene.pixels, options, threads(2)));
+      benchmark::DoNotOptimize(encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(2)));
     });
   }
   state.counters["cpu_ratio"] = one.cpu_s / plain.cpu_s;
@@ -76,12 +77,13 @@ BENCHMARK(encode_ladder_bench)
 
 void build_tables_bench(benchmark::State& state) {
   const Scene scene = made_scene(state);
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, threads(2));
+  const Previews previews = make_previews(scene.fragments, scene.pixels, {}, threads(2));
+  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, previews, {}, {}, threads(2));
   const Predictors predictors = predict_quality(scene.fragments, scene.pixels, {}, threads(2));
   Cost plain, one, two;
   const auto build = [&](int count) {
     benchmark::DoNotOptimize(
-        build_tables(scene.fragments, scene.pixels, predictors, ladder, {}, threads(count)));
+        build_tables(scene.fragments, scene.pixels, predictors, ladder, previews, {}, threads(count)));
   };
   for (auto _ : state) {
     plain = best(plain, [&] {

@@ -18,6 +18,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/ladder/ladder.h"
 #include "stages/ladder/lossless_top.h"
+#include "stages/previews/previews.h"
 #include "tests/bench/bench_texture.h"
 
 namespace texmesh {
@@ -39,7 +40,7 @@ double status_mb(const std::string& field) {
 std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlane& plane) {
   std::string why_not;
   const auto rung = cut_coefficients(plane, probe_image("whole", file, {}), why_not, threads(2));
-  return rung ? rung->data.size() + rung->tables.size() : 0;
+  return rung ? rung->data.size() + rung->table_stream.size() : 0;
 }
 
 double percent(std::size_t part, std::size_t whole) {
@@ -48,7 +49,7 @@ double percent(std::size_t part, std::size_t whole) {
 
 void print_sizes(const std::string& name, const Scene& scene) {
   const LadderOptions options;
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, options, threads(2));
+  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(2));
   const TexturePlane& plane = scene.fragments.planes[0];
   std::printf("%s: %zu fragments of %u px\n  quality      ", name.c_str(), plane.fragment_count(),
               plane.fragment_width_px);
@@ -56,7 +57,7 @@ void print_sizes(const std::string& name, const Scene& scene) {
   std::string least = "\n  least possible";
   std::size_t ours_sum = 0, plain_sum = 0;
   for (const LadderRung& rung : ladder.planes[0].rungs) {
-    const std::size_t ours = rung.data.size() + rung.tables.size();
+    const std::size_t ours = rung.data.size() + rung.table_stream.size();
     const std::size_t plain = plain_encode(scene.pixels[0], rung.quality, false);
     const std::vector<std::uint8_t> optimised = plain_file(scene.pixels[0], rung.quality, true);
     char text[3][16];
@@ -78,11 +79,12 @@ void print_memory(const Scene& scene, int count) {
   ::malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
   const double before = status_mb("VmRSS");
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, threads(count));
+  const Previews previews = make_previews(scene.fragments, scene.pixels, {}, threads(count));
+  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, previews, {}, {}, threads(count));
   const double peak = status_mb("VmHWM") - before;
-  double result = static_cast<double>(ladder.planes[0].preview.size());
+  double result = static_cast<double>(previews.planes[0].file.size());
   for (const LadderRung& rung : ladder.planes[0].rungs)
-    result += static_cast<double>(rung.data.size() + rung.tables.size());
+    result += static_cast<double>(rung.data.size() + rung.table_stream.size());
   result /= 1 << 20;
   std::printf(
       "  %d thread(s): memory grows by %.1f MB, of which the result is %.1f MB; the image has %.1f MB\n",
@@ -98,11 +100,11 @@ void print_time(const Scene& scene) {
     plain = std::min(plain, cpu_seconds() - cpu);
     cpu = cpu_seconds();
     double wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, threads(1));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(1));
     ours = std::min(ours, cpu_seconds() - cpu);
     one = std::min(one, wall_seconds() - wall);
     wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, threads(2));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(2));
     two = std::min(two, wall_seconds() - wall);
   }
   std::printf(

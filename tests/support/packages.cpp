@@ -12,6 +12,7 @@
 #include "format/documents/package_writer.h"
 #include "stages/base/run_context.h"
 #include "stages/ladder/ladder.h"
+#include "stages/previews/previews.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {
@@ -86,7 +87,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {
     t.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
-    t.table_bytes.push_back(static_cast<std::uint32_t>(rung.tables.size()));
+    t.table_bytes.push_back(static_cast<std::uint32_t>(rung.table_stream.size()));
     for (std::uint32_t f = 0; f < kFragments; ++f) {
       const std::span stream(rung.data.data() + rung.offset[f], rung.offset[f + 1] - rung.offset[f]);
       t.size_bytes.push_back(static_cast<std::uint32_t>(stream.size()));
@@ -126,13 +127,15 @@ void add_texture(PackageParts& p) {
   fragments.planes = {plane};
   LadderOptions options;
   options.rungs = {20, 70};
-  const PlaneLadder ladder = encode_ladder(fragments, {picture(64, 64)}, options, {}).planes.at(0);
+  const std::vector<Pixels> pixels{picture(64, 64)};
+  const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, {}, options, {}).planes.at(0);
+  const PlanePreview preview = make_previews(fragments, pixels, {}, {}).planes.at(0);
   p.tables.planes = {make_tables(plane, ladder)};
-  p.streams[preview_path(0)] = ladder.preview;
+  p.streams[preview_path(0)] = preview.file;
   for (std::uint32_t r = 0; r < 2; ++r) {
     const LadderRung& rung = ladder.rungs[r];
     Bytes& tables = p.streams[table_streams_path(0)];
-    tables.insert(tables.end(), rung.tables.begin(), rung.tables.end());
+    tables.insert(tables.end(), rung.table_stream.begin(), rung.table_stream.end());
     Bytes& pack = p.streams[rung_path(0, r)];
     for (const std::uint16_t f : p.tables.planes[0].order)
       pack.insert(pack.end(), rung.data.begin() + static_cast<std::ptrdiff_t>(rung.offset[f]),
@@ -142,7 +145,7 @@ void add_texture(PackageParts& p) {
   t.role = "base-colour", t.name = "ball.jpg", t.colour_space = "srgb";
   t.width_px = 64, t.height_px = 48, t.fragment_width_px = t.fragment_height_px = 32, t.columns = t.rows = 2;
   t.grid_reason = plane.grid_reason;
-  t.preview_width_px = ladder.preview_width_px, t.preview_height_px = ladder.preview_height_px;
+  t.preview_width_px = preview.width_px, t.preview_height_px = preview.height_px;
   t.rung_quality = {20, 70};
   p.textures = {t};
 }

@@ -65,6 +65,7 @@ std::string maker(const std::string& path) {
     case EntryKind::kQuality:
       return "quality";
     case EntryKind::kPreview:
+      return "previews";
     case EntryKind::kTableStreams:
     case EntryKind::kRung:
     case EntryKind::kTextures:

@@ -6,7 +6,7 @@
 #include "format/container/layout.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
-#include "stages/ladder/lossless_top.h"
+#include "stages/data/ladder.h"
 
 namespace texmesh {
 namespace {

@@ -10,6 +10,7 @@
 #include "stages/image/png_writer.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
 #include "stages/study/fragment_study.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_texture.h"
@@ -94,7 +95,8 @@ TEST(TextureFigures, FreeTexelsAgainstTheBackgroundAtEqualErrorOfWhatIsCovered) 
     options.uncovered = uncovered;
     const PackageTables tables =
         build_tables(scene.fragments, pixels, predict_quality(scene.fragments, pixels, {}, context),
-                     encode_ladder(scene.fragments, pixels, options, context), {}, context);
+                     encode_ladder(scene.fragments, pixels, {}, {}, options, context),
+                     make_previews(scene.fragments, pixels, {}, context), {}, context);
     return testing::fill_curve(tables, {0});
   };
   const auto background = curve(scene.pixels, Uncovered::kKept);
@@ -115,7 +117,8 @@ TEST(TextureFigures, AllocationsAgainstOneQualityEverywhereAtEqualLossOfTheSurfa
   const auto pixels = filled(scene, context);
   const testing::Planes planes{build_tables(scene.fragments, pixels,
                                             predict_quality(scene.fragments, pixels, {}, context),
-                                            encode_ladder(scene.fragments, pixels, {}, context), {}, context)
+                                            encode_ladder(scene.fragments, pixels, {}, {}, {}, context),
+                                            make_previews(scene.fragments, pixels, {}, context), {}, context)
                                    .planes};
   testing::Curve all;
   for (std::size_t r = 0; r < planes.tables[0].rung_count(); ++r) all.push_back(testing::uniform(planes, r));

@@ -53,7 +53,7 @@ struct Coded {
             streams.begin() + static_cast<std::ptrdiff_t>(rung + 1)};
   }
   const Bytes& tables(std::size_t rung) const {
-    return rungs[codec_traits(codec).incremental ? 0 : rung].tables;
+    return rungs[codec_traits(codec).incremental ? 0 : rung].table_stream;
   }
   Bytes file(std::size_t rung) const { return join_fragment(codec, tables(rung), parts(rung)); }
   /// The file of the highest rung with other bytes as that rung's own stream.
@@ -88,7 +88,7 @@ TEST(TextureCodec, EveryRungIsACompleteFileAndBetterThanTheOneBelow) {
     double last = 1e30;
     for (std::size_t r = 0; r < coded.rungs.size(); ++r) {
       ASSERT_FALSE(coded.streams[r].empty());
-      EXPECT_TRUE(is_table_stream(codec, static_cast<std::uint32_t>(r), coded.rungs[r].tables));
+      EXPECT_TRUE(is_table_stream(codec, static_cast<std::uint32_t>(r), coded.rungs[r].table_stream));
       const Pixels got = decode_fragment_file(codec, coded.file(r), 64 * 48);
       ASSERT_EQ(got.width_px, 64u);
       ASSERT_EQ(got.height_px, 48u);
@@ -274,7 +274,7 @@ Ladder encode(const Plane& p, LadderMode mode, int threads = 1) {
   options.mode = mode;
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 TEST(LadderModes, ProgressiveRungsAreCutsOfOneFile) {

@@ -352,7 +352,7 @@ Ladder ladder_of(const Scene& s, Uncovered uncovered, int threads = 1) {
   options.uncovered = uncovered;
   RunContext context;
   context.threads = threads;
-  return encode_ladder(s.fragments, s.pixels, options, context);
+  return encode_ladder(s.fragments, s.pixels, {}, {}, options, context);
 }
 
 std::vector<std::uint8_t> stream(const LadderRung& rung, std::size_t f) {
@@ -382,7 +382,7 @@ TEST(MaskedLadder, WhollyCoveredPlanesAndKeptTexelsAreCodedAsWithoutCoverage) {
 TEST(MaskedLadder, IsTheSameForAnyThreadCount) {
   const Ladder one = ladder_of(scene(), Uncovered::kFree), eight = ladder_of(scene(), Uncovered::kFree, 8);
   for (std::size_t r = 0; r < one.planes[0].rungs.size(); ++r) {
-    EXPECT_EQ(one.planes[0].rungs[r].tables, eight.planes[0].rungs[r].tables);
+    EXPECT_EQ(one.planes[0].rungs[r].table_stream, eight.planes[0].rungs[r].table_stream);
     EXPECT_EQ(one.planes[0].rungs[r].data, eight.planes[0].rungs[r].data);
   }
 }

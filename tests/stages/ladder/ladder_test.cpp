@@ -63,11 +63,12 @@ Plane make_plane(std::uint32_t columns, std::uint32_t rows, std::uint32_t side, 
 Ladder encode(const Plane& p, LadderOptions options = {}, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 Pixels decode_baseline(const LadderRung& rung, std::size_t fragment) {
-  return decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, fragment_stream(rung, fragment)), 1 << 24);
+  return decode_jpeg(join_fragment(Codec::kJpeg, rung.table_stream, fragment_stream(rung, fragment)),
+                     1 << 24);
 }
 
 /// The pixels of one fragment as an image of its own.
@@ -177,10 +178,10 @@ TEST(Ladder, StreamsHoldTheirDataAloneAndRise) {
   for (const LadderRung& rung : ladder.planes[0].rungs) {
     EXPECT_GT(rung.data.size(), last);
     last = rung.data.size();
-    EXPECT_EQ(rung.tables[2], 0xff);
-    EXPECT_EQ(rung.tables[3], 0xdb);  // DQT right after SOI
-    EXPECT_EQ(rung.tables[rung.tables.size() - 16], 0xff);
-    EXPECT_EQ(rung.tables[rung.tables.size() - 15], 0xda);  // SOS right before EOI: data follow
+    EXPECT_EQ(rung.table_stream[2], 0xff);
+    EXPECT_EQ(rung.table_stream[3], 0xdb);  // DQT right after SOI
+    EXPECT_EQ(rung.table_stream[rung.table_stream.size() - 16], 0xff);
+    EXPECT_EQ(rung.table_stream[rung.table_stream.size() - 15], 0xda);  // SOS right before EOI: data follow
     for (std::size_t f = 0; f < 4; ++f) {
       const auto stream = fragment_stream(rung, f);
       EXPECT_EQ(stream[1], 0xd8);
@@ -237,8 +238,7 @@ TEST(Ladder, UncoveredFragmentsAreNotStored) {
   p.fragments.planes[0].covered_texels = {0, 0, 0};
   const Ladder none = encode(p);
   EXPECT_TRUE(none.planes[0].rungs[0].data.empty());
-  EXPECT_FALSE(none.planes[0].rungs[0].tables.empty());
-  EXPECT_FALSE(none.planes[0].preview.empty());
+  EXPECT_FALSE(none.planes[0].rungs[0].table_stream.empty());
 }
 
 TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
@@ -247,7 +247,7 @@ TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
   const auto tables = [&] {
     std::vector<std::vector<std::uint8_t>> out;
     const Ladder ladder = encode(p);
-    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.tables);
+    for (const LadderRung& rung : ladder.planes[0].rungs) out.push_back(rung.table_stream);
     return out;
   };
   const auto before = tables();
@@ -260,81 +260,14 @@ TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
   EXPECT_NE(tables(), before) << "the noise would show";
 }
 
-/// Luma's sampling factors in the frame header of a baseline JPEG: 0x22 halves the chroma.
-int luma_sampling(const std::vector<std::uint8_t>& jpeg) {
-  for (std::size_t at = 2; at + 11 < jpeg.size() && jpeg[at] == 0xff;) {
-    if (jpeg[at + 1] == 0xc0) return jpeg[at + 11];
-    at += 2 + (std::size_t{jpeg[at + 2]} << 8 | jpeg[at + 3]);
-  }
-  return -1;
-}
-
-TEST(Ladder, PreviewsOfDataAreNotSubsampled) {
-  const auto sampling = [](TextureRole role) {
-    return luma_sampling(encode(make_plane(2, 2, 64, 3, Content::kPhoto, role)).planes[0].preview);
-  };
-  for (const TextureRole role : {TextureRole::kBaseColour, TextureRole::kEmissive, TextureRole::kColour})
-    EXPECT_EQ(sampling(role), 0x22);
-  for (const TextureRole role :
-       {TextureRole::kNormal, TextureRole::kOcclusionRoughnessMetallic, TextureRole::kData})
-    EXPECT_EQ(sampling(role), 0x11);
-}
-
 TEST(Ladder, SameBytesForAnyNumberOfThreads) {
   const Plane p = make_plane(5, 4, 48, 3);
   const Ladder one = encode(p, {}, 1), eight = encode(p, {}, 8);
   for (std::size_t r = 0; r < one.planes[0].rungs.size(); ++r) {
     EXPECT_TRUE(one.planes[0].rungs[r].data == eight.planes[0].rungs[r].data);
-    EXPECT_TRUE(one.planes[0].rungs[r].tables == eight.planes[0].rungs[r].tables);
+    EXPECT_TRUE(one.planes[0].rungs[r].table_stream == eight.planes[0].rungs[r].table_stream);
     EXPECT_EQ(one.planes[0].rungs[r].offset, eight.planes[0].rungs[r].offset);
   }
-  EXPECT_TRUE(one.planes[0].preview == eight.planes[0].preview);
-}
-
-TEST(Ladder, PreviewIsOneEighthWhereSmallAndOneSixteenthElsewhere) {
-  Plane p = make_plane(4, 2, 64, 3);
-  p.fragments.planes[0].width_px = 250;  // the plane proper ends in the last fragment
-  Ladder ladder = encode(p);
-  EXPECT_EQ(ladder.planes[0].preview_width_px, 32u);
-  EXPECT_EQ(ladder.planes[0].preview_height_px, 16u);
-  const Pixels preview = decode_jpeg(ladder.planes[0].preview, 1 << 20);
-  EXPECT_EQ(preview.width_px, 32u);
-  EXPECT_EQ(preview.height_px, 16u);
-
-  const Plane noisy = make_plane(6, 6, 256, 1, Content::kNoise);
-  LadderOptions options;
-  options.rungs = {5};
-  options.preview_quality = 100;
-  ladder = encode(noisy, options);
-  EXPECT_EQ(ladder.planes[0].preview_width_px, 96u);
-  EXPECT_EQ(decode_jpeg(ladder.planes[0].preview, 1 << 20).channels, 1u);
-
-  Plane tiny = make_plane(1, 1, 16, 3);
-  tiny.fragments.planes[0].width_px = tiny.fragments.planes[0].height_px = 1;
-  ladder = encode(tiny);
-  EXPECT_EQ(ladder.planes[0].preview_width_px, 1u);
-  const Pixels dot = decode_jpeg(ladder.planes[0].preview, 16);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(dot.data[c], tiny.pixels[0].data[c], 12);
-}
-
-TEST(Ladder, PreviewsAreMeansOfWhatMipsAreMeansOf) {
-  Plane p = make_plane(2, 2, 64, 3);
-  const auto fill = [&](auto value) {
-    for (std::uint32_t y = 0; y < 128; ++y)
-      for (std::uint32_t x = 0; x < 128; ++x)
-        for (std::uint32_t c = 0; c < 3; ++c)
-          p.pixels[0].data[(std::size_t{y} * 128 + x) * 3 + c] = static_cast<std::uint8_t>(value(x + y, c));
-  };
-  fill([](std::uint32_t k, std::uint32_t) { return k % 2 * 255; });
-  const auto preview = [&] { return decode_jpeg(encode(p).planes[0].preview, 1 << 20); };
-  for (const std::uint8_t v : preview().data) EXPECT_NEAR(v, 188, 2) << "half the light, not half the code";
-  p.fragments.planes[0].role = TextureRole::kOcclusionRoughnessMetallic;
-  for (const std::uint8_t v : preview().data) EXPECT_NEAR(v, 128, 2);
-
-  p.fragments.planes[0].role = TextureRole::kNormal;  // ridges: their mean is (0, 0, 1)
-  fill([](std::uint32_t k, std::uint32_t c) { return c == 1 ? 128 : c == 2 ? 204 : k % 2 ? 230 : 25; });
-  const Pixels normals = preview();
-  for (std::size_t k = 0; k < normals.data.size(); k += 3) EXPECT_NEAR(normals.data[k + 2], 255, 3);
 }
 
 TEST(Ladder, RefusesRungsThatDoNotRiseAndPixelsThatDoNotFit) {
@@ -360,12 +293,13 @@ TEST(Ladder, EveryTruncationIsRefused) {
   const LadderRung& rung = ladder.planes[0].rungs[0];
   const auto whole = fragment_stream(rung, 0);
   for (std::size_t n = 0; n < whole.size(); ++n)
-    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, rung.tables, whole.first(n)), 1 << 20), FormatError)
+    EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, rung.table_stream, whole.first(n)), 1 << 20),
+                 FormatError)
         << n;
-  const std::span<const std::uint8_t> tables(rung.tables);
+  const std::span<const std::uint8_t> tables(rung.table_stream);
   for (std::size_t n = 0; n < tables.size(); ++n)
     EXPECT_THROW(decode_jpeg(join_fragment(Codec::kJpeg, tables.first(n), whole), 1 << 20), FormatError) << n;
-  const auto complete = join_fragment(Codec::kJpeg, rung.tables, whole);
+  const auto complete = join_fragment(Codec::kJpeg, rung.table_stream, whole);
   for (std::size_t n = 0; n < complete.size(); ++n)
     EXPECT_THROW(decode_jpeg(std::span(complete).first(n), 1 << 20), FormatError) << n;
 }

@@ -76,10 +76,10 @@ Ladder ladder_below(const std::vector<int>& qualities) {
   return ladder;
 }
 
-Fragments one(const TexturePlane& plane) {
-  Fragments out;
-  out.planes.push_back(plane);
-  return out;
+/// The ladder with the top of `image`, as encode_ladder() makes it.
+Ladder topped(const TexturePlane& plane, const Image& image, Ladder ladder) {
+  ladder.planes[0] = with_lossless_top(std::move(ladder.planes[0]), plane, image, ladder.notes, {});
+  return ladder;
 }
 
 RunContext with_threads(int threads) {
@@ -146,8 +146,7 @@ TEST(LosslessTop, FragmentsHaveTheSourcesCoefficientsAndPixels) {
     SCOPED_TRACE(kind.name);
     const Image image = image_of(make_jpeg(kind, 83, 61));
     const TexturePlane plane = plane_of(image);
-    Ladder ladder = ladder_below({50, 97});
-    add_lossless_top(one(plane), {image}, ladder, {});
+    const Ladder ladder = topped(plane, image, ladder_below({50, 97}));
     const PlaneLadder& top = ladder.planes[0];
     ASSERT_TRUE(top.lossless);
     EXPECT_EQ(top.source, SourceFile::kNone);
@@ -175,15 +174,13 @@ TEST(LosslessTop, BytesAreThoseOfTheSource) {
   plane.fragment_width_px = plane.fragment_height_px = 256;
   plane.columns = plane.rows = 2;
   plane.covered_texels.assign(4, 1);
-  Ladder ladder = ladder_below({50});
-  add_lossless_top(one(plane), {image}, ladder, {});
+  const Ladder ladder = topped(plane, image, ladder_below({50}));
   EXPECT_LT(ladder.planes[0].rungs[1].data.size(), image.bytes.size());  // tables of its own
 }
 
 TEST(LosslessTop, OtherFormatsStayAsTheyAre) {
   const Image png = image_of(testing::png_bytes(40, 40, 4));
-  Ladder ladder = ladder_below({50, 97});
-  add_lossless_top(one(plane_of(png)), {png}, ladder, {});
+  Ladder ladder = topped(plane_of(png), png, ladder_below({50, 97}));
   EXPECT_EQ(ladder.planes[0].rungs.size(), 2u);
   EXPECT_FALSE(ladder.planes[0].lossless);
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kSameColours);
@@ -191,41 +188,33 @@ TEST(LosslessTop, OtherFormatsStayAsTheyAre) {
 
   TexturePlane alpha = plane_of(png);
   alpha.role = TextureRole::kAlpha;
-  ladder = ladder_below({50, 97});
-  add_lossless_top(one(alpha), {png}, ladder, {});
+  ladder = topped(alpha, png, ladder_below({50, 97}));
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kNone);  // the colour plane's has it
 }
 
 TEST(LosslessTop, MipsHaveNone) {
   const Image png = image_of(testing::png_bytes(40, 40, 3));
-  Fragments fragments = one(plane_of(png));
-  fragments.planes.push_back(fragments.planes[0]);
-  fragments.planes[1].mip = 1;
-  Ladder ladder = ladder_below({50});
-  ladder.planes.push_back(ladder.planes[0]);
-  add_lossless_top(fragments, {png}, ladder, {});
-  EXPECT_EQ(ladder.planes[0].source, SourceFile::kSameColours);
-  EXPECT_EQ(ladder.planes[1].source, SourceFile::kNone);
+  TexturePlane mip = plane_of(png);
+  EXPECT_EQ(topped(mip, png, ladder_below({50})).planes[0].source, SourceFile::kSameColours);
+  mip.mip = 1;
+  EXPECT_EQ(topped(mip, png, ladder_below({50})).planes[0].source, SourceFile::kNone);
 }
 
 TEST(LosslessTop, JpegsThatCannotBeCutStayWhole) {
   const Image wide = image_of(make_jpeg({"4:1:1", 3, 4, 1}, 64, 64));
-  Ladder ladder = ladder_below({50});
-  add_lossless_top(one(plane_of(wide)), {wide}, ladder, {});
+  Ladder ladder = topped(plane_of(wide), wide, ladder_below({50}));
   EXPECT_FALSE(ladder.planes[0].lossless);
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kSameColours);
   ASSERT_EQ(ladder.notes.size(), 1u);
   EXPECT_NE(ladder.notes[0].text.find("wider than 16 px"), std::string::npos);
 
   const Image coarse = image_of(make_jpeg({"16-bit quantisers", 3, 1, 1, false, false, 1}, 64, 64));
-  ladder = ladder_below({50});
-  add_lossless_top(one(plane_of(coarse)), {coarse}, ladder, {});
+  ladder = topped(plane_of(coarse), coarse, ladder_below({50}));
   EXPECT_FALSE(ladder.planes[0].lossless);
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kSameColours);
 
   const Image inks = image_of(testing::cmyk_jpeg(48, 48, {10, 20, 30, 40}, true));
-  ladder = ladder_below({50});
-  add_lossless_top(one(plane_of(inks)), {inks}, ladder, {});
+  ladder = topped(plane_of(inks), inks, ladder_below({50}));
   EXPECT_FALSE(ladder.planes[0].lossless);
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kOtherColours);
 }
@@ -234,7 +223,7 @@ TEST(LosslessTop, OtherCodecsKeepTheFile) {
   const Image image = image_of(make_jpeg({""}, 64, 64));
   Ladder ladder = ladder_below({50});
   ladder.planes[0].codec = Codec::kWebp;
-  add_lossless_top(one(plane_of(image)), {image}, ladder, {});
+  ladder = topped(plane_of(image), image, std::move(ladder));
   EXPECT_FALSE(ladder.planes[0].lossless);
   EXPECT_EQ(ladder.planes[0].source, SourceFile::kSameColours);
 }
@@ -242,8 +231,7 @@ TEST(LosslessTop, OtherCodecsKeepTheFile) {
 TEST(LosslessTop, ARungOfQuality100MakesRoom) {
   const Image image = image_of(make_jpeg({""}, 64, 64));
   for (const std::vector<int>& below : {std::vector<int>{60, 100}, std::vector<int>{100}}) {
-    Ladder ladder = ladder_below(below);
-    add_lossless_top(one(plane_of(image)), {image}, ladder, {});
+    const Ladder ladder = topped(plane_of(image), image, ladder_below(below));
     const auto& rungs = ladder.planes[0].rungs;
     ASSERT_EQ(rungs.size(), 2u);
     EXPECT_LT(rungs[0].quality, kLosslessQuality);
@@ -259,7 +247,7 @@ TEST(LosslessTop, ThreadsMakeNoDifference) {
   const auto first = cut_coefficients(plane, image, why_not, with_threads(1));
   const auto second = cut_coefficients(plane, image, why_not, with_threads(8));
   ASSERT_TRUE(first && second);
-  EXPECT_EQ(first->tables, second->tables);
+  EXPECT_EQ(first->table_stream, second->table_stream);
   EXPECT_EQ(first->data, second->data);
   EXPECT_EQ(first->offset, second->offset);
 }

@@ -9,6 +9,7 @@
 #include "stages/jpeg/jpeg.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/support/meshes.h"
 
@@ -53,7 +54,7 @@ Plane make_plane() {
 Ladder encode(const Plane& p, const LadderOptions& options, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return encode_ladder(p.fragments, p.pixels, options, context);
+  return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
 }
 
 LadderOptions rungs(std::vector<int> qualities) {
@@ -63,7 +64,8 @@ LadderOptions rungs(std::vector<int> qualities) {
 }
 
 PlaneTables tables_of(const Plane& p, const Ladder& ladder) {
-  return build_tables(p.fragments, p.pixels, predict_quality(p.fragments, p.pixels, {}, {}), ladder, {}, {})
+  return build_tables(p.fragments, p.pixels, predict_quality(p.fragments, p.pixels, {}, {}), ladder,
+                      make_previews(p.fragments, p.pixels, {}, {}), {}, {})
       .planes[0];
 }
 

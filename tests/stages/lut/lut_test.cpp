@@ -15,6 +15,7 @@
 #include "stages/lut/size_model.h"
 #include "stages/measure/distortion.h"
 #include "stages/measure/fragment_meter.h"
+#include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/support/meshes.h"
 
@@ -28,6 +29,7 @@ struct Scene {
   std::vector<Pixels> pixels;
   Predictors predictors;
   Ladder ladder;
+  Previews previews;
 };
 
 TexturePlane plane_of(std::uint32_t columns, std::uint32_t rows, std::uint32_t channels) {
@@ -69,14 +71,15 @@ Scene make_scene(LadderOptions ladder_options = {}) {
     s.pixels.push_back(pixels);
   }
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
-  s.ladder = encode_ladder(s.fragments, s.pixels, ladder_options, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder_options, {});
+  s.previews = make_previews(s.fragments, s.pixels, {}, {});
   return s;
 }
 
 PackageTables build(const Scene& s, const LutOptions& options = {}, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, options, context);
+  return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, s.previews, options, context);
 }
 
 TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
@@ -87,7 +90,7 @@ TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
     const PlaneTables& t = tables.planes[p];
     ASSERT_EQ(t.rung_count(), 10u);
     for (std::size_t r = 0; r < 10; ++r) {
-      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].tables.size());
+      EXPECT_EQ(t.table_bytes[r], s.ladder.planes[p].rungs[r].table_stream.size());
       for (std::size_t f = 0; f < t.fragment_count(); ++f) {
         const auto stream = fragment_stream(s.ladder.planes[p].rungs[r], f);
         const std::size_t at = r * t.fragment_count() + f;
@@ -129,7 +132,8 @@ TEST(Lut, NoChannelOfDataStandsForAnother) {
     s.pixels[0].data[k] = s.pixels[0].data[k + 1] = 128;
   const auto measured = [&](TextureRole role) {  // only blue varies: luma has 1/77 of its square error
     s.fragments.planes[0].role = role;
-    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+    s.previews = make_previews(s.fragments, s.pixels, {}, {});
     return build(s).planes[0];
   };
   const PlaneTables data = measured(TextureRole::kOcclusionRoughnessMetallic);
@@ -192,7 +196,8 @@ TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
   // A flat texture is as good in the preview.
   Scene flat = make_scene();
   for (Pixels& pixels : flat.pixels) std::fill(pixels.data.begin(), pixels.data.end(), std::uint8_t{97});
-  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {});
+  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {}, {}, {});
+  flat.previews = make_previews(flat.fragments, flat.pixels, {}, {});
   const PlaneTables t = build(flat).planes[0];
   for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
 }
@@ -226,14 +231,14 @@ TEST(Lut, SkippedFragmentsShowThePreviewOfTheirOwnImageBilinearly) {
                                                       50 * std::cos(y / length * 6.28));
     }
   LadderOptions ladder;
-  ladder.preview_quality = 95;
   ladder.hull_gain = -1;
-  s.ladder = encode_ladder(s.fragments, s.pixels, ladder, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder, {});
+  s.previews = make_previews(s.fragments, s.pixels, {.quality = 95}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables tables = build(s);
   for (std::size_t p = 0; p < 3; ++p) {
     const TexturePlane& plane = s.fragments.planes[p];
-    const Pixels preview = decode_jpeg_luma(s.ladder.planes[p == 2 ? 1 : p].preview, 1 << 20);
+    const Pixels preview = decode_jpeg_luma(s.previews.planes[p == 2 ? 1 : p].file, 1 << 20);
     for (const std::uint16_t f : tables.planes[p].order) {
       std::vector<std::uint8_t> source, shown, mask;
       for (std::uint32_t y = f / plane.columns * 48; y < (f / plane.columns + 1) * 48; ++y)
@@ -320,7 +325,7 @@ TEST(Lut, ConstantBytesAreTheCodecs) {
   other.codec = Codec::kJpegProgressive;
   EXPECT_EQ(constant_bytes(other, 32, 48), 0);
   other = s.ladder.planes[0];
-  std::vector<std::uint8_t>& tables = other.rungs[0].tables;
+  std::vector<std::uint8_t>& tables = other.rungs[0].table_stream;
   while (!tables.empty()) {  // cut anywhere: some number of blocks, nothing read beyond the end
     tables.pop_back();
     EXPECT_GE(constant_bytes(other, 32, 48), 4);
@@ -351,7 +356,8 @@ TEST(Lut, SizeModelHoldsForBlurredTextures) {  // whose blocks' shortest codes a
         for (std::uint32_t c = 0; c < pixels.channels; ++c)
           pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
               static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+  s.previews = make_previews(s.fragments, s.pixels, {}, {});
   const PackageTables tables = build(s);
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneTables& t = tables.planes[p];
@@ -426,7 +432,8 @@ TEST(Lut, EmptyAndUnfitInput) {
     std::fill(p.covered_texels.begin(), p.covered_texels.end(), 0u);
     std::fill(p.coverage.begin(), p.coverage.end(), std::uint8_t{0});
   }
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+  s.previews = make_previews(s.fragments, s.pixels, {}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables none = build(s);
   EXPECT_TRUE(none.planes[0].order.empty());

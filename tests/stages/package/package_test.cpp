@@ -30,6 +30,7 @@ struct Inputs {
   std::vector<Image> images;
   Fragments fragments;
   Ladder ladder;
+  Previews previews;
   PackageTables tables;
   ScaleFiles files;
   QualityTable quality;
@@ -63,7 +64,7 @@ struct Inputs {
     for (std::size_t r = 0; r < 2; ++r) {
       LadderRung rung;
       rung.quality = t.rung_quality[r];
-      rung.tables = fake_jpeg(t.table_bytes[r], 't');
+      rung.table_stream = fake_jpeg(t.table_bytes[r], 't');
       rung.offset.push_back(0);
       for (std::size_t f = 0; f < 6; ++f) {
         const std::size_t bytes = t.size_bytes[r * 6 + f];
@@ -74,9 +75,7 @@ struct Inputs {
       }
       rungs.rungs.push_back(std::move(rung));
     }
-    rungs.preview = fake_jpeg(300 + p, 'p');
-    rungs.preview_width_px = 48;
-    rungs.preview_height_px = 32;
+    previews.planes.push_back({fake_jpeg(300 + p, 'p'), 48, 32});
     TexturePlane plane;
     plane.image = static_cast<std::uint32_t>(p);
     plane.width_px = 760;
@@ -94,8 +93,8 @@ struct Inputs {
   }
 
   Bytes assemble() const {
-    return assemble_package(scales, perceptual, images, fragments, ladder, tables, files, quality, 0.1,
-                            "{\"texmesh\":\"test\"}", options, {});
+    return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
+                            0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
@@ -245,7 +244,7 @@ Inputs inputs_with_mips(std::size_t full) {
     plane.height_px = 500 >> mip;
     plane.fragment_width_px = plane.fragment_height_px = mip == 1 ? 128 : 64;
     plane.fragment_height_px = mip == 1 ? 128 : 64;
-    inputs.ladder.planes[p].preview.clear();
+    inputs.previews.planes[p].file.clear();
   }
   return inputs;
 }
@@ -270,7 +269,7 @@ TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
   wrong.fragments.planes[1].base = 1;
   EXPECT_THROW(wrong.assemble(), StageError);
   wrong = inputs_with_mips(1);
-  wrong.ladder.planes[1].preview = fake_jpeg(30, 'p');
+  wrong.previews.planes[1].file = fake_jpeg(30, 'p');
   EXPECT_THROW(wrong.assemble(), StageError);
 }
 
@@ -327,10 +326,11 @@ TEST(Package, InputsThatDoNotBelongTogetherAreRefused) {
   refused([](Inputs& i) { i.files.files[0].scale = 5; });
   refused([](Inputs& i) { i.files.files.erase(i.files.files.begin()); });
   refused([](Inputs& i) { i.ladder.planes.clear(); });
+  refused([](Inputs& i) { i.previews.planes.clear(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].offset[3] += 1; });
-  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].tables.pop_back(); });
+  refused([](Inputs& i) { i.ladder.planes[0].rungs[1].table_stream.pop_back(); });
   refused([](Inputs& i) { i.ladder.planes[0].rungs[1].quality += 1; });
   refused([](Inputs& i) { i.images.clear(); });
   Inputs long_title(1);

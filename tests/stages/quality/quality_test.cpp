@@ -64,7 +64,7 @@ Sample sample_sheet(bool textured) {
         p.data.push_back(
             static_cast<std::uint8_t>(90 + 60 * ((x / 8 + y / 12 + c) % 2) + 40 * random.uniform()));
   s.pixels.push_back(std::move(p));
-  s.ladder = encode_ladder(s.fragments, s.pixels, LadderOptions{}, RunContext{});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, LadderOptions{}, RunContext{});
   return s;
 }
 

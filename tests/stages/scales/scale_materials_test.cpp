@@ -46,13 +46,13 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   EXPECT_EQ(glb.json["images"][0]["name"], "texture/0");
   EXPECT_EQ(glb.json["images"][0]["mimeType"], "image/png");
   EXPECT_EQ(glb.json["images"][1]["name"], "texture/1");
-  EXPECT_EQ(view_bytes(glb, glb.json["images"][1]["bufferView"]), c.ladder.planes[2].preview);
+  EXPECT_EQ(view_bytes(glb, glb.json["images"][1]["bufferView"]), c.previews.planes[2].file);
 
   // The PNG holds the colours of one preview and the alpha of the other.
   Image png = probe_image("preview", view_bytes(glb, glb.json["images"][0]["bufferView"]), {});
   EXPECT_EQ(png.channels, 4);
-  const Pixels both = decode_image(png), colour = decode_jpeg(c.ladder.planes[0].preview, 1 << 20);
-  const Pixels alpha = decode_jpeg(c.ladder.planes[1].preview, 1 << 20);
+  const Pixels both = decode_image(png), colour = decode_jpeg(c.previews.planes[0].file, 1 << 20);
+  const Pixels alpha = decode_jpeg(c.previews.planes[1].file, 1 << 20);
   ASSERT_EQ(both.width_px, 32u);
   for (std::uint32_t y = 0; y < 32; ++y)
     for (std::uint32_t x = 0; x < 32; ++x) {

@@ -39,7 +39,7 @@ struct Case {
   std::vector<Material> materials;
   std::vector<Image> images;
   Fragments fragments;
-  Ladder ladder;
+  Previews previews;
 
   explicit Case(const Mesh& mesh, std::size_t material_count = 1, int scale_count = 8)
       : materials(material_count) {
@@ -66,17 +66,15 @@ struct Case {
     plane.image = image, plane.role = role, plane.channels = channels;
     plane.width_px = plane.height_px = 512;
     fragments.planes.push_back(plane);
-    PlaneLadder rungs;
     const std::uint32_t side = channels == 1 ? 64 : 32;  // previews of colour and alpha may differ in size
-    rungs.preview = encode_jpeg(picture(side, side, channels), 60, Subsampling::k420);
-    rungs.preview_width_px = rungs.preview_height_px = side;
-    ladder.planes.push_back(rungs);
+    previews.planes.push_back(
+        {encode_jpeg(picture(side, side, channels), 60, Subsampling::k420), side, side});
   }
   ScaleFiles write(MeshCodec codec, ScalesOptions options = {}, int threads = 1) const {
     options.mesh_codec = codec;
     RunContext context;
     context.threads = threads;
-    return write_scales(scales, perceptual, materials, images, fragments, ladder, options, context);
+    return write_scales(scales, perceptual, materials, images, fragments, previews, options, context);
   }
 };
 

@@ -133,9 +133,8 @@ TEST(Zim, TheSpreadIsThatOfCoveredFragments) {
   plane.eta = {0, 0, 0, 0};
   for (std::size_t k = 8 * 4; k < 16 * 4; ++k)
     if (k % 4 < 2) plane.coverage[k] = 0;
-  ZimOptions options;
-  options.weights = "i=1";
-  const std::vector<float> vqp = predict(p, options).vqp;
+  const std::vector<float> vqp =
+      predict(p, {.weight_eta = 0, .weight_z = 0, .weight_i = 1, .weight_m = 0}).vqp;
   EXPECT_FLOAT_EQ(vqp[0], 1);
   EXPECT_NEAR(vqp[1], 0.5f, 1e-6);
   EXPECT_FLOAT_EQ(vqp[2], 0);
@@ -148,53 +147,23 @@ TEST(Zim, ThresholdAndWeights) {
   EXPECT_FLOAT_EQ(predict(p, options).zeta[0], 0.5f);  // east neighbours differ, south ones do not
   options.difference = 25;
   EXPECT_FLOAT_EQ(predict(p, options).zeta[0], 0);
-  options.weights = "eta=7";
+  options = {.weight_eta = 7, .weight_z = 0, .weight_i = 0, .weight_m = 0};
   EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
-  for (const char* bad : {"", "eta=0", "eta", "eta=", "=1", "eta=1,", "eta=1,eta=2", "eta=x", "eta=-1",
-                          "eta=101", "eta=nan", "eta=1e999", "beauty=1", "eta=1;z=1", "eta==1"}) {
-    options.weights = bad;
-    EXPECT_THROW(predict(p, options), StageError) << bad;
-  }
+  options.weight_eta = 0;
+  EXPECT_THROW(predict(p, options), StageError);
 }
 
-TEST(Zim, FurtherPredictorsByName) {
-  Plane p = make_plane(3, [](auto x, auto y, auto) { return x < 16 ? 100 : 100 + (x + y) % 2 * 20; });
-  p.fragments.planes[0].surface_fraction = {0.25f, 0.125f};
-  ZimOptions options;
-  options.weights = "gradient=1";  // differences of 20 are under zeta's threshold, not gradient's
-  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
-  EXPECT_EQ(predict(p, options).zeta, (std::vector<float>{0, 0}));
-  options.weights = "surface=1";
-  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{1, 0}));
-  options.weights = " eta=1, surface = 3 ";
-  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0.75f, 0.25f}));
-
-  options.weights = "area=1";
-  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 0}));  // both are whole
-  TexturePlane& plane = p.fragments.planes[0];
-  for (std::uint32_t y = 0; y < 16; ++y) plane.coverage[y * 4] = 0;
-  plane.covered_texels[0] = 128;
-  EXPECT_EQ(predict(p, options).vqp, (std::vector<float>{0, 1}));
-}
-
-TEST(Zim, AProgramMayRegisterItsOwn) {
-  const Plane p = make_plane(1, [](auto x, auto, auto) { return x; });
-  PredictorRegistry registry = PredictorRegistry::standard();
-  const std::size_t before = registry.all().size();
-  registry.add({"last", "the fragment's number",
-                [](const PredictorInput& in) { return static_cast<double>(in.fragment) * 1e9; }});
-  EXPECT_EQ(registry.all().size(), before + 1);
-  ZimOptions options;
-  options.weights = "last=1";
-  EXPECT_EQ(predict_quality(p.fragments, p.pixels, options, {}, registry).planes[0].vqp,
-            (std::vector<float>{0, 1}));
-  EXPECT_THROW(predict(p, options), StageError);  // the standard ones do not know it
-  for (const char* bad : {"last", "", "A", "a b"})
-    EXPECT_THROW(registry.add({bad, "", [](const PredictorInput&) { return 0.0; }}), StageError) << bad;
-  EXPECT_THROW(registry.add({"empty", "", nullptr}), StageError);
-  registry.add({"wild", "", [](const PredictorInput&) { return std::nan(""); }});
-  options.weights = "wild=1";
-  EXPECT_THROW(predict_quality(p.fragments, p.pixels, options, {}, registry), StageError);
+TEST(Zim, WeightsAreRelativeToTheirSum) {
+  // Left brighter and flat, right darker and a board: eta and Z are highest on the right, I and M on the
+  // left.
+  const Plane p = make_plane(3, [](auto x, auto y, auto) { return x < 16 ? 200 : (x + y) % 2 * 100; });
+  const auto right = [&](double eta, double z, double i, double m) {
+    return predict(p, {.weight_eta = eta, .weight_z = z, .weight_i = i, .weight_m = m}).vqp[1];
+  };
+  EXPECT_FLOAT_EQ(right(1, 1, 1, 1), 0.5f);
+  EXPECT_FLOAT_EQ(right(3, 0, 1, 0), 0.75f);
+  EXPECT_FLOAT_EQ(right(0, 1, 0, 3), 0.25f);
+  EXPECT_FLOAT_EQ(right(0, 0.5, 0, 0), 1.0f);
 }
 
 TEST(Zim, SameResultForAnyNumberOfThreadsAndBadInputIsRefused) {

@@ -1,0 +1,42 @@
+#pragma once
+// Inside the ladder only: fragments through their planes' codecs, on several threads.
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/data/fragments.h"
+#include "stages/data/ladder.h"
+#include "stages/data/pixels.h"
+#include "stages/fragment_codec/fragment_codec.h"
+#include "stages/ladder/ladder.h"
+
+namespace texmesh {
+
+/// A plane's codec after its training, and what the training gave.
+struct TrainedPlane {
+  std::unique_ptr<TextureCodec> codec;
+  std::vector<CodecRung> rungs;
+  SizeKnots knots;
+};
+
+/// What is encoded of one plane.
+struct PlaneWork {
+  std::vector<std::size_t> rungs;    // indices into TrainedPlane::rungs, rising
+  std::vector<std::uint8_t> wanted;  // by fragment, 1 or 0; empty: nothing, `known` is the result
+  std::vector<LadderRung> known;     // by index of `rungs`: streams that need no encoding; empty: none
+};
+
+/// Of the whole stage's progress.
+struct ProgressPart {
+  double begin, end;
+};
+
+/// The ladders of all planes: at the rungs of `work` the streams of the covered fragments that `work` wants.
+/// Beside the result it takes some fragments' streams per thread. Same bytes for any thread count.
+std::vector<PlaneLadder> encode_rungs(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                      Uncovered uncovered, const std::vector<TrainedPlane>& trained,
+                                      std::vector<PlaneWork> work, ProgressPart progress,
+                                      const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,234 @@
+#include "stages/ladder/rung_loss.h"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "stages/base/parallel.h"
+#include "stages/measure/fragment_meter.h"
+#include "stages/measure/scale_samples.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kWindows = 6;
+constexpr std::uint32_t kWindowPx = 128;
+// Mips show their source's windows interpolated. A window so far from the border of its fragment shows one of
+// a mip's fragments, which covers four of the source's: fewer to encode and to decode.
+constexpr std::uint32_t kInsetPx = 16;
+
+/// A rectangle of the plane's padded pixels, within one fragment.
+struct Window {
+  std::size_t fragment = 0;
+  TexelRectangle rectangle;
+  std::uint64_t covered = 0;
+};
+
+/// Of the fragment's middle and corners, `inset` from its border, the one with most covered texels.
+Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t inset) {
+  if (std::min(plane.fragment_width_px, plane.fragment_height_px) < 4 * inset) inset = 0;
+  const TexelRectangle whole = padded_fragment_rectangle(plane, fragment);
+  const std::uint32_t width = whole.width_px - 2 * inset, w = std::min(kWindowPx, width);
+  const std::uint32_t height = whole.height_px - 2 * inset, h = std::min(kWindowPx, height);
+  const std::uint32_t right = width - w, low = height - h;
+  Window best;
+  for (const auto& [x, y] : {std::pair{right / 2, low / 2}, std::pair{0u, 0u}, std::pair{right, 0u},
+                             std::pair{0u, low}, std::pair{right, low}}) {
+    Window window{fragment, {whole.left_px + inset + x, whole.top_px + inset + y, w, h}, 0};
+    const std::vector<std::uint8_t> mask = coverage_samples(plane, window.rectangle);
+    window.covered = static_cast<std::uint64_t>(std::count(mask.begin(), mask.end(), 255));
+    if (best.rectangle.width_px == 0 || window.covered > best.covered) best = window;
+  }
+  return best;
+}
+
+/// In every `sparseness`-th covered fragment, up to kWindows.
+std::vector<Window> sample_windows(const TexturePlane& plane, std::size_t sparseness, std::uint32_t inset) {
+  std::vector<std::size_t> covered;
+  for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
+    if (plane.covered_texels[f] > 0) covered.push_back(f);
+  const std::size_t count = std::min(kWindows, (covered.size() + sparseness - 1) / sparseness);
+  std::vector<Window> out;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)], inset);
+    if (w.covered > 0) out.push_back(w);
+  }
+  return out;
+}
+
+/// Of a full-size plane, to be shown by its mips, and of a mip for itself.
+std::vector<Window> chain_windows(const TexturePlane& full) { return sample_windows(full, 4, kInsetPx); }
+std::vector<Window> own_windows(const TexturePlane& mip) { return sample_windows(mip, 1, 0); }
+
+/// What of a level a window of the full size shows.
+struct Support {
+  std::vector<BilinearPlace> across, down;
+  Support(const TexturePlane& full, const TexturePlane& level, const TexelRectangle& window)
+      : across(bilinear_places(window.left_px, window.width_px, full.width_px, level.width_px)),
+        down(bilinear_places(window.top_px, window.height_px, full.height_px, level.height_px)) {}
+  TexelRectangle rectangle() const {
+    const std::uint32_t left = across.front().first, top = down.front().first;
+    return {left, top, across.back().second - left + 1, down.back().second - top + 1};
+  }
+};
+
+/// Calls visit(fragment) for every fragment of the plane that the rectangle touches.
+template <class Visit>
+void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangle, const Visit& visit) {
+  const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
+  for (std::uint32_t row = rectangle.top_px / h; row <= (rectangle.bottom_px() - 1) / h; ++row)
+    for (std::uint32_t column = rectangle.left_px / w; column <= (rectangle.right_px() - 1) / w; ++column)
+      visit(std::size_t{row} * plane.columns + column);
+}
+
+/// The rectangle as one rung shows it; as the source does where no fragment is stored.
+SamplePatch decode_patch(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                         std::size_t rung, const TexelRectangle& rectangle) {
+  const std::size_t measured = measured_channels(plane);
+  SamplePatch patch{rectangle, rectangle_samples(plane, pixels, rectangle)};
+  for_each_fragment(plane, rectangle, [&](std::size_t f) {
+    if (fragment_stream(ladder.rungs[rung], f).empty()) return;
+    const TexelRectangle whole = padded_fragment_rectangle(plane, f);
+    const Samples decoded =
+        decode_samples(ladder, rung, f, std::uint64_t{whole.width_px} * whole.height_px, measured);
+    const std::uint32_t left = std::max(rectangle.left_px, whole.left_px);
+    const std::uint32_t right = std::min(rectangle.right_px(), whole.right_px());
+    const std::uint32_t bottom = std::min(rectangle.bottom_px(), whole.bottom_px());
+    for (std::size_t c = 0; c < measured; ++c)
+      for (std::uint32_t y = std::max(rectangle.top_px, whole.top_px); y < bottom; ++y)
+        std::copy_n(
+            decoded[c].data() + std::size_t{y - whole.top_px} * whole.width_px + (left - whole.left_px),
+            right - left,
+            patch.samples[c].data() + std::size_t{y - rectangle.top_px} * rectangle.width_px +
+                (left - rectangle.left_px));
+  });
+  return patch;
+}
+
+/// The window of `full` as a level's rung shows it, scaled up to the full size.
+Samples show(const TexturePlane& full, const TexturePlane& level, const Pixels& pixels,
+             const PlaneLadder& ladder, std::size_t rung, const TexelRectangle& window) {
+  const Support support(full, level, window);
+  return scaled_up(decode_patch(level, pixels, ladder, rung, support.rectangle()), support.across,
+                   support.down);
+}
+
+/// Marks the mip's fragments that windows of a full-size plane, or its own, show.
+void mark_shown(const TexturePlane& full, const TexturePlane& mip, const std::vector<Window>& windows,
+                std::vector<std::uint8_t>& marks) {
+  for (const Window& window : windows)
+    for_each_fragment(mip, Support(full, mip, window.rectangle).rectangle(),
+                      [&](std::size_t f) { marks[f] = 1; });
+}
+
+/// The plane's covered texels over those of the fragments that the ladder holds.
+double times_held(const TexturePlane& plane, const PlaneLadder& ladder) {
+  double all = 0, held = 0;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
+    all += plane.covered_texels[f];
+    if (!fragment_stream(ladder.rungs[0], f).empty()) held += plane.covered_texels[f];
+  }
+  return held > 0 ? all / held : 1;
+}
+
+/// Bytes to show the whole plane, by rung.
+std::vector<std::uint64_t> bytes_by_rung(const TexturePlane& plane, const PlaneLadder& ladder) {
+  const double times = times_held(plane, ladder);
+  std::vector<std::uint64_t> out;
+  for (const LadderRung& rung : ladder.rungs) {
+    std::uint64_t bytes = static_cast<std::uint64_t>(static_cast<double>(rung.data.size()) * times);
+    bytes += rung.table_stream.size();
+    if (codec_traits(ladder.codec).incremental && !out.empty()) bytes += out.back();
+    out.push_back(bytes);
+  }
+  return out;
+}
+
+/// 1 - SSIM of `ways` to show the plane, by way: the mean over the windows, each of which weighs as much as
+/// its fragment's surface. shown(window, way) gives the samples of a window.
+std::vector<double> mean_losses(
+    const TexturePlane& plane, const Pixels& pixels, const std::vector<Window>& windows, std::size_t ways,
+    const std::function<Samples(const TexelRectangle& window, std::size_t way)>& shown,
+    const RunContext& context) {
+  std::vector<double> loss(windows.size() * ways);
+  parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t w = begin; w < end; ++w) {
+      const TexelRectangle& window = windows[w].rectangle;
+      const FragmentMeter meter(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
+                                window.width_px, window.height_px);
+      for (std::size_t k = 0; k < ways; ++k)
+        loss[w * ways + k] = std::max(meter.against(shown(window, k)).dssim, 0.0);
+    }
+  });
+  std::vector<double> mean(ways);
+  double whole = 0;
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const double weight = std::max(static_cast<double>(plane.surface_fraction[windows[w].fragment]), 1e-9);
+    whole += weight;
+    for (std::size_t k = 0; k < ways; ++k) mean[k] += weight * loss[w * ways + k];
+  }
+  for (double& m : mean) m /= std::max(whole, 1e-9);
+  return mean;
+}
+
+}  // namespace
+
+std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base) {
+  std::vector<std::size_t> chain{base};
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
+    if (fragments.planes[p].mip > 0 && fragments.planes[p].base == base) chain.push_back(p);
+  return chain;
+}
+
+std::vector<std::vector<std::uint8_t>> hull_sample(const Fragments& fragments) {
+  std::vector<std::vector<std::uint8_t>> out;
+  for (const TexturePlane& plane : fragments.planes) {
+    std::vector<std::uint8_t>& marks = out.emplace_back(plane.fragment_count(), plane.mip == 0);
+    if (plane.mip == 0) continue;
+    const TexturePlane& full = fragments.planes[plane.base];
+    mark_shown(full, plane, chain_windows(full), marks);
+    mark_shown(plane, plane, own_windows(plane), marks);
+    std::uint64_t covered = 0;
+    for (std::size_t f = 0; f < marks.size(); ++f) covered += marks[f] ? plane.covered_texels[f] : 0;
+    if (covered == 0) marks.assign(marks.size(), 1);
+  }
+  return out;
+}
+
+std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                    const std::vector<PlaneLadder>& planes, std::size_t base,
+                                    const RunContext& context) {
+  const TexturePlane& full = fragments.planes[base];
+  const std::vector<std::size_t> chain = chain_of(fragments, base);
+  std::vector<RungPair> pairs;
+  for (std::size_t level = 0; level < chain.size(); ++level) {
+    const std::vector<std::uint64_t> bytes =
+        bytes_by_rung(fragments.planes[chain[level]], planes[chain[level]]);
+    for (std::size_t r = 0; r < bytes.size(); ++r) pairs.push_back({level, r, bytes[r], 0});
+  }
+  const auto shown = [&](const TexelRectangle& window, std::size_t k) {
+    const std::size_t p = chain[pairs[k].level];
+    return show(full, fragments.planes[p], pixels[p], planes[p], pairs[k].rung, window);
+  };
+  const std::vector<double> losses =
+      mean_losses(full, pixels[base], chain_windows(full), pairs.size(), shown, context);
+  for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss = losses[k];
+  return pairs;
+}
+
+std::vector<MipChoice> measure_mip(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
+                                   const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
+  const std::vector<Window> windows = own_windows(plane);
+  if (windows.empty()) return {};
+  const SamplePatch preview = preview_samples(plane, preview_file);
+  std::vector<MipChoice> choices(1);
+  for (const std::uint64_t bytes : bytes_by_rung(plane, ladder)) choices.push_back({bytes, 0});
+  const auto shown = [&](const TexelRectangle& window, std::size_t k) {
+    return k == 0 ? show_preview(plane, preview, window) : show(plane, plane, pixels, ladder, k - 1, window);
+  };
+  const std::vector<double> losses = mean_losses(plane, pixels, windows, choices.size(), shown, context);
+  for (std::size_t k = 0; k < choices.size(); ++k) choices[k].loss = losses[k];
+  return choices;
+}
+
+}  // namespace texmesh
