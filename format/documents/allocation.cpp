@@ -1,8 +1,11 @@
+#include "format/documents/allocation.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"
+#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
 
 // Thesis 3.2-3.3: from feature counts to the quality that a fragment is asked to have.

@@ -1,3 +1,5 @@
+#include "format/documents/index.h"
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -6,7 +8,6 @@
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {

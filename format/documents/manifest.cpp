@@ -1,5 +1,7 @@
 #include "format/documents/manifest.h"
 
+#include "format/documents/textures.h"
+
 #include <algorithm>
 #include <array>
 #include <string_view>

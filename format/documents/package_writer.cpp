@@ -8,6 +8,7 @@
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
+#include "format/documents/index.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/documents/manifest.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 

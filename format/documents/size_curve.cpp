@@ -1,8 +1,11 @@
+#include "format/documents/size_curve.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
 
 namespace texmesh {

@@ -7,7 +7,6 @@
 #include "format/base/half.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {

@@ -68,7 +68,7 @@ class SplitMesh {
   void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
 
  private:
-  void walk(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
+  void gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
   std::vector<Point> points_;
   std::vector<std::uint32_t> wedge_point_;
   std::vector<std::array<std::uint32_t, 3>> faces_;

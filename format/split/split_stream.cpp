@@ -5,7 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/container/format_version.h"
-#include "format/split/split_codec.h"
+#include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
 

@@ -13,6 +13,7 @@
 #include <set>
 
 #include "format/base/errors.h"
+#include "format/documents/allocation.h"
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/depfile.h"
 #include "pipeline/batch/reports.h"

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "format/base/sha256.h"
+#include "format/documents/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/lut/size_model.h"

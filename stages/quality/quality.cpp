@@ -6,6 +6,7 @@
 #include <string>
 
 #include "format/base/srgb.h"
+#include "format/documents/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/measure/image_compare.h"

@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "format/base/srgb.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"

@@ -14,6 +14,10 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
+#include "format/documents/size_curve.h"
+#include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh {

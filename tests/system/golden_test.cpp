@@ -5,6 +5,7 @@
 
 #include "format/container/format_version.h"
 #include "format/documents/manifest.h"
+#include "format/documents/textures.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "stages/jpeg/jpeg.h"

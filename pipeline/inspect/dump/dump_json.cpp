@@ -1,4 +1,5 @@
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
 #include "format/documents/viewing.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/package_figures.h"

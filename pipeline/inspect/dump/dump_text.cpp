@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "format/documents/allocation.h"
 #include "format/documents/viewing.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/option_changes.h"

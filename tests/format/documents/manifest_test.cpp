@@ -1,4 +1,6 @@
 #include "format/documents/manifest.h"
+#include "format/documents/index.h"
+#include "format/documents/textures.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,6 @@
 #include "format/documents/tables.h"
+#include "format/documents/allocation.h"
+#include "format/documents/quality_table.h"
 
 #include <gtest/gtest.h>
 

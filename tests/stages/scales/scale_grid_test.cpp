@@ -1,5 +1,6 @@
 // The grid that positions and texture coordinates of all scales lie on.
 #include "tests/stages/scales/scales_checks.h"
+#include "pipeline/import/import_images.h"
 
 namespace texmesh {
 namespace {

@@ -2,6 +2,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "tests/stages/scales/scales_checks.h"
+#include "pipeline/import/import_images.h"
 
 namespace texmesh {
 namespace {

@@ -17,6 +17,7 @@
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
+#include "pipeline/import/import_images.h"
 
 namespace texmesh::testing {
 

@@ -1,5 +1,6 @@
 // Scales as glTF files: every codec, every attribute, all of them read back.
 #include "tests/stages/scales/scales_checks.h"
+#include "pipeline/import/import_images.h"
 
 namespace texmesh {
 namespace {
