@@ -6,7 +6,9 @@
 #include "format/base/finding.h"
 #include "format/base/vec.h"
 #include "format/documents/manifest.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
+#include "format/documents/textures.h"
 #include "pipeline/inspect/provenance.h"
 #include "stages/base/run_context.h"
 
