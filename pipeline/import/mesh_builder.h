@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/model/model.h"
+#include "pipeline/import/local_frame.h"
 
 namespace texmesh {
 
@@ -42,7 +43,7 @@ class MeshBuilder {
 
   std::size_t triangle_count() const { return mesh_.triangles.size(); }
   /// The mesh, positions in their local frame (set_positions); the builder is empty afterwards.
-  Mesh take();
+  Mesh finish();
 
  private:
   std::uint32_t wedge(const Corner& corner);

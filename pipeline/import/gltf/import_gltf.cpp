@@ -7,7 +7,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/finish_model.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/local_frame.h"
 
 namespace texmesh {
 namespace gltf {

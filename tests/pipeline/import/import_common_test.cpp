@@ -10,6 +10,9 @@
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 #include "tests/support/meshes.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/local_frame.h"
+#include "pipeline/import/finish_model.h"
 
 namespace texmesh {
 namespace {

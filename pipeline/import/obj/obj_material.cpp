@@ -1,10 +1,11 @@
-#include "pipeline/import/obj_material.h"
+#include "pipeline/import/obj/obj_material.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "format/base/errors.h"
 #include "pipeline/import/combine_images.h"
+#include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"

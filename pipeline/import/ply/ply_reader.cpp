@@ -1,4 +1,4 @@
-#include "pipeline/import/ply_reader.h"
+#include "pipeline/import/ply/ply_reader.h"
 
 #include <bit>
 #include <cmath>

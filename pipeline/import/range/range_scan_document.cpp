@@ -1,4 +1,4 @@
-#include "pipeline/import/range_scan_document.h"
+#include "pipeline/import/range/range_scan_document.h"
 
 #include <cmath>
 #include <map>
