@@ -12,6 +12,8 @@
 #include <sstream>
 
 #include "delivery/cpp/client/delivery_plan.h"
+#include "delivery/cpp/decide/htc_theorem.h"
+#include "delivery/cpp/decide/upgrades.h"
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
 #include "format/documents/allocation.h"

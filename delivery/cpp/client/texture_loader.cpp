@@ -1,4 +1,5 @@
 #include "delivery/cpp/client/texture_loader.h"
+#include "delivery/cpp/decide/upgrades.h"
 #include "format/base/bytes.h"
 
 #include <algorithm>
