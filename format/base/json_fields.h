@@ -1,6 +1,6 @@
 #pragma once
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,8 +9,7 @@
 
 namespace texmesh {
 
-// Strict reading of the package's JSON documents; for the .cpp files of this folder only (it drags nlohmann
-// in).
+// Strict reading of the package's JSON documents.
 
 /// Largest integer that every JSON reader keeps: 2^53.
 inline constexpr std::uint64_t kMaxJsonInteger = std::uint64_t{1} << 53;

@@ -1,5 +1,7 @@
 #include "format/documents/quality_table.h"
 
+#include <nlohmann/json.hpp>
+
 #include "format/base/json_fields.h"
 #include "format/container/layout.h"
 

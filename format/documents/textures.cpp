@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"

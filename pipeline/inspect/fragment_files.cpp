@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/bounded_json.h"

@@ -5,6 +5,7 @@
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
+#include "pipeline/inspect/provenance.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/inspect/verify/verify_entries.h"
 #include "pipeline/inspect/verify/verify_guard.h"

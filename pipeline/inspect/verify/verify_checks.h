@@ -9,10 +9,11 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
-#include "pipeline/inspect/provenance.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
+
+struct Provenance;
 
 // The rules of verify.h, each over documents that have been read or bytes whose place is known. All add
 // findings and go on.
