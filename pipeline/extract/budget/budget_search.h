@@ -1,5 +1,5 @@
 #pragma once
-#include "pipeline/extract/extract.h"
+#include "pipeline/extract/glb/extracted.h"
 
 namespace texmesh {
 

@@ -25,7 +25,7 @@ struct MeshCandidate {
   int scale = 0;
   std::vector<int> levels;
   std::uint64_t triangles = 0;
-  std::unique_ptr<StandaloneGlb> file;
+  std::shared_ptr<const StandaloneGlb> file;
   Model model;
   std::unique_ptr<ModelViews> views;
   std::uint64_t fixed_bytes = 0;  // the file without its images' bytes

@@ -11,12 +11,6 @@
 
 namespace texmesh {
 
-/// An image as a file holds it.
-struct FileImageData {
-  FileImage format = FileImage::kJpeg;
-  std::vector<std::uint8_t> bytes;
-};
-
 /// A scale's GLB taken apart, changed and written again: other images, a coarser mesh, further levels of
 /// detail. Materials, nodes, names, extras and extensions stay as they are. Brings the JSON library along;
 /// for .cpp files of this folder.
@@ -24,7 +18,7 @@ class StandaloneGlb {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Checks the whole file first (inspect/check_glb.h). `entry` is for messages. FormatError.
+  /// Checks the whole file first (check_glb.h). `entry` is for messages. FormatError.
   StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry);
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
