@@ -20,8 +20,8 @@ inline constexpr int kMaxJsonDepth = 64;
 nlohmann::json parse_json(std::span<const std::uint8_t> bytes, const std::string& file,
                           std::uint64_t max_bytes);
 
-/// Without blanks, numbers in the shortest form that reads back the same; FormatError when a text is not
-/// UTF-8.
+/// Without blanks, numbers in the shortest form that reads back the same; FormatError when a text
+/// is not UTF-8.
 std::string dump_json(const nlohmann::ordered_json& json, const std::string& file);
 
 /// The double whose decimal form is the shortest for this float, so that dump_json writes no noise digits.
@@ -29,8 +29,8 @@ double shortest_double(float value);
 /// `value` rounded to six significant decimal digits.
 double six_digits(double value);
 
-/// A value and its JSON pointer. Every accessor checks the type and the range and throws FormatError
-/// otherwise.
+/// A value and its JSON pointer. Every accessor checks the type and the range and
+/// throws FormatError otherwise.
 class JsonAt {
  public:
   JsonAt(const nlohmann::json& value, const std::string& file, std::string pointer = "")

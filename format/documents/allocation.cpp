@@ -102,8 +102,8 @@ std::vector<std::uint32_t> bytes_of(const PlaneTables& tables, const std::vector
 
 std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment) {
   const std::size_t fragments = tables.fragment_count();
-  const std::uint64_t own = tables.size_bytes[rung * fragments + fragment];
-  if (!tables.incremental || own == 0) return own;
+  const std::uint64_t stream_bytes = tables.size_bytes[rung * fragments + fragment];
+  if (!tables.incremental || stream_bytes == 0) return stream_bytes;
   std::uint64_t bytes = 0;
   for (std::size_t r = 0; r <= rung; ++r) bytes += tables.size_bytes[r * fragments + fragment];
   return bytes;

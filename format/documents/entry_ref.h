@@ -14,8 +14,8 @@ struct EntryRef {
   friend bool operator==(const EntryRef&, const EntryRef&) = default;
 };
 
-/// An entry that a client may read in pages: its first head_bytes bytes tell where the pages are and their
-/// digests.
+/// An entry that a client may read in pages: its first head_bytes bytes tell where the pages are
+/// and their digests.
 struct PagedRef : EntryRef {
   std::uint64_t head_bytes = 0;
   Sha256 head_digest{};

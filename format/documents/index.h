@@ -9,9 +9,9 @@
 
 namespace texmesh {
 
-/// index.bin: every entry except manifest.json and index.bin itself. Page 0 holds the entries that belong to
-/// no texture plane, then one page per plane (SPEC.md). A client that needs one plane reads the head and that
-/// page.
+/// index.bin: every entry except manifest.json and index.bin itself. Page 0 holds the entries that belong
+/// to no texture plane, then one page per plane (SPEC.md). A client that needs one plane reads the head
+/// and that page.
 inline constexpr std::uint32_t kNoPlane = kNoIndex;
 struct IndexPage {
   std::uint32_t plane = kNoPlane;

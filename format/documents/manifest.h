@@ -12,8 +12,8 @@
 
 namespace texmesh {
 
-/// The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
-/// client.
+/// The manifest with its ZIP header fits in this many bytes, whatever the model: one request
+/// bootstraps a client.
 inline constexpr std::uint64_t kBootstrapBytes = 16384;
 /// "Enough at any size": display_px of S_0 and the last step's up_to_px.
 inline constexpr double kAnyDisplayPx = 1e9;
@@ -32,16 +32,16 @@ struct ManifestScale {
   double p95 = 0, p99 = 0;              // relative distance to S_0 (perceptual value), 0 for S_0
   // Displayed object height in px up to which the scale is enough; kAnyDisplayPx for S_0:
   double display_px_jnd = 0, display_px_error = 0, display_px_edge = 0;
-  std::string
-      floor;  // why it has more vertices than its scale asks for, or no scale is coarser; else "" (since 1.1)
+  // Why it has more vertices than its scale asks for, or why no scale is coarser; else "" (since 1.1).
+  std::string floor;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
 
 /// Longest ManifestScale::floor, bytes.
 inline constexpr std::size_t kMaxFloorBytes = 100;
 
-/// One step of the step function displayed size -> scale, coarse to fine; the last step's up_to_px is
-/// kAnyDisplayPx.
+/// One step of the step function displayed size -> scale, coarse to fine; the last step's
+/// up_to_px is kAnyDisplayPx.
 struct ManifestStep {
   double up_to_px = 0;
   int scale = 0;
@@ -61,8 +61,8 @@ struct Manifest {
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // default rule: finer of JND and <= 1 px error
   std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
-  // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between them; its
-  // SHA-256.
+  // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between
+  // them; its SHA-256.
   std::uint64_t first_picture_offset = 0, first_picture_bytes = 0;
   Sha256 first_picture_digest{};
   // Of the full-size planes 0.., at most kMaxManifestPreviews; inside the first picture.

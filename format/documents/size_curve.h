@@ -6,9 +6,9 @@
 
 namespace texmesh {
 
-/// Bytes that the fragment's stream would have at a quality that no rung has: monotone cubic interpolation of
-/// log bytes between the rungs (exact there) along the plane's knots, constant outside them; 0 when it is not
-/// stored.
+/// Bytes that the fragment's stream would have at a quality that no rung has: monotone cubic interpolation
+/// of log bytes between the rungs (exact there) along the plane's knots, constant outside them; 0 when it
+/// is not stored.
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality);
 /// The knots' positions with which interpolated_bytes() of a stream of `rung_bytes` [R] > 0 at `rung_quality`
 /// is `knot_bytes` at `knot_quality`, as far as they lie between those of the rungs around them. Where these

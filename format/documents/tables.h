@@ -24,8 +24,7 @@ struct PlaneTables {
   std::vector<std::uint32_t> covered_texels;
   std::vector<float> surface_fraction;    // of the object's surface
   std::vector<float> z, i, zeta, m, vqp;  // 0..1, stored as multiples of 1 / 65535
-  std::vector<std::uint16_t>
-      order;  // fragments that are stored, by falling importance (eta_0, surface, index)
+  std::vector<std::uint16_t> order;       // stored fragments by falling importance (eta_0, surface, index)
   // [F], 1 - SSIM when the preview stands for the fragment, binary16; empty: format 1.0 did not say
   std::vector<float> skip_dssim;
   // Where sizes between two rungs are (format 1.1; empty: not measured): whole qualities that lie between
@@ -43,8 +42,8 @@ struct PlaneTables {
   std::uint8_t allocation = 1;
   float quality_width = 60, log_width = 0.7f, quality_min = 5, quality_max = 97;
   // Size model S = A R^Q + c with exponent B from (8.8), fitted over the plane's rungs (thesis 8.6-8.8)
-  float model_a = 0, model_b = 0, model_r = 0, model_correlation = 0,
-        model_error = 0;  // error: mean |S' - S| / S
+  float model_a = 0, model_b = 0, model_r = 0, model_correlation = 0;
+  float model_error = 0;  // mean |S' - S| / S
 
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   std::size_t rung_count() const { return rung_quality.size(); }

@@ -17,21 +17,23 @@ struct TextureInfo {
   std::uint32_t image = 0;  // GLB image "texture/<image>"
   std::uint32_t mip = 0;    // sides are 1 / 2^mip of the full-size plane's, rounded up; 0 = full size
   std::uint32_t base = 0;   // of a mip: the full-size plane
-  std::string role;  // base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data
-  std::string name;  // as the source names the image
+  // base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour or data.
+  std::string role;
+  std::string name;          // as the source names the image
   std::string colour_space;  // srgb | linear
   Codec codec = Codec::kJpeg;
   std::uint32_t width_px = 0, height_px = 0, channels = 3;
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;
   std::string grid_reason;
   std::uint32_t preview_width_px = 0, preview_height_px = 0;
-  EntryRef preview,             // preview/NNN.jpg; that of the full-size plane for a mip
-      tables;                   // texture/<plane>/tables.pack, all rungs' table streams in rung order
-  std::vector<EntryRef> rungs;  // texture/<plane>/rNN.pack, rising quality: fragments in PlaneTables::order
+  EntryRef preview;  // preview/NNN.jpg; that of the full-size plane for a mip
+  EntryRef tables;   // texture/<plane>/tables.pack, all rungs' table streams in rung order
+  // texture/<plane>/rNN.pack by rising quality: fragments in PlaneTables::order.
+  std::vector<EntryRef> rungs;
   std::vector<int> rung_quality;
   bool lossless = false;  // the last rung holds the coefficients of the source, a JPEG (since 1.1)
-  std::string
-      source_extension;  // jpg, png, tif, webp, exr: the package holds the source image; "" = it does not
+  // jpg, png, tif, webp or exr where the package holds the source image; "" = it does not.
+  std::string source_extension;
   bool source_colours = true;  // its numbers are the plane's; false: import has converted them
   EntryRef source;             // source/NNN.<extension>
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;

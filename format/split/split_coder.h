@@ -38,8 +38,8 @@ class BitEncoder {
   void encode_raw(std::uint32_t value, int count) {
     while (count-- > 0) put(2048, (value >> count) & 1);
   }
-  /// Ends the code; the encoder can be used again. Zeros at the end are left out: the decoder reads them
-  /// anyway.
+  /// Ends the code; the encoder can be used again. Zeros at the end are left out: the decoder
+  /// reads them anyway.
   std::vector<std::uint8_t> finish() {
     // Of all numbers in [low, low + range) the one with the most zeros at its end.
     const std::uint64_t last = low_ + range_ - 1;

@@ -22,7 +22,7 @@ class EncodingChannel {
       : source_(source), truth_(source, mesh), symbols_(source.attributes.size() + 1) {}
   SplitTruth& truth() { return truth_; }
   std::vector<std::uint8_t> finish_connectivity() { return bits_.finish(); }
-  std::vector<Symbols> take_symbols() {
+  std::vector<Symbols> finish_symbols() {
     std::vector<Symbols> out(symbols_.size());
     out.swap(symbols_);
     return out;
@@ -134,7 +134,7 @@ class SplitStreamWriter {
     block.count = count;
     head_.blocks.push_back(block);
     bytes_.push_back(channel_.finish_connectivity());
-    symbols_.push_back(channel_.take_symbols());
+    symbols_.push_back(channel_.finish_symbols());
   }
   void code_values() {
     for (std::size_t part = 0; part <= source_.attributes.size(); ++part)

@@ -7,9 +7,9 @@
 
 namespace texmesh {
 
-/// One glTF file that any viewer opens alone: a scale of the package with whole textures. Deterministic for
-/// any number of threads. InputError for a scale or rung that is not there; FormatError when the package is
-/// damaged.
+/// One glTF file that any viewer opens alone: a scale of the package with whole textures. Deterministic
+/// for any number of threads. InputError for a scale or rung that is not there; FormatError when the
+/// package is damaged.
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context);
 
 /// The answer to --json (schemas/extract.v1.schema.json), and the text for people.

@@ -85,9 +85,9 @@ struct ImportedModel {
 ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
                            Resolver& resolver, const ImportOptions& options, const RunContext& context);
 
+/// .gltf and .glb.
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
-                          Resolver& resolver, const ImportOptions& options,
-                          const RunContext& context);  // .gltf and .glb
+                          Resolver& resolver, const ImportOptions& options, const RunContext& context);
 ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          Resolver& resolver, const ImportOptions& options, const RunContext& context);
 ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,

@@ -25,16 +25,16 @@ struct Corner {
   Vec4f colour{1, 1, 1, 1};
 };
 
-/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the same
-/// position and bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL and range
-/// scans.
+/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the
+/// same position and bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL
+/// and range scans.
 class MeshBuilder {
  public:
   struct Attributes {
     bool uv = false, normals = false, colours = false;
   };
-  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who know
-  /// the line).
+  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who
+  /// know the line).
   MeshBuilder(const std::vector<Vec3d>& positions, Attributes attributes);
 
   /// A polygon of three corners or more, in order; fewer are ignored. Triangulated by cutting ears in the

@@ -260,8 +260,8 @@ double HarmonicTimePlan::proportional_share(double now_s, double beta) const {
 }
 
 /// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
-/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return to
-/// its mean.
+/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return
+/// to its mean.
 double HarmonicTimePlan::lasting_bytes_s(double now_s) const {
   const double recent = throughput_.recent_bytes_s(kGuardSamples);
   const double left_s = options_.time_limit_s - now_s;

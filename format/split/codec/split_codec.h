@@ -9,9 +9,9 @@
 
 namespace texmesh {
 
-/// The order of decisions that writer and reader share. Channel::bit(model, truth) codes a decision: the
-/// writer's channel asks truth(its knowledge) and writes the answer, the reader's reads it and never calls
-/// truth.
+/// The order of decisions that writer and reader share. Channel::bit(model, truth) codes a decision:
+/// the writer's channel asks truth(its knowledge) and writes the answer, the reader's reads it and
+/// never calls truth.
 template <class Channel>
 class SplitCodec {
  public:

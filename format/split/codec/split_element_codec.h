@@ -11,8 +11,8 @@
 
 namespace texmesh {
 
-/// What vertex splits and patches have in common: new points, wedges and faces, and which wedge of a point a
-/// corner gets.
+/// What vertex splits and patches have in common: new points, wedges and faces, and which wedge of a point
+/// a corner gets.
 template <class Channel>
 class SplitElementCodec {
  public:

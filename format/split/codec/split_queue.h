@@ -69,8 +69,8 @@ class SplitQueue {
   std::size_t next_ = 0;
   bool no_split_since_refill_ = false;
   std::vector<bool> queued_;  // per point
-  std::vector<std::uint8_t>
-      history_;  // per point: refusals 0 to 3, + kHasSplit after a split in this chapter
+  // Per point: refusals 0 to 3, + kHasSplit after a split in this chapter.
+  std::vector<std::uint8_t> history_;
 };
 
 }  // namespace texmesh

@@ -9,8 +9,7 @@
 
 namespace texmesh {
 
-/// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is
-/// stored).
+/// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
 inline constexpr int kMeshCodings = 5;
 
 /// Which mesh: an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1.

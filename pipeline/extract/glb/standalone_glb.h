@@ -30,8 +30,8 @@ class StandaloneGlb {
   void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
   bool has_draco() const;
 
-  /// Makes the nodes of the scene the children of one node, the first level of detail. Once, before
-  /// add_level().
+  /// Makes the nodes of the scene the children of one node, the first level of detail.
+  /// Once, before add_level().
   void begin_levels(double screen_coverage);
   /// Adds a coarser file of the same package as a further level (MSFT_lod), whose materials and images are
   /// those already here. Levels by falling `screen_coverage`: the share of the screen's area above which the

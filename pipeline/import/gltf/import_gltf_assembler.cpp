@@ -52,8 +52,8 @@ void Assembler::add_wedge(const Primitive& primitive, std::uint32_t vertex, std:
   if (with_normals_) mesh_.normals.push_back(normal);
 }
 
-/// Directions on the surface go the way of positions. A mirrored surface has its bitangents the other way
-/// round.
+/// Directions on the surface go the way of positions. A mirrored surface has its bitangents the
+/// other way round.
 void Assembler::add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored) {
   if (primitive.tangents.empty()) return;
   mesh_.tangents.resize(mesh_.wedge_count() - primitive.tangents.size());

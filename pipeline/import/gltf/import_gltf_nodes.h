@@ -8,8 +8,8 @@
 
 namespace texmesh::gltf {
 
-/// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes with large
-/// translations.
+/// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes
+/// with large translations.
 struct Affine {
   std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   double at(int row, int column) const { return m[static_cast<std::size_t>(row * 4 + column)]; }

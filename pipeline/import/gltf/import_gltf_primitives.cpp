@@ -12,14 +12,14 @@ namespace {
 
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
-struct Place {
+struct PrimitivePlace {
   std::size_t mesh, primitive;
   std::string text() const {
     return "/meshes/" + std::to_string(mesh) + "/primitives/" + std::to_string(primitive);
   }
 };
 
-const Json* draco_extension(const Json& document, const Place& place) {
+const Json* draco_extension(const Json& document, const PrimitivePlace& place) {
   const Json& primitive = document["meshes"][place.mesh]["primitives"][place.primitive];
   const auto e = primitive.find("extensions");
   if (e == primitive.end() || !e->is_object()) return nullptr;
@@ -30,7 +30,7 @@ const Json* draco_extension(const Json& document, const Place& place) {
 class PrimitiveReader {
  public:
   PrimitiveReader(const Source& source, const Json& document, const tinygltf::Model& model, Buffers& buffers,
-                  const Place& place)
+                  const PrimitivePlace& place)
       : source_(source),
         document_(document),
         model_(model),
@@ -53,7 +53,7 @@ class PrimitiveReader {
   const Json& document_;
   const tinygltf::Model& model_;
   Buffers& buffers_;
-  const Place place_;
+  const PrimitivePlace place_;
   const tinygltf::Primitive& primitive_;
 };
 

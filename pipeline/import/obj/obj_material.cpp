@@ -32,7 +32,7 @@ std::vector<double> leading_numbers(std::string_view& rest, std::size_t most) {
 double or_default(double x, double fallback) { return std::isfinite(x) ? x : fallback; }
 
 // One option with its arguments; false when the text does not begin with an option.
-bool take_option(std::string_view& rest, MtlTexture& texture) {
+bool consume_option(std::string_view& rest, MtlTexture& texture) {
   std::string_view after = rest;
   const std::string option = lower(next_token(after));
   if (option.size() < 2 || option[0] != '-') return false;
@@ -61,7 +61,7 @@ bool take_option(std::string_view& rest, MtlTexture& texture) {
 std::optional<MtlTexture> read_texture(std::string_view rest, std::size_t line) {
   MtlTexture texture;
   texture.line = line;
-  while (take_option(rest, texture)) {
+  while (consume_option(rest, texture)) {
   }
   std::string_view file = trim(rest);
   if (file.size() >= 2 && file.front() == '"' && file.back() == '"')
@@ -168,8 +168,7 @@ class MtlReader {
   bool warned_ = false;
 };
 
-// --- what the pictures show
-// -------------------------------------------------------------------------------------
+// ---- what the pictures show
 
 // Visits up to about 256 x 256 texels spread over the picture.
 template <class F>
@@ -208,8 +207,7 @@ AlphaMode alpha_of(const Image& image) {
   return between * 20 <= n ? AlphaMode::kMask : AlphaMode::kBlend;
 }
 
-// --- to glTF
-// ----------------------------------------------------------------------------------------------------
+// ---- to glTF
 
 // uv' = scale * uv + offset with v upwards, said with v downwards.
 UvTransform transform_of(const MtlTexture& texture) {

@@ -9,8 +9,8 @@
 
 namespace texmesh {
 
-/// A texture statement of an MTL: options come before the file name, which runs to the end of the line,
-/// blanks included.
+/// A texture statement of an MTL: options come before the file name, which runs to the end of the
+/// line, blanks included.
 struct MtlTexture {
   std::string file;  // '/' for '\'
   std::size_t line = 0;
@@ -39,21 +39,17 @@ struct MtlFile {
 MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes);
 
 /// The glTF material, images added to the model. Decisions where MTL is vague:
-/// - Kd, Ke are sRGB, as the viewers that made MTL common show them; Kd beside a texture follows
-/// options.obj_kd.
-/// - `d` is opacity. `Tr` is transparency, but opacity in files that MeshLab wrote; and Tr 1 without d,
-/// literally an
-///   invisible material, is opaque with a note: exporters mean that.
+/// - Kd and Ke are sRGB, as the viewers that made MTL common show them. Kd beside a texture follows
+///   options.obj_kd.
+/// - `d` is opacity. `Tr` is transparency, but opacity in files that MeshLab wrote. Tr 1 without d, literally
+///   an invisible material, is opaque with a note: exporters mean that.
 /// - The alpha of map_Kd counts where the image has any that is not opaque: cut-out where nearly all texels
-/// are either or,
-///   blended otherwise. map_d becomes the alpha of map_Kd's image, blended.
+///   are either or, blended otherwise. map_d becomes the alpha of map_Kd's image, blended.
 /// - map_Pr and map_Pm become one image, roughness in green and metallic in blue. Where two such images do
-/// not
-///   have the same -s, -o and -clamp the second is left out with a warning.
+///   not have the same -s, -o and -clamp the second is left out with a warning.
 /// - map_Ks, map_Ns, disp, decal and refl have no counterpart: a warning names them.
-/// - norm is a normal map; bump and map_Bump are one when the picture is the typical blue, else a height map,
-/// which glTF
-///   cannot show: a note.
+/// - norm is a normal map. bump and map_Bump are one when the picture is the typical blue, else a height map,
+///   which glTF cannot show: a note.
 /// - -clamp on clamps; everything else repeats.
 Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,
                            Model& model, Resolver& resolver, const ImportOptions& options);

@@ -207,8 +207,8 @@ void PlyRows::next(PlyRow& row) {
   ++row_;
 }
 
-// Counts come as doubles: any type may hold one. `least_bytes_each` bounds what the rest of the file can
-// hold.
+// Counts come as doubles: any type may hold one. `least_bytes_each` bounds what the rest of the
+// file can hold.
 std::size_t PlyRows::list_count(double count, std::size_t least_bytes_each) const {
   const double most = static_cast<double>(left() / least_bytes_each + 1);
   if (!(count >= 0) || count > most || count != std::floor(count))

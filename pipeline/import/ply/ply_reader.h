@@ -60,9 +60,9 @@ class PlyRows {
   /// To be called for each element in order, before its rows: throws InputError when the rest of the file is
   /// shorter than the element must be.
   void begin(const PlyElement& element);
-  /// Reads the next row. An ASCII row is a line; a line with too few numbers goes on in the next one, what a
-  /// line has too many is `extra`. Throws InputError at the end of the data and for anything that is no
-  /// number.
+  /// Reads the next row. An ASCII row is a line; a line with too few numbers goes on in the next one,
+  /// what a line has too many is `extra`. Throws InputError at the end of the data and for anything that
+  /// is no number.
   void next(PlyRow& row);
   /// "vertex 17 (line 29)" or "vertex 17 (byte 812)".
   std::string place() const;

@@ -193,9 +193,9 @@ class SurfaceReader {
     surface_.faces.has_uv.push_back(good);
   }
 
-  // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a line
-  // ends in `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail holds the
-  // colours.
+  // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a
+  // line ends in `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail
+  // holds the colours.
   bool add_vcg_corner_colours(std::size_t declared, std::size_t corners) {
     if (row_.extra.empty()) return false;
     std::vector<double> tail(row_.values.end() - static_cast<std::ptrdiff_t>(declared), row_.values.end());

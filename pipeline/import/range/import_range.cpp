@@ -19,8 +19,7 @@
 namespace texmesh {
 namespace {
 
-// --- the grid's values
-// ------------------------------------------------------------------------------------------
+// ---- the grid's values
 
 struct Values {
   std::uint32_t columns = 0, rows = 0;
@@ -97,8 +96,7 @@ Values read_values(const std::string& name, std::vector<std::uint8_t> bytes, con
   return {pixels.width_px, pixels.height_px, std::move(pixels.data)};
 }
 
-// --- from the JSON
-// ----------------------------------------------------------------------------------------------
+// ---- from the JSON
 
 bool is_full_turn(double alpha_step_rad, std::uint32_t columns) {
   return std::fabs(alpha_step_rad * columns - 2 * portable::kPi) < 0.5 * alpha_step_rad;
@@ -144,8 +142,7 @@ void check_scan(const std::string& file, RangeScan& scan, const ImportOptions& o
                      std::to_string(scan.alpha_step_rad * scan.columns * 180 / portable::kPi) + " degrees");
 }
 
-// --- the mesh
-// ---------------------------------------------------------------------------------------------------
+// ---- the mesh
 
 class GridMesher {
  public:
@@ -185,8 +182,8 @@ class GridMesher {
   }
 
   // A wedge per position, and behind them one more for each sample of column 0 of a full turn: the seam,
-  // where u goes on past 1 (the texture repeats), so that the last cells are not squeezed backwards over the
-  // whole picture.
+  // where u goes on past 1 (the texture repeats), so that the last cells are not squeezed backwards over
+  // the whole picture.
   void add_wedges() {
     Mesh& mesh = model_.mesh;
     seam_.assign(scan_.rows, kNoIndex);

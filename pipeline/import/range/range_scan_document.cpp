@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::size_t kMaxJsonBytes = 1 << 20, kMaxHeaderBytes = 1 << 16;
 
-// Takes the members of an object one by one; what is left at the end is unknown.
+/// Reads the fields of an object one by one. Fields that were not read are unknown ones:
+/// finish() refuses them.
 class Members {
  public:
   Members(const std::string& file, const nlohmann::ordered_json& object) : file_(file) {
@@ -21,14 +22,14 @@ class Members {
     for (const auto& [name, value] : object.items()) values_.emplace(name, &value);
   }
   std::optional<std::string> text(const char* name) {
-    const auto* value = take(name);
+    const auto* value = remove_field(name);
     if (!value) return std::nullopt;
     if (!value->is_string() || value->template get_ref<const std::string&>().empty())
       fail(name, "a text that is not empty", *value);
     return value->template get<std::string>();
   }
   std::optional<double> number(const char* name, double lo, double hi, bool above_lo = false) {
-    const auto* value = take(name);
+    const auto* value = remove_field(name);
     if (!value) return std::nullopt;
     const double x = value->is_number() ? value->template get<double>() : NAN;
     if (!(x >= lo && x <= hi) || (above_lo && x == lo))
@@ -53,7 +54,7 @@ class Members {
   }
 
  private:
-  const nlohmann::ordered_json* take(const char* name) {
+  const nlohmann::ordered_json* remove_field(const char* name) {
     const auto it = values_.find(name);
     if (it == values_.end()) return nullptr;
     const auto* value = it->second;

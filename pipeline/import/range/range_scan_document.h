@@ -12,8 +12,8 @@ namespace texmesh {
 /// The JSON of a cylindrical range scan (schemas/range-scan.v1.schema.json).
 struct RangeScanDescription {
   std::string grid;  // EXR, TIFF, PNG or PGM: one column per angle, one row per height, top row first
-  std::optional<std::string>
-      texture;  // spread over the grid: its columns and rows are the grid's, at any resolution
+  // Spread over the grid: its columns and rows are the grid's, at any resolution.
+  std::optional<std::string> texture;
   std::optional<double> alpha_step_deg;        // between columns; without it the columns are a full turn
   double alpha_start_deg = 0;                  // of the first column: 0 looks along +z, 90 along +x
   bool clockwise = false;                      // columns run clockwise as seen from above
@@ -21,12 +21,12 @@ struct RangeScanDescription {
   std::optional<double> y_top;                 // of the first row; without it the last row is at 0
   double radius_scale = 1, radius_offset = 0;  // r = scale * value + offset, object units
   std::optional<double> valid_min, valid_max;  // values (of the grid, before scaling) outside are no samples
-  std::optional<double>
-      max_radius_step;  // triangles whose corners differ more in r are left out (the rim of what hides)
+  // Triangles whose corners differ more in r are left out (the rim of what hides).
+  std::optional<double> max_radius_step;
 };
 
-/// Strict: an unknown field, a missing one or a value out of range is an InputError that names its JSON
-/// pointer.
+/// Strict: an unknown field, a missing one or a value out of range is an InputError that names
+/// its JSON pointer.
 RangeScanDescription read_range_scan_description(const std::string& file, std::span<const std::uint8_t> json);
 
 /// A scan before it is a mesh. Rows from the top; radius <= 0 = no sample.

@@ -21,8 +21,8 @@ std::uint64_t package_bytes(PackageReader& p) {
   return bytes;
 }
 
-/// Every step function, with the viewing distance in object heights at which a step begins (null = 0, at any
-/// distance).
+/// Every step function, with the viewing distance in object heights at which a step begins (null = 0,
+/// at any distance).
 Json steps_json(const std::vector<ManifestStep>& steps) {
   Json list = Json::array();
   for (const ManifestStep& s : steps) {

@@ -28,7 +28,7 @@ class Verifier {
       read_documents();
       check_entries();
     }
-    report_.findings = findings_.take();
+    report_.findings = findings_.release();
     return std::move(report_);
   }
 

@@ -31,7 +31,7 @@ ScaleMap run(const Mesh& m, const SsfOptions& options = {}, int threads = 1) {
 std::vector<std::uint8_t> bytes(const ScaleMap& map) {
   ArchiveWriter writer;
   writer(map);
-  return writer.take();
+  return writer.finish();
 }
 
 std::size_t at_least(const ScaleMap& map, int scale) {
