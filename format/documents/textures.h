@@ -38,6 +38,8 @@ struct TextureInfo {
   EntryRef source;             // source/NNN.<extension>
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;
 };
+/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
+inline constexpr int kLosslessQuality = 100;
 /// The feature that packages with mips require.
 inline constexpr const char* kMipsFeature = "mips";
 /// How many of the planes have full size; they stand first.

@@ -3,15 +3,13 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/textures.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 
 namespace texmesh {
-
-/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
-inline constexpr int kLosslessQuality = 100;
 
 /// Gives every full-size plane of the ladder a top that loses nothing of its source image:
 /// - a JPEG in a plane coded as baseline JPEG: a last rung that holds the source's quantised coefficients,

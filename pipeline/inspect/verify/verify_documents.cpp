@@ -8,7 +8,6 @@
 #include "pipeline/inspect/provenance.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
-#include "stages/ladder/lossless_top.h"
 
 namespace texmesh {
 namespace {
