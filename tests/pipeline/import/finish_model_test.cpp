@@ -1,10 +1,11 @@
+#include "pipeline/import/finish_model.h"
+
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "format/base/errors.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/local_frame.h"
@@ -29,6 +30,7 @@ Model model_of(Mesh mesh) {
   m.mesh = std::move(mesh);
   return m;
 }
+
 Model finished(Model m, const ImportOptions& options = {}) {
   finish_model(m, "f", options);
   return m;
@@ -119,91 +121,6 @@ TEST(FinishModel, ZUpTurnsEverything) {
             (Vec3f{m.mesh.positions[5].x, m.mesh.positions[5].z, -m.mesh.positions[5].y}));
 }
 
-TEST(SetPositions, NearModelsKeepTheirCoordinatesAndFarOnesGetAnOrigin) {
-  Mesh mesh;
-  set_positions(mesh, {{-1, 2, 3}, {1, 2.5, 3}});
-  EXPECT_EQ(mesh.origin, Vec3d{});
-  EXPECT_EQ(mesh.positions[1], (Vec3f{1, 2.5f, 3}));
-  set_positions(mesh, {{5e6 + 0.001, 0, 0}, {5e6 + 1.003, 1, 1}});
-  EXPECT_EQ(mesh.origin.x, static_cast<double>(static_cast<float>(mesh.origin.x))) << "exact as a float";
-  EXPECT_NEAR(to_double(mesh.positions[1]).x + mesh.origin.x, 5e6 + 1.003, 1e-7);
-  set_positions(mesh, {{std::nan(""), 0, 0}, {1e300, 0, 0}, {7e6, 1, 1}, {7e6 + 1, 1, 1}});
-  EXPECT_TRUE(std::isnan(mesh.positions[0].x) && std::isnan(mesh.positions[1].x));
-  EXPECT_NEAR(mesh.origin.x, 7e6, 1);
-  set_positions(mesh, {});
-  EXPECT_TRUE(mesh.positions.empty());
-}
-
-TEST(AddImage, OneEntryPerContentOneWarningPerName) {
-  Model m;
-  MemoryResolver resolver;
-  resolver.files["a/x.png"] = testing::png_bytes(4, 4, 3);
-  resolver.files["b/x.png"] = testing::png_bytes(4, 4, 4);
-  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
-  EXPECT_EQ(add_image(m, "b/x.png", resolver, "f", "p", {}), 1);
-  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
-  EXPECT_EQ(m.images[0].name, "x.png");
-  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "p", {}), -1);
-  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "q", {}), -1);
-  EXPECT_EQ(count_notes(m, "missing-texture"), 1);
-  EXPECT_THROW(add_image(m, "../x.png", resolver, "f", "p", {}), InputError);
-  ImportOptions options;
-  options.max_image_pixels = 15;
-  resolver.files["c.png"] = testing::png_bytes(4, 4, 1);
-  const std::string error =
-      input_error([&] { add_image(m, "c.png", resolver, "model.obj", "material", options); });
-  EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
-  EXPECT_NE(error.find("c.png"), std::string::npos) << error;
-}
-
-TEST(ImportModel, ContentDecidesThenTheName) {
-  MemoryResolver resolver;
-  const std::string ply =
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-  EXPECT_EQ(import_model("wrong.obj", bytes_of(ply), resolver, {}, {}).format, "ply");
-  EXPECT_EQ(import_model("A.OBJ", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), resolver, {}, {}).format,
-            "obj");
-  EXPECT_THROW(import_model("a.obj", {}, resolver, {}, {}), InputError);
-  EXPECT_THROW(import_model("a.fbx", bytes_of("Kaydara FBX Binary"), resolver, {}, {}), InputError);
-  EXPECT_THROW(import_model("noname", bytes_of("?"), resolver, {}, {}), InputError);
-  ImportOptions options;
-  options.max_file_bytes = 10;
-  EXPECT_THROW(import_model("a.ply", bytes_of(ply), resolver, options, {}), InputError);
-}
-
-TEST(TextScan, Numbers) {
-  double x = 0;
-  for (const auto& [text, value] : {std::pair{"1", 1.0},
-                                    {"-2.5e3", -2500.0},
-                                    {"+.5", 0.5},
-                                    {"1.", 1.0},
-                                    {"1e999", HUGE_VAL},
-                                    {"-1e999", -HUGE_VAL},
-                                    {"1e-999", 0.0},
-                                    {"inf", HUGE_VAL},
-                                    {"-Infinity", -HUGE_VAL},
-                                    {"0.1", 0.1}}) {
-    EXPECT_TRUE(parse_number(text, x)) << text;
-    EXPECT_EQ(x, value) << text;
-  }
-  for (const char* text : {"nan", "-NaN", "nan(ind)", "-1.#IND", "1.#QNAN00"}) {
-    EXPECT_TRUE(parse_number(text, x)) << text;
-    EXPECT_TRUE(std::isnan(x)) << text;
-  }
-  for (const char* text : {"", "-", "+-1", "--1", "x", "1x", "1,5", "0x10", "1 2", "1.#"})
-    EXPECT_FALSE(parse_number(text, x)) << text;
-}
-
-TEST(LinearFromSrgb, EndsAndMiddle) {
-  EXPECT_EQ(linear_from_srgb(0), 0);
-  EXPECT_EQ(linear_from_srgb(1), 1);
-  EXPECT_EQ(linear_from_srgb(-3), 0);
-  EXPECT_EQ(linear_from_srgb(7), 1);
-  EXPECT_EQ(linear_from_srgb(std::nan("")), 1);
-  EXPECT_NEAR(linear_from_srgb(0.5), 0.2140411, 1e-6);
-}
-
 /// A triangle at `u` repeats to the right and `v` down, with its own material.
 Model chart_at(float u, float v, const TextureRef& texture) {
   Model m;
@@ -252,42 +169,6 @@ TEST(FinishModel, TangentsAreMadeSoundAndKeptOnlyWhereTheyCount) {
   m.materials[0].normal_texture = t;
   EXPECT_EQ(finished(m).mesh.tangents, (std::vector<Vec4f>{{1, 0, 0, 1}, {0, 0, 0, 0}, {0, 1, 0, -1}}));
   EXPECT_EQ(finished(m, {.up = UpAxis::kZ}).mesh.tangents[2], (Vec4f{0, 0, -1, -1}));
-}
-
-TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
-  testing::MemoryResolver resolver;
-  std::vector<std::uint8_t> exif{0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f',  0, 0, 'I',
-                                 'I',  42,   0,    8,    0, 0,  0,   1,   0,   0x12, 1, 3, 0,
-                                 1,    0,    0,    0,    6, 0,  0,   0,   0,   0,    0, 0};
-  const auto jpeg = testing::jpeg_bytes(8, 8, 3);
-  exif.insert(exif.end(), jpeg.begin() + 2, jpeg.end());
-  resolver.files["turned.jpg"] = exif;
-  resolver.files["inks.jpg"] = testing::cmyk_jpeg(8, 8, {1, 2, 3, 4}, true);
-  Model m;
-  add_image(m, "turned.jpg", resolver, "f", "p", {});
-  add_image(m, "inks.jpg", resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
-  EXPECT_EQ(count_notes(m, "exif-orientation"), 1);
-  EXPECT_EQ(count_notes(m, "cmyk-image"), 1);
-  for (const Note& note : m.notes) EXPECT_EQ(note.severity, Severity::kWarning) << note.code;
-  EXPECT_EQ(m.images[0].width_px, 8u);
-  EXPECT_TRUE(m.images[0].honour_profile);
-  EXPECT_FALSE(m.images[1].honour_profile);
-}
-
-TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
-  testing::MemoryResolver resolver;
-  const auto png = testing::png_bytes(8, 8, 3);
-  std::vector<std::uint8_t> frames(png.begin(), png.begin() + 33);  // signature and IHDR
-  frames.insert(frames.end(),
-                {0, 0, 0, 8, 'a', 'c', 'T', 'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xf3, 0x8d, 0x93, 0x70});
-  frames.insert(frames.end(), png.begin() + 33, png.end());
-  resolver.files["frames.png"] = frames;
-  resolver.files["still.png"] = png;
-  Model m;
-  add_image(m, "still.png", resolver, "f", "p", {});
-  EXPECT_EQ(count_notes(m, "more-pictures"), 0);
-  add_image(m, "frames.png", resolver, "f", "p", {});
-  EXPECT_EQ(count_notes(m, "more-pictures"), 1);
 }
 
 }  // namespace
