@@ -14,9 +14,10 @@
 namespace texmesh {
 
 // Serialisation of plain data for cached stage artefacts (not for packages: their layouts stand in SPEC.md).
-// A struct names its members once, in `template <class S, class A> static void archive(S& s, A& a)`; both
-// archives below walk that list. Numbers are little-endian; a vector or string is a u64 count and its
-// elements.
+// A struct names its members once, in
+//   template <class S, class A> static void archive(S& s, A& a)
+// and both archives below go through that list. Numbers are little-endian. A vector or string is a u64 count
+// and its elements.
 static_assert(std::endian::native == std::endian::little,
               "artefact and package codecs copy little-endian memory");
 
@@ -39,7 +40,8 @@ class ArchiveWriter {
   void operator()(const T&... values) {
     (put(values), ...);
   }
-  std::vector<std::uint8_t> take() { return std::move(bytes_); }
+  /// The bytes; the writer is empty afterwards.
+  std::vector<std::uint8_t> finish() { return std::move(bytes_); }
 
  private:
   void raw(const void* data, std::size_t size) {
@@ -139,7 +141,7 @@ template <class T>
 std::vector<std::uint8_t> encode_artefact(const T& value) {
   ArchiveWriter w;
   w(value);
-  return w.take();
+  return w.finish();
 }
 template <class T>
 T decode_artefact(std::span<const std::uint8_t> bytes, const std::string& name) {

@@ -13,8 +13,8 @@ namespace texmesh {
 using Bytes = std::vector<std::uint8_t>;
 using ByteSpan = std::span<const std::uint8_t>;
 
-// Little-endian building and bounded reading of binary entries: shared by the codecs of this folder, no
-// interface.
+// Little-endian building and bounded reading of binary entries: shared by the codecs of this
+// folder, no interface.
 
 class BytesOut {
  public:
@@ -29,7 +29,8 @@ class BytesOut {
   void raw(std::span<const std::uint8_t> v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
   void text(std::string_view v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
   std::size_t size() const { return bytes_.size(); }
-  std::vector<std::uint8_t> take() { return std::move(bytes_); }
+  /// The bytes; the writer is empty afterwards.
+  std::vector<std::uint8_t> finish() { return std::move(bytes_); }
 
  private:
   std::vector<std::uint8_t> bytes_;

@@ -51,8 +51,8 @@ struct FormatError : Error {
   using Error::Error;
 };
 
-/// A stage could not do its work on data that import and condition had let through. `file` holds the stage's
-/// name.
+/// A stage could not do its work on data that import and condition had let through. `file` holds
+/// the stage's name.
 struct StageError : Error {
   using Error::Error;
 };

@@ -19,15 +19,15 @@ namespace texmesh {
 //   };
 //
 // Names are snake_case. Field types: bool, int, double, std::string, std::vector<int>, std::vector<double>,
-// and enums that have EnumNames. The Range (inclusive) is given for numbers and for the elements of vectors,
-// never otherwise.
+// and enums that have EnumNames. The Range (inclusive) is given for numbers and for the elements of
+// vectors, never otherwise.
 
 struct Range {
   double lo, hi;
 };
 
-/// Specialise with `static constexpr std::array<std::string_view, N> names`, in the order of the enumerators
-/// 0..N-1.
+/// Specialise with `static constexpr std::array<std::string_view, N> names`, in the order of
+/// the enumerators 0..N-1.
 template <class E>
 struct EnumNames;
 

@@ -18,8 +18,8 @@ struct Finding {
 /// `mesh/s09.glb: /accessors/3/count: expected 12, found 13 [glb-accessor]`
 std::string to_string(const Finding& finding);
 
-/// Collects findings; every method returns whether the rule holds, so that a check can stop where going on is
-/// pointless.
+/// Collects findings; every method returns whether the rule holds, so that a check can stop where going
+/// on is pointless.
 class Findings {
  public:
   void add(std::string check, std::string entry, std::string field, std::string expected, std::string found) {
@@ -50,7 +50,8 @@ class Findings {
   }
   bool empty() const { return list_.empty(); }
   const std::vector<Finding>& list() const { return list_; }
-  std::vector<Finding> take() { return std::move(list_); }
+  /// The findings; none are left afterwards.
+  std::vector<Finding> release() { return std::move(list_); }
 
  private:
   std::vector<Finding> list_;

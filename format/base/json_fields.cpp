@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
+#include "format/base/bounded_json.h"
 #include "format/base/errors.h"
 
 namespace texmesh {
@@ -14,23 +16,9 @@ namespace {
 using Json = nlohmann::json;
 
 void check_depth(std::span<const std::uint8_t> bytes, const std::string& file) {
-  int depth = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const std::uint8_t c = bytes[i];
-    if (in_text) {
-      if (c == '\\') ++i;
-      if (c == '"') in_text = false;
-    } else if (c == '"') {
-      in_text = true;
-    } else if (c == '[' || c == '{') {
-      if (++depth > kMaxJsonDepth)
-        throw FormatError(file, "byte " + std::to_string(i),
-                          "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
+  if (const auto byte = first_bracket_deeper_than(bytes, kMaxJsonDepth))
+    throw FormatError(file, "byte " + std::to_string(*byte),
+                      "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
 }
 
 /// At most 40 printable ASCII characters of a value, for an error message.

@@ -1,6 +1,6 @@
 #pragma once
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,8 +9,7 @@
 
 namespace texmesh {
 
-// Strict reading of the package's JSON documents; for the .cpp files of this folder only (it drags nlohmann
-// in).
+// Strict reading of the package's JSON documents.
 
 /// Largest integer that every JSON reader keeps: 2^53.
 inline constexpr std::uint64_t kMaxJsonInteger = std::uint64_t{1} << 53;
@@ -21,8 +20,8 @@ inline constexpr int kMaxJsonDepth = 64;
 nlohmann::json parse_json(std::span<const std::uint8_t> bytes, const std::string& file,
                           std::uint64_t max_bytes);
 
-/// Without blanks, numbers in the shortest form that reads back the same; FormatError when a text is not
-/// UTF-8.
+/// Without blanks, numbers in the shortest form that reads back the same; FormatError when a text
+/// is not UTF-8.
 std::string dump_json(const nlohmann::ordered_json& json, const std::string& file);
 
 /// The double whose decimal form is the shortest for this float, so that dump_json writes no noise digits.
@@ -30,8 +29,8 @@ double shortest_double(float value);
 /// `value` rounded to six significant decimal digits.
 double six_digits(double value);
 
-/// A value and its JSON pointer. Every accessor checks the type and the range and throws FormatError
-/// otherwise.
+/// A value and its JSON pointer. Every accessor checks the type and the range and
+/// throws FormatError otherwise.
 class JsonAt {
  public:
   JsonAt(const nlohmann::json& value, const std::string& file, std::string pointer = "")

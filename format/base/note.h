@@ -7,9 +7,9 @@ namespace texmesh {
 
 enum class Severity : std::uint8_t { kInfo = 0, kWarning = 1 };
 
-/// Something a user should know about a model that compiled all the same. Notes travel inside stage results,
-/// so a result that comes from the cache says the same as one that was computed. `--strict` makes warnings
-/// errors.
+/// Something a user should know about a model that compiled all the same. Notes travel inside stage
+/// results, so a result that comes from the cache says the same as one that was computed. `--strict`
+/// makes warnings errors.
 struct Note {
   Severity severity = Severity::kInfo;
   std::string code;   // stable, kebab-case: "missing-texture", "non-finite-position"

@@ -61,7 +61,7 @@ class MemorySource final : public ByteSource {
   MemorySource(std::span<const std::uint8_t> bytes, std::string name)
       : bytes_(bytes), name_(std::move(name)) {}
   MemorySource(Bytes&& bytes, std::string name)
-      : own_(std::move(bytes)), bytes_(own_), name_(std::move(name)) {}
+      : owned_(std::move(bytes)), bytes_(owned_), name_(std::move(name)) {}
   std::string name() const override { return name_; }
   std::uint64_t size() override { return bytes_.size(); }
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
@@ -73,7 +73,7 @@ class MemorySource final : public ByteSource {
   }
 
  private:
-  Bytes own_;
+  Bytes owned_;
   std::span<const std::uint8_t> bytes_;
   std::string name_;
 };

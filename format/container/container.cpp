@@ -56,7 +56,7 @@ Bytes local_header(const ContainerEntry& e, std::uint64_t offset) {
     out.u16(kAlignment);
     for (std::uint64_t i = 6; i < pad; ++i) out.u8(0);
   }
-  return out.take();
+  return out.finish();
 }
 
 Bytes central_header(const ContainerEntry& e, std::uint64_t header_offset) {
@@ -89,7 +89,7 @@ Bytes central_header(const ContainerEntry& e, std::uint64_t header_offset) {
     }
     if (far) out.u64(header_offset);
   }
-  return out.take();
+  return out.finish();
 }
 
 /// End of central directory, with the ZIP64 record and locator where a number does not fit.
@@ -120,7 +120,7 @@ Bytes tail(std::uint64_t count, std::uint64_t directory_bytes, std::uint64_t dir
   out.u32(std::min(directory_bytes, kMax32));
   out.u32(std::min(directory_offset, kMax32));
   out.u16(0);
-  return out.take();
+  return out.finish();
 }
 
 struct Field {

@@ -16,8 +16,8 @@ class ByteSource {
   /// What errors call it: a file name or URL.
   virtual std::string name() const { return "package"; }
   virtual std::uint64_t size() = 0;
-  /// Exactly `bytes` bytes from `offset`; throws FormatError when they are not there, InputError when reading
-  /// fails.
+  /// Exactly `bytes` bytes from `offset`; throws FormatError when they are not there, InputError
+  /// when reading fails.
   virtual std::vector<std::uint8_t> read(std::uint64_t offset, std::uint64_t bytes) = 0;
 };
 std::unique_ptr<ByteSource> open_file_source(const std::string& path);  // InputError
@@ -32,8 +32,8 @@ struct ContainerEntry {
   std::uint32_t crc32 = 0;
 };
 
-/// Paths a package may hold: relative, '/'-separated, [a-z0-9._-] only, no empty, "." or ".." part, at most
-/// 200 bytes.
+/// Paths a package may hold: relative, '/'-separated, [a-z0-9._-] only, no empty, "." or ".." part, at
+/// most 200 bytes.
 bool is_valid_entry_path(const std::string& path);
 
 /// Writes the ISO/IEC 21320-1 profile of SPEC.md: STORE, data 64-byte aligned, dates 1980-01-01, no
@@ -68,8 +68,8 @@ class ContainerWriter {
 /// that are not alignment, trailing bytes); FormatError otherwise. Entries in file order.
 std::vector<ContainerEntry> read_container(ByteSource& source);
 
-/// Reads an entry's data and compares its CRC-32; FormatError when it differs. read_container itself reads no
-/// data.
+/// Reads an entry's data and compares its CRC-32; FormatError when it differs. read_container itself
+/// reads no data.
 void check_crc(ByteSource& source, const ContainerEntry& entry);
 
 }  // namespace texmesh

@@ -16,14 +16,14 @@ std::string print(const char* format, T... values) {
 }
 
 /// Takes the digits at the front of `text`; false when there are none or the number does not fit.
-bool take_number(std::string_view& text, std::uint32_t& number) {
+bool consume_number(std::string_view& text, std::uint32_t& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end == text.data()) return false;
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   return true;
 }
 
-bool take(std::string_view& text, std::string_view prefix) {
+bool consume_prefix(std::string_view& text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return false;
   text.remove_prefix(prefix.size());
   return true;
@@ -31,12 +31,12 @@ bool take(std::string_view& text, std::string_view prefix) {
 
 EntryName parse_texture_path(std::string_view text) {
   EntryName name;
-  if (!take_number(text, name.number) || !take(text, "/")) return {};
+  if (!consume_number(text, name.number) || !consume_prefix(text, "/")) return {};
   if (text == "tables.pack") {
     name.kind = EntryKind::kTableStreams;
-  } else if (take(text, "r") && take_number(text, name.rung)) {
+  } else if (consume_prefix(text, "r") && consume_number(text, name.rung)) {
     if (text == ".pack") name.kind = EntryKind::kRung;
-    if (take(text, "/") && take_number(text, name.fragment) && take(text, "."))
+    if (consume_prefix(text, "/") && consume_number(text, name.fragment) && consume_prefix(text, "."))
       for (const std::string_view extension : {"jpg", "webp"})
         if (text == extension) name.kind = EntryKind::kFragmentFile, name.extension = extension;
   }
@@ -53,15 +53,15 @@ EntryName parse_any_spelling(std::string_view path) {
     if (path == single) return {kind};
   std::string_view text = path;
   EntryName name;
-  if (take(text, "mesh/s")) {
-    if (take_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
-  } else if (take(text, "preview/")) {
-    if (take_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
-  } else if (take(text, "source/")) {
-    if (take_number(text, name.number) && take(text, "."))
+  if (consume_prefix(text, "mesh/s")) {
+    if (consume_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
+  } else if (consume_prefix(text, "preview/")) {
+    if (consume_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
+  } else if (consume_prefix(text, "source/")) {
+    if (consume_number(text, name.number) && consume_prefix(text, "."))
       for (const std::string_view extension : kSourceExtensions)
         if (text == extension) name.kind = EntryKind::kSource, name.extension = extension;
-  } else if (take(text, "texture/")) {
+  } else if (consume_prefix(text, "texture/")) {
     return parse_texture_path(text);
   }
   return name;

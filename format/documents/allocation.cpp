@@ -1,8 +1,11 @@
+#include "format/documents/allocation.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"
+#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
 
 // Thesis 3.2-3.3: from feature counts to the quality that a fragment is asked to have.
@@ -99,8 +102,8 @@ std::vector<std::uint32_t> bytes_of(const PlaneTables& tables, const std::vector
 
 std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment) {
   const std::size_t fragments = tables.fragment_count();
-  const std::uint64_t own = tables.size_bytes[rung * fragments + fragment];
-  if (!tables.incremental || own == 0) return own;
+  const std::uint64_t stream_bytes = tables.size_bytes[rung * fragments + fragment];
+  if (!tables.incremental || stream_bytes == 0) return stream_bytes;
   std::uint64_t bytes = 0;
   for (std::size_t r = 0; r <= rung; ++r) bytes += tables.size_bytes[r * fragments + fragment];
   return bytes;

@@ -1,3 +1,5 @@
+#include "format/documents/index.h"
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -6,7 +8,6 @@
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {
@@ -53,7 +54,7 @@ Bytes write_page(const std::vector<EntryRef>& entries) {
     out.u8(e.path.size());
     out.text(e.path);
   }
-  return out.take();
+  return out.finish();
 }
 
 }  // namespace
@@ -82,8 +83,8 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
   };
   add_page(kNoPlane, general);
   for (const auto& [plane, page_entries] : planes) add_page(plane, page_entries);
-  head.raw(pages.take());
-  return head.take();
+  head.raw(pages.finish());
+  return head.finish();
 }
 
 IndexHead read_index_head(std::span<const std::uint8_t> bytes) {

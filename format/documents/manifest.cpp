@@ -1,7 +1,10 @@
 #include "format/documents/manifest.h"
 
+#include "format/documents/textures.h"
+
 #include <algorithm>
 #include <array>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "format/base/errors.h"

@@ -8,6 +8,7 @@
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
+#include "format/documents/index.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"
 
@@ -90,9 +91,9 @@ class ManifestFiller {
   std::map<std::string, const EntryRef*> by_path_;
 };
 
-/// The bytes of the first picture's range: entries and the headers between them. Every header there follows
-/// from path, size, CRC and place, so a container of the same entries up to the range's end has the same
-/// bytes.
+/// The bytes of the first picture's range: entries and the headers between them. Every header there
+/// follows from path, size, CRC and place, so a container of the same entries up to the range's end has
+/// the same bytes.
 Sha256 first_picture_digest(const Manifest& m, const std::vector<EntryRef>& refs,
                             const std::map<std::string, const Bytes*>& data, std::uint64_t manifest_bytes) {
   Bytes head;

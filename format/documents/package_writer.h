@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/documents/manifest.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 
@@ -13,10 +14,10 @@ struct PackageEntry {
 };
 
 /// Lays out and writes entries that are already final except for the offsets in manifest and index, in
-/// streaming_order(). `entries` holds all but manifest.json, index.bin and textures.json, which are made here
-/// from the arguments (refs and offsets in them are filled in). `pack` needs no new layout: it hands the
-/// files of a tree to ContainerWriter in index order. FormatError when an entry is missing or a value breaks
-/// a rule.
+/// streaming_order(). `entries` holds all but manifest.json, index.bin and textures.json, which are made
+/// here from the arguments (refs and offsets in them are filled in). `pack` needs no new layout: it hands
+/// the files of a tree to ContainerWriter in index order. FormatError when an entry is missing or a value
+/// breaks a rule.
 std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
                                         const std::vector<PackageEntry>& entries);
 

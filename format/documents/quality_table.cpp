@@ -1,6 +1,9 @@
+#include "format/documents/quality_table.h"
+
+#include <nlohmann/json.hpp>
+
 #include "format/base/json_fields.h"
 #include "format/container/layout.h"
-#include "format/documents/tables.h"
 
 namespace texmesh {
 namespace {

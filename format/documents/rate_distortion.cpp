@@ -1,7 +1,10 @@
+#include "format/documents/rate_distortion.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "format/base/half.h"
+#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
 
 // Which rung of which fragment a budget is best spent on (facts: surface-weighted 1 - SSIM; convex hulls and

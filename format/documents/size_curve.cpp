@@ -1,15 +1,18 @@
+#include "format/documents/size_curve.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
 
 namespace texmesh {
 namespace {
 
-// Luma quantisers of ISO/IEC 10918-1, table K.1: what IJG's scale multiplies. Their order does not matter
-// here.
+// Luma quantisers of ISO/IEC 10918-1, table K.1: what IJG's scale multiplies. Their order does
+// not matter here.
 constexpr std::array<int, 64> kLumaQuantisers{
     16, 11,  10,  16, 24, 40, 51, 61, 12,  12,  14,  19,  26, 58, 60, 55,  14,  13,  16,  24, 40, 57,
     69, 56,  14,  17, 22, 29, 51, 87, 80,  62,  18,  22,  37, 56, 68, 109, 103, 77,  24,  35, 55, 64,

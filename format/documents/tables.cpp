@@ -7,7 +7,6 @@
 #include "format/base/half.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {
@@ -199,7 +198,7 @@ Bytes write_section(const PlaneTables& t) {
     out.raw(t.knot_quality);
     for (const auto v : t.knot_position) out.u16(to_unit16(v));
   }
-  return out.take();
+  return out.finish();
 }
 
 template <class T, class Get>
@@ -281,8 +280,8 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   if (size_width < 1 || size_width > 4 || feature_width < 1 || feature_width > 3)
     in.fail("widths of 1 to 4 and 1 to 3 bytes",
             std::to_string(size_width) + ", " + std::to_string(feature_width));
-  // All counts are known to be small by now, so the sum cannot overflow; nothing is allocated before it is
-  // checked.
+  // All counts are known to be small by now, so the sum cannot overflow; nothing is allocated before
+  // it is checked.
   const std::uint64_t expected =
       section_bytes(t.fragment_count(), rungs, t.scales + std::uint64_t{1}, order,
                     static_cast<std::uint64_t>(size_width), static_cast<std::uint64_t>(feature_width));
@@ -314,8 +313,8 @@ std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
     head.raw(sha256(section));
     sections.raw(section);
   }
-  head.raw(sections.take());
-  return head.take();
+  head.raw(sections.finish());
+  return head.finish();
 }
 
 TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {

@@ -1,10 +1,12 @@
+#include "format/documents/textures.h"
+
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/container/layout.h"
-#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {

@@ -26,8 +26,8 @@ double viewing_distance(double object_height, double height_px, const Camera& ca
 /// finer of kJnd and kError, which is what Manifest::steps holds.
 enum class StepRule { kDefault, kJnd, kError, kEdge };
 /// The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's, up to
-/// kAnyDisplayPx. A scale that accepts no more than a coarser one gives no step. `scales` as in a manifest,
-/// S_0 first.
+/// kAnyDisplayPx. A scale that accepts no more than a coarser one gives no step. `scales` as in a
+/// manifest, S_0 first.
 std::vector<ManifestStep> step_function(std::span<const ManifestScale> scales, StepRule rule);
 /// The scale of the first step that reaches this height.
 int scale_at(std::span<const ManifestStep> steps, double displayed_px);

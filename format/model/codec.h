@@ -28,8 +28,8 @@ struct CodecTraits {
   std::string_view required_feature;  // of the manifest; empty: every reader knows the codec
   std::string_view extension;         // of complete files, without the dot
   std::string_view media_type;
-  /// A rung's streams continue those of the rungs below: a complete file needs all of them, and its bytes are
-  /// their sum.
+  /// A rung's streams continue those of the rungs below: a complete file needs all of them, and its bytes
+  /// are their sum.
   bool incremental = false;
 };
 const CodecTraits& codec_traits(Codec codec);
@@ -48,9 +48,9 @@ std::vector<std::uint8_t> join_fragment(Codec codec, std::span<const std::uint8_
 std::vector<std::uint8_t> join_fragment(Codec codec, std::span<const std::uint8_t> tables,
                                         std::span<const std::uint8_t> stream);
 
-/// The reverse: the rung's stream out of a complete file. `lower_bytes` is the sum of the streams of lower
-/// rungs, for an incremental codec; ignored otherwise. FormatError when the file does not begin with the
-/// tables.
+/// The reverse: the rung's stream out of a complete file. `lower_bytes` is the sum of the streams of
+/// lower rungs, for an incremental codec; ignored otherwise. FormatError when the file does not begin
+/// with the tables.
 std::vector<std::uint8_t> split_fragment(Codec codec, std::span<const std::uint8_t> tables,
                                          std::span<const std::uint8_t> file, std::uint64_t lower_bytes);
 

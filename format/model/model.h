@@ -46,8 +46,8 @@ struct Mesh {
 enum class Wrap : std::uint8_t { kRepeat = 0, kClamp = 1, kMirror = 2 };
 enum class AlphaMode : std::uint8_t { kOpaque = 0, kMask = 1, kBlend = 2 };
 
-/// Affine map of a UV before sampling: uv' = offset + rotate(rotation) * (scale * uv), as
-/// KHR_texture_transform.
+/// Affine map of a UV before sampling: uv' = offset + rotate(rotation) * (scale *
+/// uv), as KHR_texture_transform.
 struct UvTransform {
   Vec2f offset{0, 0}, scale{1, 1};
   float rotation = 0;  // radians, counter-clockwise in the extension's sense
@@ -97,8 +97,8 @@ struct ExtensionFactor {
   }
 };
 
-/// A glTF material extension of those that format/model/material_extensions.h lists, with what the source
-/// says.
+/// A glTF material extension of those that format/model/material_extensions.h lists, with what
+/// the source says.
 struct MaterialExtension {
   std::string name;
   std::vector<ExtensionFactor> factors;
@@ -180,8 +180,8 @@ struct RangeGrid {
   }
 };
 
-/// What import gives. Every texture reference, material and part index is in range; images nobody uses are
-/// gone.
+/// What import gives. Every texture reference, material and part index is in range; images nobody
+/// uses are gone.
 struct Model {
   Mesh mesh;
   std::vector<Material> materials;  // at least one

@@ -38,8 +38,8 @@ class BitEncoder {
   void encode_raw(std::uint32_t value, int count) {
     while (count-- > 0) put(2048, (value >> count) & 1);
   }
-  /// Ends the code; the encoder can be used again. Zeros at the end are left out: the decoder reads them
-  /// anyway.
+  /// Ends the code; the encoder can be used again. Zeros at the end are left out: the decoder
+  /// reads them anyway.
   std::vector<std::uint8_t> finish() {
     // Of all numbers in [low, low + range) the one with the most zeros at its end.
     const std::uint64_t last = low_ + range_ - 1;
@@ -96,19 +96,19 @@ class BitDecoder {
     for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
   }
   bool decode(BitModel& model, std::uint8_t limit) {
-    const bool bit = take(model.odds());
+    const bool bit = decode_by_odds(model.odds());
     model.learn(bit, limit);
     return bit;
   }
   std::uint32_t decode_raw(int count) {
     std::uint32_t value = 0;
-    while (count-- > 0) value = value << 1 | static_cast<std::uint32_t>(take(2048));
+    while (count-- > 0) value = value << 1 | static_cast<std::uint32_t>(decode_by_odds(2048));
     return value;
   }
 
  private:
   std::uint32_t next() { return at_ < bytes_.size() ? bytes_[at_++] : 0; }
-  bool take(std::uint32_t odds) {
+  bool decode_by_odds(std::uint32_t odds) {
     const std::uint32_t bound = (range_ >> 12) * odds;
     const bool bit = code_ < bound;
     if (bit) {
@@ -150,8 +150,8 @@ inline int residual_length(std::int32_t residual) {
 }
 
 /// Codes residuals through `bits`, which is given the model (or a number of raw bits) and returns what was
-/// coded; so the encoder and the decoder are the same walk.
-class ValueWalk {
+/// coded; so the encoder and the decoder are the same code.
+class ResidualCodec {
  public:
   static constexpr int kLongest = 26;
   ValueModels models;

@@ -63,7 +63,7 @@ void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vect
 }
 
 /// Appends the fan that begins with the loose corner `start`.
-void SplitMesh::walk(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans) {
+void SplitMesh::gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans) {
   Fan fan{static_cast<std::uint32_t>(corners.size()), 0, false};
   for (std::uint32_t at = start; at != kNoIndex;) {
     taken_[at] = true;
@@ -93,9 +93,9 @@ void SplitMesh::gather(std::uint32_t point, std::vector<Corner>& corners, std::v
     ++count_b_[loose_[i].b];
   }
   for (std::uint32_t i = 0; i < loose_.size(); ++i)
-    if (!taken_[i] && count_b_[loose_[i].a] == 0) walk(i, corners, fans);
+    if (!taken_[i] && count_b_[loose_[i].a] == 0) gather_fan(i, corners, fans);
   for (std::uint32_t i = 0; i < loose_.size(); ++i)
-    if (!taken_[i]) walk(i, corners, fans);
+    if (!taken_[i]) gather_fan(i, corners, fans);
   for (const Corner& c : loose_) first_a_[c.a] = kNoIndex, count_b_[c.b] = 0;
 }
 

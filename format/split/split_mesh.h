@@ -37,8 +37,8 @@ class SplitMesh {
   const std::vector<std::int32_t>& values(std::size_t k) const { return values_[k]; }
   int components(std::size_t k) const { return components_[k]; }
   std::size_t attributes() const { return components_.size(); }
-  /// Faces whose three points are at different places; the others show nothing and are no triangles of a
-  /// scale.
+  /// Faces whose three points are at different places; the others show nothing and are no triangles
+  /// of a scale.
   std::vector<std::uint32_t> visible_faces() const;
 
   // For the codec:
@@ -60,15 +60,15 @@ class SplitMesh {
   void each_corner(std::uint32_t point, Visit&& visit) const {
     for (std::uint32_t c = head_[point]; c != kNoIndex; c = next_[c]) visit(c / 3, c % 3);
   }
-  /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in the
-  /// point's list.
+  /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in
+  /// the point's list.
   void gather(std::uint32_t point, std::vector<Corner>& corners, std::vector<Fan>& fans);
   /// Gives the corners that move their target wedges, all of point `to`, which had no corner before.
   /// `corners` are those of gather(from); both points' corners stand in that order afterwards.
   void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
 
  private:
-  void walk(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
+  void gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
   std::vector<Point> points_;
   std::vector<std::uint32_t> wedge_point_;
   std::vector<std::array<std::uint32_t, 3>> faces_;

@@ -1,13 +1,14 @@
+#include "format/split/split_reader.h"
+
 #include <limits>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
-#include "format/split/split_codec.h"
+#include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_fill.h"
 #include "format/split/split_head.h"
-#include "format/split/split_stream.h"
 
 namespace texmesh {
 namespace {
@@ -19,28 +20,28 @@ class PartDecoder {
     present_ = !bytes.empty();
     if (!present_) return;
     for (std::size_t i = 0; i < models.size(); ++i)
-      walk_.models.all[i] = {static_cast<std::uint16_t>(models[i] << 8), ValueModels::kPrior};
-    walk_.start(bytes[0] * 2);
+      residuals_.models.all[i] = {static_cast<std::uint16_t>(models[i] << 8), ValueModels::kPrior};
+    residuals_.start(bytes[0] * 2);
     bits_ = BitDecoder(bytes.subspan(1));
   }
   void values(std::int32_t* out, const std::int32_t* guess, int components, int bits) {
     const std::int32_t largest = (1 << bits) - 1;
     for (int i = 0; i < components; ++i) {
-      const std::int32_t residual = present_ ? walk_.residual(*this, i, 0) : 0;
+      const std::int32_t residual = present_ ? residuals_.residual(*this, i, 0) : 0;
       out[i] = (std::clamp(guess[i], 0, largest) + residual) & largest;
     }
   }
   bool present() const { return present_; }
-  bool same() { return present_ && walk_.same(*this, false); }
+  bool same() { return present_ && residuals_.same(*this, false); }
 
-  // What ValueWalk asks of its bits:
+  // What ResidualCodec asks of its bits:
   bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kLimit); }
   std::uint32_t raw(std::uint32_t, int count) { return bits_.decode_raw(count); }
 
  private:
   bool present_ = false;
   BitDecoder bits_;
-  ValueWalk walk_;
+  ResidualCodec residuals_;
 };
 
 /// The reader's side of SplitCodec. Blocks of patches have no splits: what their points lack stays predicted.
@@ -61,12 +62,12 @@ class DecodingChannel {
     return connectivity_.decode_raw(count);
   }
   template <class Note>
-  void know(Note&&) {}
+  void update_truth(Note&&) {}
   template <class Truth>
   void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&&) {
     parts_[0].values(point.data(), guess.data(), 3, head_.position.bits);
   }
-  void made(SplitMesh& mesh, std::uint32_t point) {
+  void finish_point(SplitMesh& mesh, std::uint32_t point) {
     if (parts_[0].present()) return;
     lost_.push_back(point);
     if (fill_ == SplitFill::kTexture) fill_lost_point(head_, mesh, point);
@@ -197,9 +198,9 @@ void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   }
   s.channel.start(parts);
   if (b.is_patch)
-    s.codec.patch(b.count);
+    s.codec.code_patch(b.count);
   else
-    s.codec.splits(b.count);
+    s.codec.code_splits(b.count);
   ++s.block;
   const SplitScale& scale = s.head.scales[s.scale];
   if (s.block != scale.blocks) return;
@@ -216,7 +217,7 @@ void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
 
 const std::vector<std::uint32_t>& SplitStreamReader::lost_points() const { return state_->channel.lost(); }
 
-void SplitStreamReader::fill_again() {
+void SplitStreamReader::refill_lost_points() {
   for (const std::uint32_t point : state_->channel.lost()) fill_lost_point(state_->head, state_->mesh, point);
 }
 

@@ -5,7 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/container/format_version.h"
-#include "format/split/split_codec.h"
+#include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
 
@@ -153,7 +153,7 @@ std::vector<std::uint8_t> write_split_head(const SplitStreamHead& head) {
     for (std::uint32_t p : b.parts) write_varint(out, p);
     out.raw(b.digest);
   }
-  return out.take();
+  return out.finish();
 }
 
 SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {

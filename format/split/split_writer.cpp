@@ -1,245 +1,18 @@
-#include <algorithm>
-#include <limits>
-#include <map>
+#include "format/split/split_writer.h"
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
+#include <algorithm>
+
 #include "format/base/sha256.h"
-#include "format/split/split_codec.h"
+#include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
-#include "format/split/split_stream.h"
+#include "format/split/split_symbols.h"
+#include "format/split/split_truth.h"
 
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kNone = kNoIndex;
 constexpr std::uint32_t kFacesPerBlock = 512;  // of patches but the first
-
-[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
-  throw FormatError("split source", place, expected, found);
-}
-
-/// What the writer knows and the reader must be told: the source, how its numbers stand to the stream's, and
-/// the split or face under way.
-class SplitTruth {
- public:
-  SplitTruth(const SplitSource& source, const SplitMesh& mesh)
-      : source_(source),
-        mesh_(mesh),
-        stream_point_(source.points.size(), kNone),
-        ready_(source.points.size(), kNone),
-        move_(source.face_group.size(), kNone) {}
-
-  // ---- chapters
-
-  void begin_chapter(const SplitSource::Chapter& chapter) {
-    chapter_ = &chapter;
-    waiting_.assign(chapter.splits.size(), 0);
-    first_.assign(chapter.splits.size() + 1, 0);
-    for (const auto& [a, b] : chapter.before) {
-      if (a >= chapter.splits.size() || b >= chapter.splits.size())
-        fail("order of splits", "splits of the chapter", std::to_string(std::max(a, b)));
-      ++first_[a + 1];
-      ++waiting_[b];
-    }
-    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-    after_.resize(chapter.before.size());
-    std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-    for (const auto& [a, b] : chapter.before) after_[at[a]++] = b;
-    for (std::uint32_t s = 0; s < chapter.splits.size(); ++s)
-      if (waiting_[s] == 0) make_ready(s);
-    sort_patch();
-  }
-
-  bool is_ready(std::uint32_t v) const { return ready_[source_point_[v]] != kNone; }
-  void begin_split(std::uint32_t v, std::uint32_t u) {
-    std::uint32_t& ready = ready_[source_point_[v]];
-    number_ = ready;
-    ready = kNone;
-    const SplitSource::Split& split = chapter_->splits[number_];
-    parent_ = split.parent, child_ = split.child;
-    bind_point(u, child_);
-    for (std::uint32_t i = split.move_begin; i < split.move_end; ++i)
-      move_[chapter_->moves[i].face] = chapter_->moves[i].wedge;
-    remaining_.clear();
-    for (std::uint32_t i = split.born_begin; i < split.born_end; ++i) remaining_.push_back(i);
-  }
-  void check_moves(std::size_t found) const {
-    const SplitSource::Split& split = chapter_->splits[number_];
-    if (found != split.move_end - split.move_begin)
-      fail("split " + std::to_string(number_),
-           std::to_string(split.move_end - split.move_begin) + " faces at its parent", std::to_string(found));
-  }
-  void end_split() {
-    const SplitSource::Split& split = chapter_->splits[number_];
-    for (std::uint32_t i = split.move_begin; i < split.move_end; ++i) move_[chapter_->moves[i].face] = kNone;
-    for (std::uint32_t i = first_[number_]; i < first_[number_ + 1]; ++i)
-      if (--waiting_[after_[i]] == 0) make_ready(after_[i]);
-  }
-
-  // ---- corners that move
-
-  bool moves(std::uint32_t face) const { return move_[source_face_[face]] != kNone; }
-  bool is_target(std::uint32_t face, std::uint32_t w) const {
-    return source_wedge_[w] == move_[source_face_[face]];
-  }
-  bool is_any_target(std::uint32_t face, const std::vector<std::uint32_t>& wedges) const {
-    return std::ranges::any_of(wedges, [&](std::uint32_t w) { return is_target(face, w); });
-  }
-  bool target_equals(std::uint32_t face, std::uint32_t w) const {
-    for (std::size_t k = 0; k < source_.values.size(); ++k)
-      if (!equal_source(k, move_[source_face_[face]], source_wedge_[w])) return false;
-    return true;
-  }
-  void bind_target(std::uint32_t face, std::uint32_t w) { bind_wedge(w, move_[source_face_[face]]); }
-
-  // ---- the face under way; roles are parent, child, third, or start, end, third of a patch's edge
-
-  bool take(std::uint32_t x) {
-    for (std::size_t i = 0; i < remaining_.size(); ++i)
-      if (third_of(chapter_->born[remaining_[i]]) == source_point_[x]) return take_born(i);
-    return false;
-  }
-  bool take_any() { return !remaining_.empty() && take_born(0); }
-  std::uint32_t third_point() const { return wanted_point(2); }
-  bool is_forward(std::uint32_t) const { return forward_; }
-  bool is_wanted(std::uint32_t role, std::uint32_t w) const { return source_wedge_[w] == wanted_[role]; }
-  bool fits_better(std::uint32_t v, std::uint32_t x, std::uint32_t v2, std::uint32_t x2) const {
-    return (is_wanted(0, v) ? 1 : 0) + (is_wanted(2, x) ? 1 : 0) >=
-           (is_wanted(0, v2) ? 1 : 0) + (is_wanted(2, x2) ? 1 : 0);
-  }
-  std::uint32_t wanted_group() const { return source_.face_group[face_]; }
-  std::uint32_t wanted_point(std::uint32_t role) const {
-    return stream_point_[source_.wedge_point[wanted_[role]]];
-  }
-  void bind_wanted(std::uint32_t role, std::uint32_t w) { bind_wedge(w, wanted_[role]); }
-  void bind_wanted_point(std::uint32_t role, std::uint32_t p) {
-    bind_point(p, source_.wedge_point[wanted_[role]]);
-  }
-  void bind_face(std::uint32_t face) {
-    if (face != source_face_.size()) fail("faces", "in order", "another");
-    source_face_.push_back(face_);
-  }
-
-  // ---- patches
-
-  void take_seed() {
-    while (patch_taken_[next_seed_]) ++next_seed_;
-    take_patch_face(static_cast<std::uint32_t>(next_seed_), 0);
-  }
-  bool take_gate(std::uint32_t a, std::uint32_t b) {
-    const std::array<std::uint32_t, 2> key{source_point_[b], source_point_[a]};
-    auto at = std::lower_bound(edges_.begin(), edges_.end(), Edge{key, 0, 0});
-    for (; at != edges_.end() && at->points == key; ++at) {
-      if (patch_taken_[at->face]) continue;
-      // The face is (b, a, third): its corner at `a` follows the one at b.
-      take_patch_face(at->face, at->corner);
-      std::swap(wanted_[0], wanted_[1]);
-      return true;
-    }
-    return false;
-  }
-
-  // ---- values
-
-  SplitMesh::Point place(std::uint32_t p) const { return source_.points[source_point_[p]]; }
-  const std::int32_t* value(std::size_t k, std::uint32_t w) const {
-    return source_value(k, source_wedge_[w]);
-  }
-  bool equal(std::size_t k, std::uint32_t a, std::uint32_t b) const {
-    return equal_source(k, source_wedge_[a], source_wedge_[b]);
-  }
-
- private:
-  struct Edge {
-    std::array<std::uint32_t, 2> points;
-    std::uint32_t face, corner;
-    friend auto operator<=>(const Edge&, const Edge&) = default;
-  };
-  void make_ready(std::uint32_t split) {
-    std::uint32_t& ready = ready_.at(chapter_->splits[split].parent);
-    if (ready != kNone) fail("splits of one point", "one after the other", "two at once");
-    ready = split;
-  }
-  void bind_point(std::uint32_t p, std::uint32_t source) {
-    if (source >= stream_point_.size() || stream_point_[source] != kNone)
-      fail("point " + std::to_string(source), "a point that is made once", "another");
-    stream_point_[source] = p;
-    source_point_.push_back(source);
-  }
-  void bind_wedge(std::uint32_t w, std::uint32_t source) {
-    source_wedge_.resize(w + std::size_t{1}, kNone);
-    source_wedge_[w] = source;
-  }
-  std::uint32_t third_of(const SplitSource::Face& face) const {
-    for (std::uint32_t w : face.wedges)
-      if (const std::uint32_t p = source_.wedge_point[w]; p != parent_ && p != child_) return p;
-    return kNone;
-  }
-  bool take_born(std::size_t i) {
-    const SplitSource::Face& face = chapter_->born[remaining_[i]];
-    remaining_.erase(remaining_.begin() + static_cast<std::ptrdiff_t>(i));
-    face_ = face.face;
-    std::size_t at = 3;
-    for (std::size_t k = 0; k < 3; ++k)
-      if (source_.wedge_point[face.wedges[k]] == parent_) at = k;
-    if (at == 3 || third_of(face) == kNone)
-      fail("face " + std::to_string(face_), "corners at its split", "others");
-    const std::uint32_t next = face.wedges[(at + 1) % 3], last = face.wedges[(at + 2) % 3];
-    forward_ = source_.wedge_point[last] == child_;
-    if (!forward_ && source_.wedge_point[next] != child_)
-      fail("face " + std::to_string(face_), "a corner at its split's child", "none");
-    wanted_ = forward_ ? std::array{face.wedges[at], last, next} : std::array{face.wedges[at], next, last};
-    return true;
-  }
-  void sort_patch() {
-    edges_.clear();
-    next_seed_ = 0;
-    patch_taken_.assign(chapter_->patch.size(), false);
-    for (std::uint32_t f = 0; f < chapter_->patch.size(); ++f)
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        const auto& w = chapter_->patch[f].wedges;
-        edges_.push_back({{source_.wedge_point[w[k]], source_.wedge_point[w[(k + 1) % 3]]}, f, k});
-      }
-    std::sort(edges_.begin(), edges_.end());
-  }
-  void take_patch_face(std::uint32_t index, std::uint32_t corner) {
-    const SplitSource::Face& face = chapter_->patch[index];
-    patch_taken_[index] = true;
-    face_ = face.face;
-    for (std::size_t k = 0; k < 3; ++k) wanted_[k] = face.wedges[(corner + k) % 3];
-  }
-  const std::int32_t* source_value(std::size_t k, std::uint32_t wedge) const {
-    return source_.values[k].data() +
-           wedge * static_cast<std::size_t>(split_components(source_.attributes[k].kind));
-  }
-  bool equal_source(std::size_t k, std::uint32_t a, std::uint32_t b) const {
-    return std::equal(source_value(k, a), source_value(k, a) + split_components(source_.attributes[k].kind),
-                      source_value(k, b));
-  }
-
-  const SplitSource& source_;
-  const SplitMesh& mesh_;
-  std::vector<std::uint32_t> stream_point_;                               // by source number
-  std::vector<std::uint32_t> source_point_, source_wedge_, source_face_;  // by stream number
-  const SplitSource::Chapter* chapter_ = nullptr;
-  std::vector<std::uint32_t> ready_;  // per source point: the split it is parent of that may come now
-  std::vector<std::uint32_t> waiting_, first_, after_;
-  std::vector<std::uint32_t> move_;  // per source face: its wedge at the child of the split under way
-  std::vector<std::uint32_t> remaining_;
-  std::uint32_t number_ = 0, parent_ = kNone, child_ = kNone, face_ = 0;
-  std::array<std::uint32_t, 3> wanted_{};
-  bool forward_ = false;
-  std::vector<Edge> edges_;
-  std::vector<bool> patch_taken_;
-  std::size_t next_seed_ = 0;
-};
-
-constexpr std::int32_t kSame = std::numeric_limits<std::int32_t>::min(), kOther = kSame + 1;
-
-/// Symbols of one value part of one block: residuals, and kSame or kOther where that was asked.
-using Symbols = std::vector<std::int32_t>;
 
 /// The writer's side of SplitCodec: codes connectivity at once and keeps the values' residuals, which are
 /// coded when the models of the whole stream are known.
@@ -249,7 +22,7 @@ class EncodingChannel {
       : source_(source), truth_(source, mesh), symbols_(source.attributes.size() + 1) {}
   SplitTruth& truth() { return truth_; }
   std::vector<std::uint8_t> finish_connectivity() { return bits_.finish(); }
-  std::vector<Symbols> take_symbols() {
+  std::vector<Symbols> finish_symbols() {
     std::vector<Symbols> out(symbols_.size());
     out.swap(symbols_);
     return out;
@@ -268,7 +41,7 @@ class EncodingChannel {
     return value;
   }
   template <class Note>
-  void know(Note&& note) {
+  void update_truth(Note&& note) {
     note(truth_);
   }
   template <class Truth>
@@ -276,7 +49,7 @@ class EncodingChannel {
     point = truth(truth_);
     put(0, point.data(), guess.data(), 3, source_.position.bits);
   }
-  void made(SplitMesh&, std::uint32_t) {}
+  void finish_point(SplitMesh&, std::uint32_t) {}
   template <class Truth>
   bool same(std::size_t k, Truth&& truth) {
     const bool same = truth(truth_);
@@ -306,128 +79,6 @@ class EncodingChannel {
   BitEncoder bits_;
   std::vector<Symbols> symbols_;
 };
-
-/// Counts how often each model's bit is 1.
-struct CountingBits {
-  ValueWalk& walk;
-  std::vector<std::array<std::uint32_t, 2>>& counts;
-  bool bit(BitModel& model, bool value) {
-    ++counts[static_cast<std::size_t>(&model - walk.models.all.data())][value];
-    return value;
-  }
-  std::uint32_t raw(std::uint32_t value, int) { return value; }
-};
-
-struct CodingBits {
-  BitEncoder encoder;
-  bool bit(BitModel& model, bool value) {
-    encoder.encode(model, value, ValueModels::kLimit);
-    return value;
-  }
-  std::uint32_t raw(std::uint32_t value, int count) {
-    encoder.encode_raw(value, count);
-    return value;
-  }
-};
-
-/// Where the running mean of a block's residual lengths starts, in eighths of a bit.
-std::uint8_t first_mean(const Symbols& symbols) {
-  constexpr std::uint32_t kLooked = 30;
-  std::uint32_t sum = 0, count = 0;
-  for (std::int32_t s : symbols) {
-    if (s == kSame || s == kOther) continue;
-    sum += static_cast<std::uint32_t>(residual_length(s));
-    if (++count == kLooked) break;
-  }
-  return static_cast<std::uint8_t>(count > 0 ? (8 * sum + count / 2) / count : 0);
-}
-
-template <class Bits>
-void walk_symbols(ValueWalk& walk, Bits& bits, const Symbols& symbols, int components) {
-  walk.start(first_mean(symbols) * 2);
-  int component = 0;
-  for (std::int32_t s : symbols) {
-    if (s == kSame || s == kOther) {
-      walk.same(bits, s == kSame);
-    } else {
-      walk.residual(bits, component, s);
-      component = component + 1 == components ? 0 : component + 1;
-    }
-  }
-}
-
-std::vector<std::uint8_t> stream_models(const std::vector<std::vector<Symbols>>& blocks, std::size_t part,
-                                        int components) {
-  std::vector<std::array<std::uint32_t, 2>> counts(ValueModels::kCount);
-  for (const auto& block : blocks) {
-    ValueWalk walk;
-    CountingBits bits{walk, counts};
-    walk_symbols(walk, bits, block[part], components);
-  }
-  std::vector<std::uint8_t> models;
-  for (const auto& [zeros, ones] : counts) {
-    const double share = (ones + 0.5) / (static_cast<double>(zeros) + ones + 1);
-    models.push_back(static_cast<std::uint8_t>(std::clamp(static_cast<int>(share * 256 + 0.5), 1, 255)));
-  }
-  return models;
-}
-
-std::vector<std::uint8_t> code_symbols(const Symbols& symbols, const std::vector<std::uint8_t>& models,
-                                       int components) {
-  if (symbols.empty()) return {};
-  ValueWalk walk;
-  for (std::size_t i = 0; i < models.size(); ++i)
-    walk.models.all[i] = {static_cast<std::uint16_t>(models[i] << 8), ValueModels::kPrior};
-  CodingBits bits;
-  walk_symbols(walk, bits, symbols, components);
-  std::vector<std::uint8_t> out{first_mean(symbols)};
-  const std::vector<std::uint8_t> coded = bits.encoder.finish();
-  out.insert(out.end(), coded.begin(), coded.end());
-  return out;
-}
-
-void check_source(const SplitSource& s) {
-  const auto require = [](bool good, const std::string& what) {
-    if (!good) fail(what, "in range", "another");
-  };
-  require(s.splits_per_block >= 1 && s.splits_per_block <= kMostSplits, "splits per block");
-  require(!s.chapters.empty() && s.chapters.size() <= kMostScales && !s.chapters[0].patch.empty(),
-          "chapters");
-  require(s.position.bits >= 1 && s.position.bits <= 24, "position bits");
-  require(s.values.size() == s.attributes.size() && !s.groups.empty() && s.groups.size() <= 65536,
-          "attributes and groups");
-  for (const SplitMesh::Point& p : s.points)
-    for (std::int32_t x : p) require(x >= 0 && x < (1 << s.position.bits), "places");
-  for (std::uint32_t p : s.wedge_point) require(p < s.points.size(), "points of wedges");
-  for (std::size_t k = 0; k < s.values.size(); ++k) {
-    const SplitAttribute& a = s.attributes[k];
-    require(k == 0 || s.attributes[k - 1].kind < a.kind, "order of attribute kinds");
-    require(a.grid.bits >= (a.kind == SplitKind::kNormal ? 2 : 1) && a.grid.bits <= 24, "attribute bits");
-    require(s.values[k].size() == s.wedge_point.size() * static_cast<std::size_t>(split_components(a.kind)),
-            "number of attributes");
-    for (std::int32_t x : s.values[k]) require(x >= 0 && x < (1 << a.grid.bits), "attributes");
-  }
-  for (std::uint16_t g : s.face_group) require(g < s.groups.size(), "groups of faces");
-  const auto check_face = [&](const SplitSource::Face& f) {
-    require(f.face < s.face_group.size(), "faces");
-    for (std::uint32_t w : f.wedges) require(w < s.wedge_point.size(), "wedges of faces");
-  };
-  for (const SplitSource::Chapter& c : s.chapters) {
-    for (const SplitSource::Face& f : c.patch) {
-      check_face(f);
-      const std::uint32_t a = s.wedge_point[f.wedges[0]], b = s.wedge_point[f.wedges[1]],
-                          d = s.wedge_point[f.wedges[2]];
-      require(a != b && b != d && d != a, "corners of a face");
-    }
-    for (const SplitSource::Face& f : c.born) check_face(f);
-    for (const SplitSource::Move& m : c.moves)
-      require(m.face < s.face_group.size() && m.wedge < s.wedge_point.size(), "moves");
-    for (const SplitSource::Split& x : c.splits)
-      require(x.parent < s.points.size() && x.child < s.points.size() && x.move_begin <= x.move_end &&
-                  x.move_end <= c.moves.size() && x.born_begin <= x.born_end && x.born_end <= c.born.size(),
-              "splits");
-  }
-}
 
 /// Runs the codec over the source block by block.
 class SplitStreamWriter {
@@ -462,13 +113,13 @@ class SplitStreamWriter {
     const std::uint32_t per_block = head_.scales.empty() ? faces : kFacesPerBlock;
     for (std::uint32_t at = 0; at < faces; at += per_block) {
       const std::uint32_t count = std::min(per_block, faces - at);
-      codec_.patch(count);
+      codec_.code_patch(count);
       end_block(true, count);
     }
     const auto splits = static_cast<std::uint32_t>(chapter.splits.size());
     for (std::uint32_t at = 0; at < splits; at += source_.splits_per_block) {
       const std::uint32_t count = std::min(source_.splits_per_block, splits - at);
-      codec_.splits(count);
+      codec_.code_splits(count);
       end_block(false, count);
     }
     head_.scales.push_back({chapter.scale, static_cast<std::uint32_t>(head_.blocks.size()),
@@ -483,11 +134,11 @@ class SplitStreamWriter {
     block.count = count;
     head_.blocks.push_back(block);
     bytes_.push_back(channel_.finish_connectivity());
-    symbols_.push_back(channel_.take_symbols());
+    symbols_.push_back(channel_.finish_symbols());
   }
   void code_values() {
     for (std::size_t part = 0; part <= source_.attributes.size(); ++part)
-      head_.models.push_back(stream_models(symbols_, part, part_components(part)));
+      head_.models.push_back(start_models(symbols_, part, part_components(part)));
     for (std::size_t i = 0; i < bytes_.size(); ++i) {
       std::vector<std::uint8_t>& bytes = bytes_[i];
       SplitBlock& block = head_.blocks[i];
@@ -525,7 +176,7 @@ class SplitStreamWriter {
 }  // namespace
 
 std::vector<std::uint8_t> write_split_stream(const SplitSource& source) {
-  check_source(source);
+  check_split_source(source);
   return SplitStreamWriter(source).write();
 }
 

@@ -162,8 +162,8 @@ void BuildMemo::load() {
 
 bool BuildMemo::find(const std::string& package, MemoRecord& record) const {
   std::span<const std::uint8_t> bytes;
-  if (const auto own = changed_.find(package); own != changed_.end()) {
-    bytes = own->second;
+  if (const auto changed = changed_.find(package); changed != changed_.end()) {
+    bytes = changed->second;
   } else {
     const auto it = index_.find(package);
     if (it == index_.end()) return false;

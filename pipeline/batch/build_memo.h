@@ -10,8 +10,8 @@
 
 namespace texmesh {
 
-/// What the last run left of one package: enough to see, by looking at files' stamps alone, that nothing has
-/// changed.
+/// What the last run left of one package: enough to see, by looking at files' stamps alone, that
+/// nothing has changed.
 struct MemoRecord {
   Sha256 request{};  // of everything but files: options, strictness, tool
   bool failed = false;

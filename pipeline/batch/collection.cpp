@@ -166,9 +166,9 @@ class CollectionReader {
       fail(place + "/output", "an output of its own", m.output + ", as another model");
     m.options = options_for(m.input);
     if (json.contains("options")) {
-      CompileOptions own = *m.options;
-      apply(own, json["options"], place + "/options");
-      m.options = std::make_shared<const CompileOptions>(std::move(own));
+      CompileOptions with_changes = *m.options;
+      apply(with_changes, json["options"], place + "/options");
+      m.options = std::make_shared<const CompileOptions>(std::move(with_changes));
     }
     return m;
   }

@@ -24,9 +24,9 @@ using FolderLister = std::function<std::vector<std::string>(const std::string& f
 /// Reads a collection (schemas/collection.v1.schema.json): models, folders of models, and their options.
 /// Strict: unknown fields, wrong types, options out of range, outputs that leave the output folder and
 /// outputs named twice throw InputError{file_name, JSON pointer, ...}. `base` holds the options that the
-/// collection starts from (a profile). A model that is listed and found in a folder, too, is compiled once,
-/// as listed. Patterns are matched against the input as the collection writes it; `*` and `?` match "/" as
-/// well.
+/// collection starts from (a profile). A model that is listed and found in a folder, too, is compiled
+/// once, as listed. Patterns are matched against the input as the collection writes it; `*` and `?` match
+/// "/" as well.
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
                                              const CompileOptions& base,
                                              const FolderLister& list_folder = {});

@@ -67,7 +67,7 @@ void refuse_shared_outputs(const BatchPlan& plan) {
   }
 }
 
-void keep_shard(BatchPlan& plan, const PlanRequest& request) {
+void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
   if (request.shards <= 1) return;
   std::erase_if(plan.models, [&](const PlannedModel& m) {
     const std::string name = fs::path(m.output).lexically_relative(request.output).generic_string();
@@ -103,7 +103,7 @@ BatchPlan plan_batch(const PlanRequest& request) {
     }
   }
   refuse_shared_outputs(plan);
-  keep_shard(plan, request);
+  drop_other_shards(plan, request);
   plan.outputs = fs::absolute(request.output).lexically_normal().string();
   return plan;
 }

@@ -20,8 +20,8 @@ struct PlanRequest {
   std::string output;                                // package or folder
   CompileOptions base;                               // defaults and --profile
   std::function<void(CompileOptions&)> apply_flags;  // the command line's options, which win over everything
-  int shard = 0,
-      shards = 1;  // this run's part: models whose package's name falls on `shard` of 0 .. shards - 1
+  // This run's part: models whose package's name falls on `shard` of 0 .. shards - 1.
+  int shard = 0, shards = 1;
 };
 
 struct BatchPlan {
@@ -30,9 +30,9 @@ struct BatchPlan {
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only
 };
 
-/// Finds the models and their options. A model's shard depends on its package's path within the output folder
-/// alone, so that it stays when models come and go. InputError for what makes no sense, before anything is
-/// compiled.
+/// Finds the models and their options. A model's shard depends on its package's path within the output
+/// folder alone, so that it stays when models come and go. InputError for what makes no sense, before
+/// anything is compiled.
 BatchPlan plan_batch(const PlanRequest& request);
 
 }  // namespace texmesh

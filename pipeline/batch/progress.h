@@ -18,8 +18,8 @@ struct ProgressModel {
 };
 
 /// What a user sees of a compile run: one bar for the whole run that redraws itself on a terminal, plain
-/// lines in a pipe, or one JSON event a line (schemas/event.v1.schema.json). Errors and warnings are shown in
-/// every mode.
+/// lines in a pipe, or one JSON event a line (schemas/event.v1.schema.json). Errors and warnings are shown
+/// in every mode.
 class Progress {
  public:
   /// `explain`: say of every stage why it runs.

@@ -21,10 +21,6 @@ struct RunSettings {
   std::vector<std::string> more_inputs;  // read for the whole run (a profile): dependencies of every package
 };
 
-/// InputError for a report that cannot be written, or paths that a dependency file cannot hold: before
-/// anything is compiled.
-void check_reports(const BatchPlan& plan, const RunSettings& settings);
-
 /// Compiles what a plan holds and is not up to date, writes the reports that were asked for, and gives the
 /// exit code of the command. A model is up to date, without a child process, when neither options nor tool
 /// nor any file that it was made from nor its package has changed since the last run with this cache; one

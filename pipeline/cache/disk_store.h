@@ -13,8 +13,8 @@ namespace texmesh {
 /// InputError when the folder cannot be made.
 std::unique_ptr<Store> open_disk_store(const std::string& folder);
 
-/// The same folder only to look at: nothing is made, written, moved or marked as used. No error when it is
-/// not there.
+/// The same folder only to look at: nothing is made, written, moved or marked as used. No error when it
+/// is not there.
 std::unique_ptr<Store> look_into_disk_store(const std::string& folder);
 
 /// Makes the folder of a cache; why it cannot be made, "" when it stands.

@@ -19,7 +19,7 @@ struct Upload {
   std::span<const std::uint8_t> rest;
 };
 
-std::size_t take(char* data, std::size_t size, std::size_t count, void* user) {
+std::size_t receive_body(char* data, std::size_t size, std::size_t count, void* user) {
   auto& sink = *static_cast<Sink*>(user);
   if (sink.bytes.size() + size * count > sink.max_bytes)
     return 0;  // ends the transfer: longer than what was asked for
@@ -27,7 +27,7 @@ std::size_t take(char* data, std::size_t size, std::size_t count, void* user) {
   return size * count;
 }
 std::size_t ignore(char*, std::size_t size, std::size_t count, void*) { return size * count; }
-std::size_t give(char* data, std::size_t size, std::size_t count, void* user) {
+std::size_t send_body(char* data, std::size_t size, std::size_t count, void* user) {
   auto& upload = *static_cast<Upload*>(user);
   const std::size_t n = std::min(size * count, upload.rest.size());
   if (n > 0) std::memcpy(data, upload.rest.data(), n);
@@ -70,7 +70,7 @@ class HttpLayer : public CacheLayer {
     Sink sink{{}, max_bytes};
     prepare(kind, digest);
     ::curl_easy_setopt(easy_.handle, CURLOPT_HTTPGET, 1L);
-    ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, take);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, receive_body);
     ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEDATA, &sink);
     const CURLcode rc = perform();
     const long status = status_code();
@@ -86,7 +86,7 @@ class HttpLayer : public CacheLayer {
     Upload upload{bytes};
     prepare(kind, digest);
     ::curl_easy_setopt(easy_.handle, CURLOPT_UPLOAD, 1L);
-    ::curl_easy_setopt(easy_.handle, CURLOPT_READFUNCTION, give);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_READFUNCTION, send_body);
     ::curl_easy_setopt(easy_.handle, CURLOPT_READDATA, &upload);
     ::curl_easy_setopt(easy_.handle, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes.size()));
     ::curl_easy_setopt(easy_.handle, CURLOPT_WRITEFUNCTION, ignore);

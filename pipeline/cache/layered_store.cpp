@@ -154,7 +154,7 @@ class LayeredStore : public Store {
     return bytes;
   }
 
-  std::nullopt_t tell_damaged(const Layer& layer, const std::string& what) {
+  std::nullopt_t report_damaged(const Layer& layer, const std::string& what) {
     const std::lock_guard lock(mutex_);
     events_.push_back({"cache-entry-damaged", what + " from " + layer.layer->name() + "; not used"});
     return std::nullopt;
@@ -166,14 +166,14 @@ class LayeredStore : public Store {
     const auto bytes = get(layer, "ac", key, kMaxRecordBytes);
     if (!bytes) return std::nullopt;
     const auto record = read_record(*bytes, key);
-    if (!record) return tell_damaged(layer, "what is no record of its key");
+    if (!record) return report_damaged(layer, "what is no record of its key");
     std::vector<std::pair<std::string, SharedBytes>> outputs;
     for (const StoredBlob& blob : record->outputs) {
       if (blob.bytes > kMaxBlobBytes) return std::nullopt;
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
       if (!blob_bytes) return std::nullopt;
       if (!is(blob, *blob_bytes))
-        return tell_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
+        return report_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
       outputs.emplace_back(blob.name,
                            std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
     }

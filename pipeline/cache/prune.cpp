@@ -43,8 +43,8 @@ bool is_object_name(const std::string& name) {
   return from_hex(name, digest);
 }
 
-/// Start of the oldest build that still runs; the largest time when none does. Forgets builds that were
-/// killed.
+/// Start of the oldest build that still runs; the largest time when none does. Forgets builds
+/// that were killed.
 std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count = nullptr) {
   std::int64_t oldest = std::numeric_limits<std::int64_t>::max();
   for (const Entry& e : list(folder, "running")) {

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
+#include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"

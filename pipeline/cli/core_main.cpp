@@ -5,7 +5,6 @@
 
 #include "format/base/errors.h"
 #include "format/container/format_version.h"
-#include "format/documents/manifest.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
 #include "pipeline/compile/library_versions.h"

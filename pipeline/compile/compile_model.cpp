@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "format/container/format_version.h"
-#include "format/documents/manifest.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"

@@ -85,9 +85,9 @@ struct ImportedModel {
 ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
                            Resolver& resolver, const ImportOptions& options, const RunContext& context);
 
+/// .gltf and .glb.
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
-                          Resolver& resolver, const ImportOptions& options,
-                          const RunContext& context);  // .gltf and .glb
+                          Resolver& resolver, const ImportOptions& options, const RunContext& context);
 ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          Resolver& resolver, const ImportOptions& options, const RunContext& context);
 ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,
@@ -98,26 +98,5 @@ ImportedModel import_stl(const std::string& file_name, std::span<const std::uint
 /// Cyberware-style file; the grid image and the texture come through the resolver.
 ImportedModel import_range_scan(const std::string& file_name, std::span<const std::uint8_t> bytes,
                                 Resolver& resolver, const ImportOptions& options, const RunContext& context);
-
-// Shared by the readers (pipeline/import/import_common.cpp):
-
-/// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index
-/// returned; -1 and a warning "missing-texture" when it is not there. Content that no allow-listed reader
-/// takes throws InputError. Notes say what becomes of colour profiles, CMYK and EXIF orientation.
-std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
-                       const std::string& place, const ImportOptions& options);
-std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
-                             const std::string& file_name, const std::string& place,
-                             const ImportOptions& options);
-
-/// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
-/// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
-/// box's centre, rounded to a float-exact value.
-void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions);
-
-/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
-/// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
-/// checks the limits; throws InputError when no triangle is left.
-void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
 
 }  // namespace texmesh

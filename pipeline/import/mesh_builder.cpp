@@ -5,6 +5,7 @@
 
 #include "format/base/srgb.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/local_frame.h"
 
 namespace texmesh {
 namespace {
@@ -223,7 +224,7 @@ void MeshBuilder::add_face(std::span<const Corner> corners, std::uint16_t materi
   }
 }
 
-Mesh MeshBuilder::take() {
+Mesh MeshBuilder::finish() {
   set_positions(mesh_, positions_);
   table_.assign(1024, 0);
   Mesh mesh = std::move(mesh_);

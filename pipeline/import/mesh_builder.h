@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/model/model.h"
+#include "pipeline/import/local_frame.h"
 
 namespace texmesh {
 
@@ -24,16 +25,16 @@ struct Corner {
   Vec4f colour{1, 1, 1, 1};
 };
 
-/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the same
-/// position and bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL and range
-/// scans.
+/// Collects faces whose corners carry values of their own and makes wedges of them: corners with the
+/// same position and bit-equal attributes become one wedge, numbered by first use. Used by OBJ, PLY, STL
+/// and range scans.
 class MeshBuilder {
  public:
   struct Attributes {
     bool uv = false, normals = false, colours = false;
   };
-  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who know
-  /// the line).
+  /// `positions` must outlive the builder; faces refer to them, in range (checked by the readers, who
+  /// know the line).
   MeshBuilder(const std::vector<Vec3d>& positions, Attributes attributes);
 
   /// A polygon of three corners or more, in order; fewer are ignored. Triangulated by cutting ears in the
@@ -42,7 +43,7 @@ class MeshBuilder {
 
   std::size_t triangle_count() const { return mesh_.triangles.size(); }
   /// The mesh, positions in their local frame (set_positions); the builder is empty afterwards.
-  Mesh take();
+  Mesh finish();
 
  private:
   std::uint32_t wedge(const Corner& corner);

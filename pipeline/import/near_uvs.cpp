@@ -13,8 +13,8 @@ namespace {
 struct Period {
   std::array<int, 2> move{1, 1};
   void restrict_by(int axis, int other) {
-    int& own = move[static_cast<std::size_t>(axis)];
-    own = own == 0 || other == 0 ? 0 : std::max(own, other);  // 1 or 2
+    int& along = move[static_cast<std::size_t>(axis)];
+    along = along == 0 || other == 0 ? 0 : std::max(along, other);  // 1 or 2
   }
 };
 

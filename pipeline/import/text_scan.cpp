@@ -89,8 +89,8 @@ bool parse_integer(std::string_view token, std::int64_t& value) {
 bool LineReader::next(std::string_view& line) {
   if (rest_.empty()) return false;
   ++number_;
-  // The next LF is remembered: in a file whose lines end in CR, looking for it at every line would take
-  // quadratic time.
+  // The next LF is remembered: in a file whose lines end in CR, looking for it at every line would
+  // take quadratic time.
   const char* begin = rest_.data();
   if (!line_feed_ || line_feed_ < begin) {
     line_feed_ = static_cast<const char*>(std::memchr(begin, '\n', rest_.size()));

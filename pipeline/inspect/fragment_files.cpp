@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/bounded_json.h"
 #include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
 
 namespace texmesh {
 namespace {

@@ -93,8 +93,8 @@ class NewTree {
     sync_folder(tree_);
     check_target();
     if (fs::exists(target_) && !fs::is_empty(target_)) {
-      // Both names stay whole at any moment: the old tree moves into the temporary name, which the destructor
-      // removes.
+      // Both names stay whole at any moment: the old tree moves into the temporary name, which
+      // the destructor removes.
       if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0)
         fail_output(target_, "a folder that can be replaced");
     } else {

@@ -8,8 +8,8 @@
 
 namespace texmesh {
 
-/// provenance.json (schemas/provenance.v1.schema.json): what a package was made from and with. No dates,
-/// hosts, paths.
+/// provenance.json (schemas/provenance.v1.schema.json): what a package was made from and with. No
+/// dates, hosts, paths.
 struct Provenance {
   struct Input {
     std::string role, uri, sha256;  // role: model, or file for what the model refers to by `uri`

@@ -92,8 +92,8 @@ std::optional<SiteFile> regular_file(int fd, const std::string& path) {
   return SiteFile(fd, static_cast<std::uint64_t>(st.st_size), media_type(path), etag_of(st));
 }
 
-/// The file at the end of `parts`. With `packages_only`, one named .texmesh or beneath a folder with a
-/// manifest.
+/// The file at the end of `parts`. With `packages_only`, one named .texmesh or beneath a folder
+/// with a manifest.
 std::optional<SiteFile> open_beneath(int root, const std::vector<std::string>& parts, bool packages_only) {
   bool in_package = !packages_only;
   int folder = ::dup(root);

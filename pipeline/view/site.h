@@ -41,8 +41,8 @@ class Site {
   Site(const Site&) = delete;
   Site& operator=(const Site&) = delete;
 
-  /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there is
-  /// none. Thread-safe.
+  /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there
+  /// is none. Thread-safe.
   std::optional<SiteFile> open(const std::string& path) const;
   /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
   std::vector<std::string> packages() const;

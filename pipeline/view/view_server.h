@@ -13,10 +13,10 @@ struct RequestedRange {
   std::uint64_t first = 0, bytes = 0;
 };
 
-/// The one range of a Range header (RFC 9110, section 14) over a file of `size` bytes: a-b, a-, -n. kNone for
-/// what a server may answer with the whole file: no header, other units, several ranges, nonsense. What
-/// httplib's own parser does not take (5-2, numbers beyond 64 bits) it answers with 416 before a handler is
-/// asked.
+/// The one range of a Range header (RFC 9110, section 14) over a file of `size` bytes: a-b, a-, -n. kNone
+/// for what a server may answer with the whole file: no header, other units, several ranges, nonsense.
+/// What httplib's own parser does not take (5-2, numbers beyond 64 bits) it answers with 416 before a
+/// handler is asked.
 RequestedRange requested_range(const std::string& header, std::uint64_t size);
 
 /// Serves a Site over HTTP: GET and HEAD (OPTIONS for browsers that ask before a request from elsewhere), one

@@ -51,6 +51,10 @@ class GlbDocument {
 
   [[noreturn]] void fail(const char* check, const std::string& field, const std::string& expected,
                          const std::string& found);
+  /// The JSON pointer of an element of a top-level array.
+  static std::string element(const char* array, std::size_t i) {
+    return std::string("/") + array + "/" + std::to_string(i);
+  }
   /// The array under `key`, an empty one when absent.
   const Json& array(const Json& object, const char* key, const std::string& place);
   /// A non-negative integer under `key`, or `fallback` when absent.

@@ -28,8 +28,8 @@ class GlbWriter {
   /// A second buffer of this size that holds nothing (EXT_meshopt_compression's fallback); 0 = none.
   void set_fallback_buffer(std::size_t bytes) { fallback_bytes_ = bytes; }
 
-  /// The file. JSON keys in a fixed order, no blanks, shortest numbers: the same document gives the same
-  /// bytes.
+  /// The file. JSON keys in a fixed order, no blanks, shortest numbers: the same document gives
+  /// the same bytes.
   std::vector<std::uint8_t> finish() const;
 
   /// A number that prints as the shortest decimal that is this float again.

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/textures.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"

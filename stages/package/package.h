@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"

@@ -7,6 +7,7 @@
 
 #include "format/base/box.h"
 #include "format/base/srgb.h"
+#include "format/documents/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/measure/image_compare.h"

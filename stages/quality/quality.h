@@ -1,6 +1,6 @@
 #pragma once
 #include "format/base/note.h"
-#include "format/documents/tables.h"
+#include "format/documents/quality_table.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"

@@ -6,6 +6,7 @@
 
 #include "format/base/no_index.h"
 #include "format/split/split_stream.h"
+#include "format/split/split_writer.h"
 #include "stages/base/parallel.h"
 #include "stages/scales/scale_codecs.h"
 #include "stages/scales/scale_materials.h"

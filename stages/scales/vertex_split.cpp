@@ -7,6 +7,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
+#include "format/split/split_source.h"
 
 namespace texmesh {
 namespace {

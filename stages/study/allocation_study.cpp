@@ -7,6 +7,8 @@
 
 #include "format/base/box.h"
 #include "format/base/srgb.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
@@ -299,10 +301,11 @@ std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choic
     const std::size_t index = scene.shown.planes[p];
     const TexturePlane& plane = scene.fragments.planes[index];
     const Pixels& whole = scene.pixels.at(index);
-    textures.push_back(texture_of(
-        choice.rungs.empty() ? whole
-                             : compose(plane, whole, scene.ladder.planes.at(index), scene.previews.planes.at(index), choice.rungs[p], context),
-        plane));
+    textures.push_back(texture_of(choice.rungs.empty()
+                                      ? whole
+                                      : compose(plane, whole, scene.ladder.planes.at(index),
+                                                scene.previews.planes.at(index), choice.rungs[p], context),
+                                  plane));
   }
   return textures;
 }

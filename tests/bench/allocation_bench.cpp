@@ -14,6 +14,7 @@
 #include <iostream>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/documents/size_curve.h"
 #include "stages/fill/fill.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"

@@ -10,6 +10,7 @@
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
+#include "format/split/split_reader.h"
 
 namespace {
 
@@ -35,7 +36,7 @@ SplitMesh decode(const SplitStreamHead& head, const Bytes& stream, const std::ve
     if (!lost.empty() && lost[i]) parts[1] = {};
     reader.add_parts(parts);
   }
-  if (way == Way::kTextureAgain) reader.fill_again();
+  if (way == Way::kTextureAgain) reader.refill_lost_points();
   if (lost_points) *lost_points = reader.lost_points();
   return reader.mesh();
 }

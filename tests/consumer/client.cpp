@@ -7,6 +7,7 @@
 #include "delivery/cpp/transfer/package_transport.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
+#include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 
 int main(int argc, char** argv) {

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
 
 namespace texmesh::testing {

@@ -9,6 +9,8 @@
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
+#include "format/documents/index.h"
 #include "format/documents/package_writer.h"
 #include "stages/base/run_context.h"
 #include "stages/ladder/ladder.h"

@@ -7,7 +7,9 @@
 
 #include "format/base/bytes.h"
 #include "format/documents/manifest.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
+#include "format/documents/textures.h"
 #include "format/model/model.h"
 
 namespace texmesh::testing {

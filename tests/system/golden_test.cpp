@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "format/container/format_version.h"
 #include "format/documents/manifest.h"
+#include "format/documents/textures.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "stages/jpeg/jpeg.h"

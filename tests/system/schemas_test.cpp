@@ -12,12 +12,14 @@
 #include <valijson/schema_parser.hpp>
 #include <valijson/validator.hpp>
 
+#include "format/documents/allocation.h"
 #include "format/documents/manifest.h"
-#include "format/documents/tables.h"
+#include "format/documents/quality_table.h"
+#include "format/documents/textures.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/import/range_scan_document.h"
+#include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"
 

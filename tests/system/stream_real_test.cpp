@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "format/split/split_reader.h"
+#include "format/split/split_writer.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/scales/scale_grid.h"

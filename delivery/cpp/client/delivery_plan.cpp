@@ -1,4 +1,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 
 #include <algorithm>
 #include <cmath>

@@ -52,16 +52,16 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
 /// table says that each is seen to be better (0.004 of SSIM with the best textures): the rules speak of
 /// distances, and shading tells more. The table holds for objects displayed at least as high as its pictures.
 int finer_where_seen(const QualityTable& table, int scale, double displayed_px);
-/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
-/// measured table (scale number, log-quantiser of the quality), and below its lowest quality on the same
-/// line.
+/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the
+/// package's measured table (scale number, log-quantiser of the quality), and below its lowest quality
+/// on the same line.
 double predicted_ssim(const QualityTable& table, int scale, double quality);
 /// The same for what the textures lose as they are displayed, mip_loss() included.
 double predicted_ssim(PackageReader& package, double displayed_px, int scale, double texture_dssim);
 /// The scale that the request asks for: its own, or the rule's, or a finer one by measurement.
 int wanted_scale(PackageReader& package, const DeliveryRequest& request);
-/// The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs'
-/// losses.
+/// The uniform quality whose textures lose as much as these do: by interpolation over the
+/// uniform rungs' losses.
 double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
                           double texture_dssim);
 

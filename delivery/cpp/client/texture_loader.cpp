@@ -1,4 +1,5 @@
 #include "delivery/cpp/client/texture_loader.h"
+#include "delivery/cpp/decide/upgrades.h"
 #include "format/base/bytes.h"
 
 #include <algorithm>
@@ -49,9 +50,9 @@ void join(FragmentOffer& all, const FragmentOffer& one) {
 class UpgradeSource final : public RequestSource {
  public:
   using Parts = std::function<std::vector<PackagePart>(std::uint32_t, std::int32_t)>;
-  using Take = std::function<bool(std::uint32_t, std::int32_t, const Transport::Outcome&)>;
+  using Accept = std::function<bool(std::uint32_t, std::int32_t, const Transport::Outcome&)>;
   UpgradeSource(std::vector<Upgrade> upgrades, std::size_t offers, std::uint64_t bytes, int window,
-                Parts parts, Take take)
+                Parts parts, Accept accept)
       : upgrades_(std::move(upgrades)),
         busy_(offers, false),
         dead_(offers, false),
@@ -59,7 +60,7 @@ class UpgradeSource final : public RequestSource {
         bytes_left_(bytes),
         window_(window),
         parts_(std::move(parts)),
-        take_(std::move(take)) {}
+        accept_(std::move(accept)) {}
 
   std::optional<TransferRequest> next(double) override {
     if (in_flight_ >= window_) return std::nullopt;
@@ -84,7 +85,7 @@ class UpgradeSource final : public RequestSource {
     return std::nullopt;
   }
   bool arrived(const Transport::Outcome& outcome) override {
-    if (!take_(outcome.number, rung_[outcome.number], outcome)) return false;
+    if (!accept_(outcome.number, rung_[outcome.number], outcome)) return false;
     end(outcome.number);
     return true;
   }
@@ -106,7 +107,7 @@ class UpgradeSource final : public RequestSource {
   int window_, in_flight_ = 0;
   std::size_t at_ = 0;
   Parts parts_;
-  Take take_;
+  Accept accept_;
 };
 
 TransferOptions transfer_options(const LoadOptions& options) {
@@ -221,8 +222,9 @@ std::vector<PackagePart> TextureLoader::parts_of(const Wanted& w, std::int32_t r
 }
 
 /// Keeps the fragments that are as they should be; false when not all of them are.
-bool TextureLoader::take(const Wanted& w, std::int32_t rung, const Transport::Outcome& outcome,
-                         const std::function<void(const LoadedFragment&)>& on_fragment) {
+bool TextureLoader::keep_sound_fragments(const Wanted& w, std::int32_t rung,
+                                         const Transport::Outcome& outcome,
+                                         const std::function<void(const LoadedFragment&)>& on_fragment) {
   const PlaneTables& t = package_.tables().planes[w.plane];
   const bool incremental = is_incremental(package_, w.plane);
   const std::vector<PackagePart> asked = parts_of(w, rung);
@@ -269,7 +271,7 @@ LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const Loa
       plan, start_s,
       [&](std::uint32_t i, std::int32_t rung) { return parts_of(wanted[i], wanted[i].first_rung + rung); },
       [&](std::uint32_t i, std::int32_t rung, const Transport::Outcome& outcome) {
-        return take(wanted[i], wanted[i].first_rung + rung, outcome, options.on_fragment);
+        return keep_sound_fragments(wanted[i], wanted[i].first_rung + rung, outcome, options.on_fragment);
       });
   TransferOptions how = transfer_options(options);
   const double limit_s = options.htc.time_limit_s;
@@ -331,7 +333,7 @@ LoadReport TextureLoader::refine(const std::vector<PlaneChoice>& planes, const L
       [&](std::uint32_t i, std::int32_t rung) { return parts_of(now[i], wanted[i].first_rung + rung); },
       [&](std::uint32_t i, std::int32_t rung, const Transport::Outcome& outcome) {
         const std::int32_t to = wanted[i].first_rung + rung;
-        if (!take(now[i], to, outcome, options.on_fragment)) return false;
+        if (!keep_sound_fragments(now[i], to, outcome, options.on_fragment)) return false;
         now[i].first_rung = to + 1;
         return true;
       });

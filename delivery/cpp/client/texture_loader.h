@@ -43,8 +43,8 @@ struct LoadReport {
 };
 
 /// Bytes that one request should bring, so that waiting for answers does not leave the link idle, and that
-/// leave a time limit decisions enough to make good at its end what went wrong at its beginning. The browser
-/// client's measure.
+/// leave a time limit decisions enough to make good at its end what went wrong at its beginning. The
+/// browser client's measure.
 double group_bytes(double bytes_s, double rtt_s, double limit_s);
 
 /// What a client has of a package's textures, and how it gets more: fragments within a time limit, better
@@ -82,8 +82,8 @@ class TextureLoader {
   std::vector<Wanted> join_neighbours(std::vector<Wanted> fragments, double bytes_each, double budget);
   bool follows(const Wanted& w, std::uint32_t fragment);
   std::vector<PackagePart> parts_of(const Wanted& w, std::int32_t rung);
-  bool take(const Wanted& w, std::int32_t rung, const Transport::Outcome& outcome,
-            const std::function<void(const LoadedFragment&)>& on_fragment);
+  bool keep_sound_fragments(const Wanted& w, std::int32_t rung, const Transport::Outcome& outcome,
+                            const std::function<void(const LoadedFragment&)>& on_fragment);
   void count_fragments(const HarmonicTimePlan& plan, const std::vector<Wanted>& wanted,
                        LoadReport& report) const;
 

@@ -5,6 +5,9 @@
 
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
+#include "format/documents/size_curve.h"
 
 namespace texmesh {
 namespace {

@@ -29,8 +29,8 @@ struct FragmentList {
   double preview_loss = 0;  // of fragments not in the list: no rung shows more of them than the preview
 };
 
-/// What a role counts for in the list and in losses: 1 for base colour, less for what changes the picture
-/// less.
+/// What a role counts for in the list and in losses: 1 for base colour, less for what changes
+/// the picture less.
 double role_weight(const std::string& role);
 
 struct ListOptions {

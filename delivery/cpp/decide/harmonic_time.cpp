@@ -182,7 +182,7 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
     step.rung = rung_of(offer, step.target_bytes, now_s);
     step.bytes = bytes_at_rung(f, step.rung);
     step.issued_s = now_s;
-    take(offer);
+    remove_from_list(offer);
     step_of_offer_[offer] = steps_.size();
     steps_.push_back(step);
     if (step.rung < 0) {  // no transfer: it takes no time and says nothing of the link
@@ -215,7 +215,7 @@ std::uint32_t HarmonicTimePlan::choose_offer(double credit) const {
   return sorted_[finest ? left : right - 1];
 }
 
-void HarmonicTimePlan::take(std::uint32_t offer) {
+void HarmonicTimePlan::remove_from_list(std::uint32_t offer) {
   const FragmentOffer& f = offers_[offer];
   taken_[offer] = true;
   while (left_ < right_ && taken_[sorted_[left_]]) ++left_;
@@ -260,8 +260,8 @@ double HarmonicTimePlan::proportional_share(double now_s, double beta) const {
 }
 
 /// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
-/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return to
-/// its mean.
+/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return
+/// to its mean.
 double HarmonicTimePlan::lasting_bytes_s(double now_s) const {
   const double recent = throughput_.recent_bytes_s(kGuardSamples);
   const double left_s = options_.time_limit_s - now_s;
@@ -380,30 +380,6 @@ std::vector<std::int32_t> HarmonicTimePlan::rungs() const {
   std::vector<std::int32_t> rungs(offers_.size(), -1);
   for (const HtcStep& s : steps_) rungs[s.offer] = s.rung;
   return rungs;
-}
-
-HtcTheorem theorem_of(const HarmonicTimePlan& plan) {
-  HtcTheorem t;
-  const std::vector<HtcStep>& steps = plan.steps();
-  if (steps.empty()) return t;
-  const std::size_t n = steps.size();
-  const HtcStep& last = steps.back();
-  t.surplus_s = plan.surplus_s();
-  t.last_residual_s = last.residual_s;
-  if (last.bytes > 0) {
-    const double beta_n = last.bytes / last.spacing_s;
-    t.corrected_bound_s = std::abs(last.theta_s) * std::abs(last.throughput_bytes_s / beta_n - 1) +
-                          std::abs(last.target_bytes - last.bytes) / beta_n;
-  } else {
-    t.corrected_bound_s = std::abs(last.theta_s);
-  }
-  double sum = 0;
-  for (std::size_t k = 0; k + 1 < n; ++k) sum += steps[k].residual_s;
-  const double mean = n > 1 ? sum / static_cast<double>(n - 1) : 0;
-  const double log_n = portable::log(static_cast<double>(std::max<std::size_t>(n, 3)));
-  t.published_bound_s =
-      last.residual_s + (n > 1 ? steps[n - 2].residual_s / 2 : 0) + (1.088 + portable::log(log_n)) * mean;
-  return t;
 }
 
 }  // namespace texmesh

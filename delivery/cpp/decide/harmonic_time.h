@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "delivery/cpp/decide/fragment_offer.h"
 #include "delivery/cpp/decide/throughput.h"
 
 namespace texmesh {
@@ -15,15 +16,6 @@ namespace texmesh {
 //
 // The plan does no I/O and knows no clock: its user tells it what the time is. Plain double arithmetic and
 // format/base/portable_math.h: the same decisions bit for bit in C++ and TypeScript (delivery/vectors).
-
-/// One fragment as the plan sees it.
-struct FragmentOffer {
-  std::vector<std::uint32_t> bytes;  // by rung, lowest first; at least one, all > 0
-  std::vector<double> loss;  // [rungs + 1]: what is lost when it is skipped, then by rung; any unit, >= 0
-  double eta = 0;            // feature density times weights; orders the list
-  double planned_bytes = 0;  // d_g > 0: what it gets by Eq. 3.2
-  std::uint16_t low_rung = 0, high_rung = 0xffff;  // limits of quality, see HtcOptions::hard_limits
-};
 
 /// How rungs are chosen. kHtc: the method. kGuard: the method over the plan of least loss instead of
 /// Eq. 3.2's, with sizes kept within a factor of that plan's share of what the link gives in the time left,
@@ -103,7 +95,7 @@ class HarmonicTimePlan {
   bool window_open(double now_s) const;
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
-  void take(std::uint32_t offer);
+  void remove_from_list(std::uint32_t offer);
   double theta_of(std::uint32_t offer) const;
   double target_of(std::uint32_t offer, double theta_s, double now_s) const;
   double room_bytes(double beta, double now_s) const;
@@ -129,12 +121,13 @@ class HarmonicTimePlan {
   std::vector<std::uint32_t> sorted_;  // offers by falling eta
   std::vector<std::size_t> step_of_offer_;
   std::vector<bool> taken_;
-  std::uint32_t left_ = 0, right_ = 0, mean_ = 0;          // remaining: [left_, right_) less what is taken
-  std::vector<double> planned_;                            // d_g in bytes by offer, by the policy's plan
-  double planned_total_ = 0, planned_left_ = 0;            // bytes
-  double smallest_left_ = 0;                               // bytes of the lowest rungs of what is not issued
-  double low_left_ = 0;                                    // and of their low_rung
-  double price_0_ = 0, price_total_ = 0, price_done_ = 0;  // kPrice: lambda_0; its plan's bytes, issued ones
+  std::uint32_t left_ = 0, right_ = 0, mean_ = 0;  // remaining: [left_, right_) less what is taken
+  std::vector<double> planned_;                    // d_g in bytes by offer, by the policy's plan
+  double planned_total_ = 0, planned_left_ = 0;    // bytes
+  double smallest_left_ = 0;                       // bytes of the lowest rungs of what is not issued
+  double low_left_ = 0;                            // and of their low_rung
+  // kPrice: lambda_0; bytes of its plan, and those of them that were issued
+  double price_0_ = 0, price_total_ = 0, price_done_ = 0;
   std::vector<double> price_bytes_;
   std::uint32_t in_flight_ = 0;
   std::vector<std::size_t> waiting_;  // steps in flight
@@ -143,27 +136,5 @@ class HarmonicTimePlan {
   double latency_s_ = 0;  // at the start, in which nothing can arrive
   double last_done_s_ = 0, unspent_s_ = 0;
 };
-
-/// What may be fetched after the deadline: upgrades of fragments in order of loss saved per byte, each from
-/// the rung before. `rungs` by offer, -1 = skipped. With `incremental` rungs (each continues the one below)
-/// only the missing bytes count.
-struct Upgrade {
-  std::uint32_t offer = 0;
-  std::int32_t rung = 0;
-  std::uint64_t bytes = 0;
-  double gain_per_byte = 0;
-};
-std::vector<Upgrade> upgrades_in_order(const std::vector<FragmentOffer>& offers,
-                                       const std::vector<std::int32_t>& rungs, bool incremental = false);
-
-/// The bounds of the thesis for a finished serial run, and what really holds (Appendix A).
-struct HtcTheorem {
-  double surplus_s = 0;          // Pi
-  double last_residual_s = 0;    // dT_n: equal to Pi
-  double corrected_bound_s = 0;  // theta_n |beta_{n-1} / beta_n - 1| + rounding to a rung at beta_n
-  double published_bound_s = 0;  // Theorem 4.1 as printed, a diagnostic: its proof drops a term
-};
-/// For plans with one request at a time in which nothing failed; beta_n is the last transfer's throughput.
-HtcTheorem theorem_of(const HarmonicTimePlan& plan);
 
 }  // namespace texmesh

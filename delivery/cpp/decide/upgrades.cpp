@@ -1,6 +1,6 @@
 #include <queue>
 
-#include "delivery/cpp/decide/harmonic_time.h"
+#include "delivery/cpp/decide/upgrades.h"
 
 namespace texmesh {
 namespace {

@@ -71,7 +71,7 @@ void read_content_range(std::string_view value, HttpAnswer& answer) {
   answer.total = total;
 }
 
-std::size_t take_header(char* data, std::size_t size, std::size_t count, void* user) {
+std::size_t receive_header(char* data, std::size_t size, std::size_t count, void* user) {
   auto& transfer = *static_cast<Transfer*>(user);
   const std::string_view line(data, size * count);
   std::string_view value;
@@ -89,7 +89,7 @@ std::size_t take_header(char* data, std::size_t size, std::size_t count, void* u
   return size * count;
 }
 
-std::size_t take_body(char* data, std::size_t size, std::size_t count, void* user) {
+std::size_t receive_body(char* data, std::size_t size, std::size_t count, void* user) {
   auto& transfer = *static_cast<Transfer*>(user);
   long status = 0;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &status);
@@ -175,9 +175,9 @@ curl_slist* prepare(Transfer& transfer, const std::string& url, const std::strin
   ::curl_easy_setopt(h, CURLOPT_NOSIGNAL, 1L);
   ::curl_easy_setopt(h, CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(options.connect_timeout_s * 1000));
   ::curl_easy_setopt(h, CURLOPT_USERAGENT, "texmesh");
-  ::curl_easy_setopt(h, CURLOPT_HEADERFUNCTION, take_header);
+  ::curl_easy_setopt(h, CURLOPT_HEADERFUNCTION, receive_header);
   ::curl_easy_setopt(h, CURLOPT_HEADERDATA, &transfer);
-  ::curl_easy_setopt(h, CURLOPT_WRITEFUNCTION, take_body);
+  ::curl_easy_setopt(h, CURLOPT_WRITEFUNCTION, receive_body);
   ::curl_easy_setopt(h, CURLOPT_WRITEDATA, &transfer);
   ::curl_easy_setopt(h, CURLOPT_NOPROGRESS, 0L);
   ::curl_easy_setopt(h, CURLOPT_XFERINFOFUNCTION, look);

@@ -1,23 +1,17 @@
 #include "delivery/cpp/package/http_store.h"
 
 #include <algorithm>
-#include <chrono>
-#include <map>
-#include <thread>
 
-#include "format/base/bytes.h"
+#include "delivery/cpp/package/http_source.h"
+#include "delivery/cpp/package/http_tree.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
+#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {
 
-constexpr int kConnections = 6;                 // as browsers have
-constexpr double kHeadStart_s = 0.5;            // of a mirror before the next is asked
-constexpr double kWait_s = 3600;                // the pool's own limits end requests sooner
-constexpr std::uint64_t kProgressBytes = 1024;  // a try that brings as much does not count
-constexpr std::uint64_t kJoinBytes = 4096;      // ranges so near to each other are one request
-constexpr int kStallTries = 2;                  // what a try costs that ended with silence
+constexpr double kHeadStart_s = 0.5;  // of a mirror before the next is asked
 
 bool is_tree(const std::string& url) { return url.substr(0, url.find_first_of("?#")).ends_with('/'); }
 
@@ -28,295 +22,11 @@ std::string tree_beside(const std::string& url) {
   return path.ends_with(kExtension) ? path.substr(0, path.size() - kExtension.size()) + "/" : "";
 }
 
-/// Waits longer from try to try; false when there have been enough.
-class Retries {
- public:
-  explicit Retries(const HttpOptions& options)
-      : options_(options), left_(options.retries), delay_s_(options.retry_delay_s) {}
-  bool wait(const HttpAnswer& a) {
-    left_ -= a.timed_out ? kStallTries : 1;
-    if (left_ < 0) return false;
-    double s = std::min(std::max(delay_s_, a.retry_after_s), options_.most_retry_delay_s);
-    for (; s > 0; s -= kSlice_s) {
-      if (options_.cancelled && options_.cancelled()) return false;
-      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(s, kSlice_s)));
-    }
-    delay_s_ *= 2;
-    return true;
-  }
-
- private:
-  static constexpr double kSlice_s = 0.1;
-  HttpOptions options_;
-  int left_;
-  double delay_s_;
-};
-
-/// What all that read from one set of servers share.
-struct Link {
-  explicit Link(const HttpOptions& o) : options(o), pool(o, kConnections) {}
-  HttpOptions options;
-  HttpPool pool;
-};
-
-/// Ranges of a container, from the first of its servers that delivers them.
-class HttpSource final : public ByteSource {
- public:
-  /// `first`: the answer of urls[0] to a request for the first kBootstrapBytes, or a part of it.
-  HttpSource(std::vector<std::string> urls, std::shared_ptr<Link> link, HttpAnswer first)
-      : urls_(std::move(urls)), link_(std::move(link)) {
-    check_range(first, 0, kBootstrapBytes);
-    const std::uint64_t bytes = std::min(kBootstrapBytes, *total_);
-    if (first.complete && first.body.size() != bytes)
-      throw FormatError(name(), "byte 0", std::to_string(bytes) + " bytes",
-                        std::to_string(first.body.size()));
-    keep(0, std::move(first.body));
-  }
-  std::string name() const override { return shown_url(urls_.front()); }
-  std::uint64_t size() override { return *total_; }
-  const std::string& etag() const { return etag_; }
-
-  Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
-    if (bytes == 0) return {};
-    require(offset, bytes);
-    fetch(missing(offset, bytes, {}));
-    return copy(offset, bytes);
-  }
-
-  /// Fetches all of these at once.
-  void prefetch(std::vector<ByteRange> ranges) {
-    std::ranges::sort(ranges, {}, &ByteRange::offset);
-    std::vector<Piece> pieces;
-    for (const ByteRange& r : ranges) {
-      if (r.bytes == 0) continue;
-      require(r.offset, r.bytes);
-      pieces = missing(r.offset, r.bytes, std::move(pieces));
-    }
-    fetch(std::move(pieces));
-  }
-
- private:
-  struct Piece {
-    std::uint64_t offset = 0, bytes = 0;
-    Bytes got;
-    std::optional<Retries> retries;
-  };
-
-  void require(std::uint64_t offset, std::uint64_t bytes) const {
-    if (offset > *total_ || bytes > *total_ - offset)
-      throw FormatError(name(), "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
-                        "a file of " + std::to_string(*total_) + " bytes");
-    if (bytes > link_->options.max_whole_bytes)
-      throw InputError(name(), "byte " + std::to_string(offset),
-                       "at most " + std::to_string(link_->options.max_whole_bytes) + " bytes from a server",
-                       std::to_string(bytes));
-  }
-  /// `pieces` and what is not known of a range behind them; the last one grows where it is near.
-  std::vector<Piece> missing(std::uint64_t offset, std::uint64_t bytes, std::vector<Piece> pieces) const {
-    for (std::uint64_t at = offset; at < offset + bytes;) {
-      const auto [known_end, next_begin] = known_from(at);
-      if (known_end > at) {
-        at = known_end;
-        continue;
-      }
-      const std::uint64_t end = std::min(offset + bytes, next_begin);
-      const std::uint64_t last_end = pieces.empty() ? 0 : pieces.back().offset + pieces.back().bytes;
-      if (!pieces.empty() && at <= last_end + kJoinBytes && known_from(last_end).second >= end &&
-          known_from(last_end).first == last_end)
-        pieces.back().bytes = std::max(last_end, end) - pieces.back().offset;
-      else if (at >= last_end)
-        pieces.push_back({at, end - at, {}, {}});
-      at = end;
-    }
-    return pieces;
-  }
-  /// Where what is known at `at` ends (`at` itself when nothing is), and where the next known part begins.
-  std::pair<std::uint64_t, std::uint64_t> known_from(std::uint64_t at) const {
-    auto next = parts_.upper_bound(at);
-    const std::uint64_t next_begin = next == parts_.end() ? ~0ull : next->first;
-    if (next == parts_.begin()) return {at, next_begin};
-    const auto& [begin, part] = *std::prev(next);
-    return {std::max(at, begin + part.size()), next_begin};
-  }
-  void keep(std::uint64_t begin, Bytes bytes) {
-    if (!bytes.empty()) parts_.emplace(begin, std::move(bytes));
-  }
-  Bytes copy(std::uint64_t offset, std::uint64_t bytes) const {
-    Bytes out;
-    out.reserve(static_cast<std::size_t>(bytes));
-    for (std::uint64_t at = offset; at < offset + bytes;) {
-      const auto& [begin, part] = *std::prev(parts_.upper_bound(at));
-      const std::uint64_t n = std::min<std::uint64_t>(begin + part.size(), offset + bytes) - at;
-      const auto from = part.begin() + static_cast<std::ptrdiff_t>(at - begin);
-      out.insert(out.end(), from, from + static_cast<std::ptrdiff_t>(n));
-      at += n;
-    }
-    return out;
-  }
-
-  /// What has come is kept, whether all comes or not.
-  void fetch(std::vector<Piece> pieces) {
-    const auto keep_all = [&] {
-      for (std::size_t i = 0; i < pieces.size(); ++i) {
-        link_->pool.cancel(i);
-        keep(pieces[i].offset, std::move(pieces[i].got));
-      }
-    };
-    try {
-      for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces[i].retries.emplace(link_->options);
-        start(i, pieces[i]);
-      }
-      while (auto ended = link_->pool.wait(kWait_s)) {
-        Piece& piece = pieces[static_cast<std::size_t>(ended->number)];
-        const std::size_t asked_of = at_;
-        if (take(piece, ended->answer)) continue;
-        if (at_ != asked_of)  // another server for what is left
-          for (std::size_t i = 0; i < pieces.size(); ++i) {
-            if (&pieces[i] == &piece || !link_->pool.so_far(i)) continue;
-            link_->pool.cancel(i);
-            start(i, pieces[i]);
-          }
-        start(static_cast<std::size_t>(ended->number), piece);
-      }
-    } catch (...) {
-      keep_all();
-      throw;
-    }
-    keep_all();
-  }
-  void start(std::size_t number, const Piece& p) {
-    const std::uint64_t bytes = p.bytes - p.got.size();
-    link_->pool.start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes, etag_);
-  }
-  /// Whether the piece is complete; otherwise it is to be asked for again.
-  bool take(Piece& p, HttpAnswer& a) {
-    const std::uint64_t at = p.offset + p.got.size();
-    const std::string place = "byte " + std::to_string(at);
-    if (a.status == 206 && (a.complete || !a.body.empty())) {
-      check_range(a, at, p.bytes - p.got.size());
-      p.got.insert(p.got.end(), a.body.begin(), a.body.end());
-      if (a.body.size() >= kProgressBytes) p.retries.emplace(link_->options);
-      if (p.got.size() == p.bytes) return true;
-      if (a.complete)
-        throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", std::to_string(p.got.size()));
-    }
-    if (a.too_long && a.status == 206)
-      throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", "more");
-    if (may_retry(a) && p.retries->wait(a)) return false;
-    if (at_ + 1 < urls_.size() && a.problem != "cancelled") {
-      ++at_;
-      etag_.clear();
-      p.retries.emplace(link_->options);
-      return false;
-    }
-    if (a.status == 200)
-      throw FormatError(name(), "", "the file that reading began with",
-                        "status 200: it was replaced, or the server no longer answers ranges");
-    if (a.status == 416) throw FormatError(name(), place, "a longer file", "status 416");
-    throw InputError(name(), place, "an answer with status 206", what_came(a));
-  }
-
-  void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
-    const std::string place = "byte " + std::to_string(offset);
-    if (!a.first) throw FormatError(name(), place, "a Content-Range", "none that can be read");
-    if (total_ && *a.total != *total_)
-      throw FormatError(name(), place, "a file of " + std::to_string(*total_) + " bytes",
-                        std::to_string(*a.total));
-    if (!etag_.empty() && !a.etag.empty() && a.etag != etag_)
-      throw FormatError(name(), place, "the file that reading began with", "another one (ETag)");
-    if (*a.first != offset || *a.last != std::min(offset + bytes, *a.total) - 1)
-      throw FormatError(name(), place, "the range that was asked for",
-                        std::to_string(*a.first) + "-" + std::to_string(*a.last));
-    total_ = a.total;
-    if (etag_.empty()) etag_ = a.etag;
-  }
-
-  std::vector<std::string> urls_;
-  std::size_t at_ = 0;  // the server that is asked
-  std::shared_ptr<Link> link_;
-  std::optional<std::uint64_t> total_;
-  std::string etag_;                      // of the server that is asked
-  std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
-};
-
-/// Whole files of a tree, from any of its servers.
-class HttpTree {
- public:
-  HttpTree(std::string root, std::shared_ptr<Link> link, bool ranges)
-      : root_(std::move(root)), link_(std::move(link)), ranges_(ranges) {}
-  const std::string& root() const { return root_; }
-  std::string name() const { return shown_url(root_); }
-  void keep(const std::string& path, Bytes bytes) { files_[path] = std::move(bytes); }
-
-  struct Wanted {
-    std::string path;
-    std::uint64_t max_bytes = 0;
-    Bytes got = {};  // of a transfer that broke, where the server knows ranges
-    std::string etag = {};
-  };
-  const Bytes& file(const std::string& path, std::uint64_t max_bytes) {
-    fetch({{path, max_bytes}});
-    return files_[path];
-  }
-  void fetch(std::vector<Wanted> wanted) {
-    std::erase_if(wanted, [&](const Wanted& w) { return files_.contains(w.path); });
-    std::vector<Retries> retries(wanted.size(), Retries(link_->options));
-    try {
-      for (std::size_t i = 0; i < wanted.size(); ++i) {
-        if (!is_valid_entry_path(wanted[i].path))
-          throw FormatError(name(), wanted[i].path, "a path within the package", "another");
-        start(i, wanted[i]);
-      }
-      while (auto ended = link_->pool.wait(kWait_s)) {
-        const auto i = static_cast<std::size_t>(ended->number);
-        HttpAnswer& a = ended->answer;
-        if (take(wanted[i], a)) {
-          keep(wanted[i].path, std::move(wanted[i].got));
-          continue;
-        }
-        if (a.too_long)
-          throw FormatError(name(), wanted[i].path,
-                            "at most " + std::to_string(wanted[i].max_bytes) + " bytes", "more");
-        if (a.body.size() >= kProgressBytes && ranges_) retries[i] = Retries(link_->options);
-        if (!may_retry(a) || !retries[i].wait(a))
-          throw InputError(name() + wanted[i].path, "", "a file", what_came(a));
-        start(i, wanted[i]);
-      }
-    } catch (...) {
-      for (std::size_t i = 0; i < wanted.size(); ++i) link_->pool.cancel(i);
-      throw;
-    }
-  }
-
- private:
-  void start(std::size_t number, const Wanted& w) {
-    const std::uint64_t have = w.got.size();
-    const HttpRange rest{have, w.max_bytes - have, true};  // all of it where it was replaced
-    link_->pool.start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes,
-                      w.etag);
-  }
-  /// Whether the file is complete now.
-  bool take(Wanted& w, HttpAnswer& a) const {
-    if (a.status == 200) w.got.clear();
-    if (a.status != 200 && (a.status != 206 || !a.first || *a.first != w.got.size())) return false;
-    w.got.insert(w.got.end(), a.body.begin(), a.body.end());
-    if (a.complete) return true;
-    w.etag = a.etag;
-    if (!ranges_ || w.got.size() >= w.max_bytes) w.got.clear();
-    return false;
-  }
-  std::string root_;
-  std::shared_ptr<Link> link_;
-  bool ranges_;
-  std::map<std::string, Bytes> files_;
-};
-
 /// Finds out how the servers can be read when the manifest is asked for.
 class UrlStore final : public HttpStore {
  public:
   UrlStore(std::vector<std::string> urls, const HttpOptions& options)
-      : urls_(std::move(urls)), link_(std::make_shared<Link>(options)), refused_(urls_.size(), false) {}
+      : urls_(std::move(urls)), link_(std::make_shared<HttpLink>(options)), refused_(urls_.size(), false) {}
   std::string name() const override { return shown_url(place_.url.empty() ? urls_.front() : place_.url); }
   bool is_folder() const override { return tree_ != nullptr; }
   HttpPlace place() const override {
@@ -329,13 +39,13 @@ class UrlStore final : public HttpStore {
     if (container_) return container_->read_manifest();
     if (tree_) return tree_->file(kManifestPath, kBootstrapBytes);
     for (;;) {
-      First first = first_answer();
+      FirstAnswer first = first_answer();
       place_.mirror = first.mirror;
       place_.rtt_s = first.answer.first_byte_s;
       place_.bytes_s =
           static_cast<double>(first.answer.body.size()) / std::max(1e-6, first.answer.received_s);
       try {
-        Bytes manifest = use(std::move(first));
+        Bytes manifest = open_by(std::move(first));
         if (urls_.size() > 1) texmesh::read_manifest(manifest);
         return manifest;
       } catch (const FormatError&) {  // another server may know better
@@ -382,13 +92,13 @@ class UrlStore final : public HttpStore {
   }
 
  private:
-  struct First {
+  struct FirstAnswer {
     std::size_t mirror = 0;
     HttpAnswer answer;
   };
   /// The first that answers with the beginning of a package, or says that it knows no ranges.
-  First first_answer() {
-    Retries retries(link_->options);
+  FirstAnswer first_answer() {
+    HttpRetries retries(link_->options);
     for (;;) {
       std::vector<std::size_t> order;
       for (std::size_t m = 0; m < urls_.size(); ++m)
@@ -397,7 +107,7 @@ class UrlStore final : public HttpStore {
       std::size_t started = 0, ended_count = 0;
       const auto start_next = [&] { ask_first(order[started++]); };
       for (start_next(); ended_count < order.size();) {
-        auto ended = link_->pool.wait(started < order.size() ? kHeadStart_s : kWait_s);
+        auto ended = link_->pool.wait(started < order.size() ? kHeadStart_s : kRequestWait_s);
         if (!ended) {
           if (started == order.size() && link_->pool.idle()) break;
           if (started < order.size()) start_next();
@@ -417,7 +127,7 @@ class UrlStore final : public HttpStore {
         if (started < order.size()) start_next();
       }
       const bool none = std::ranges::find(refused_, false) == refused_.end();
-      if (none || !retries.wait(last)) refuse(last);
+      if (none || !retries.wait(last)) throw_problem(last);
     }
   }
   void ask_first(std::size_t mirror) {
@@ -425,7 +135,7 @@ class UrlStore final : public HttpStore {
     link_->pool.start(mirror, tree ? urls_[mirror] + kManifestPath : urls_[mirror],
                       HttpRange{0, kBootstrapBytes, tree}, kBootstrapBytes);
   }
-  [[noreturn]] void refuse(const HttpAnswer& a) const {
+  [[noreturn]] void throw_problem(const HttpAnswer& a) const {
     std::string names = shown_url(urls_.front());
     for (std::size_t m = 1; m < urls_.size(); ++m) names += ", " + shown_url(urls_[m]);
     if (a.too_long)
@@ -434,20 +144,20 @@ class UrlStore final : public HttpStore {
     throw InputError(names, "byte 0", "an answer with status 206", what_came(a));
   }
 
-  Bytes use(First first) {
+  Bytes open_by(FirstAnswer first) {
     const std::string& url = urls_[first.mirror];
     if (is_tree(url)) {
       if (first.answer.too_long)
         throw FormatError(shown_url(url), kManifestPath,
                           "at most " + std::to_string(kBootstrapBytes) + " bytes", "more");
-      return use_tree(url, std::move(first.answer));
+      return open_tree(url, std::move(first.answer));
     }
-    if (first.answer.status == 206) return use_container(first.mirror, std::move(first.answer));
+    if (first.answer.status == 206) return open_ranges(first.mirror, std::move(first.answer));
     if (const std::string root = tree_beside(url); !root.empty()) {
       link_->pool.start(0, root + kManifestPath, HttpRange{0, kBootstrapBytes, true}, kBootstrapBytes);
-      const auto ended = link_->pool.wait(kWait_s);
+      const auto ended = link_->pool.wait(kRequestWait_s);
       if (ended && ended->answer.complete && (ended->answer.status == 200 || ended->answer.status == 206))
-        return use_tree(root, std::move(ended->answer));
+        return open_tree(root, std::move(ended->answer));
     }
     container_ = open_container(memory_source(whole_file(url), shown_url(url)));
     place_.url = url;
@@ -455,16 +165,16 @@ class UrlStore final : public HttpStore {
     return container_->read_manifest();
   }
   /// `manifest`: the answer to a request for as much of manifest.json as may be.
-  Bytes use_tree(const std::string& root, HttpAnswer manifest) {
+  Bytes open_tree(const std::string& root, HttpAnswer manifest) {
     place_.url = root;
     place_.ranges = manifest.status == 206;
     if (place_.ranges && (!manifest.first || *manifest.first != 0 || *manifest.last + 1 != *manifest.total))
       throw FormatError(shown_url(root), kManifestPath, "the range that was asked for", "another");
     tree_ = std::make_unique<HttpTree>(root, link_, place_.ranges);
-    tree_->keep(kManifestPath, manifest.body);
+    tree_->store(kManifestPath, manifest.body);
     return std::move(manifest.body);
   }
-  Bytes use_container(std::size_t mirror, HttpAnswer first) {
+  Bytes open_ranges(std::size_t mirror, HttpAnswer first) {
     std::vector<std::string> urls{urls_[mirror]};
     for (std::size_t m = 0; m < urls_.size(); ++m)
       if (m != mirror && !refused_[m] && !is_tree(urls_[m])) urls.push_back(urls_[m]);
@@ -475,10 +185,10 @@ class UrlStore final : public HttpStore {
     return container_->read_manifest();
   }
   Bytes whole_file(const std::string& url) {
-    Retries retries(link_->options);
+    HttpRetries retries(link_->options);
     for (;;) {
       link_->pool.start(0, url, std::nullopt, link_->options.max_whole_bytes);
-      auto ended = link_->pool.wait(kWait_s);
+      auto ended = link_->pool.wait(kRequestWait_s);
       HttpAnswer a = ended ? std::move(ended->answer) : HttpAnswer{};
       if (a.status == 200 && a.complete) return std::move(a.body);
       if (a.too_long)
@@ -492,7 +202,7 @@ class UrlStore final : public HttpStore {
   }
 
   std::vector<std::string> urls_;
-  std::shared_ptr<Link> link_;
+  std::shared_ptr<HttpLink> link_;
   std::vector<bool> refused_;  // by mirror: never to be asked again
   HttpPlace place_;
   std::unique_ptr<PackageStore> container_;  // or

@@ -6,6 +6,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
+#include "format/documents/index.h"
 
 namespace texmesh {
 namespace {

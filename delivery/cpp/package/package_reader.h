@@ -8,7 +8,9 @@
 
 #include "format/container/container.h"
 #include "format/documents/manifest.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
+#include "format/documents/textures.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh {

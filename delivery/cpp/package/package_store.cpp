@@ -125,8 +125,8 @@ class FolderStore final : public PackageStore {
   }
 
  private:
-  /// Goes down part by part and follows no symbolic link, so that a tree from elsewhere cannot point out of
-  /// itself.
+  /// Goes down part by part and follows no symbolic link, so that a tree from elsewhere cannot point
+  /// out of itself.
   Descriptor open_file(const std::string& path, std::uint64_t& size) const {
     if (!is_valid_entry_path(path)) throw FormatError(root_, path, "a path within the package", "another");
     Descriptor folder(::dup(fd_.get()));

@@ -45,8 +45,8 @@ SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOp
 SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
                                        const BandwidthTrace& trace);
 
-/// Deterministic random numbers for traces: SplitMix64, normal values by Box and Muller with portable
-/// functions.
+/// Deterministic random numbers for traces: SplitMix64, normal values by Box and Muller
+/// with portable functions.
 class TraceRandom {
  public:
   explicit TraceRandom(std::uint64_t seed) : state_(seed) {}

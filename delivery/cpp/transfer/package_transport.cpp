@@ -98,7 +98,7 @@ class HttpTransport final : public Transport {
       const auto it = open_.find(number);
       if (it == open_.end()) continue;
       Outcome outcome{number, now_s(), true, {}, {}, 0, false};
-      if (!keep(it->second, part, std::move(ended->answer), outcome)) {
+      if (!store_part(it->second, part, std::move(ended->answer), outcome)) {
         outcome.good = false;
         stop(number);
         return outcome;
@@ -161,7 +161,7 @@ class HttpTransport final : public Transport {
                 whole ? std::nullopt : std::optional(range), range.bytes, mirror.etag);
   }
   /// Whether the part is complete now; otherwise the outcome says why not.
-  bool keep(Open& open, std::size_t part, HttpAnswer a, Outcome& outcome) {
+  bool store_part(Open& open, std::size_t part, HttpAnswer a, Outcome& outcome) {
     const HttpRange asked = place_of(open, part);
     const PackagePart& p = open.wanted[part];
     Mirror& mirror = mirrors_[open.mirror];

@@ -20,8 +20,8 @@ class Mirrors {
     options.initial_bytes_s = initial_bytes_s;
     for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options)});
   }
-  /// Nothing when all of them have failed for good. `but`: the one that has just failed, unless it is the
-  /// only one.
+  /// Nothing when all of them have failed for good. `but`: the one that has just failed, unless it is
+  /// the only one.
   std::optional<std::uint32_t> choose(double bytes, std::optional<std::uint32_t> but, double now_s) const {
     std::optional<std::uint32_t> best = best_of(bytes, but, now_s);
     if (!best && but) best = best_of(bytes, {}, now_s);
@@ -52,8 +52,8 @@ class Mirrors {
   /// It is asked again no sooner than after a pause: its own, or one that grows from failure to failure.
   void pause(std::uint32_t m, double now_s, double wait_s) {
     Mirror& mirror = mirrors_[m];
-    const double own = kFirstPause_s * static_cast<double>(1 << std::min(mirror.failures++, 6));
-    mirror.ready_s = std::max(mirror.ready_s, now_s + std::min(kMostPause_s, std::max(wait_s, own)));
+    const double growing_s = kFirstPause_s * static_cast<double>(1 << std::min(mirror.failures++, 6));
+    mirror.ready_s = std::max(mirror.ready_s, now_s + std::min(kMostPause_s, std::max(wait_s, growing_s)));
   }
   /// Another one that has shown that it delivers.
   bool another_delivers(std::uint32_t but) const {
@@ -93,9 +93,9 @@ struct Asked {
   double kept = 0;      // by the transport, of tries that broke
 };
 
-class Run {
+class TransferRun {
  public:
-  Run(RequestSource& source, Transport& transport, const TransferOptions& options)
+  TransferRun(RequestSource& source, Transport& transport, const TransferOptions& options)
       : source_(source),
         transport_(transport),
         options_(options),
@@ -109,7 +109,7 @@ class Run {
       if (source_.finished()) break;
       const double until = next_look_s();
       if (auto outcome = transport_.wait(until))
-        take(*outcome);
+        end_try(*outcome);
       else if (asked_.empty() && waiting_.empty())
         break;
       else if (until >= kForEver_s)
@@ -193,7 +193,7 @@ class Run {
     return until;
   }
 
-  void take(const Transport::Outcome& outcome) {
+  void end_try(const Transport::Outcome& outcome) {
     const auto it = asked_.find(outcome.number);
     if (it == asked_.end()) return;
     Asked a = std::move(it->second);
@@ -206,9 +206,9 @@ class Run {
     }
     const std::string why = outcome.good ? "bytes of another digest" : outcome.problem;
     if (outcome.wait_s > 0) mirrors_.pause(a.mirror, outcome.time_s, outcome.wait_s);
-    again(std::move(a), why, outcome.for_good);
+    retry_or_give_up(std::move(a), why, outcome.for_good);
   }
-  void again(Asked a, const std::string& why, bool for_good) {
+  void retry_or_give_up(Asked a, const std::string& why, bool for_good) {
     mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), for_good);
     if (const double kept = transport_.received(a.request.number); kept >= a.kept + kProgressBytes) {
       a.kept = kept;
@@ -240,7 +240,7 @@ class Run {
     for (Asked& a : late) {
       transport_.cancel(a.request.number);
       asked_.erase(a.request.number);
-      again(std::move(a), "no answer in time", false);
+      retry_or_give_up(std::move(a), "no answer in time", false);
     }
   }
 
@@ -256,14 +256,14 @@ class Run {
 }  // namespace
 
 TransferEnd transfer(RequestSource& source, Transport& transport, const TransferOptions& options) {
-  return Run(source, transport, options).run();
+  return TransferRun(source, transport, options).run();
 }
 
-PlanSource::PlanSource(HarmonicTimePlan& plan, double start_s, Parts parts, Take take)
+PlanSource::PlanSource(HarmonicTimePlan& plan, double start_s, Parts parts, Accept accept)
     : plan_(plan),
       start_s_(start_s),
       parts_(std::move(parts)),
-      take_(std::move(take)),
+      accept_(std::move(accept)),
       rung_(plan.offers().size(), -1) {}
 
 std::optional<TransferRequest> PlanSource::next(double now_s) {
@@ -275,7 +275,7 @@ std::optional<TransferRequest> PlanSource::next(double now_s) {
 }
 
 bool PlanSource::arrived(const Transport::Outcome& outcome) {
-  if (take_ && !take_(outcome.number, rung_[outcome.number], outcome)) return false;
+  if (accept_ && !accept_(outcome.number, rung_[outcome.number], outcome)) return false;
   plan_.completed(outcome.number, outcome.time_s - start_s_);
   return true;
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "delivery/cpp/decide/harmonic_time.h"
-#include "format/documents/manifest.h"
+#include "format/documents/entry_ref.h"
 
 namespace texmesh {
 
@@ -57,8 +57,8 @@ class RequestSource {
   virtual ~RequestSource() = default;
   /// The next request while there is room for one; nothing: wait for those under way.
   virtual std::optional<TransferRequest> next(double now_s) = 0;
-  /// What arrived; false when it is not what it should be (a digest that differs): it is then asked for
-  /// elsewhere.
+  /// What arrived; false when it is not what it should be (a digest that differs): it is then
+  /// asked for elsewhere.
   virtual bool arrived(const Transport::Outcome& outcome) = 0;
   virtual void failed(std::uint32_t number, double now_s) = 0;  // given up
   virtual bool finished() const = 0;
@@ -90,12 +90,12 @@ struct TransferEnd {
 TransferEnd transfer(RequestSource& source, Transport& transport, const TransferOptions& options);
 
 /// A plan as a source of requests, its time counted from `start_s` of the transport's on; `parts` says what a
-/// step fetches, `take` keeps what arrived (false: the bytes are wrong). Either may be empty.
+/// step fetches, `accept` keeps what arrived (false: the bytes are wrong). Either may be empty.
 class PlanSource final : public RequestSource {
  public:
   using Parts = std::function<std::vector<PackagePart>(std::uint32_t offer, std::int32_t rung)>;
-  using Take = std::function<bool(std::uint32_t offer, std::int32_t rung, const Transport::Outcome&)>;
-  explicit PlanSource(HarmonicTimePlan& plan, double start_s = 0, Parts parts = {}, Take take = {});
+  using Accept = std::function<bool(std::uint32_t offer, std::int32_t rung, const Transport::Outcome&)>;
+  explicit PlanSource(HarmonicTimePlan& plan, double start_s = 0, Parts parts = {}, Accept accept = {});
   std::optional<TransferRequest> next(double now_s) override;
   bool arrived(const Transport::Outcome& outcome) override;
   void failed(std::uint32_t number, double now_s) override { plan_.failed(number, now_s - start_s_); }
@@ -105,7 +105,7 @@ class PlanSource final : public RequestSource {
   HarmonicTimePlan& plan_;
   double start_s_;
   Parts parts_;
-  Take take_;
+  Accept accept_;
   std::vector<std::int32_t> rung_;  // by offer, of what was asked for
 };
 

@@ -86,7 +86,7 @@ BudgetFile BudgetFiller::with_colours(const MeshCandidate& mesh, const BudgetFil
   return file;
 }
 
-void BudgetFiller::take_larger(BudgetFile&& file, BudgetFile& best) const {
+void BudgetFiller::replace_if_larger(BudgetFile&& file, BudgetFile& best) const {
   if (fits(file) && (!fits(best) || file.glb.size() > best.glb.size())) best = std::move(file);
 }
 
@@ -96,7 +96,7 @@ void BudgetFiller::by_quality(const MeshCandidate& mesh, const BudgetFile& data,
   quality = quality_for(static_cast<double>(source_.request.bytes), start, kNear, tries, [&](double q) {
     BudgetFile file = with_colours(mesh, data, pixels, coding, q);
     const std::size_t bytes = file.glb.size();
-    take_larger(std::move(file), best);
+    replace_if_larger(std::move(file), best);
     return bytes;
   });
 }
@@ -109,7 +109,7 @@ void BudgetFiller::by_size(const MeshCandidate& mesh, const BudgetFile& data, co
     BudgetFile file = with_colours(mesh, data, colours_.texels(source_.colours, share), coding, quality);
     (fits(file) ? low : high) = share;
     const bool whole = share >= 1 && fits(file);
-    take_larger(std::move(file), best);
+    replace_if_larger(std::move(file), best);
     if (whole) break;
   }
 }

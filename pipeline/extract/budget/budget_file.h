@@ -38,7 +38,7 @@ class BudgetFiller {
                   const ColourCoding& coding, double start, int tries, BudgetFile& best, double& quality);
   void by_size(const MeshCandidate& mesh, const BudgetFile& data, const ColourCoding& coding, double quality,
                double& share, BudgetFile& best);
-  void take_larger(BudgetFile&& file, BudgetFile& best) const;
+  void replace_if_larger(BudgetFile&& file, BudgetFile& best) const;
   const BudgetSource& source_;
   ColourTextures& colours_;
 };

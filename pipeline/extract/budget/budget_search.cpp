@@ -39,9 +39,9 @@ class BudgetSearch {
  private:
   const std::vector<ManifestScale>& scales() const { return source_.package.manifest().scales; }
 
-  /// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one coded
-  /// leaner or the other way round, as long as the picture gets better; one that does not is passed over
-  /// once.
+  /// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
+  /// coded leaner or the other way round, as long as the picture gets better; one that does not is
+  /// passed over once.
   MeshKey choose_mesh() {
     best_ = {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
              kFirstCoding};
@@ -49,14 +49,14 @@ class BudgetSearch {
     for (bool again = true; again;) {
       const MeshKey before = best_;
       if (!source_.request.scale) {
-        walk(1, 0);
-        walk(-1, 0);
+        follow_direction(1, 0);
+        follow_direction(-1, 0);
       }
-      walk(0, 1);
-      walk(0, -1);
+      follow_direction(0, 1);
+      follow_direction(0, -1);
       if (!source_.request.scale) {
-        walk(-1, -1);
-        walk(1, 1);
+        follow_direction(-1, -1);
+        follow_direction(1, 1);
       }
       again = before != best_;
     }
@@ -64,7 +64,7 @@ class BudgetSearch {
     return best_;
   }
 
-  void walk(int scale_step, int coding_step) {
+  void follow_direction(int scale_step, int coding_step) {
     const MeshKey from = best_;
     int worse = 0;
     for (int k = 1; worse < 2; ++k) {
@@ -85,8 +85,8 @@ class BudgetSearch {
     return true;
   }
 
-  /// Its mesh alone is less different than the best file so far, and with that one's kind of textures it is
-  /// hardly worse.
+  /// Its mesh alone is less different than the best file so far, and with that one's kind of textures it
+  /// is hardly worse.
   bool promising(const MeshKey& key) {
     if (kLeastBytes * static_cast<double>(scales()[key.scale].triangles) >
         static_cast<double>(source_.request.bytes))

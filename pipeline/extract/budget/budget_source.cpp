@@ -6,6 +6,7 @@
 #include "format/base/box.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/import/import.h"
 #include "stages/image/decode_image.h"
 

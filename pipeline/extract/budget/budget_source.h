@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "pipeline/extract/budget/picture_meter.h"
-#include "pipeline/extract/extract.h"
-#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/draco_recode.h"
+#include "pipeline/extract/glb/extracted.h"
 #include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
+
+class StandaloneGlb;
 
 using ImageTextures = std::map<std::string, MipTexture>;  // by image_name()
 

@@ -41,9 +41,9 @@ class ColourTextures {
   /// At the size and coding of `near` alone.
   TexturePoint quick(const MeshCandidate& mesh, double bytes, const TexturePoint& near);
 
-  /// Images `which` (indices into source.textures.images()) with sides of `share`. What S_0 does not show
-  /// continues what it shows, which is cheap to code and right for coarser meshes that overlap a seam a
-  /// little.
+  /// Images `which` (indices into source.textures.images()) with sides of `share`. What S_0 does not
+  /// show continues what it shows, which is cheap to code and right for coarser meshes that overlap a
+  /// seam a little.
   std::vector<Pixels> texels(const std::vector<std::size_t>& which, double share);
   std::vector<FileImageData> encoded(const std::vector<Pixels>& pixels, const ColourCoding& coding,
                                      double quality, bool quick) const;

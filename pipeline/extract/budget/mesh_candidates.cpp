@@ -4,6 +4,7 @@
 
 #include "format/container/layout.h"
 #include "pipeline/extract/budget/budget_search.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {
@@ -51,11 +52,12 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   c.scale = m.scales[key.scale].scale;
   c.triangles = m.scales[key.scale].triangles;
   c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
-  c.file = coded(c.scale, key.coding);
-  c.model = read_model(*c.file, mesh_path(c.scale), source_.context);
-  if (source_.request.lods) c.file->begin_levels(screen_coverage_of(m, c.scale));
+  std::unique_ptr<StandaloneGlb> file = coded(c.scale, key.coding);
+  c.model = read_model(*file, mesh_path(c.scale), source_.context);
+  if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
-    c.file->add_level(*coded(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+    file->add_level(*coded(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+  c.file = std::move(file);
   c.fixed_bytes = c.with({}).size();
   c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);
   c.geometry = source_.difference(*c.views, source_.best_textures);

@@ -9,8 +9,7 @@
 
 namespace texmesh {
 
-/// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is
-/// stored).
+/// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
 inline constexpr int kMeshCodings = 5;
 
 /// Which mesh: an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1.
@@ -25,7 +24,7 @@ struct MeshCandidate {
   int scale = 0;
   std::vector<int> levels;
   std::uint64_t triangles = 0;
-  std::unique_ptr<StandaloneGlb> file;
+  std::shared_ptr<const StandaloneGlb> file;
   Model model;
   std::unique_ptr<ModelViews> views;
   std::uint64_t fixed_bytes = 0;  // the file without its images' bytes

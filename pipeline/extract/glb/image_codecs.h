@@ -8,6 +8,12 @@ namespace texmesh {
 
 enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
 
+/// An image as a file holds it.
+struct FileImageData {
+  FileImage format = FileImage::kJpeg;
+  std::vector<std::uint8_t> bytes;
+};
+
 /// "image/jpeg", "image/webp", "image/png".
 const char* mime_type_of(FileImage format);
 

@@ -11,12 +11,6 @@
 
 namespace texmesh {
 
-/// An image as a file holds it.
-struct FileImageData {
-  FileImage format = FileImage::kJpeg;
-  std::vector<std::uint8_t> bytes;
-};
-
 /// A scale's GLB taken apart, changed and written again: other images, a coarser mesh, further levels of
 /// detail. Materials, nodes, names, extras and extensions stay as they are. Brings the JSON library along;
 /// for .cpp files of this folder.
@@ -24,7 +18,7 @@ class StandaloneGlb {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Checks the whole file first (inspect/check_glb.h). `entry` is for messages. FormatError.
+  /// Checks the whole file first (check_glb.h). `entry` is for messages. FormatError.
   StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry);
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
@@ -36,8 +30,8 @@ class StandaloneGlb {
   void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
   bool has_draco() const;
 
-  /// Makes the nodes of the scene the children of one node, the first level of detail. Once, before
-  /// add_level().
+  /// Makes the nodes of the scene the children of one node, the first level of detail.
+  /// Once, before add_level().
   void begin_levels(double screen_coverage);
   /// Adds a coarser file of the same package as a further level (MSFT_lod), whose materials and images are
   /// those already here. Levels by falling `screen_coverage`: the share of the screen's area above which the

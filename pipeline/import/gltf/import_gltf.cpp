@@ -1,12 +1,12 @@
 #include <tiny_gltf.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/finish_model.h"
+#include "pipeline/import/gltf/import_gltf_assembler.h"
+#include "pipeline/import/gltf/import_gltf_nodes.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
 namespace texmesh {
@@ -15,252 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxParts = 65535;      // Mesh::triangle_part is 16 bits wide
 constexpr std::size_t kMaxMaterials = 65535;  // and so is triangle_material
-
-/// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes with large
-/// translations.
-struct Affine {
-  std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-  double at(int row, int column) const { return m[static_cast<std::size_t>(row * 4 + column)]; }
-  double& at(int row, int column) { return m[static_cast<std::size_t>(row * 4 + column)]; }
-};
-
-Affine operator*(const Affine& a, const Affine& b) {
-  Affine c;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 4; ++j) {
-      c.at(i, j) = a.at(i, 0) * b.at(0, j) + a.at(i, 1) * b.at(1, j) + a.at(i, 2) * b.at(2, j) +
-                   (j == 3 ? a.at(i, 3) : 0);
-    }
-  }
-  return c;
-}
-
-Vec3d operator*(const Affine& a, Vec3d p) {
-  Vec3d r;
-  for (int i = 0; i < 3; ++i) r[i] = a.at(i, 0) * p.x + a.at(i, 1) * p.y + a.at(i, 2) * p.z + a.at(i, 3);
-  return r;
-}
-
-Affine from_matrix(const Source& source, const std::vector<double>& v, const std::string& place) {
-  Affine a;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 4; ++j) a.at(i, j) = v[static_cast<std::size_t>(j * 4 + i)];
-  }
-  if (v[3] != 0 || v[7] != 0 || v[11] != 0 || v[15] != 1) {
-    source.note_once(Severity::kWarning, "projective-matrix", place,
-                     "the last row of a matrix is taken as 0 0 0 1");
-  }
-  return a;
-}
-
-Affine from_rotation(const Source& source, const std::vector<double>& q, const std::string& place) {
-  const double l = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(l > 0) || !std::isfinite(l)) {
-    source.note_once(Severity::kWarning, "bad-rotation", place,
-                     "a quaternion of no length is taken as no rotation");
-    return {};
-  }
-  const double x = q[0] / l, y = q[1] / l, z = q[2] / l, w = q[3] / l;
-  Affine a;
-  a.m = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     0,
-         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),     0,
-         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y), 0};
-  return a;
-}
-
-Affine local_map(const Source& source, const tinygltf::Node& node, std::size_t index) {
-  const std::string place = "/nodes/" + std::to_string(index);
-  if (!node.matrix.empty()) return from_matrix(source, node.matrix, place + "/matrix");
-  Affine a;
-  if (!node.rotation.empty()) a = from_rotation(source, node.rotation, place + "/rotation");
-  for (int i = 0; i < 3 && !node.scale.empty(); ++i) {
-    for (int j = 0; j < 3; ++j) a.at(j, i) *= node.scale[static_cast<std::size_t>(i)];
-  }
-  for (int i = 0; i < 3 && !node.translation.empty(); ++i) {
-    a.at(i, 3) = node.translation[static_cast<std::size_t>(i)];
-  }
-  return a;
-}
-
-/// Columns of the cofactor matrix: maps normals up to a positive factor when the determinant is positive.
-struct NormalMap {
-  std::array<Vec3d, 3> column;
-  double determinant = 1;
-};
-
-NormalMap normal_map(const Affine& a) {
-  const auto column = [&](int j) { return Vec3d{a.at(0, j), a.at(1, j), a.at(2, j)}; };
-  const Vec3d x = column(0), y = column(1), z = column(2);
-  NormalMap n{{cross(y, z), cross(z, x), cross(x, y)}, 0};
-  n.determinant = dot(x, n.column[0]);
-  return n;
-}
-
-/// A node that shows a mesh, with its map to the scene's space.
-struct Instance {
-  std::size_t node = 0, mesh = 0;
-  Affine to_scene;
-};
-
-std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model) {
-  if (!model.scenes.empty()) {
-    const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
-    if (model.scenes.size() > 1) {
-      add_info(
-          source.notes, "other-scenes", "/scenes",
-          "only scene " + std::to_string(scene) + " of " + std::to_string(model.scenes.size()) + " is read");
-    }
-    return model.scenes[scene].nodes;
-  }
-  std::vector<bool> is_child(model.nodes.size());
-  for (const tinygltf::Node& node : model.nodes) {
-    for (const int c : node.children) is_child[static_cast<std::size_t>(c)] = true;
-  }
-  std::vector<int> roots;
-  for (std::size_t n = 0; n < is_child.size(); ++n) {
-    if (!is_child[n]) roots.push_back(static_cast<int>(n));
-  }
-  return roots;
-}
-
-/// Depth first in the order of the file, without recursion: a chain may be as long as the file allows.
-std::vector<Instance> find_instances(const Source& source, const tinygltf::Model& model) {
-  struct Pending {
-    int node;
-    Affine to_scene;
-  };
-  std::vector<Pending> stack;
-  const std::vector<int> roots = scene_roots(source, model);
-  for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}});
-  std::vector<bool> seen(model.nodes.size());
-  std::vector<Instance> found;
-  while (!stack.empty()) {
-    const Pending p = stack.back();
-    stack.pop_back();
-    const auto n = static_cast<std::size_t>(p.node);
-    if (seen[n]) {
-      source.fail("/nodes/" + std::to_string(n), "a tree of nodes", "a node with two parents, or a cycle");
-    }
-    seen[n] = true;
-    const tinygltf::Node& node = model.nodes[n];
-    const Affine to_scene = p.to_scene * local_map(source, node, n);
-    if (node.mesh >= 0) found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene});
-    for (auto c = node.children.rbegin(); c != node.children.rend(); ++c) stack.push_back({*c, to_scene});
-  }
-  return found;
-}
-
-/// Puts primitives together to one mesh in the scene's space.
-class Assembler {
- public:
-  Assembler(const Source& source, Mesh& mesh, bool with_normals)
-      : source_(source), mesh_(mesh), with_normals_(with_normals) {}
-  void add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material, std::uint16_t part);
-  void finish();
-
- private:
-  void check_room(const Primitive& primitive, std::size_t new_wedges) const;
-  void add_wedge(const Primitive& primitive, std::uint32_t vertex, std::uint32_t first_position,
-                 Vec3f normal);
-  void add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored);
-
-  const Source& source_;
-  Mesh& mesh_;
-  const bool with_normals_;
-  std::vector<Vec3d> positions_;
-};
-
-void Assembler::check_room(const Primitive& primitive, std::size_t new_wedges) const {
-  const auto check = [&](const char* what, std::size_t count, int limit) {
-    if (count > static_cast<std::size_t>(limit)) {
-      source_.fail(what, "at most " + std::to_string(limit), std::to_string(count) + " or more");
-    }
-  };
-  check("vertices of all meshes", positions_.size() + primitive.positions.size(),
-        source_.options.max_vertices);
-  check("wedges of all meshes", mesh_.wedge_count() + new_wedges, source_.options.max_vertices);
-  check("triangles of all meshes", mesh_.triangles.size() + primitive.triangles.size(),
-        source_.options.max_triangles);
-}
-
-/// Attributes that only some primitives have are 0 (colours: white) on the others.
-void Assembler::add_wedge(const Primitive& primitive, std::uint32_t vertex, std::uint32_t first_position,
-                          Vec3f normal) {
-  const std::size_t before = mesh_.wedge_position.size();
-  mesh_.wedge_position.push_back(first_position + vertex);
-  const auto add_to = [&](auto& all, const auto& own, auto otherwise) {
-    if (own.empty() && all.empty()) return;
-    all.resize(before, otherwise);
-    all.push_back(own.empty() ? otherwise : own[vertex]);
-  };
-  add_to(mesh_.uv0, primitive.uv0, Vec2f{});
-  add_to(mesh_.uv1, primitive.uv1, Vec2f{});
-  add_to(mesh_.colours, primitive.colours, Vec4f{1, 1, 1, 1});
-  if (with_normals_) mesh_.normals.push_back(normal);
-}
-
-/// Directions on the surface go the way of positions. A mirrored surface has its bitangents the other way
-/// round.
-void Assembler::add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored) {
-  if (primitive.tangents.empty()) return;
-  mesh_.tangents.resize(mesh_.wedge_count() - primitive.tangents.size());
-  for (const Vec4f& t : primitive.tangents) {
-    Vec3d d;
-    for (int i = 0; i < 3; ++i)
-      d[i] = to_scene.at(i, 0) * t.x + to_scene.at(i, 1) * t.y + to_scene.at(i, 2) * t.z;
-    const Vec3f unit = to_float(normalized(d));
-    mesh_.tangents.push_back({unit.x, unit.y, unit.z, mirrored ? -t.w : t.w});
-  }
-}
-
-void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material,
-                    std::uint16_t part) {
-  // glTF: without normals a primitive is flat. Where others have normals that means a wedge per corner.
-  const bool flat = with_normals_ && primitive.normals.empty();
-  check_room(primitive, flat ? primitive.triangles.size() * 3 : primitive.positions.size());
-  const NormalMap normals = normal_map(to_scene);
-  const double sign = normals.determinant < 0 ? -1 : 1;
-  const auto first_position = static_cast<std::uint32_t>(positions_.size());
-  const auto first_wedge = static_cast<std::uint32_t>(mesh_.wedge_count());
-  for (const Vec3f& p : primitive.positions) positions_.push_back(to_scene * to_double(p));
-  for (std::uint32_t v = 0; v < primitive.positions.size() && !flat; ++v) {
-    Vec3d n;
-    if (with_normals_) {
-      const Vec3f& own = primitive.normals[v];
-      n = (normals.column[0] * own.x + normals.column[1] * own.y + normals.column[2] * own.z) * sign;
-    }
-    add_wedge(primitive, v, first_position, to_float(normalized(n)));
-  }
-  if (!flat) add_tangents(primitive, to_scene, sign < 0);
-  for (std::size_t t = 0; t < primitive.triangles.size(); ++t) {
-    Triangle corners = primitive.triangles[t];
-    if (sign < 0) std::swap(corners[1], corners[2]);  // a mirrored front face would be seen from behind
-    Triangle wedges;
-    if (flat) {
-      const Vec3d a = positions_[first_position + corners[0]];
-      const Vec3d n = normalized(
-          cross(positions_[first_position + corners[1]] - a, positions_[first_position + corners[2]] - a));
-      for (std::size_t i = 0; i < 3; ++i) {
-        wedges[i] = static_cast<std::uint32_t>(mesh_.wedge_count());
-        add_wedge(primitive, corners[i], first_position, to_float(n));
-      }
-    } else {
-      for (std::size_t i = 0; i < 3; ++i) wedges[i] = first_wedge + corners[i];
-    }
-    mesh_.triangles.push_back(wedges);
-    mesh_.triangle_material.push_back(material);
-    mesh_.triangle_part.push_back(part);
-  }
-}
-
-void Assembler::finish() {
-  const std::size_t n = mesh_.wedge_count();
-  if (!mesh_.uv0.empty()) mesh_.uv0.resize(n);
-  if (!mesh_.uv1.empty()) mesh_.uv1.resize(n);
-  if (!mesh_.colours.empty()) mesh_.colours.resize(n, {1, 1, 1, 1});
-  if (!mesh_.tangents.empty()) mesh_.tangents.resize(n);
-  set_positions(mesh_, positions_);
-}
 
 /// Reads each primitive once; keeps it only while further nodes show the same mesh.
 class PrimitiveCache {
@@ -282,9 +36,9 @@ class PrimitiveCache {
   std::map<std::size_t, std::shared_ptr<const std::vector<Primitive>>> kept_;
 };
 
-class Reader {
+class GltfReader {
  public:
-  Reader(const Source& source, ByteSpan bytes, Model& model)
+  GltfReader(const Source& source, ByteSpan bytes, Model& model)
       : source_(source),
         container_(split_container(source, bytes)),
         document_(checked(source, container_)),
@@ -313,7 +67,7 @@ class Reader {
 };
 
 /// In the order of the file, -1 (glTF's default material) first.
-std::map<int, std::uint16_t> Reader::read_used_materials(const std::vector<Instance>& instances) {
+std::map<int, std::uint16_t> GltfReader::read_used_materials(const std::vector<Instance>& instances) {
   std::map<int, std::uint16_t> index;
   for (const Instance& i : instances) {
     for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives) index[p.material] = 0;
@@ -329,7 +83,7 @@ std::map<int, std::uint16_t> Reader::read_used_materials(const std::vector<Insta
   return index;
 }
 
-std::uint16_t Reader::add_part(const Instance& instance) {
+std::uint16_t GltfReader::add_part(const Instance& instance) {
   std::vector<std::string>& names = model_.mesh.part_names;
   if (names.size() == kMaxParts) {
     source_.note_once(Severity::kInfo, "many-parts", "/nodes", "the nodes after the 65534th are one part");
@@ -342,7 +96,7 @@ std::uint16_t Reader::add_part(const Instance& instance) {
   return static_cast<std::uint16_t>(names.size() - 1);
 }
 
-void Reader::drop_textures_without_uv() {
+void GltfReader::drop_textures_without_uv() {
   const bool has_uv[2] = {!model_.mesh.uv0.empty(), !model_.mesh.uv1.empty()};
   for (Material& m : model_.materials) {
     for_each_texture(m, [&](TextureRef& ref) {
@@ -355,7 +109,7 @@ void Reader::drop_textures_without_uv() {
   }
 }
 
-void Reader::read() {
+void GltfReader::read() {
   const std::vector<Instance> instances = find_instances(source_, structure_);
   bool with_normals = false;
   for (const Instance& i : instances) {
@@ -393,10 +147,12 @@ void Reader::read() {
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
-  ImportOptions own = options;  // glTF 2.0, 3.8.3: colour space information of PNG and JPEG must be ignored
-  if (own.colour_profiles == ProfilePolicy::kAuto) own.colour_profiles = ProfilePolicy::kIgnore;
-  const gltf::Source source{file_name, resolver, own, context, out.model.notes};
-  gltf::Reader reader(source, bytes, out.model);
+  // glTF 2.0, 3.8.3: colour space information of PNG and JPEG must be ignored.
+  ImportOptions by_specification = options;
+  if (by_specification.colour_profiles == ProfilePolicy::kAuto)
+    by_specification.colour_profiles = ProfilePolicy::kIgnore;
+  const gltf::Source source{file_name, resolver, by_specification, context, out.model.notes};
+  gltf::GltfReader reader(source, bytes, out.model);
   reader.read();
   out.format = reader.is_glb() ? "glb" : "gltf";
   out.normals_by_specification = true;

@@ -5,6 +5,7 @@
 
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/import_images.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh::gltf {
@@ -207,10 +208,10 @@ void MaterialReader::read_extensions(const Json& material, const std::string& pl
     const std::string textures = texture_names(value);
     const std::string text =
         name + " is left out" + (textures.empty() ? "" : ", and with it the textures " + textures);
-    const bool told = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
+    const bool is_noted = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
       return n.code == "unknown-extension" && n.text == text;
     });
-    if (!told)
+    if (!is_noted)
       source_.notes.push_back(
           {textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension", place, text});
   }

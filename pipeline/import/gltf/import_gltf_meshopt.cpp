@@ -26,9 +26,9 @@ void check_layout(const Source& source, const std::string& place, std::uint64_t 
   if (mode == MeshoptMode::kTriangles && count % 3 != 0) source.fail(place, "whole triangles", found());
 }
 
-/// Fewest bytes that the codec spends on so many elements; a header that promises more is a lie, found out
-/// before anything is allocated. Attributes: 2 bits per 16 bytes of one column; triangles and indices: a byte
-/// each.
+/// Fewest bytes that the codec spends on so many elements; a header that promises more is a lie, found
+/// out before anything is allocated. Attributes: 2 bits per 16 bytes of one column; triangles and
+/// indices: a byte each.
 std::uint64_t fewest_bytes(std::uint64_t count, std::uint64_t stride, MeshoptMode mode) {
   if (mode == MeshoptMode::kAttributes) return count / 64 * stride;
   return mode == MeshoptMode::kTriangles ? count / 3 : count;

@@ -50,9 +50,9 @@ Json parse_json(const Source& source, std::string_view text);
 
 // import_gltf_check.cpp
 
-/// Checks types, ranges and indices of every property that the reader uses, takes out `extras`, and refuses
-/// versions and required extensions that the reader does not know. Notes what it leaves out (skins,
-/// animations, ...).
+/// Checks types, ranges and indices of every property that the reader uses, takes out `extras`, and
+/// refuses versions and required extensions that the reader does not know. Notes what it leaves out
+/// (skins, animations, ...).
 void check_document(const Source& source, Json& document);
 
 // import_gltf_structure.cpp
@@ -63,8 +63,8 @@ tinygltf::Model parse_structure(const Source& source, const Json& document);
 
 // import_gltf_buffers.cpp
 
-/// The bytes behind bufferViews: the BIN chunk, data: URIs and files, read at first use, with
-/// EXT_meshopt_compression undone.
+/// The bytes behind bufferViews: the BIN chunk, data: URIs and files, read at first use,
+/// with EXT_meshopt_compression undone.
 class Buffers {
  public:
   Buffers(const Source& source, const Json& document, std::optional<ByteSpan> bin);

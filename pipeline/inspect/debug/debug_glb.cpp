@@ -1,6 +1,7 @@
 #include <cstring>
 
 #include "format/base/box.h"
+#include "format/documents/allocation.h"
 #include "pipeline/inspect/debug/debug_view.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"

@@ -35,8 +35,8 @@ struct DebugLegend {
   std::vector<std::string> remarks;            // sentences without a final full stop
 };
 
-/// A mesh whose colours (or painted textures) show something, and lines beside it. Pictures are a function
-/// of it.
+/// A mesh whose colours (or painted textures) show something, and lines beside it. Pictures are a
+/// function of it.
 struct DebugView {
   Mesh mesh;                        // colours: linear RGBA per wedge; empty where textures show
   std::vector<Material> materials;  // for mesh.triangle_material; texture refs index `textures`

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/inspect/diff/diff.h"
 #include "pipeline/io/text_table.h"

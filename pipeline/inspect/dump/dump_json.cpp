@@ -1,4 +1,5 @@
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
 #include "format/documents/viewing.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/package_figures.h"
@@ -20,8 +21,8 @@ std::uint64_t package_bytes(PackageReader& p) {
   return bytes;
 }
 
-/// Every step function, with the viewing distance in object heights at which a step begins (null = 0, at any
-/// distance).
+/// Every step function, with the viewing distance in object heights at which a step begins (null = 0,
+/// at any distance).
 Json steps_json(const std::vector<ManifestStep>& steps) {
   Json list = Json::array();
   for (const ManifestStep& s : steps) {

@@ -1,6 +1,7 @@
 #include "pipeline/inspect/dump/option_changes.h"
 
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/compile/options.h"
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -7,8 +7,9 @@ namespace texmesh {
 
 /// An option of a package that is not what this build would take by itself.
 struct OptionChange {
-  std::string name, value,
-      fallback;  // "ladder.rungs", JSON text; fallback "" where this build has no such option
+  std::string name;      // "ladder.rungs"
+  std::string value;     // JSON text
+  std::string fallback;  // JSON text; "" where this build has no such option
 };
 /// `profile`: every option of a package, as its provenance holds them.
 std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile);

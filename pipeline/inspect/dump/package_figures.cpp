@@ -4,6 +4,8 @@
 #include <array>
 
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 
 namespace texmesh {
 namespace {

@@ -14,11 +14,11 @@ struct VerifyReport {
   std::uint64_t entries = 0, bytes = 0, meshes = 0, previews = 0, fragments = 0;  // what was looked at
 };
 
-/// Looks at every byte of a package and collects everything that is not as format/SPEC.md says: container
-/// rules, every digest, the documents and their agreement with each other, every GLB (check_glb.h), every
-/// preview and every fragment decoded. Goes on after a finding wherever the rest can still be judged. Same
-/// findings for any number of threads. Throws only for what is not the package's fault: reading fails,
-/// cancelled.
+/// Looks at every byte of a package and collects everything that is not as format/SPEC.md says:
+/// container rules, every digest, the documents and their agreement with each other, every GLB
+/// (check_glb.h), every preview and every fragment decoded. Goes on after a finding wherever the rest
+/// can still be judged. Same findings for any number of threads. Throws only for what is not the
+/// package's fault: reading fails, cancelled.
 VerifyReport verify_package(PackageStore& store, const RunContext& context);
 
 }  // namespace texmesh

@@ -6,21 +6,24 @@
 #include "format/base/finding.h"
 #include "format/base/vec.h"
 #include "format/documents/manifest.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
-#include "pipeline/inspect/provenance.h"
+#include "format/documents/textures.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
+struct Provenance;
+
 // The rules of verify.h, each over documents that have been read or bytes whose place is known. All add
 // findings and go on.
 
-/// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse, the step
-/// function.
+/// Figures of the manifest that must agree: bounds, object height, scales from fine to coarse,
+/// the step function.
 void check_manifest(const Manifest& manifest, Findings& findings);
 
-/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews and first
-/// picture.
+/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews
+/// and first picture.
 void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
 
 /// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
@@ -41,8 +44,8 @@ std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& sca
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
                               Findings& findings);
 
-/// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty list says
-/// nothing.
+/// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty
+/// list says nothing.
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,
                   const ManifestScale& coarser, const std::vector<Vec3d>& coarser_positions,
                   Findings& findings);

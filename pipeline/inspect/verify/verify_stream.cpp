@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "format/container/layout.h"
+#include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 

@@ -5,6 +5,7 @@
 
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
+#include "format/documents/allocation.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/base/parallel.h"

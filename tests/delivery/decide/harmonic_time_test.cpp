@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "delivery/cpp/decide/htc_theorem.h"
+#include "delivery/cpp/decide/upgrades.h"
 #include "delivery/cpp/simulate/simulation.h"
 
 namespace texmesh {

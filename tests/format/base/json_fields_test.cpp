@@ -1,6 +1,7 @@
 #include "format/base/json_fields.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
 

@@ -4,6 +4,7 @@
 
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "tests/format/documents/tables_fixture.h"
 

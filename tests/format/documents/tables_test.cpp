@@ -1,4 +1,6 @@
 #include "format/documents/tables.h"
+#include "format/documents/allocation.h"
+#include "format/documents/quality_table.h"
 
 #include <gtest/gtest.h>
 
@@ -18,22 +20,6 @@ using testing::make_tables;
 PackageTables small() { return {{make_tables(3, 2, 2, 1), make_tables(1, 1, 1, 0)}}; }
 
 Bytes flat(const PackageTables& t) { return write_tables(t); }
-
-TEST(Half, RoundsToNearestEven) {
-  for (std::uint32_t code = 0; code <= kLargestHalf; ++code) {
-    const float v = from_half(static_cast<std::uint16_t>(code));
-    EXPECT_EQ(to_half(v), code);
-    if (code == kLargestHalf) break;
-    const float next = from_half(static_cast<std::uint16_t>(code + 1)),
-                middle = (v + next) / 2;  // exact in float
-    EXPECT_EQ(to_half(middle), code + (code & 1));
-    EXPECT_EQ(to_half(std::nextafter(middle, 0.0f)), code);
-    EXPECT_EQ(to_half(std::nextafter(middle, 1e9f)), code + 1);
-  }
-  EXPECT_EQ(from_half(0x3c00), 1.0f);
-  EXPECT_EQ(from_half(1), 0x1p-24f);
-  EXPECT_EQ(from_half(kLargestHalf), 65504.0f);
-}
 
 TEST(Tables, RoundTrip) {
   const Bytes bytes = write_tables(small());
@@ -276,112 +262,6 @@ TEST(Tables, ReaderTakesNoFractionAboveOne) {
   const Sha256 right = sha256(std::span(bytes).subspan(52));
   std::copy(right.begin(), right.end(), bytes.begin() + 20);
   EXPECT_NO_THROW(read_tables(bytes));
-}
-
-PlaneTables allocation_case(std::uint8_t allocation) {
-  PlaneTables t = make_tables(4, 1, 2, 1);
-  t.allocation = allocation;
-  t.rung_quality = {30, 75};
-  t.covered_texels = {10, 10, 10, 0};
-  t.features = {10, 20, 40, 1000, 7, 7, 7, 0};  // the uncovered fragment's count does not matter
-  t.quality = {80, 40};
-  return t;
-}
-
-TEST(Allocation, EtaIsMinMaxOverCoveredFragments) {
-  const PlaneTables t = allocation_case(0);
-  EXPECT_EQ(eta_of(t, 0), (std::vector<float>{0, 1 / 3.0f, 1, 0}));
-  EXPECT_EQ(eta_of(t, 1), (std::vector<float>{0, 0, 0, 0}));  // all equal
-  EXPECT_NEAR(mean_eta(t, 0), 4 / 9.0, 1e-7);
-  EXPECT_EQ(mean_eta(t, 1), 0);
-}
-
-TEST(Allocation, Equation32) {
-  const PlaneTables t = allocation_case(0);
-  const auto q = quality_of(t, 0, 0.5);
-  EXPECT_FLOAT_EQ(q[0], 50);  // 80 - 60 / 2
-  EXPECT_FLOAT_EQ(q[1], 70);
-  EXPECT_FLOAT_EQ(q[2], 97);  // 110, clipped
-  EXPECT_FLOAT_EQ(quality_of(t, 1, 0)[0], 40);
-}
-
-TEST(Allocation, LogQuantiserForm) {
-  PlaneTables t = allocation_case(1);
-  t.log_width = 0.7f;
-  const auto scale = [](double q) { return q < 50 ? 50 / q : 2 - q / 50; };
-  const auto q = quality_of(t, 0, 4 / 9.0);
-  for (std::size_t f = 0; f < 3; ++f) {
-    const double eta = static_cast<double>(eta_of(t, 0)[f]);
-    EXPECT_NEAR(scale(static_cast<double>(q[f])), scale(80) * std::exp(-(eta - 4 / 9.0) * 0.7), 1e-6);
-  }
-  // Crossing quality 50, where IJG's formula changes: 40 is scale 1.25, half of it is quality 68.75.
-  t.features = {0, 1, 0, 0, 0, 1, 0, 0};
-  t.log_width = static_cast<float>(std::log(2.0));
-  EXPECT_NEAR(quality_of(t, 1, 0)[1], 68.75, 1e-4);
-  EXPECT_NEAR(quality_of(t, 1, 0)[0], 40, 1e-4);
-  EXPECT_NEAR(quality_of(t, 1, 1)[0], 20, 1e-4);
-  t.log_width = 4;
-  EXPECT_EQ(quality_of(t, 1, 0)[1], 97);  // clipped
-  EXPECT_EQ(quality_of(t, 1, 1)[0], 5);
-}
-
-TEST(Allocation, NearestRungInLogQuantiserSpace) {
-  PlaneTables t = allocation_case(1);
-  t.rung_quality = {5, 30, 75, 100};
-  EXPECT_EQ(nearest_rung(t, 1), 0u);
-  EXPECT_EQ(nearest_rung(t, 30), 1u);
-  // scale(30) = 5/3, scale(75) = 1/2: their geometric mean 0.9129 is quality 54.36, not 52.5.
-  EXPECT_EQ(nearest_rung(t, 54.3), 1u);
-  EXPECT_EQ(nearest_rung(t, 54.4), 2u);
-  EXPECT_EQ(nearest_rung(t, 100), 3u);
-  t.rung_quality = {75};
-  EXPECT_EQ(nearest_rung(t, 5), 0u);
-}
-
-TEST(Quality, RoundTripTruncationAndRules) {
-  QualityTable t{{0, 4, 9}, {5, 30}, {}, {}, 6, 256};
-  for (int k = 0; k < 6; ++k) {
-    t.ssim.push_back(1 / (1.1f + static_cast<float>(k)));
-    t.difference.push_back(static_cast<float>(k) / 7);
-  }
-  const std::string json = write_quality(t);
-  const auto bytes = [](const std::string& s) {
-    return std::span(reinterpret_cast<const std::uint8_t*>(s.data()), s.size());
-  };
-  EXPECT_EQ(read_quality(bytes(json)), t);
-  for (std::size_t n = 0; n < json.size(); ++n) EXPECT_THROW(read_quality(bytes(json).first(n)), FormatError);
-  for (std::size_t i = 0; i < json.size(); ++i)
-    for (int bit = 0; bit < 8; ++bit) {
-      std::string damaged = json;
-      damaged[i] = static_cast<char>(damaged[i] ^ (1 << bit));
-      try {
-        write_quality(read_quality(bytes(damaged)));
-      } catch (const FormatError&) {
-      }
-    }
-  const auto refused = [&](auto change) {
-    QualityTable bad = t;
-    change(bad);
-    EXPECT_THROW(write_quality(bad), FormatError);
-  };
-  refused([](QualityTable& q) { q.ssim.pop_back(); });
-  refused([](QualityTable& q) { q.difference[2] = 1.5f; });
-  refused([](QualityTable& q) { q.scales = {0, 9, 4}; });
-  refused([](QualityTable& q) { q.rungs = {0, 30}; });
-  refused([](QualityTable& q) { q.views = 0; });
-}
-
-TEST(Quality, FloatsSurviveTheirDecimalForm) {
-  QualityTable t{{0}, {}, {}, {}, 1, 16};
-  std::uint32_t bits = 1;
-  for (int k = 1; k <= 100; ++k) {
-    t.rungs.push_back(k);
-    bits = bits * 1664525u + 1013904223u;
-    t.ssim.push_back(std::ldexp(static_cast<float>(bits >> 8), -24 - k % 30));
-    t.difference.push_back(std::nextafter(1.0f, 0.0f));
-  }
-  const std::string json = write_quality(t);
-  EXPECT_EQ(read_quality(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size())), t);
 }
 
 }  // namespace

@@ -82,22 +82,22 @@ struct Decoding {
   std::uint32_t raw(std::uint32_t, int n) { return decoder.decode_raw(n); }
 };
 
-TEST(ValueWalk, ResidualsOfEveryLengthSurvive) {
+TEST(ResidualCodec, ResidualsOfEveryLengthSurvive) {
   std::vector<std::int32_t> residuals{0, 1, -1, 2, -2, 3};
   for (int bits = 2; bits <= 24; ++bits)
     for (const std::int32_t r : {(1 << bits) - 1, 1 << bits, -(1 << bits)})
       residuals.push_back(r), residuals.push_back(0);
   for (const int mean : {0, 7, 160, 510}) {
     Encoding out;
-    ValueWalk walk;
-    walk.start(mean);
+    ResidualCodec codec;
+    codec.start(mean);
     for (std::size_t i = 0; i < residuals.size(); ++i) {
-      walk.residual(out, static_cast<int>(i % 3), residuals[i]);
-      walk.same(out, i % 5 == 0);
+      codec.residual(out, static_cast<int>(i % 3), residuals[i]);
+      codec.same(out, i % 5 == 0);
     }
     const auto bytes = out.encoder.finish();
     Decoding in{BitDecoder(bytes)};
-    ValueWalk again;
+    ResidualCodec again;
     again.start(mean);
     for (std::size_t i = 0; i < residuals.size(); ++i) {
       ASSERT_EQ(again.residual(in, static_cast<int>(i % 3), 0), residuals[i]) << mean;
@@ -106,17 +106,17 @@ TEST(ValueWalk, ResidualsOfEveryLengthSurvive) {
   }
 }
 
-TEST(ValueWalk, AnyBytesDecodeToResidualsOfBoundedLength) {
+TEST(ResidualCodec, AnyBytesDecodeToResidualsOfBoundedLength) {
   Random random{5};
   for (int round = 0; round < 50; ++round) {
     std::vector<std::uint8_t> bytes(200);
     for (auto& b : bytes)
       b = static_cast<std::uint8_t>(random.below(round % 2 ? 256 : 2) * (round % 3 ? 1 : 127));
     Decoding in{BitDecoder(bytes)};
-    ValueWalk walk;
-    walk.start(static_cast<int>(random.below(512)));
+    ResidualCodec codec;
+    codec.start(static_cast<int>(random.below(512)));
     for (int i = 0; i < 300; ++i)
-      ASSERT_LE(residual_length(walk.residual(in, i % 4, 0)), ValueWalk::kLongest);
+      ASSERT_LE(residual_length(codec.residual(in, i % 4, 0)), ResidualCodec::kLongest);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <set>
 #include <vector>
 
+#include "format/split/split_source.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh::testing {

@@ -7,6 +7,9 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/split/split_reader.h"
+#include "format/split/split_source.h"
+#include "format/split/split_writer.h"
 #include "tests/format/split/split_fixture.h"
 
 namespace texmesh {
@@ -205,7 +208,7 @@ double error_with(SplitFill fill, const SplitStreamHead& head, const Bytes& stre
   }
   EXPECT_EQ(reader.lost_points().size(), lost);
   EXPECT_GT(lost, 0u);
-  if (again) reader.fill_again();
+  if (again) reader.refill_lost_points();
   EXPECT_EQ(reader.mesh().faces(), whole.faces());
   double sum = 0;
   for (std::size_t p = 0; p < whole.points().size(); ++p)

@@ -32,7 +32,7 @@ Checked check(const Bytes& glb) {
   Findings findings;
   Checked c;
   c.facts = check_glb(glb, "mesh/s00.glb", findings);
-  c.findings = findings.take();
+  c.findings = findings.release();
   for (const Finding& f : c.findings) c.text += to_string(f) + "\n";
   return c;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/documents/size_curve.h"
 #include "format/documents/tables.h"
 #include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"

@@ -8,6 +8,8 @@
 
 #include "format/base/archive.h"
 #include "format/base/sha256.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 #include "stages/base/run_context.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"

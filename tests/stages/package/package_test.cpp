@@ -8,6 +8,7 @@
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
+#include "format/documents/index.h"
 #include "format/documents/package_writer.h"
 #include "stages/base/run_context.h"
 #include "tests/format/documents/tables_fixture.h"

@@ -1,4 +1,5 @@
 // The grid that positions and texture coordinates of all scales lie on.
+#include "pipeline/import/import_images.h"
 #include "tests/stages/scales/scales_checks.h"
 
 namespace texmesh {

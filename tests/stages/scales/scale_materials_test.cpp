@@ -1,4 +1,5 @@
 // Materials, their textures' previews and tangents in the files of the scales.
+#include "pipeline/import/import_images.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "tests/stages/scales/scales_checks.h"

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "format/base/archive.h"
+#include "pipeline/import/import_images.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
 #include "stages/jpeg/jpeg.h"

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "format/base/bytes.h"
+#include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/condition.h"

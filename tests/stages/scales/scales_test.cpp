@@ -1,4 +1,5 @@
 // Scales as glTF files: every codec, every attribute, all of them read back.
+#include "pipeline/import/import_images.h"
 #include "tests/stages/scales/scales_checks.h"
 
 namespace texmesh {

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <map>
 
+#include "format/split/split_reader.h"
+#include "format/split/split_source.h"
+#include "format/split/split_writer.h"
 #include "stages/condition/condition.h"
 #include "stages/scales/scale_grid.h"
 #include "stages/scales/scales.h"

@@ -33,7 +33,7 @@ Skeleton run(const Mesh& m, const SkeletonizationOptions& options = kQuick, int 
 std::vector<std::uint8_t> bytes(const Skeleton& s) {
   ArchiveWriter writer;
   writer(s);
-  return writer.take();
+  return writer.finish();
 }
 
 Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {

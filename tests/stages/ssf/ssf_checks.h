@@ -23,7 +23,7 @@ inline ScaleMap run(const Mesh& m, const SsfOptions& options = {}, int threads =
 inline std::vector<std::uint8_t> bytes(const ScaleMap& map) {
   ArchiveWriter writer;
   writer(map);
-  return writer.take();
+  return writer.finish();
 }
 
 inline std::size_t at_least(const ScaleMap& map, int scale) {

@@ -6,6 +6,7 @@
 #include "pipeline/extract/budget/mesh_candidates.h"
 #include "pipeline/extract/budget/quality_search.h"
 #include "pipeline/extract/glb/fit_normals.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 #include "stages/condition/condition.h"
 #include "stages/scales/scales.h"
 #include "tests/support/meshes.h"

@@ -33,7 +33,7 @@ std::string faults(const Bytes& glb) {
   Findings findings;
   check_glb(glb, "debug.glb", findings);
   std::string text;
-  for (const Finding& f : findings.take()) text += to_string(f) + "\n";
+  for (const Finding& f : findings.release()) text += to_string(f) + "\n";
   return text;
 }
 

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/option_changes.h"

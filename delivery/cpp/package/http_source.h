@@ -1,0 +1,62 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "delivery/cpp/package/http_link.h"
+#include "format/base/bytes.h"
+#include "format/container/container.h"
+#include "format/documents/entry_ref.h"
+
+namespace texmesh {
+
+/// Ranges of a container, from the first of its servers that delivers them.
+class HttpSource final : public ByteSource {
+ public:
+  /// `first`: the answer of urls[0] to a request for the first kBootstrapBytes, or a part of it.
+  HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpLink> link, HttpAnswer first);
+  std::string name() const override { return shown_url(urls_.front()); }
+  std::uint64_t size() override { return *total_; }
+  const std::string& etag() const { return etag_; }
+
+  Bytes read(std::uint64_t offset, std::uint64_t bytes) override;
+
+  /// Fetches all of these at once.
+  void prefetch(std::vector<ByteRange> ranges);
+
+ private:
+  struct Piece {
+    std::uint64_t offset = 0, bytes = 0;
+    Bytes got;
+    std::optional<HttpRetries> retries;
+  };
+
+  void require(std::uint64_t offset, std::uint64_t bytes) const;
+  /// `pieces` and what is not known of a range behind them; the last one grows where it is near.
+  std::vector<Piece> missing(std::uint64_t offset, std::uint64_t bytes, std::vector<Piece> pieces) const;
+  /// Where what is known at `at` ends (`at` itself when nothing is), and where the next known part begins.
+  std::pair<std::uint64_t, std::uint64_t> known_from(std::uint64_t at) const;
+  void store(std::uint64_t begin, Bytes bytes);
+  Bytes copy(std::uint64_t offset, std::uint64_t bytes) const;
+
+  /// What has come is kept, whether all comes or not.
+  void fetch(std::vector<Piece> pieces);
+  void start(std::size_t number, const Piece& p);
+  /// Whether the piece is complete; otherwise it is to be asked for again.
+  bool accept(Piece& p, HttpAnswer& a);
+
+  void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes);
+
+  std::vector<std::string> urls_;
+  std::size_t at_ = 0;  // the server that is asked
+  std::shared_ptr<HttpLink> link_;
+  std::optional<std::uint64_t> total_;
+  std::string etag_;                      // of the server that is asked
+  std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
+};
+
+}  // namespace texmesh

@@ -1,0 +1,21 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "format/documents/tables.h"
+
+namespace texmesh {
+
+/// Bytes that the fragment's stream would have at a quality that no rung has: monotone cubic interpolation
+/// of log bytes between the rungs (exact there) along the plane's knots, constant outside them; 0 when it
+/// is not stored.
+double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality);
+/// The knots' positions with which interpolated_bytes() of a stream of `rung_bytes` [R] > 0 at `rung_quality`
+/// is `knot_bytes` at `knot_quality`, as far as they lie between those of the rungs around them. Where these
+/// do not rise the knots lie as without any. Same bits everywhere.
+std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
+                                  const std::vector<double>& rung_bytes,
+                                  const std::vector<std::uint8_t>& knot_quality,
+                                  const std::vector<double>& knot_bytes);
+
+}  // namespace texmesh

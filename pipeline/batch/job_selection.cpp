@@ -1,0 +1,146 @@
+#include "pipeline/batch/job_selection.h"
+
+#include <filesystem>
+
+#include "pipeline/io/core_path.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What a model costs that was never compiled: measured on the sample scans, rounded up.
+constexpr std::uint64_t kBaseMemory_bytes = 300'000'000, kMemoryPerByte = 10;
+constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
+
+/// Another build of the tool looks at every model again; the cache then says what has really changed.
+std::string tool_seed() {
+  const auto stamp = stamp_of(core_executable());
+  return stamp ? std::to_string(stamp->inode) + " " + std::to_string(stamp->bytes) + " " +
+                     std::to_string(stamp->modified_ns)
+               : "";
+}
+
+/// Failures that only another machine or another moment explains are not remembered.
+bool is_lasting(const WorkerReport& r) {
+  return r.result == ModelResult::kFailed &&
+         (r.error_kind == "input" || r.error_kind == "format" || r.error_kind == "stage");
+}
+
+}  // namespace
+
+JobSelection::JobSelection(const BatchPlan& plan, const RunSettings& settings)
+    : plan_(plan),
+      settings_(settings),
+      memo_(settings.cache.folder, plan.outputs),
+      records_(plan.models.size()),
+      tool_seed_(tool_seed()) {}
+
+const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>& profile) {
+  const auto [it, fresh] = requests_.try_emplace(profile.get());
+  if (fresh) {
+    Key key("compile", 1);
+    key.add("tool", tool_seed_).add("profile", *profile).add("strict", settings_.strict ? "1" : "0");
+    it->second = key.digest();
+  }
+  return it->second;
+}
+
+void JobSelection::select(std::vector<WorkerReport>& reports) {
+  for (std::size_t i = 0; i < plan_.models.size(); ++i) {
+    const PlannedModel& m = plan_.models[i];
+    MemoRecord& record = records_[i];
+    const bool remembered = memo_.find(m.output, record);
+    bool refreshed = false;
+    if (remembered && record.request == request_of(m.profile) && !(record.failed && settings_.retry_failed) &&
+        still_holds(record, m.input, m.output, refreshed)) {
+      if (refreshed) memo_.set(m.output, record);
+      recall(record, reports[i]);
+      record = {};
+      continue;
+    }
+    add_job(i, remembered);
+  }
+}
+
+void JobSelection::recall(const MemoRecord& record, WorkerReport& r) {
+  has_recalled_failure_ = has_recalled_failure_ || record.failed;
+  r.result = record.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
+  r.package_bytes = record.package_bytes;
+  if (!settings_.depfile.empty()) r.files = record.files;
+  if (record.failed && record.error.size() == 6) {
+    r.error_kind = record.error[0];
+    r.error_file = record.error[1];
+    r.error_place = record.error[2];
+    r.error_expected = record.error[3];
+    r.error_found = record.error[4];
+    r.error_message = record.error[5];
+  }
+}
+
+void JobSelection::add_job(std::size_t i, bool remembered) {
+  const PlannedModel& m = plan_.models[i];
+  MemoRecord& record = records_[i];
+  WorkerJob job;
+  job.input = m.input;
+  job.output = m.output;
+  job.profile = m.profile;
+  job.cache = settings_.cache;
+  job.strict = settings_.strict;
+  job.explain = settings_.explain;
+  job.forecast = settings_.dry_run;
+  if (remembered) {
+    for (FileRequest& f : record.files)
+      if (f.found && f.stamp.is_settled(record.looked_at_ns)) job.known.push_back(std::move(f));
+    job.earlier_keys = std::move(record.keys);
+    record.files = {};  // of 100,000 models there is no room for both
+    record.keys = {};
+  }
+  if (remembered && record.peak_memory_bytes > 0) {
+    job.predicted_memory_bytes = record.peak_memory_bytes;
+    job.predicted_s = record.seconds;
+  } else {
+    std::error_code ec;
+    const auto size = fs::file_size(m.input, ec);
+    const std::uint64_t bytes = ec ? 0 : size;
+    job.predicted_memory_bytes = kBaseMemory_bytes + kMemoryPerByte * bytes;
+    job.predicted_s = kBaseSeconds + kSecondsPerByte * static_cast<double>(bytes);
+  }
+  jobs_.push_back(std::move(job));
+  model_of_job_.push_back(i);
+}
+
+void JobSelection::remember(std::size_t job, const WorkerReport& report) {
+  const std::size_t i = model_of_job_[job];
+  if (report.files.empty() || (!report.ok() && !is_lasting(report))) return;
+  const PlannedModel& m = plan_.models[i];
+  MemoRecord record;
+  record.request = request_of(m.profile);
+  record.failed = !report.ok();
+  record.files = report.files;
+  record.peak_memory_bytes = report.peak_memory_bytes;
+  record.seconds = report.seconds;
+  record.keys = report.keys;
+  const bool known = records_[i].peak_memory_bytes > 0;
+  // A run that found everything in the cache, or that failed on the way, says little about what the model
+  // costs, and a failure nothing about what the stages that it did not reach would run with.
+  if (known && (!report.ok() || report.stages_hit > report.stages_ran)) {
+    record.peak_memory_bytes = records_[i].peak_memory_bytes;
+    record.seconds = records_[i].seconds;
+  }
+  if (!report.ok()) record.keys.insert(jobs_[job].earlier_keys.begin(), jobs_[job].earlier_keys.end());
+  if (report.ok()) {
+    const auto stamp = stamp_of(m.output);
+    if (!stamp) return;
+    record.package_stamp = *stamp;
+    record.package_digest = report.package_digest;
+    record.package_bytes = report.package_bytes;
+  } else {
+    record.error = {report.error_kind,     report.error_file,  report.error_place,
+                    report.error_expected, report.error_found, report.error_message};
+  }
+  record.looked_at_ns = wall_clock_ns();
+  memo_.set(m.output, record);
+}
+
+}  // namespace texmesh

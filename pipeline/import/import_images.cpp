@@ -1,0 +1,113 @@
+#include "pipeline/import/import_images.h"
+
+#include <algorithm>
+
+#include "format/base/errors.h"
+#include "pipeline/import/text_scan.h"
+#include "pipeline/io/uri.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/image_metadata.h"
+
+namespace texmesh {
+namespace {
+
+std::string base_name(const std::string& uri) {
+  const std::size_t slash = uri.find_last_of('/');
+  return slash == std::string::npos ? uri : uri.substr(slash + 1);
+}
+
+bool extension_fits(const std::string& extension, ImageFormat format) {
+  switch (format) {
+    case ImageFormat::kJpeg:
+      return extension == "jpg" || extension == "jpeg" || extension == "jpe" || extension == "jfif";
+    case ImageFormat::kPng:
+      return extension == "png";
+    case ImageFormat::kTiff:
+      return extension == "tif" || extension == "tiff";
+    case ImageFormat::kWebp:
+      return extension == "webp";
+    case ImageFormat::kExr:
+      return extension == "exr";
+  }
+  return false;
+}
+
+void note_foreign_extension(Model& model, const Image& image, const std::string& place) {
+  static constexpr std::string_view kKnown[] = {"jpg", "jpeg", "jpe", "jfif", "png", "tif", "tiff", "webp",
+                                                "exr", "tga",  "bmp", "gif",  "ppm", "pgm", "hdr",  "dds"};
+  const std::string extension = lower_extension(image.name);
+  if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) return;
+  if (!extension_fits(extension, image.format))
+    add_info(model.notes, "image-extension", place,
+             image.name + " holds a " + image_format_name(image.format) + " and is read as one");
+}
+
+/// What an image says beside its pixels: what is done about it, and that a user should know.
+void apply_metadata(Model& model, Image& image, const std::string& place, const ImportOptions& options) {
+  const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
+  image.honour_profile = options.colour_profiles != ProfilePolicy::kIgnore;
+  const char* what = metadata.damaged_profile        ? "a damaged ICC profile"
+                     : !metadata.icc_profile.empty() ? "an ICC profile"
+                     : metadata.gamma > 0            ? "a gamma"
+                                                     : nullptr;
+  if (what && !image.honour_profile)
+    add_info(model.notes, "colour-profile-ignored", place,
+             image.name + " has " + what + " that is ignored: its values are taken as sRGB");
+  if (what && image.honour_profile)
+    add_info(model.notes, "colour-profile", place,
+             image.name + " has " + what +
+                 (metadata.damaged_profile ? ": where it gives colours it is refused"
+                                           : ": where it gives colours they are converted to sRGB"));
+  if (metadata.other_primaries)
+    add_warning(model.notes, "colour-primaries-ignored", place,
+                image.name + " names primaries other than sRGB's without a profile; they are ignored");
+  if (metadata.cmyk && metadata.icc_profile.empty())
+    add_warning(model.notes, "cmyk-image", place,
+                image.name +
+                    " is CMYK without a profile; its inks are taken as ideal ones, so where it gives colours "
+                    "they may differ from those of its maker");
+  if (metadata.more_pictures)
+    add_info(model.notes, "more-pictures", place,
+             image.name + " holds more than one picture; the first is read");
+  if (metadata.orientation != 1)
+    add_warning(model.notes, "exif-orientation", place,
+                image.name + " asks to be turned for display (EXIF orientation " +
+                    std::to_string(metadata.orientation) +
+                    "); texture coordinates count from its first stored pixel, so it is not turned");
+}
+
+}  // namespace
+
+std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
+                             const std::string& file_name, const std::string& place,
+                             const ImportOptions& options) {
+  for (std::size_t i = 0; i < model.images.size(); ++i)
+    if (model.images[i].bytes == bytes) return static_cast<std::int32_t>(i);
+  if (model.images.size() >= static_cast<std::size_t>(options.max_images))
+    throw InputError(file_name, place, "at most " + std::to_string(options.max_images) + " images", "more");
+  ImageLimits limits;
+  limits.max_pixels = static_cast<std::uint64_t>(options.max_image_pixels);
+  try {
+    model.images.push_back(probe_image(base_name(name), std::move(bytes), limits));
+  } catch (const InputError& e) {
+    throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
+                     e.expected(), e.found());
+  }
+  note_foreign_extension(model, model.images.back(), place);
+  apply_metadata(model, model.images.back(), place, options);
+  return static_cast<std::int32_t>(model.images.size() - 1);
+}
+
+std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
+                       const std::string& place, const ImportOptions& options) {
+  check_relative_name(uri, file_name, place);
+  auto bytes = resolver.read(uri, static_cast<std::uint64_t>(options.max_file_bytes));
+  if (bytes) return add_image_bytes(model, uri, std::move(*bytes), file_name, place, options);
+  const std::string text = "texture " + uri + " not found; the material stays without it";
+  const bool is_noted =
+      std::any_of(model.notes.begin(), model.notes.end(), [&text](const Note& n) { return n.text == text; });
+  if (!is_noted) add_warning(model.notes, "missing-texture", place, text);
+  return -1;
+}
+
+}  // namespace texmesh

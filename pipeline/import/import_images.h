@@ -1,0 +1,20 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "format/model/model.h"
+#include "pipeline/import/import.h"
+
+namespace texmesh {
+
+/// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index
+/// returned; -1 and a warning "missing-texture" when it is not there. Content that no allow-listed reader
+/// takes throws InputError. Notes say what becomes of colour profiles, CMYK and EXIF orientation.
+std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
+                       const std::string& place, const ImportOptions& options);
+std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
+                             const std::string& file_name, const std::string& place,
+                             const ImportOptions& options);
+
+}  // namespace texmesh

@@ -1,0 +1,13 @@
+#pragma once
+#include <vector>
+
+#include "format/model/model.h"
+
+namespace texmesh {
+
+/// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
+/// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
+/// box's centre, rounded to a float-exact value.
+void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions);
+
+}  // namespace texmesh

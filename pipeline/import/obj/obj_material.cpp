@@ -1,0 +1,356 @@
+#include "pipeline/import/obj/obj_material.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/errors.h"
+#include "pipeline/import/combine_images.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/text_scan.h"
+#include "stages/image/decode_image.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kMaxMaterials = 65000;
+
+// Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a
+// file may be named "1".
+std::vector<double> leading_numbers(std::string_view& rest, std::size_t most) {
+  std::vector<double> numbers;
+  while (numbers.size() < most) {
+    std::string_view after = rest;
+    double x = 0;
+    if (!parse_number(next_token(after), x) || trim(after).empty()) break;
+    numbers.push_back(x);
+    rest = after;
+  }
+  return numbers;
+}
+
+double or_default(double x, double fallback) { return std::isfinite(x) ? x : fallback; }
+
+// One option with its arguments; false when the text does not begin with an option.
+bool consume_option(std::string_view& rest, MtlTexture& texture) {
+  std::string_view after = rest;
+  const std::string option = lower(next_token(after));
+  if (option.size() < 2 || option[0] != '-') return false;
+  if (option == "-s" || option == "-o" || option == "-t") {
+    const std::vector<double> n = leading_numbers(after, 3);
+    Vec2d& target = option == "-s" ? texture.scale : texture.offset;
+    if (!n.empty() && option != "-t") target.x = or_default(n[0], target.x);
+    if (n.size() > 1 && option != "-t") target.y = or_default(n[1], target.y);
+  } else if (option == "-mm") {
+    leading_numbers(after, 2);
+  } else if (option == "-bm") {
+    double bump = 1;
+    if (parse_number(next_token(after), bump)) texture.bump = or_default(bump, 1);
+  } else if (option == "-clamp") {
+    texture.clamp = same_word(next_token(after), "on");
+  } else if (option == "-blendu" || option == "-blendv" || option == "-boost" || option == "-cc" ||
+             option == "-imfchan" || option == "-texres" || option == "-type" || option == "-colorspace") {
+    next_token(after);
+  } else {
+    return false;
+  }
+  rest = after;
+  return true;
+}
+
+std::optional<MtlTexture> read_texture(std::string_view rest, std::size_t line) {
+  MtlTexture texture;
+  texture.line = line;
+  while (consume_option(rest, texture)) {
+  }
+  std::string_view file = trim(rest);
+  if (file.size() >= 2 && file.front() == '"' && file.back() == '"')
+    file = trim(file.substr(1, file.size() - 2));
+  if (file.empty()) return std::nullopt;
+  texture.file = file;
+  std::replace(texture.file.begin(), texture.file.end(), '\\', '/');
+  return texture;
+}
+
+class MtlReader {
+ public:
+  MtlReader(const std::string& name, std::string_view text, Notes& notes)
+      : name_(name), lines_(text), notes_(notes) {}
+
+  MtlFile read() {
+    std::string_view line;
+    while (lines_.next(line)) {
+      std::string_view rest = line;
+      const std::string_view word = next_token(rest);
+      if (!word.empty() && word.front() == '#') {
+        if (lower(line.substr(0, 200)).find("meshlab") != std::string::npos) file_.by_meshlab = true;
+      } else if (same_word(word, "newmtl")) {
+        if (file_.materials.size() >= kMaxMaterials)
+          throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxMaterials) + " materials",
+                           "more");
+        file_.materials.emplace_back().name = trim(rest);
+      } else if (!file_.materials.empty()) {
+        statement(lower(word), rest, file_.materials.back());
+      }
+    }
+    return std::move(file_);
+  }
+
+ private:
+  std::optional<double> number(std::string_view rest) {
+    double x = 0;
+    std::string_view token = next_token(rest);
+    if (token == "-halo") token = next_token(rest);  // `d -halo 0.5`
+    if (parse_number(token, x) && std::isfinite(x)) return x;
+    warn(token);
+    return std::nullopt;
+  }
+
+  std::optional<Vec3d> colour(std::string_view rest) {
+    Vec3d c;
+    for (int i = 0; i < 3; ++i) {
+      const std::string_view token = next_token(rest);
+      if (token.empty() && i > 0) {
+        c[i] = c[0];  // `Kd 0.5` is grey
+      } else if (!parse_number(token, c[i]) || !std::isfinite(c[i])) {
+        warn(token);
+        return std::nullopt;
+      }
+    }
+    return c;
+  }
+
+  void warn(std::string_view token) {
+    if (warned_) return;
+    warned_ = true;
+    add_warning(notes_, "odd-material", name_ + " " + lines_.place(),
+                "expected a number, found " + quote(token));
+  }
+
+  void statement(const std::string& word, std::string_view rest, MtlMaterial& m) {
+    if (word == "kd")
+      m.diffuse = colour(rest);
+    else if (word == "ke")
+      m.emission = colour(rest);
+    else if (word == "d")
+      m.opacity = number(rest);
+    else if (word == "tr")
+      m.transparency = number(rest);
+    else if (word == "pr")
+      m.roughness = number(rest);
+    else if (word == "pm")
+      m.metallic = number(rest);
+    else if (word == "map_kd")
+      m.map_kd = read_texture(rest, lines_.number());
+    else if (word == "map_ka")
+      m.map_ka = read_texture(rest, lines_.number());
+    else if (word == "map_ke" || word == "map_emissive")
+      m.map_ke = read_texture(rest, lines_.number());
+    else if (word == "map_d" || word == "map_opacity")
+      m.map_d = read_texture(rest, lines_.number());
+    else if (word == "map_pr")
+      m.map_pr = read_texture(rest, lines_.number());
+    else if (word == "map_pm")
+      m.map_pm = read_texture(rest, lines_.number());
+    else if (word == "map_ks" || word == "map_ns" || word == "map_ps" || word == "disp" ||
+             word == "map_disp" || word == "decal" || word == "refl" || word == "map_refl")
+      m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
+    else if (word == "norm" || word == "map_kn")
+      m.norm = read_texture(rest, lines_.number());
+    else if (word == "bump" || word == "map_bump")
+      m.bump = read_texture(rest, lines_.number());
+  }
+
+  const std::string& name_;
+  LineReader lines_;
+  Notes& notes_;
+  MtlFile file_;
+  bool warned_ = false;
+};
+
+// ---- what the pictures show
+
+// Visits up to about 256 x 256 texels spread over the picture.
+template <class F>
+void sample(const Pixels& pixels, F&& f) {
+  const std::uint32_t step_x = std::max(1u, pixels.width_px / 256),
+                      step_y = std::max(1u, pixels.height_px / 256);
+  for (std::uint32_t y = 0; y < pixels.height_px; y += step_y)
+    for (std::uint32_t x = 0; x < pixels.width_px; x += step_x) f(pixels.at(x, y));
+}
+
+// Tangent-space normals point outwards: z (blue) is high nearly everywhere, x and y average to the middle.
+bool looks_like_normal_map(const Image& image) {
+  if (image.channels < 3) return false;
+  const Pixels pixels = decode_image(image);
+  std::uint64_t n = 0, blue = 0, sum[3] = {0, 0, 0};
+  sample(pixels, [&](const std::uint8_t* p) {
+    ++n;
+    for (int c = 0; c < 3; ++c) sum[c] += p[c];
+    blue += p[2] >= 128 && p[2] >= p[0] && p[2] >= p[1];
+  });
+  const auto near_middle = [n](std::uint64_t s) { return s >= 88 * n && s <= 168 * n; };
+  return blue * 10 >= n * 8 && near_middle(sum[0]) && near_middle(sum[1]) && sum[2] >= 160 * n;
+}
+
+AlphaMode alpha_of(const Image& image) {
+  if (image.channels != 2 && image.channels != 4) return AlphaMode::kOpaque;
+  const Pixels pixels = decode_image(image);
+  std::uint64_t n = 0, opaque = 0, between = 0;
+  const std::size_t step = pixels.channels;
+  for (std::size_t i = step - 1; i < pixels.data.size(); i += step) {
+    ++n;
+    opaque += pixels.data[i] >= 250;
+    between += pixels.data[i] > 10 && pixels.data[i] < 250;
+  }
+  if (opaque == n) return AlphaMode::kOpaque;
+  return between * 20 <= n ? AlphaMode::kMask : AlphaMode::kBlend;
+}
+
+// ---- to glTF
+
+// uv' = scale * uv + offset with v upwards, said with v downwards.
+UvTransform transform_of(const MtlTexture& texture) {
+  UvTransform t;
+  t.scale = {static_cast<float>(texture.scale.x), static_cast<float>(texture.scale.y)};
+  t.offset = {static_cast<float>(texture.offset.x),
+              static_cast<float>(1 - texture.scale.y - texture.offset.y)};
+  return t;
+}
+
+struct Converter {
+  const MtlMaterial& mtl;
+  const std::string& mtl_name;
+  Model& model;
+  Resolver& resolver;
+  const ImportOptions& options;
+
+  std::string place(const MtlTexture& t) const {
+    return "material " + quote(mtl.name) + " line " + std::to_string(t.line);
+  }
+
+  TextureRef texture(const std::optional<MtlTexture>& t) const {
+    TextureRef ref;
+    if (!t) return ref;
+    ref.image = add_image(model, t->file, resolver, mtl_name, place(*t), options);
+    if (!ref.used()) return {};
+    ref.transform = transform_of(*t);
+    if (t->clamp) ref.wrap_s = ref.wrap_t = Wrap::kClamp;
+    return ref;
+  }
+
+  const Image& image_of(const TextureRef& ref) const {
+    return model.images[static_cast<std::size_t>(ref.image)];
+  }
+
+  void base_colour(Material& out) const {
+    out.base_colour_texture = texture(mtl.map_kd ? mtl.map_kd : mtl.map_ka);
+    if (mtl.diffuse && (!out.base_colour_texture.used() || options.obj_kd == KdPolicy::kMultiply)) {
+      const Vec3d kd = *mtl.diffuse;
+      out.base_colour = {linear_from_srgb(kd.x), linear_from_srgb(kd.y), linear_from_srgb(kd.z), 1};
+    }
+  }
+
+  static bool same_place(const MtlTexture& a, const MtlTexture& b) {
+    return a.scale == b.scale && a.offset == b.offset && a.clamp == b.clamp;
+  }
+
+  void separate_alpha(Material& out) const {
+    const TextureRef alpha = texture(mtl.map_d);
+    if (!alpha.used()) return;
+    if (mtl.map_kd && !same_place(*mtl.map_kd, *mtl.map_d)) {
+      add_warning(model.notes, "separate-alpha-map", mtl_name + " " + place(*mtl.map_d),
+                  "map_d lies elsewhere than map_Kd (-s, -o, -clamp) and is not used");
+      return;
+    }
+    const std::int32_t colour = out.base_colour_texture.image;
+    out.base_colour_texture = alpha;
+    out.base_colour_texture.image = combine_alpha(model, colour, alpha.image);
+    out.alpha_mode = AlphaMode::kBlend;
+  }
+
+  void roughness_metallic(Material& out) const {
+    TextureRef rough = texture(mtl.map_pr), metal = texture(mtl.map_pm);
+    if (rough.used() && metal.used() && !same_place(*mtl.map_pr, *mtl.map_pm)) {
+      add_warning(model.notes, "separate-metallic-map", mtl_name + " " + place(*mtl.map_pm),
+                  "map_Pm lies elsewhere than map_Pr (-s, -o, -clamp) and is not used");
+      metal = {};
+    }
+    if (!rough.used() && !metal.used()) return;
+    out.metallic_roughness_texture = rough.used() ? rough : metal;
+    out.metallic_roughness_texture.image = combine_roughness_metallic(model, rough.image, metal.image);
+    if (rough.used())
+      out.roughness = 1;  // the map says it all: Pr beside it is what viewers without maps show
+    if (metal.used()) out.metallic = 1;
+  }
+
+  double opacity(bool by_meshlab) const {
+    if (mtl.opacity) return *mtl.opacity;
+    if (!mtl.transparency) return 1;
+    if (by_meshlab) return *mtl.transparency;
+    if (*mtl.transparency < 1) return 1 - *mtl.transparency;
+    add_info(model.notes, "transparency-read-as-opaque", mtl_name,
+             "material " + quote(mtl.name) + ": Tr 1 without d is read as opaque");
+    return 1;
+  }
+
+  void alpha(Material& out, bool by_meshlab) const {
+    const double d = opacity(by_meshlab);
+    out.base_colour.w = static_cast<float>(std::clamp(d, 0.0, 1.0));
+    if (d < 1) out.alpha_mode = AlphaMode::kBlend;
+    if (d <= 0)
+      add_warning(model.notes, "invisible-material", mtl_name,
+                  "material " + quote(mtl.name) + " has no opacity");
+    if (mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file)) return separate_alpha(out);
+    if (!out.base_colour_texture.used()) return;
+    const AlphaMode mode = alpha_of(image_of(out.base_colour_texture));
+    if (out.alpha_mode == AlphaMode::kOpaque) out.alpha_mode = mode;
+  }
+
+  void normal(Material& out) const {
+    const std::optional<MtlTexture>& source = mtl.norm ? mtl.norm : mtl.bump;
+    if (!source) return;
+    const TextureRef ref = texture(source);
+    if (!ref.used()) return;
+    const Image& image = image_of(ref);
+    if (mtl.norm ? image.channels >= 3 : looks_like_normal_map(image)) {
+      out.normal_texture = ref;
+      out.normal_scale = static_cast<float>(source->bump);
+    } else {
+      add_info(model.notes, "height-map", mtl_name + " " + place(*source),
+               source->file + " is no normal map; height maps are not shown");
+    }
+  }
+
+  void emission(Material& out) const {
+    out.emissive_texture = texture(mtl.map_ke);
+    const Vec3d ke = mtl.emission.value_or(Vec3d{});
+    out.emissive = {linear_from_srgb(ke.x), linear_from_srgb(ke.y), linear_from_srgb(ke.z)};
+    if (out.emissive_texture.used() && out.emissive == Vec3f{}) out.emissive = {1, 1, 1};
+  }
+};
+
+}  // namespace
+
+MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes) {
+  return MtlReader(name, text_of(bytes), notes).read();
+}
+
+Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,
+                           Model& model, Resolver& resolver, const ImportOptions& options) {
+  Material out = scan_material(mtl.name);
+  const Converter converter{mtl, mtl_name, model, resolver, options};
+  converter.base_colour(out);
+  converter.alpha(out, file.by_meshlab);
+  converter.normal(out);
+  converter.emission(out);
+  if (mtl.roughness) out.roughness = static_cast<float>(std::clamp(*mtl.roughness, 0.0, 1.0));
+  if (mtl.metallic) out.metallic = static_cast<float>(std::clamp(*mtl.metallic, 0.0, 1.0));
+  converter.roughness_metallic(out);
+  for (const std::string& statement : mtl.left_out)
+    add_warning(model.notes, "unsupported-map", mtl_name + " material " + quote(mtl.name),
+                statement + " has no counterpart in glTF and is left out");
+  return out;
+}
+
+}  // namespace texmesh

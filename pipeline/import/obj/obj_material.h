@@ -1,0 +1,57 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/model/model.h"
+#include "pipeline/import/import.h"
+
+namespace texmesh {
+
+/// A texture statement of an MTL: options come before the file name, which runs to the end of the
+/// line, blanks included.
+struct MtlTexture {
+  std::string file;  // '/' for '\'
+  std::size_t line = 0;
+  Vec2d scale{1, 1}, offset{0, 0};  // -s, -o: uv' = scale * uv + offset, v upwards
+  bool clamp = false;               // -clamp on
+  double bump = 1;                  // -bm
+};
+
+struct MtlMaterial {
+  std::string name;
+  std::optional<Vec3d> diffuse, emission;     // Kd, Ke as written
+  std::optional<double> opacity;              // d
+  std::optional<double> transparency;         // Tr as written
+  std::optional<double> roughness, metallic;  // Pr, Pm
+  std::optional<MtlTexture> map_kd, map_ka, map_ke, map_d, map_pr, map_pm, bump, norm;
+  std::vector<std::string> left_out;  // texture statements without a counterpart: "map_Ks line 7"
+};
+
+struct MtlFile {
+  std::vector<MtlMaterial> materials;
+  bool by_meshlab = false;  // its Tr is an opacity
+};
+
+/// Never fails: what is no statement is ignored, a number that is none leaves the default (Kd and the like
+/// are looks, not geometry) with one warning.
+MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes);
+
+/// The glTF material, images added to the model. Decisions where MTL is vague:
+/// - Kd and Ke are sRGB, as the viewers that made MTL common show them. Kd beside a texture follows
+///   options.obj_kd.
+/// - `d` is opacity. `Tr` is transparency, but opacity in files that MeshLab wrote. Tr 1 without d, literally
+///   an invisible material, is opaque with a note: exporters mean that.
+/// - The alpha of map_Kd counts where the image has any that is not opaque: cut-out where nearly all texels
+///   are either or, blended otherwise. map_d becomes the alpha of map_Kd's image, blended.
+/// - map_Pr and map_Pm become one image, roughness in green and metallic in blue. Where two such images do
+///   not have the same -s, -o and -clamp the second is left out with a warning.
+/// - map_Ks, map_Ns, disp, decal and refl have no counterpart: a warning names them.
+/// - norm is a normal map. bump and map_Bump are one when the picture is the typical blue, else a height map,
+///   which glTF cannot show: a note.
+/// - -clamp on clamps; everything else repeats.
+Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,
+                           Model& model, Resolver& resolver, const ImportOptions& options);
+
+}  // namespace texmesh

@@ -1,0 +1,180 @@
+#include "pipeline/inspect/dump/dump_textures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "format/documents/allocation.h"
+#include "pipeline/inspect/dump/dump_cells.h"
+#include "pipeline/inspect/dump/package_figures.h"
+#include "pipeline/io/text_table.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kGammas = 21;
+
+/// Where texture detail lies: a digit per fragment, eta of S_0 in tenths, '.' where nothing is stored.
+std::string eta_map(const PlaneTables& t, const std::vector<float>& eta) {
+  std::string map;
+  for (std::size_t i = 0; i < t.fragment_count(); ++i) {
+    const int tenth = std::clamp(static_cast<int>(10 * eta[i]), 0, 9);
+    map += i % t.columns == 0 ? "  " : " ";
+    map += t.covered_texels[i] == 0 ? '.' : static_cast<char>('0' + tenth);
+    if (i % t.columns == t.columns - 1) map += '\n';
+  }
+  return map;
+}
+
+std::string allocation_text(const PlaneTables& t, std::optional<double> gamma) {
+  TextTable table;
+  for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB",
+                             "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
+    table.column(header);
+  for (std::uint32_t s = 0; s <= t.scales; ++s) {
+    const AllocationFigures f = allocation_figures(t, s, gamma);
+    std::vector<std::string> row{fmt::format("S_{}", s),   fixed(static_cast<double>(t.quality[s]), 1),
+                                 fixed(f.gamma, 3),        fixed(f.quality_min, 1),
+                                 fixed(f.quality_mean, 1), fixed(f.quality_max, 1),
+                                 kilobytes(f.bytes)};
+    for (std::size_t g = 0; g < kGammas; g += 5) row.push_back(kilobytes(t.total_bytes[s * kGammas + g]));
+    table.row(std::move(row));
+  }
+  return table.text();
+}
+
+/// q_i(x, y) and d_i(x, y) of every stored fragment and scale at one Gamma.
+std::string gamma_text(const PlaneTables& t, double gamma) {
+  TextTable table;
+  table.column("fragment");
+  std::vector<AllocationFigures> scales;
+  for (std::uint32_t s = 0; s <= t.scales; ++s) {
+    table.column(fmt::format("q_{}", s));
+    table.column(fmt::format("d_{} B", s));
+    scales.push_back(allocation_figures(t, s, gamma));
+  }
+  for (const std::uint16_t i : t.order) {
+    std::vector<std::string> row{std::to_string(i)};
+    for (const AllocationFigures& f : scales) {
+      row.push_back(fixed(static_cast<double>(f.fragment_quality[i]), 1));
+      row.push_back(std::to_string(f.fragment_bytes[i]));
+    }
+    table.row(std::move(row));
+  }
+  return fmt::format(
+             "  fragments by falling importance at Gamma {}: quality, 0 = skipped, and bytes at S_i\n",
+             shortest(gamma)) +
+         table.text();
+}
+
+std::string measured_text(const QualityTable& q) {
+  TextTable table;
+  table.column("scale");
+  for (const int rung : q.rungs) table.column(fmt::format("SSIM q{}", rung));
+  for (const int rung : q.rungs) table.column(fmt::format("diff q{}", rung));
+  for (std::size_t s = 0; s < q.scales.size(); ++s) {
+    std::vector<std::string> row{fmt::format("S_{}", q.scales[s])};
+    for (std::size_t r = 0; r < q.rungs.size(); ++r)
+      row.push_back(fixed(static_cast<double>(q.ssim[s * q.rungs.size() + r]), 4));
+    for (std::size_t r = 0; r < q.rungs.size(); ++r)
+      row.push_back(fixed(static_cast<double>(q.difference[s * q.rungs.size() + r]), 4));
+    table.row(std::move(row));
+  }
+  return fmt::format("measured quality against S_0 with the source's texture ({} views of {} px)\n", q.views,
+                     q.size_px) +
+         table.text();
+}
+
+}  // namespace
+
+std::string fragments_text(PackageReader& p) {
+  std::string s;
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& info = p.textures()[k];
+    const PlaneTables& t = p.tables().planes[k];
+    const std::vector<float> eta = eta_of(t, 0);
+    TextTable table;
+    for (const char* header :
+         {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP", "q_0", "d_0 B"})
+      table.column(header);
+    const AllocationFigures finest = allocation_figures(t, 0);
+    for (const int q : info.rung_quality) table.column(fmt::format("q{} B", q));
+    const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
+    for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
+      const std::size_t i = t.order[rank];
+      std::vector<std::string> row{std::to_string(rank),
+                                   std::to_string(i),
+                                   std::to_string(i % t.columns),
+                                   std::to_string(i / t.columns),
+                                   percent(t.covered_texels[i] / texels),
+                                   percent(static_cast<double>(t.surface_fraction[i]), 2),
+                                   fixed(static_cast<double>(eta[i]), 3),
+                                   fixed(static_cast<double>(t.vqp[i]), 3),
+                                   fixed(static_cast<double>(finest.fragment_quality[i]), 1),
+                                   std::to_string(finest.fragment_bytes[i])};
+      for (std::size_t r = 0; r < t.rung_count(); ++r)
+        row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
+      table.row(std::move(row));
+    }
+    s += plane_title(info, k);
+    s += "grid: " + printable(info.grid_reason) + "\neta of S_0 in tenths, . = not stored\n";
+    s += eta_map(t, eta) +
+         "fragments by falling importance; q_0, d_0: quality and bytes that the tables ask for at S_0\n" +
+         table.text() + "\n";
+  }
+  return s.empty() ? "no textures\n" : s;
+}
+
+std::string ladder_text(PackageReader& p) {
+  std::string s;
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    TextTable table;
+    for (const char* header :
+         {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "surface SSIM", "bits/texel"})
+      table.column(header);
+    const PlaneTables& t = p.tables().planes[k];
+    double texels = 0;
+    for (const std::uint16_t i : t.order) texels += t.covered_texels[i];
+    const auto figures = rung_figures(t);
+    for (std::size_t r = 0; r < figures.size(); ++r)
+      table.row({std::to_string(r), std::to_string(figures[r].quality), kilobytes(figures[r].bytes),
+                 std::to_string(figures[r].table_bytes), fixed(figures[r].mse, 2), fixed(figures[r].ssim, 4),
+                 fixed(figures[r].surface_ssim, 4),
+                 texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
+    const TextureInfo& info = p.textures()[k];
+    s += plane_title(info, k) + table.text();
+    if (info.lossless) s += "  the last rung holds the source's coefficients: lossless\n";
+    if (!info.source_extension.empty())
+      s += fmt::format("  {}: the source as it was, {} B{}\n", info.source.path, info.source.bytes,
+                       info.source_colours ? "" : ", whose colours were converted for this plane");
+    s += fmt::format(
+        "  preview {} x {} px, {} B; means over covered texels, surface SSIM over the object's surface\n\n",
+        info.preview_width_px, info.preview_height_px, info.preview.bytes);
+  }
+  return s.empty() ? "no textures\n" : s;
+}
+
+std::string tables_text(PackageReader& p, std::optional<double> gamma) {
+  std::string s;
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const PlaneTables& t = p.tables().planes[k];
+    s += plane_title(p.textures()[k], k);
+    if (t.model_r > 0)
+      s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
+                       shortest(static_cast<double>(t.model_a)), shortest(static_cast<double>(t.model_b)),
+                       shortest(static_cast<double>(t.model_r), 6),
+                       fixed(static_cast<double>(t.model_correlation), 4),
+                       percent(static_cast<double>(t.model_error)));
+    else
+      s += "  no size model: it needs two rungs\n";
+    s += fmt::format(
+        "  allocation {}, width {}, q within {} .. {}; D_i at {}, then by Gamma\n", allocation_name(t),
+        shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
+        shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)),
+        gamma ? "the Gamma asked for" : "the default Gamma");
+    s += allocation_text(t, gamma) + (gamma ? gamma_text(t, *gamma) : "") + "\n";
+  }
+  return s + measured_text(p.quality());
+}
+
+}  // namespace texmesh

@@ -1,0 +1,262 @@
+#include "tests/delivery/vectors.h"
+
+#include <cmath>
+
+#include "delivery/cpp/client/delivery_plan.h"
+#include "format/container/layout.h"
+#include "format/documents/allocation.h"
+#include "format/documents/rate_distortion.h"
+#include "format/documents/size_curve.h"
+#include "format/split/split_reader.h"
+#include "format/split/split_stream.h"
+
+namespace texmesh {
+namespace {
+
+// ---- packages: what a client reads in the golden ones
+
+std::string hex(const Sha256& digest) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string out;
+  for (const std::uint8_t b : digest) out += {kDigits[b >> 4], kDigits[b & 15]};
+  return out;
+}
+template <class T>
+std::string digest_of(const std::vector<T>& values) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data());
+  return hex(sha256({bytes, values.size() * sizeof(T)}));
+}
+
+Json viewing(PackageReader& package) {
+  const Manifest& m = package.manifest();
+  Json rules = Json::object();
+  const std::vector<double> sizes{1, 20, 64, 100, 150, 300, 500, 800, 1200, 2000, 4000, 1e5};
+  for (const auto& [rule, name] : kRules) {
+    const auto steps = step_function(m.scales, rule);
+    Json shown = Json::array(), at = Json::array();
+    for (const ManifestStep& s : steps) shown.push_back({s.up_to_px, s.scale});
+    for (const double px : sizes) at.push_back({px, scale_at(steps, px)});
+    rules[name] = {{"steps", shown}, {"displayed_px_scale", at}};
+  }
+  Json parts = Json::array();
+  const ScreenRect object{100, 50, 900, 1250};
+  for (const ScreenRect& view : {ScreenRect{0, 0, 1000, 1400}, ScreenRect{300, 200, 500, 900},
+                                 ScreenRect{850, 0, 1500, 300}, ScreenRect{-50, -50, 10, 10}}) {
+    const VisiblePart part = clip_to(object, view);
+    Json scales = Json::object();
+    for (const auto& [rule, name] : kRules) scales[name] = select_scale(m, 1200, part, rule);
+    parts.push_back({{"view", {view.x0, view.y0, view.x1, view.y1}},
+                     {"part", {part.width_px, part.height_px, part.clipped}},
+                     {"scale_of_1200_px", scales}});
+  }
+  const VisiblePart seen = clip_to(object, ScreenCircle{400, 400, fovea_radius_px(1500)});
+  const Camera camera;
+  Json errors = Json::array();
+  for (const ManifestScale& s : m.scales) {
+    const PixelError e = pixel_error(m, s, 700);
+    errors.push_back({s.scale, e.p95, e.rms, e.max});
+  }
+  return {{"rules", rules},
+          {"object", {object.x0, object.y0, object.x1, object.y1}},
+          {"clips", parts},
+          {"fovea",
+           {{"centre_px", {400, 400}},
+            {"eye_px", 1500},
+            {"radius_px", fovea_radius_px(1500)},
+            {"part", {seen.width_px, seen.height_px, seen.clipped}}}},
+          {"displayed_px_at_distance_3_heights",
+           displayed_height_px(m.object_height, 3 * m.object_height, camera)},
+          {"distance_at_300_px", viewing_distance(m.object_height, 300, camera)},
+          {"scale_error_p95_rms_max_at_700_px", errors}};
+}
+
+/// Sizes along knots between every two rungs, which the golden packages do not have.
+Json sizes_along_knots(PlaneTables t) {
+  for (std::size_t r = 0; r + 1 < t.rung_count(); ++r)
+    for (const int k : {1, 2})
+      if (t.rung_quality[r] + k < t.rung_quality[r + 1]) {
+        t.knot_quality.push_back(static_cast<std::uint8_t>(t.rung_quality[r] + k));
+        t.knot_position.push_back(0.375f * static_cast<float>(k));
+      }
+  Json sizes = Json::array();
+  for (const std::uint16_t f : t.order)
+    for (const double quality : {3.0, 12.0, 33.0, 54.0, 77.5, 99.0})
+      sizes.push_back({f, quality, interpolated_bytes(t, f, quality)});
+  return {{"quality", t.knot_quality}, {"position", t.knot_position}, {"fragment_quality_bytes", sizes}};
+}
+
+Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
+  Json scales = Json::array();
+  for (const std::uint32_t scale : {0u, t.scales / 2, t.scales}) {
+    Json gammas = Json::array();
+    for (const double gamma : {0.0, mean_eta(t, scale), 0.8}) {
+      const auto rungs = rungs_of(t, scale, gamma);
+      gammas.push_back({{"gamma", gamma},
+                        {"quality", quality_of(t, scale, gamma)},
+                        {"rungs", rungs},
+                        {"bytes", sum_of(bytes_of(t, rungs))},
+                        {"surface_dssim", surface_dssim(t, rungs)}});
+    }
+    scales.push_back({{"scale", scale}, {"eta", eta_of(t, scale)}, {"gammas", gammas}});
+  }
+  Json sizes = Json::array();
+  for (const std::uint16_t f : t.order)
+    for (const double quality : {3.0, 33.0, 77.5, 99.0})
+      sizes.push_back({f, quality, interpolated_bytes(t, f, quality)});
+  Json rd = Json::array();
+  for (const std::uint64_t budget : {500ull, 3000ull, 12000ull})
+    rd.push_back({budget, allocate_rd(t, budget)});
+  return {{"plane", plane},
+          {"surface_weights", surface_weights(t)},
+          {"scales", scales},
+          {"fragment_quality_bytes", sizes},
+          {"knots", sizes_along_knots(t)},
+          {"budget_rungs", rd}};
+}
+
+Json budgets(PackageReader& package, double displayed_px, const ListOptions& options) {
+  Json out = Json::array();
+  for (const std::uint64_t bytes : {0ull, 1500ull, 6000ull, 20000ull, 1000000ull}) {
+    const TextureBudget b = texture_for_budget(package, displayed_px, options, bytes);
+    Json shown = Json::array();
+    for (const PlaneChoice& p : b.planes) shown.push_back({p.base, p.plane});
+    out.push_back({{"budget_bytes", bytes},
+                   {"planes", shown},
+                   {"mip_loss", mip_loss(package, b.planes, displayed_px)},
+                   {"rungs", b.rungs},
+                   {"bytes", b.bytes},
+                   {"dssim", b.dssim}});
+  }
+  return out;
+}
+
+Json lists(PackageReader& package) {
+  Json out = Json::array();
+  for (const double px : {40.0, 200.0, 1000.0}) {
+    const auto planes = planes_for_display(package, px);
+    Json shown = Json::array();
+    for (const PlaneChoice& p : planes) shown.push_back({p.base, p.plane});
+    ListOptions o;
+    o.scale = select_scale(package.manifest(), px);
+    const FragmentList list = fragment_list(package, planes, o);
+    Json fragments = Json::array(), qualities = Json::array();
+    for (const ListedFragment& f : list.fragments) fragments.push_back({f.plane, f.fragment});
+    for (const double dssim : {0.0, 0.003, 0.02, 0.2}) {
+      const double quality = equivalent_quality(package, planes, dssim);
+      qualities.push_back({dssim, quality, predicted_ssim(package.quality(), o.scale, quality)});
+    }
+    out.push_back({{"displayed_px", px},
+                   {"scale", o.scale},
+                   {"finer_where_seen", finer_where_seen(package.quality(), o.scale, px)},
+                   {"planes", shown},
+                   {"fragments", fragments},
+                   {"offers", offers_json(list.offers)},
+                   {"total_weight", list.total_weight},
+                   {"preview_loss", list.preview_loss},
+                   {"dssim_quality_ssim", qualities},
+                   {"budgets", budgets(package, px, o)}});
+  }
+  return out;
+}
+
+/// What is chosen over links that are fast, slow and too slow.
+Json plans(PackageReader& package) {
+  Json out = Json::array();
+  for (const auto& [policy, name] : kPolicies)
+    for (const double px : {60.0, 400.0, 1500.0})
+      for (const double bytes_s : {4e3, 2e4, 3e5})
+        for (const double limit_s : {1.0, 4.0}) {
+          DeliveryRequest r;
+          r.displayed_px = px;
+          r.time_limit_s = limit_s;
+          r.htc.policy = policy;
+          r.network.link = BandwidthTrace::constant(bytes_s);
+          r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
+          const DeliveryPlan p = plan_delivery(package, r);
+          Json shown = Json::array();
+          for (const PlaneChoice& c : p.planes) shown.push_back({c.base, c.plane});
+          out.push_back({{"policy", name},
+                         {"displayed_px", px},
+                         {"bytes_s", bytes_s},
+                         {"rtt_s", r.network.rtt_s},
+                         {"time_limit_s", limit_s},
+                         {"wanted_scale", wanted_scale(package, r)},
+                         {"scale", p.scale},
+                         {"planes", shown},
+                         {"rungs", p.textures.rungs},
+                         {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
+                         {"bytes", p.bytes()},
+                         {"texture_dssim", p.texture_dssim},
+                         {"ssim", p.ssim}});
+        }
+  return out;
+}
+
+Json fragments(PackageReader& package) {
+  Json out = Json::array();
+  for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
+    const TextureInfo& texture = package.textures()[plane];
+    for (std::uint32_t rung = 0; rung < texture.rungs.size(); rung += 3)
+      for (const std::uint16_t f : package.tables().planes[plane].order) {
+        const ByteRange r = package.fragment_range(plane, rung, f);
+        out.push_back({plane, rung, f, texture.rungs[rung].path, texture.rungs[rung].offset + r.offset,
+                       r.bytes, hex(sha256(package.complete_fragment(plane, rung, f)))});
+      }
+  }
+  return out;
+}
+
+Json split_stream(PackageReader& package) {
+  SplitStreamReader reader(package.split_stream_head());
+  const auto stream = package.entry(kSplitStreamPath);
+  Json out = Json::array();
+  for (std::size_t i = 0; i < reader.head().scales.size(); ++i) {
+    reader.read_to_scale(i, stream);
+    const SplitMesh& mesh = reader.mesh();
+    Json attributes = Json::array();
+    for (std::size_t k = 0; k < mesh.attributes(); ++k) attributes.push_back(digest_of(mesh.values(k)));
+    out.push_back({{"scale", reader.head().scales[i].scale},
+                   {"points", mesh.points().size()},
+                   {"wedges", mesh.wedge_point().size()},
+                   {"faces", mesh.faces().size()},
+                   {"visible_faces", mesh.visible_faces().size()},
+                   {"points_sha256", digest_of(mesh.points())},
+                   {"wedge_points_sha256", digest_of(mesh.wedge_point())},
+                   {"faces_sha256", digest_of(mesh.faces())},
+                   {"groups_sha256", digest_of(mesh.face_group())},
+                   {"values_sha256", attributes}});
+  }
+  return out;
+}
+
+Json packages() {
+  Json cases = Json::array();
+  for (const char* name : {"v1.0-scan", "v1.1-scan"}) {
+    const std::string path = std::string("tests/golden/") + name + ".texmesh";
+    PackageReader package(open_store(kRoot + "/" + path));
+    Json planes = Json::array();
+    for (std::uint32_t p = 0; p < package.tables().planes.size(); ++p)
+      planes.push_back(plane_tables(package.tables().planes[p], p));
+    Json entries = Json::array();
+    for (const EntryRef& e : package.index()) entries.push_back({e.path, e.offset, e.bytes, hex(e.digest)});
+    cases.push_back({{"name", name},
+                     {"file", path},
+                     {"id", hex(package.id())},
+                     {"entry_path_offset_bytes_sha256", entries},
+                     {"viewing", viewing(package)},
+                     {"tables", planes},
+                     {"lists", lists(package)},
+                     {"plans", plans(package)},
+                     {"fragment_plane_rung_index_path_offset_bytes_sha256", fragments(package)}});
+    if (package.manifest().stream) cases.back()["split_stream"] = split_stream(package);
+  }
+  return cases;
+}
+
+TEST(Vectors, Packages) {
+  expect_file("packages.json",
+              "what a client reads and works out from a package, relative to the project's root", packages());
+}
+
+}  // namespace
+}  // namespace texmesh

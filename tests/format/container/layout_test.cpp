@@ -1,0 +1,84 @@
+#include "format/container/layout.h"
+
+#include "format/documents/index.h"
+#include "format/documents/manifest.h"
+#include "format/documents/textures.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "format/base/errors.h"
+#include "format/container/container.h"
+#include "tests/format/documents/manifest_fixture.h"
+
+namespace texmesh {
+namespace {
+
+TextureInfo texture(std::uint32_t plane, int rungs) {
+  TextureInfo t;
+  t.image = plane / 2;
+  t.role = plane % 2 ? "alpha" : "base-colour";
+  t.name = "wall \xc3\xa4.jpg";
+  t.colour_space = plane % 2 ? "linear" : "srgb";
+  t.channels = plane % 2 ? 1 : 3;
+  t.width_px = 1000;
+  t.height_px = 500;
+  t.fragment_width_px = t.fragment_height_px = 256;
+  t.columns = 4;
+  t.rows = 2;
+  t.grid_reason = "because";
+  t.preview_width_px = 62;
+  t.preview_height_px = 31;
+  t.preview.path = preview_path(plane);
+  t.tables.path = table_streams_path(plane);
+  for (int r = 0; r < rungs; ++r) {
+    t.rung_quality.push_back(5 + 10 * r);
+    t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(r));
+  }
+  return t;
+}
+
+TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
+  EXPECT_EQ(parse_entry_path(mesh_path(7)).kind, EntryKind::kMesh);
+  EXPECT_EQ(parse_entry_path(mesh_path(7)).number, 7u);
+  EXPECT_EQ(parse_entry_path(preview_path(1234)).number, 1234u);
+  const EntryName rung = parse_entry_path(rung_path(12, 3));
+  EXPECT_EQ(rung.kind, EntryKind::kRung);
+  EXPECT_EQ(rung.number, 12u);
+  EXPECT_EQ(rung.rung, 3u);
+  const EntryName file = parse_entry_path(fragment_file_path(1, 2, 33));
+  EXPECT_EQ(file.kind, EntryKind::kFragmentFile);
+  EXPECT_EQ(file.fragment, 33u);
+  const EntryName source = parse_entry_path(source_path(7, "webp"));
+  EXPECT_EQ(source.kind, EntryKind::kSource);
+  EXPECT_EQ(source.number, 7u);
+  EXPECT_EQ(source.extension, "webp");
+  for (const char* other : {"source/7.png", "source/007.gif", "source/007.", "mesh/s7.glb", "mesh/s007.glb",
+                            "mesh/s07.glbx", "preview/1.jpg", "texture/01/r00.pack", "texture/0/r0.pack",
+                            "texture/0/rx.pack", "texture/99999999999/r00.pack", "a", ""})
+    EXPECT_EQ(parse_entry_path(other).kind, EntryKind::kOther) << other;
+}
+
+TEST(Layout, StreamingOrder) {
+  const std::vector<std::string> order{"manifest.json",         "index.bin",          "tables.bin",
+                                       "textures.json",         "quality.json",       "mesh/s09.glb",
+                                       "preview/000.jpg",       "preview/001.jpg",    "texture/0/tables.pack",
+                                       "texture/1/tables.pack", "texture/0/r00.pack", "texture/1/r00.pack",
+                                       "texture/0/r01.pack",    "texture/1/r01.pack", "mesh/s04.glb",
+                                       "texture/0/r02.pack",    "texture/1/r02.pack", "texture/0/r03.pack",
+                                       "mesh/s00.glb",          "extra/thing.bin",    "provenance.json"};
+  std::vector<std::string> shuffled = order;
+  std::ranges::sort(shuffled);
+  EXPECT_EQ(streaming_order(shuffled), order);
+  std::ranges::reverse(shuffled);
+  EXPECT_EQ(streaming_order(shuffled), order);
+  // Untextured: meshes from coarse to fine.
+  EXPECT_EQ(
+      streaming_order({"mesh/s00.glb", "mesh/s02.glb", "mesh/s01.glb", "provenance.json", "manifest.json"}),
+      (std::vector<std::string>{"manifest.json", "mesh/s02.glb", "mesh/s01.glb", "mesh/s00.glb",
+                                "provenance.json"}));
+}
+
+}  // namespace
+}  // namespace texmesh

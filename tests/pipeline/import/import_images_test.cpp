@@ -1,0 +1,85 @@
+#include "pipeline/import/import_images.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "format/base/errors.h"
+#include "pipeline/import/finish_model.h"
+#include "pipeline/import/import.h"
+#include "pipeline/import/local_frame.h"
+#include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/text_scan.h"
+#include "tests/support/images.h"
+#include "tests/support/memory_resolver.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using testing::bytes_of;
+using testing::count_notes;
+using testing::input_error;
+using testing::MemoryResolver;
+
+TEST(AddImage, OneEntryPerContentOneWarningPerName) {
+  Model m;
+  MemoryResolver resolver;
+  resolver.files["a/x.png"] = testing::png_bytes(4, 4, 3);
+  resolver.files["b/x.png"] = testing::png_bytes(4, 4, 4);
+  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, "b/x.png", resolver, "f", "p", {}), 1);
+  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(m.images[0].name, "x.png");
+  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "p", {}), -1);
+  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "q", {}), -1);
+  EXPECT_EQ(count_notes(m, "missing-texture"), 1);
+  EXPECT_THROW(add_image(m, "../x.png", resolver, "f", "p", {}), InputError);
+  ImportOptions options;
+  options.max_image_pixels = 15;
+  resolver.files["c.png"] = testing::png_bytes(4, 4, 1);
+  const std::string error =
+      input_error([&] { add_image(m, "c.png", resolver, "model.obj", "material", options); });
+  EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
+  EXPECT_NE(error.find("c.png"), std::string::npos) << error;
+}
+
+TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
+  testing::MemoryResolver resolver;
+  std::vector<std::uint8_t> exif{0xff, 0xd8, 0xff, 0xe1, 0, 34, 'E', 'x', 'i', 'f',  0, 0, 'I',
+                                 'I',  42,   0,    8,    0, 0,  0,   1,   0,   0x12, 1, 3, 0,
+                                 1,    0,    0,    0,    6, 0,  0,   0,   0,   0,    0, 0};
+  const auto jpeg = testing::jpeg_bytes(8, 8, 3);
+  exif.insert(exif.end(), jpeg.begin() + 2, jpeg.end());
+  resolver.files["turned.jpg"] = exif;
+  resolver.files["inks.jpg"] = testing::cmyk_jpeg(8, 8, {1, 2, 3, 4}, true);
+  Model m;
+  add_image(m, "turned.jpg", resolver, "f", "p", {});
+  add_image(m, "inks.jpg", resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
+  EXPECT_EQ(count_notes(m, "exif-orientation"), 1);
+  EXPECT_EQ(count_notes(m, "cmyk-image"), 1);
+  for (const Note& note : m.notes) EXPECT_EQ(note.severity, Severity::kWarning) << note.code;
+  EXPECT_EQ(m.images[0].width_px, 8u);
+  EXPECT_TRUE(m.images[0].honour_profile);
+  EXPECT_FALSE(m.images[1].honour_profile);
+}
+
+TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
+  testing::MemoryResolver resolver;
+  const auto png = testing::png_bytes(8, 8, 3);
+  std::vector<std::uint8_t> frames(png.begin(), png.begin() + 33);  // signature and IHDR
+  frames.insert(frames.end(),
+                {0, 0, 0, 8, 'a', 'c', 'T', 'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xf3, 0x8d, 0x93, 0x70});
+  frames.insert(frames.end(), png.begin() + 33, png.end());
+  resolver.files["frames.png"] = frames;
+  resolver.files["still.png"] = png;
+  Model m;
+  add_image(m, "still.png", resolver, "f", "p", {});
+  EXPECT_EQ(count_notes(m, "more-pictures"), 0);
+  add_image(m, "frames.png", resolver, "f", "p", {});
+  EXPECT_EQ(count_notes(m, "more-pictures"), 1);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,37 @@
+#include "pipeline/import/local_frame.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "format/base/errors.h"
+#include "pipeline/import/finish_model.h"
+#include "pipeline/import/import.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/text_scan.h"
+#include "tests/support/images.h"
+#include "tests/support/memory_resolver.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+TEST(SetPositions, NearModelsKeepTheirCoordinatesAndFarOnesGetAnOrigin) {
+  Mesh mesh;
+  set_positions(mesh, {{-1, 2, 3}, {1, 2.5, 3}});
+  EXPECT_EQ(mesh.origin, Vec3d{});
+  EXPECT_EQ(mesh.positions[1], (Vec3f{1, 2.5f, 3}));
+  set_positions(mesh, {{5e6 + 0.001, 0, 0}, {5e6 + 1.003, 1, 1}});
+  EXPECT_EQ(mesh.origin.x, static_cast<double>(static_cast<float>(mesh.origin.x))) << "exact as a float";
+  EXPECT_NEAR(to_double(mesh.positions[1]).x + mesh.origin.x, 5e6 + 1.003, 1e-7);
+  set_positions(mesh, {{std::nan(""), 0, 0}, {1e300, 0, 0}, {7e6, 1, 1}, {7e6 + 1, 1, 1}});
+  EXPECT_TRUE(std::isnan(mesh.positions[0].x) && std::isnan(mesh.positions[1].x));
+  EXPECT_NEAR(mesh.origin.x, 7e6, 1);
+  set_positions(mesh, {});
+  EXPECT_TRUE(mesh.positions.empty());
+}
+
+}  // namespace
+}  // namespace texmesh

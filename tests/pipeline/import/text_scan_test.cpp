@@ -1,0 +1,45 @@
+#include "pipeline/import/text_scan.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "format/base/errors.h"
+#include "pipeline/import/finish_model.h"
+#include "pipeline/import/import.h"
+#include "pipeline/import/import_images.h"
+#include "pipeline/import/local_frame.h"
+#include "pipeline/import/mesh_builder.h"
+#include "tests/support/images.h"
+#include "tests/support/memory_resolver.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+TEST(TextScan, Numbers) {
+  double x = 0;
+  for (const auto& [text, value] : {std::pair{"1", 1.0},
+                                    {"-2.5e3", -2500.0},
+                                    {"+.5", 0.5},
+                                    {"1.", 1.0},
+                                    {"1e999", HUGE_VAL},
+                                    {"-1e999", -HUGE_VAL},
+                                    {"1e-999", 0.0},
+                                    {"inf", HUGE_VAL},
+                                    {"-Infinity", -HUGE_VAL},
+                                    {"0.1", 0.1}}) {
+    EXPECT_TRUE(parse_number(text, x)) << text;
+    EXPECT_EQ(x, value) << text;
+  }
+  for (const char* text : {"nan", "-NaN", "nan(ind)", "-1.#IND", "1.#QNAN00"}) {
+    EXPECT_TRUE(parse_number(text, x)) << text;
+    EXPECT_TRUE(std::isnan(x)) << text;
+  }
+  for (const char* text : {"", "-", "+-1", "--1", "x", "1x", "1,5", "0x10", "1 2", "1.#"})
+    EXPECT_FALSE(parse_number(text, x)) << text;
+}
+
+}  // namespace
+}  // namespace texmesh
