@@ -1,11 +1,11 @@
 #include "pipeline/cli/delivery_options.h"
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
 #include <sstream>
 
+#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/units.h"
 
 namespace texmesh {
@@ -39,73 +39,130 @@ MirrorModel mirror_of(const std::string& text) {
 
 }  // namespace
 
-void add_delivery_options(CLI::App& c, DeliveryArguments& a, bool package_required) {
-  auto* package =
-      c.add_option("package", a.package, "A .texmesh file, a folder that unpack made, or an http(s) URL");
-  if (package_required) package->required();
-  auto* display = c.add_option("--display", a.display_px, "Displayed height of the object, device pixels")
-                      ->check(NumberIn(1, 1e6))
-                      ->capture_default_str();
-  c.add_option("--distance", a.distance,
-               "Instead: viewing distance, in heights (largest extents) of the object")
-      ->check(NumberIn(1e-3, 1e6))
-      ->excludes(display);
-  c.add_option("--fov", a.camera.fov_degrees, "Vertical field of view for --distance, degrees")
-      ->check(NumberIn(0.01, 179))
-      ->capture_default_str();
-  c.add_option("--viewport", a.camera.viewport_px, "Height of the picture for --distance, device pixels")
-      ->check(NumberIn(1, 1e6))
-      ->capture_default_str();
-  c.add_option("--time", a.time, "Time limit from the first request on: 4, 1.5s, 800ms")
-      ->capture_default_str();
-  auto* bandwidth = c.add_option("--bandwidth", a.bandwidth, "Throughput of the link: 2Mbit/s, 41.68kB/s");
-  c.add_option("--trace", a.trace, "CSV of the link's throughput: lines of seconds,bytes per second")
-      ->excludes(bandwidth);
-  c.add_option("--rtt", a.rtt, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds")
-      ->capture_default_str();
-  c.add_option(
-       "--policy", a.policy,
-       "htca = the method; guard = the method over the plan of least loss, within 1.5 x of that plan's share "
-       "of what the link lasts to give; price = one price of bytes that rises with delay; proportional; "
-       "static = does not adapt")
-      ->check(CLI::IsMember({"htca", "guard", "price", "proportional", "static", "htca-guard", "htca-price"}))
-      ->capture_default_str();
-  c.add_option("--order", a.order,
-               "Next fragment: credit = by the sign of the credit; beta0 = as first published; finest")
-      ->check(CLI::IsMember({"credit", "beta0", "finest"}))
-      ->capture_default_str();
-  c.add_option("--estimator", a.estimator,
-               "Throughput: last transfer, harmonic mean or ewma of several; auto = by the policy")
-      ->check(CLI::IsMember({"auto", "last", "harmonic", "ewma"}))
-      ->capture_default_str();
-  c.add_option("--samples", a.samples, "Transfers that the harmonic mean takes")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  c.add_option("--beta0", a.beta0,
-               "First guess of the throughput (default: what the mesh's transfer has shown)");
-  c.add_option("--window", a.window, "Requests in flight; 0 = by throughput and round trip")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
-  c.add_flag("--hard-limits", a.hard_limits,
-             "Qualities stay within 5 .. 97 and nothing is skipped, however late it gets (default: while the "
-             "time is enough for that)");
-  c.add_option("--scale", a.scale, "This scale instead of the one that suits the display")
-      ->check(CLI::Range(0, 99));
-  c.add_option("--rule", a.rule,
-               "What decides about the scale: default = the finer of jnd and error; measured = that, or a "
-               "finer one that "
-               "compile has measured to look better")
-      ->check(CLI::IsMember({"measured", "default", "jnd", "error", "edge"}))
-      ->capture_default_str();
-  c.add_option("--connections", a.connections, "Connections per server")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  c.add_flag("--connect-costs", a.connect_costs, "A connection's first request takes another round trip");
-  c.add_flag("--slow-start", a.slow_start, "Connections begin slowly, as TCP's do");
-  c.add_option("--loss", a.loss, "Share of packets lost")->check(NumberIn(0, 0.5))->capture_default_str();
-  c.add_option("--mirror", a.mirrors,
-               "A server's own rate, 2Mbit/s, or 2Mbit/s,dead=3s; several times for several servers");
-  c.add_option("--seed", a.seed, "Of lost packets")->capture_default_str();
+Option add_display_option(Command& c, DeliveryArguments& a) {
+  return c.option("--display", a.display_px, "Displayed height of the object, device pixels")
+      .number_in(1, 1e6)
+      .value_name("PX")
+      .shows_default();
+}
+
+void add_time_option(Command& c, DeliveryArguments& a) {
+  c.option("--time", a.time, "Time limit from the first request on: 4, 1.5s, 800ms")
+      .value_name("TIME")
+      .shows_default();
+}
+
+Option add_scale_option(Command& c, DeliveryArguments& a) {
+  return c.option("--scale", a.scale, "This scale instead of the scale that looks best").integer_in(0, 99);
+}
+
+Option add_policy_option(Command& c, DeliveryArguments& a) {
+  return c
+      .option("--policy", a.policy,
+              "htca = the thesis's method. guard = that method over the plan of least loss, within 1.5 x of "
+              "that plan's share of what the link lasts to give. price = one price of bytes that rises with "
+              "delay. proportional = planned sizes scaled by the time that is left. static = does not adapt")
+      .one_of_explained({"htca", "guard", "price", "proportional", "static"})
+      .value_name("NAME")
+      .shows_default();
+}
+
+Option add_window_option(Command& c, DeliveryArguments& a) {
+  return c.option("--window", a.window, "Requests in flight; 0 = by throughput and round trip")
+      .integer_in(0, 64)
+      .shows_default();
+}
+
+namespace {
+
+void add_camera_options(Command& c, DeliveryArguments& a) {
+  Option display = add_display_option(c, a);
+  c.option("--distance", a.distance,
+           "Viewing distance instead of --display, in heights (largest extents) of the object")
+      .number_in(1e-3, 1e6)
+      .excludes(display);
+  c.option("--fov", a.camera.fov_degrees, "Vertical field of view for --distance, degrees")
+      .number_in(0.01, 179)
+      .shows_default()
+      .rare();
+  c.option("--viewport", a.camera.viewport_px, "Height of the picture for --distance, device pixels")
+      .number_in(1, 1e6)
+      .value_name("PX")
+      .shows_default()
+      .rare();
+}
+
+void add_link_options(Command& c, DeliveryArguments& a) {
+  c.group("Network");
+  Option bandwidth =
+      c.option("--bandwidth", a.bandwidth, "Throughput of the link: 2Mbit/s, 41.68kB/s").value_name("RATE");
+  c.option("--trace", a.trace, "CSV of the link's throughput: lines of seconds,bytes per second")
+      .value_name("FILE")
+      .excludes(bandwidth);
+  c.option("--rtt", a.rtt, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds")
+      .value_name("TIME")
+      .shows_default();
+  c.option("--mirror", a.mirrors,
+           "A server's own rate, 2Mbit/s, or 2Mbit/s,dead=3s; several times for several servers")
+      .value_name("RATE");
+  c.option("--connections", a.connections, "Connections per server")
+      .integer_in(1, 1000)
+      .shows_default()
+      .rare();
+  c.flag("--connect-costs", a.connect_costs, "A connection's first request takes another round trip").rare();
+  c.flag("--slow-start", a.slow_start, "Connections begin slowly, as TCP's do").rare();
+  c.option("--loss", a.loss, "Share of packets lost").number_in(0, 0.5).shows_default().rare();
+  c.option("--seed", a.seed, "Seed of lost packets").shows_default().rare();
+}
+
+void add_method_options(Command& c, DeliveryArguments& a) {
+  c.group("Method");
+  add_policy_option(c, a).rare();
+  c.option("--order", a.order,
+           "Next fragment: credit = by the sign of the credit; beta0 = as first published; finest")
+      .one_of_explained({"credit", "beta0", "finest"})
+      .value_name("NAME")
+      .shows_default()
+      .rare();
+  c.option("--estimator", a.estimator,
+           "Throughput: last transfer, harmonic mean or ewma of several; auto = by the policy")
+      .one_of_explained({"auto", "last", "harmonic", "ewma"})
+      .value_name("NAME")
+      .shows_default()
+      .rare();
+  c.option("--samples", a.samples, "Transfers that the harmonic mean takes")
+      .integer_in(1, 64)
+      .shows_default()
+      .rare();
+  c.option("--beta0", a.beta0, "First guess of the throughput (default: what the mesh's transfer has shown)")
+      .value_name("RATE")
+      .rare();
+  add_window_option(c, a).rare();
+  c.flag("--hard-limits", a.hard_limits,
+         "Qualities stay within 5 .. 97 and nothing is skipped, however late it gets (default: while the "
+         "time is enough for that)")
+      .rare();
+  c.option("--rule", a.rule,
+           "What decides about the scale: default = the finer of jnd and error; measured = that scale, or a "
+           "finer scale that compile has measured to look better; edge = by the length of edges")
+      .one_of_explained({"measured", "default", "jnd", "error", "edge"})
+      .value_name("NAME")
+      .shows_default()
+      .rare();
+}
+
+}  // namespace
+
+void add_delivery_options(Command& c, DeliveryArguments& a, bool package_required) {
+  Option package =
+      c.option("PACKAGE", a.package, "A .texmesh file, a folder that unpack made, or an http(s) URL");
+  if (package_required) package.required();
+  add_time_option(c, a);
+  add_camera_options(c, a);
+  add_scale_option(c, a);
+  add_link_options(c, a);
+  add_method_options(c, a);
+  c.group("");
 }
 
 std::string moment(double time_s) {
@@ -143,9 +200,7 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
   for (const std::string& m : a.mirrors) r.network.mirrors.push_back(mirror_of(m));
   r.htc.policy = choice<Policy>(a.policy, {{"htca", Policy::kHtc},
                                            {"guard", Policy::kGuard},
-                                           {"htca-guard", Policy::kGuard},
                                            {"price", Policy::kPrice},
-                                           {"htca-price", Policy::kPrice},
                                            {"proportional", Policy::kProportional},
                                            {"static", Policy::kStatic}});
   r.htc.order = choice<HtcOrder>(
