@@ -8,9 +8,9 @@
 #include "pipeline/batch/progress.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/io/exit_codes.h"
 
 namespace texmesh {

@@ -7,9 +7,9 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"

@@ -1,9 +1,9 @@
 #include <iostream>
 #include <memory>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/diff/diff.h"
 #include "pipeline/io/exit_codes.h"
 

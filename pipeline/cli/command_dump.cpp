@@ -2,9 +2,9 @@
 #include <memory>
 #include <optional>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/io/exit_codes.h"
 

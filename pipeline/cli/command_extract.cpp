@@ -2,10 +2,10 @@
 #include <iostream>
 #include <memory>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"

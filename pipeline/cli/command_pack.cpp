@@ -1,8 +1,8 @@
 #include <memory>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/package_tree.h"
 #include "pipeline/io/exit_codes.h"
 

@@ -5,10 +5,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/delivery_options.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/exit_codes.h"

@@ -1,5 +1,5 @@
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/studies.h"
 
 namespace texmesh {

@@ -4,9 +4,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"

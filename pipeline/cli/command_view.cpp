@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/view/view_server.h"
 

@@ -1,8 +1,8 @@
 // texmesh-core: every command and the workers. People call texmesh (main.cpp), which starts it.
 #include "format/container/format_version.h"
 #include "format/documents/manifest.h"
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/worker.h"
 

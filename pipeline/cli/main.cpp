@@ -6,8 +6,8 @@
 #include <cstring>
 #include <iostream>
 
-#include "pipeline/cli/command_line.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/io/core_path.h"
 #include "pipeline/io/exit_codes.h"
 

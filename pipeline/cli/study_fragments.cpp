@@ -5,8 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/cli/command_line.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"

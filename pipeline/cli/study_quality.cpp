@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cli/command_line.h"
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/stage_table.h"

@@ -1,11 +1,11 @@
-#include "pipeline/cli/command_line.h"
+#include "pipeline/cli/options/command_line.h"
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 
-#include "pipeline/cli/help_text.h"
+#include "pipeline/cli/options/help_text.h"
 #include "pipeline/io/exit_codes.h"
 
 namespace texmesh {

@@ -1,9 +1,9 @@
-#include "pipeline/cli/common_options.h"
+#include "pipeline/cli/options/common_options.h"
 
 #include <algorithm>
 #include <thread>
 
-#include "pipeline/cli/command_line.h"
+#include "pipeline/cli/options/command_line.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "pipeline/cli/help_text.h"
+#include "pipeline/cli/options/help_text.h"
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>

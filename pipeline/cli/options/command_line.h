@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/units.h"
 
 namespace CLI {
 class App;

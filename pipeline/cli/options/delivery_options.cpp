@@ -1,12 +1,12 @@
-#include "pipeline/cli/delivery_options.h"
+#include "pipeline/cli/options/delivery_options.h"
 
 #include <fmt/format.h>
 #include <algorithm>
 #include <fstream>
 #include <sstream>
 
-#include "pipeline/cli/command_line.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/units.h"
 
 namespace texmesh {
 namespace {
