@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -10,7 +9,8 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
@@ -92,40 +92,44 @@ int verify(const CacheArguments& args) {
 
 }  // namespace
 
-void add_cache_command(CLI::App& app, int& exit_code) {
+void add_cache_command(Command& app) {
   auto args = std::make_shared<CacheArguments>();
-  CLI::App* c = app.add_subcommand("cache", "Look at, prune or check the cache folder");
-  c->require_subcommand(1);
+  Command c = app.add("cache", "Look at, prune or check the cache folder");
+  c.needs_command();
   const auto add = [&](const char* name, const char* help, std::function<int(const CacheArguments&)> run) {
-    CLI::App* sub = c->add_subcommand(name, help);
-    sub->add_option("--cache", args->cache,
-                    "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)");
-    if (std::string(name) != "path") sub->add_flag("--json", args->json, "As JSON");
-    sub->callback([args, &exit_code, run] {
+    Command command = c.add(name, help);
+    command
+        .option("--cache", args->cache, "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)")
+        .value_name("DIR");
+    if (std::string(name) != "path") command.flag("--json", args->json, "Print JSON");
+    command.on_run([args, run] {
       try {
-        exit_code = run(*args);
+        return run(*args);
       } catch (const InputError& e) {
         std::cerr << "texmesh cache: " << e.what() << '\n';
-        exit_code = kExitUsage;
+        return static_cast<int>(kExitUsage);
       }
     });
-    return sub;
+    return command;
   };
-  add("stat", "How much it holds", [](const CacheArguments& a) { return statistics(a), kExitOk; });
-  CLI::App* p = add("prune", "Remove what has not been used for longest",
-                    [](const CacheArguments& a) { return prune(a), kExitOk; });
-  p->add_option("--size", args->size, "Until it holds no more than this (default 20GB, 0 = no limit)");
-  p->add_option("--age", args->age, "And what was not used for this long (default 90d, 0 = no limit)");
-  add("verify", "Read every object; move damaged ones to quarantine (exit code 1 when there are any)",
+  add("stat", "Print how much the folder holds",
+      [](const CacheArguments& a) { return statistics(a), kExitOk; });
+  Command p = add("prune", "Remove the results that have not been used for longest",
+                  [](const CacheArguments& a) { return prune(a), kExitOk; });
+  p.option("--size", args->size, "Most bytes that stay (default 20GB, 0 = no limit)").value_name("SIZE");
+  p.option("--age", args->age, "Longest time that an unused result stays (default 90d, 0 = no limit)")
+      .value_name("TIME");
+  add("verify", "Read every object and move damaged ones to quarantine (exit code 1 when there are any)",
       verify);
-  add("path", "Where it is", [](const CacheArguments& a) {
+  add("path", "Print the folder", [](const CacheArguments& a) {
     std::cout << folder_of(a) << '\n';
     return kExitOk;
   });
-  c->footer(
-      "Builds prune by themselves (compile --cache-size, --cache-age) and never touch what a running build "
+  c.notes(
+      "Builds prune the folder (compile --cache-size, --cache-age). Pruning never touches what a running "
+      "build "
       "uses.\n"
-      "Deleting the folder is safe: everything in it can be computed again.");
+      "The folder may be deleted: everything in it can be computed again.");
 }
 
 }  // namespace texmesh

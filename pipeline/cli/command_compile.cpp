@@ -1,7 +1,9 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
+#include <memory>
 #include <thread>
 
 #include "format/base/errors.h"
@@ -11,7 +13,9 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/io/exit_codes.h"
@@ -20,57 +24,86 @@
 namespace texmesh {
 namespace {
 
-/// Shorter names of options that people type often.
-const std::map<std::string, std::string> kShortNames{{"ladder.rungs", "--rungs"},
-                                                     {"ladder.subsampling", "--subsampling"},
-                                                     {"ladder.mode", "--ladder"},
-                                                     {"scales.mesh_codec", "--mesh-codec"},
-                                                     {"fragmentation.fill", "--fill"},
-                                                     {"lut.allocate", "--allocate"},
-                                                     {"perceptual_values.jnd", "--jnd"},
-                                                     {"simplification.order", "--order"},
-                                                     {"package.title", "--title"},
-                                                     {"import.up", "--up"},
-                                                     {"ladder.lossless_top", "--lossless-top"}};
+/// A name beside --STAGE.OPTION.
+struct ShortName {
+  const char* name;
+  bool everyday;  // one of the options that --help shows
+};
+const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title", true}},
+                                                   {"import.up", {"--up", true}},
+                                                   {"ladder.rungs", {"--rungs", true}},
+                                                   {"ladder.mode", {"--ladder", true}},
+                                                   {"ladder.lossless_top", {"--lossless-top", true}},
+                                                   {"ladder.subsampling", {"--subsampling", true}},
+                                                   {"scales.mesh_codec", {"--mesh-codec", true}},
+                                                   {"perceptual_values.jnd", {"--jnd", true}},
+                                                   {"fragmentation.fill", {"--fill", true}},
+                                                   {"lut.allocate", {"--allocate", false}},
+                                                   {"simplification.order", {"--order", false}}};
+constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
   std::vector<std::string> inputs, layers;
-  std::string output, profile, jnd_profile, cache, memory, model_memory = "8GiB", shard;
+  std::string output, profile, jnd_profile, memory, model_memory = "8GiB", shard;
+  CacheChoice cache;
   std::string cache_size = "20GB", cache_age = "90d";
   int jobs = 0;
-  bool no_cache = false, json = false, quiet = false, keep_going = false;
+  bool json = false, quiet = false, keep_going = false;
   RunSettings run;
   std::map<std::string, std::string> options;  // path -> text
 };
 
+/// The field's own text, what it may be and its default. Names of values and of symbols stay as they are.
 std::string help_of(const OptionField& f) {
   std::string help = f.help;
-  if (f.range)
-    help += " [" + CLI::detail::to_string(f.range->lo) + " .. " + CLI::detail::to_string(f.range->hi) + "]";
-  if (const auto* e = std::get_if<EnumField>(&f.value)) {
-    help += " {";
-    for (std::size_t i = 0; i < e->names.size(); ++i) help += (i ? "|" : "") + std::string(e->names[i]);
-    help += "}";
-  }
-  return help + " (default " + option_text(f) + ")";
+  const std::string first = help.substr(0, help.find(' '));
+  const bool is_name = first.ends_with(':') || help.compare(first.size(), 2, " =") == 0;
+  if (!is_name && std::islower(static_cast<unsigned char>(first[first.size() > 1 ? 1 : 0])))
+    help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
+  if (f.range) help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
+  if (const auto* e = std::get_if<EnumField>(&f.value))
+    help += fmt::format(" {{{}}}", fmt::join(e->names, "|"));
+  std::string text = option_text(f);
+  std::erase(text, '"');
+  return text.empty() ? help : help + " (default " + text + ")";
 }
 
-void add_stage_options(CLI::App& app, CompileArguments& args) {
+const char* value_name_of(const OptionField& f) {
+  struct Name {
+    const char* operator()(bool*) const { return "true|false"; }
+    const char* operator()(int*) const { return "N"; }
+    const char* operator()(double*) const { return "X"; }
+    const char* operator()(std::string*) const { return "TEXT"; }
+    const char* operator()(std::vector<int>*) const { return "N,N..."; }
+    const char* operator()(std::vector<double>*) const { return "X,X..."; }
+    const char* operator()(const EnumField&) const { return "NAME"; }
+  };
+  return std::visit(Name{}, f.value);
+}
+
+/// The short name of a switch takes no value; --STAGE.OPTION does.
+void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) {
+  const auto it = kShortNames.find(f.path());
+  const bool is_short = it != kShortNames.end(), is_switch = std::holds_alternative<bool*>(f.value);
+  std::string names = "--" + f.path();
+  if (is_short && !is_switch) names += std::string(",") + it->second.name;
+  Option option = c.option(
+      names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
+  option.value_name(value_name_of(f)).rare();
+  if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
+  if (!is_short || !is_switch) return;
+  c.flag(
+       it->second.name, [&args, path = f.path()] { args.options[path] = "true"; },
+       "the same as " + names + " true")
+      .rare()
+      .everyday(kEverydayTitle, help_of(f));
+}
+
+void add_stage_options(Command& c, CompileArguments& args) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
-    std::string names = "--" + f.path();
-    const auto it = kShortNames.find(f.path());
-    if (it != kShortNames.end() &&
-        std::holds_alternative<bool*>(f.value))  // a flag, and the long one with a value
-      app.add_flag_callback(
-             it->second, [&args, path = f.path()] { args.options[path] = "true"; }, f.help)
-          ->group("Stage " + f.stage);
-    else if (it != kShortNames.end())
-      names += "," + it->second;
-    app.add_option_function<std::string>(
-           names, [&args, path = f.path()](const std::string& v) { args.options[path] = v; }, help_of(f))
-        ->group("Stage " + f.stage)
-        ->type_name("");
+    c.group("Stage " + f.stage);
+    add_stage_option(c, f, args);
   }
 }
 
@@ -140,7 +173,7 @@ RunSettings run_settings(const CompileArguments& args) {
       std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
   run.pool.memory_bytes = memory_to_use(args.memory);
   run.pool.limits.memory_bytes = parse_bytes(args.model_memory, "--model-memory");
-  if (!args.no_cache) run.cache.folder = default_cache_folder(args.cache);
+  if (!args.cache.off) run.cache.folder = default_cache_folder(args.cache.folder);
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
   for (const std::string& layer : run.cache.layers) check_layer(layer);
@@ -152,63 +185,82 @@ RunSettings run_settings(const CompileArguments& args) {
   return run;
 }
 
-void add_run_options(CLI::App& c, CompileArguments& args) {
+void add_run_options(Command& c, CompileArguments& args) {
   RunSettings& run = args.run;
-  c.add_option("-j,--jobs", args.jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
-  c.add_option("--memory", args.memory,
-               "Most memory of all models that run side by side, by what they took before (default: 4/5 of "
-               "the machine's); one that needs more alone runs alone, see --model-memory");
-  c.add_option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
-      ->capture_default_str();
-  c.add_option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit")
-      ->capture_default_str();
-  c.add_option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
-      ->capture_default_str();
-  c.add_option("--shard", args.shard,
-               "I/N: compile only part I of 0 .. N-1; which models that are does not change when "
-               "others come and go");
-  auto* keep_going =
-      c.add_flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)");
-  c.add_flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")
-      ->excludes(keep_going);
-  c.add_flag("--retry-failed", run.retry_failed,
-             "Try models again that failed before, though nothing has changed since");
-  c.add_flag("--strict", run.strict, "Warnings are errors");
+  c.group("Running");
+  add_jobs_option(c, args.jobs);
+  c.option("--memory", args.memory,
+           "Most memory of all models that run side by side, by what they took before (default: 4/5 of the "
+           "machine's). A model that needs more runs alone, see --model-memory")
+      .value_name("SIZE")
+      .rare();
+  c.option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
+      .value_name("SIZE")
+      .shows_default()
+      .rare();
+  c.option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit").shows_default();
+  c.option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
+      .shows_default()
+      .rare();
+  c.option("--shard", args.shard,
+           "Compile only part I of the parts 0 .. N-1. A model's part does not change when other models come "
+           "and go")
+      .value_name("I/N");
+  Option keep_going =
+      c.flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)").rare();
+  c.flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")
+      .excludes(keep_going);
+  c.flag("--retry-failed", run.retry_failed,
+         "Try models again that failed before, though nothing has changed since");
+  c.flag("--strict", run.strict, "Treat warnings as errors");
 }
 
-void add_cache_options(CLI::App& c, CompileArguments& args) {
-  c.add_option("--cache", args.cache,
-               "Cache folder (default: TEXMESH_CACHE, else the user's cache folder); one that "
-               "cannot be made or written costs a warning, never the build");
-  c.add_flag("--no-cache", args.no_cache, "Compute everything, keep nothing");
-  c.add_option("--cache-layer", args.layers,
-               "Folder or http(s) URL to ask behind the cache folder; may be given several times (also "
-               "TEXMESH_CACHE_LAYERS, separated by blanks)");
-  c.add_flag("--cache-upload", args.run.cache.upload, "Put what is computed into the layers that are URLs");
-  c.add_option("--cache-size", args.cache_size, "The cache folder is pruned to this size, 0 = no limit")
-      ->capture_default_str();
-  c.add_option("--cache-age", args.cache_age, "Results unused for this long are pruned, 0 = never")
-      ->capture_default_str();
+void add_all_cache_options(Command& c, CompileArguments& args) {
+  c.group("Cache");
+  add_cache_options(c, args.cache);
+  c.option("--cache-layer", args.layers,
+           "Folder or http(s) URL to ask behind the cache folder; may be given several times (also "
+           "TEXMESH_CACHE_LAYERS, separated by blanks)")
+      .value_name("PLACE")
+      .rare();
+  c.flag("--cache-upload", args.run.cache.upload, "Put what is computed into the layers that are URLs")
+      .rare();
+  c.option("--cache-size", args.cache_size, "The cache folder is pruned to this size, 0 = no limit")
+      .value_name("SIZE")
+      .shows_default()
+      .rare();
+  c.option("--cache-age", args.cache_age, "Results unused for this long are pruned, 0 = never")
+      .value_name("TIME")
+      .shows_default()
+      .rare();
 }
 
-void add_report_options(CLI::App& c, CompileArguments& args) {
+void add_report_options(Command& c, CompileArguments& args) {
   RunSettings& run = args.run;
-  c.add_flag("-n,--dry-run", run.dry_run, "Say what would run and why; write nothing");
-  c.add_flag("--explain", run.explain, "Say of every stage whether it runs, and what has changed");
-  c.add_flag("--stats", run.statistics, "A table of stages at the end: runs, cache hits, seconds");
-  c.add_option("--depfile", run.depfile, "Dependencies of the package, for make and ninja (one model only)");
-  c.add_option("--summary", run.summary, "JSON file: every model's result (schemas/summary.v1.schema.json)");
-  c.add_option("--junit", run.junit, "The same as JUnit XML");
-  c.add_option("--trace", run.trace, "JSON file for chrome://tracing or Perfetto: what ran when");
-  c.add_flag("--json", args.json, "One JSON event a line (schemas/event.v1.schema.json)");
-  c.add_flag("-q,--quiet", args.quiet, "Only warnings and errors");
-  c.add_flag("-v,--verbose", run.verbose, "Every stage and note");
+  c.group("Reports");
+  c.flag("-n,--dry-run", run.dry_run, "Say what would run and why; write nothing");
+  c.flag("--explain", run.explain, "Say of every stage whether it runs, and what has changed");
+  c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
+  c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
+  c.flag("-v,--verbose", run.verbose, "Print every stage and note");
+  c.flag("--json", args.json, "Print one JSON event a line (schemas/event.v1.schema.json)");
+  c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)")
+      .value_name("FILE");
+  c.option("--junit", run.junit, "Write every model's result as JUnit XML").value_name("FILE");
+  c.option("--depfile", run.depfile, "Write the package's dependencies for make and ninja (one model only)")
+      .value_name("FILE")
+      .rare();
+  c.option("--trace", run.trace, "Write what ran when, for chrome://tracing or Perfetto")
+      .value_name("FILE")
+      .rare();
 }
 
-constexpr const char* kFooter =
-    "Examples:\n"
-    "  texmesh compile turtle.glb -o turtle.texmesh\n"
-    "  texmesh compile scans/ -o packages/ --jobs 8 --cache /var/cache/texmesh\n"
+constexpr const char* kExamples =
+    "  texmesh compile turtle.glb -o turtle.texmesh             one model, one package\n"
+    "  texmesh compile scans/ -o packages/ --jobs 8             every model of a folder";
+
+constexpr const char* kNotes =
+    "More examples:\n"
     "  texmesh compile collection.json -o packages/ --junit report.xml\n"
     "  texmesh compile scans/ -o packages/ --dry-run            what would run, and why\n"
     "  texmesh compile scans/ -o packages/ --shard $TASK/40     one of 40 machines' part\n"
@@ -216,48 +268,58 @@ constexpr const char* kFooter =
     "Every stage option can stand in a profile under the same name: "
     "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
     "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
-    "changed.\n"
-    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error. A model that fails leaves the "
-    "package that was there before.";
+    "changed. A model that fails leaves the package that was there before.\n"
+    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error.";
+
+void add_options(Command& c, CompileArguments& args) {
+  c.option("INPUT", args.inputs,
+           "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
+      .required();
+  c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models")
+      .required()
+      .value_name("OUTPUT");
+  c.option("--profile", args.profile,
+           "JSON file of options (schemas/profile.v1.schema.json); flags win over the file")
+      .value_name("FILE");
+  c.option(
+       "--jnd-profile", args.jnd_profile,
+       "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
+       "--profile, flags win over the file")
+      .value_name("FILE");
+  c.help_option("--help-stage", "Stage ", "Print the options of one stage (texmesh stages lists the stages)");
+  add_run_options(c, args);
+  add_all_cache_options(c, args);
+  add_report_options(c, args);
+  add_stage_options(c, args);
+}
+
+int run(const CompileArguments& args) {
+  RunSettings settings;
+  BatchPlan plan;
+  try {
+    const PlanRequest request = plan_request(args);
+    settings = run_settings(args);
+    plan = plan_batch(request);
+    if (!settings.depfile.empty() && plan.models.size() != 1)
+      throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
+    check_reports(plan, settings);
+  } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
+    std::cerr << "texmesh compile: " << e.what() << '\n';
+    return kExitUsage;
+  }
+  settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
+  return run_batch(plan, settings, std::cout);
+}
 
 }  // namespace
 
-void add_compile_command(CLI::App& app, int& exit_code) {
+void add_compile_command(Command& app) {
   auto args = std::make_shared<CompileArguments>();
-  CLI::App* c = app.add_subcommand("compile", "Compile textured scans into packages");
-  c->add_option(
-       "INPUT", args->inputs,
-       "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of them, or collections (.json)")
-      ->required();
-  c->add_option("-o,--output", args->output, "NAME.texmesh for one model, a folder for several")->required();
-  c->add_option("--profile", args->profile,
-                "JSON file of options (schemas/profile.v1.schema.json); flags win over it");
-  c->add_option("--jnd-profile", args->jnd_profile,
-                "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json); wins over "
-                "--profile, flags win over it");
-  add_run_options(*c, *args);
-  add_cache_options(*c, *args);
-  add_report_options(*c, *args);
-  add_stage_options(*c, *args);
-  c->footer(kFooter);
-  c->callback([args, &exit_code] {
-    RunSettings run;
-    BatchPlan plan;
-    try {
-      const PlanRequest request = plan_request(*args);
-      run = run_settings(*args);
-      plan = plan_batch(request);
-      if (!run.depfile.empty() && plan.models.size() != 1)
-        throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
-      check_reports(plan, run);
-    } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
-      std::cerr << "texmesh compile: " << e.what() << '\n';
-      exit_code = kExitUsage;
-      return;
-    }
-    run.more_inputs.insert(run.more_inputs.end(), plan.files.begin(), plan.files.end());
-    exit_code = run_batch(plan, run, std::cout);
-  });
+  Command c = app.add("compile", "Compile textured scans into packages");
+  add_options(c, *args);
+  c.examples(kExamples);
+  c.notes(kNotes);
+  c.on_run([args] { return run(*args); });
 }
 
 }  // namespace texmesh

@@ -1,15 +1,15 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -22,10 +22,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Arguments {
-  std::string input, what, output, profile, cache;
+  std::string input, what, output, profile;
   std::vector<std::string> settings;
   int jobs = 0, size_px = 640;
-  bool no_cache = false, json = false;
+  CacheChoice cache;
+  bool json = false;
 };
 
 bool is_png(const std::string& path) { return path.ends_with(".png") || path.ends_with(".PNG"); }
@@ -44,7 +45,7 @@ CompileOptions gather_options(const Arguments& args) {
     const auto field =
         std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
     if (equals == std::string::npos || field == fields.end())
-      throw InputError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help lists",
+      throw InputError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help-all lists",
                        setting);
     set_option(*field, setting.substr(equals + 1), "--set " + path);
   }
@@ -99,15 +100,14 @@ void print_text(const Arguments& args, const DebugLegend& legend, const Notes& n
 DebugView make_view(const Arguments& args, const CompileOptions& options, Notes& notes) {
   const auto what = static_cast<DebugQuantity>(std::find(kDebugNames.begin(), kDebugNames.end(), args.what) -
                                                kDebugNames.begin());
-  RunContext context;
-  context.threads =
-      std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
+  const RunContext context = context_of(args.jobs);
   if (is_package(args.input)) return view_package(args.input, what, context);
   CompileRequest request;
   request.input = args.input;
   request.options = options;
-  const std::unique_ptr<Store> store =
-      args.no_cache ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(args.cache));
+  const std::unique_ptr<Store> store = args.cache.off
+                                           ? std::make_unique<NullStore>()
+                                           : open_disk_store(default_cache_folder(args.cache.folder));
   return view_input(request, what, *store, context, {}, notes);
 }
 
@@ -123,61 +123,59 @@ void run(const Arguments& args, const CompileOptions& options) {
     print_text(args, view.legend, notes);
 }
 
-void add_options(CLI::App& c, Arguments& args) {
-  c.add_option("INPUT", args.input,
-               "A model (runs the stages that are needed, through the cache) or a package")
-      ->required();
-  c.add_option("--what", args.what,
-               "persistence: up to which scale a vertex stays a feature. skeleton: the curve skeleton inside "
-               "the shape. R: the distance to it, which errors are measured against. collapse-error: at "
-               "which error a vertex was removed. fragments: the texture's grid and importance (of a package "
-               "too)")
-      ->required()
-      ->check(CLI::IsMember(std::vector<std::string>(kDebugNames.begin(), kDebugNames.end())))
-      ->type_name("QUANTITY");
-  c.add_option("-o,--output", args.output, "x.glb to turn in any viewer, x.png for two views side by side")
-      ->required();
-  c.add_option("--size", args.size_px, "Side of one view of a PNG, px")
-      ->check(CLI::Range(64, 4096))
-      ->capture_default_str();
-  c.add_option("--profile", args.profile, "JSON file of options, as for compile");
-  c.add_option("--set", args.settings,
-               "STAGE.OPTION=VALUE over the profile, as compile's --STAGE.OPTION; "
-               "may be repeated")
-      ->type_name("OPTION=VALUE");
-  c.add_option("-j,--jobs", args.jobs, "Processors to use (default: all)")->check(CLI::Range(1, 1024));
-  c.add_option("--cache", args.cache, "Cache folder, as for compile");
-  c.add_flag("--no-cache", args.no_cache, "Compute everything, keep nothing");
-  c.add_flag("--json", args.json, "The legend as one JSON object");
+void add_options(Command& c, Arguments& args) {
+  c.option("INPUT", args.input, "A model (runs the stages that are needed, through the cache) or a package")
+      .required();
+  c.option(
+       "--what", args.what,
+       "persistence: up to which scale a vertex stays a feature. skeleton: the curve skeleton inside "
+       "the shape. R: the distance to the skeleton, which errors are measured against. collapse-error: at "
+       "which error a vertex was removed. fragments: the texture's grid and importance (of packages, too)")
+      .required()
+      .one_of_explained({kDebugNames.begin(), kDebugNames.end()})
+      .value_name("QUANTITY");
+  c.option("-o,--output", args.output, "x.glb to turn in any viewer, or x.png for two views side by side")
+      .required()
+      .value_name("FILE");
+  c.option("--size", args.size_px, "Side of one view of a PNG, px").integer_in(64, 4096).shows_default();
+  c.option("--profile", args.profile, "JSON file of options, as for compile").value_name("FILE");
+  c.option("--set", args.settings,
+           "STAGE.OPTION=VALUE over the profile, as compile's --STAGE.OPTION; may be repeated")
+      .value_name("OPTION=VALUE");
+  add_jobs_option(c, args.jobs);
+  add_cache_options(c, args.cache);
+  c.flag("--json", args.json, "Print the legend as one JSON object");
+}
+
+int check_and_run(const Arguments& args) {
+  CompileOptions options;
+  try {
+    check_output(args);
+    options = gather_options(args);
+  } catch (const InputError& e) {  // what was asked for makes no sense
+    std::cerr << "texmesh debug: " << e.what() << '\n';
+    return kExitUsage;
+  }
+  run(args, options);
+  return kExitOk;
 }
 
 }  // namespace
 
-void add_debug_command(CLI::App& app, int& exit_code) {
+void add_debug_command(Command& app) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("debug", "Picture what a stage computed, with a legend of its colours");
-  add_options(*c, *args);
-  c->footer(
-      "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives\n"
-      "their values. A GLB has them as vertex colours (fragments: as textures), the skeleton as lines.\n"
-      "Examples:\n"
+  Command c = app.add("debug", "Picture what a stage computed, with a legend of its colours");
+  add_options(c, *args);
+  c.examples(
       "  texmesh debug turtle.glb --what persistence -o turtle.png\n"
       "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=120\n"
-      "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json\n"
+      "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json");
+  c.notes(
+      "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives "
+      "their values. A GLB holds the colours as vertex colours (fragments: as textures) and the skeleton as "
+      "lines.\n"
       "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
-  c->callback([args, &exit_code] {
-    CompileOptions options;
-    try {
-      check_output(*args);
-      options = gather_options(*args);
-    } catch (const InputError& e) {  // what was asked for makes no sense
-      std::cerr << "texmesh debug: " << e.what() << '\n';
-      exit_code = kExitUsage;
-      return;
-    }
-    run(*args, options);
-    exit_code = kExitOk;
-  });
+  c.on_run([args] { return check_and_run(*args); });
 }
 
 }  // namespace texmesh

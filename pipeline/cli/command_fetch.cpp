@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -14,8 +13,9 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/delivery_options.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
@@ -281,72 +281,73 @@ void print(const Fetched& f, double limit_s) {
       1 - f.texture_dssim, f.ssim, f.load.cancelled ? "; cancelled" : "");
 }
 
+int run(FetchArguments& args) {
+  std::signal(SIGINT, [](int) {
+    interrupted = 1;
+    std::signal(SIGINT, SIG_DFL);  // a second one ends the process
+  });
+  args.delivery.needs_link = false;
+  const double limit_s = parse_duration(args.delivery.time, "--time");
+  Fetched f;
+  try {
+    f = fetch(args);
+  } catch (const InputError&) {
+    if (interrupted == 0) throw;
+    std::cerr << "interrupted\n";
+    return 130;
+  }
+  if (args.json)
+    std::cout << fetch_json(f, limit_s).dump() << '\n';
+  else
+    print(f, limit_s);
+  return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
+}
+
+void add_options(Command& c, FetchArguments& args) {
+  DeliveryArguments& d = args.delivery;
+  c.option("URL", d.package, "http(s) URL of a .texmesh file, or of its tree (which ends in a slash)")
+      .required();
+  add_time_option(c, d);
+  add_display_option(c, d);
+  add_scale_option(c, d);
+  c.option("--mirror", args.mirrors, "URL of the same package on another server; may be given again")
+      .value_name("URL");
+  c.option("--refine", args.refine, "Go on for so long after the limit, best upgrades first")
+      .value_name("TIME")
+      .shows_default();
+  c.option("-o,--output", args.output,
+           "Folder for the scale's GLB and for the fragments as complete image files")
+      .value_name("DIR");
+  c.flag("--json", args.json, "Print one JSON object (schemas/fetch.v1.schema.json)");
+  c.option("--rtt", d.rtt, "Round trip, 40 are milliseconds; 0 = as the first answer shows it")
+      .value_name("TIME")
+      .shows_default()
+      .rare();
+  add_policy_option(c, d).rare();
+  add_window_option(c, d).rare();
+  c.option("--connections", d.connections, "Connections per server").integer_in(1, 64).shows_default().rare();
+  c.flag("--whole-rungs", args.whole_rungs,
+         "Ask for all fragments of a texture at once, as of servers without ranges")
+      .rare();
+}
+
 }  // namespace
 
-void add_fetch_command(CLI::App& app, int& exit_code) {
+void add_fetch_command(Command& app) {
   auto args = std::make_shared<FetchArguments>();
-  CLI::App* c = app.add_subcommand("fetch", "Fetch from web servers what a viewer would get within a time");
-  DeliveryArguments& d = args->delivery;
-  c->add_option("url", d.package, "http(s) URL of a .texmesh file, or of its tree (ending in a slash)")
-      ->required();
-  c->add_option("--time", d.time, "Time limit from the first request on: 4, 1.5s, 800ms")
-      ->capture_default_str();
-  c->add_option("--display", d.display_px, "Displayed height of the object, device pixels")
-      ->check(NumberIn(1, 1e6))
-      ->capture_default_str();
-  c->add_option("--mirror", args->mirrors, "URL of the same package on another server; may be given again");
-  c->add_option("--policy", d.policy, "htca, guard, price, proportional or static, see simulate")
-      ->check(CLI::IsMember({"htca", "guard", "price", "proportional", "static", "htca-guard", "htca-price"}))
-      ->capture_default_str();
-  c->add_option("--scale", d.scale, "This scale instead of the one that looks best in the time")
-      ->check(CLI::Range(0, 99));
-  c->add_option("--rtt", d.rtt, "Round trip, 40 are milliseconds; 0 = as the first answer shows it")
-      ->capture_default_str();
-  c->add_option("--window", d.window, "Requests in flight; 0 = by throughput and round trip")
-      ->check(CLI::Range(0, 64));
-  c->add_option("--connections", d.connections, "Connections per server")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  c->add_option("--refine", args->refine, "Go on for so long after the limit, best upgrades first")
-      ->capture_default_str();
-  c->add_flag("--whole-rungs", args->whole_rungs,
-              "All fragments of a texture at once, as for servers without ranges");
-  c->add_option("-o,--output", args->output,
-                "Folder for the scale's GLB and the fragments as complete image files");
-  c->add_flag("--json", args->json, "One JSON object (schemas/fetch.v1.schema.json)");
-  c->footer(
-      "Every fragment is checked against its digest; what a server fails to deliver is asked of another "
-      "one.\n"
-      "The package is read from the first server to answer. One that knows no ranges is asked for whole "
-      "rungs of\n"
-      "the tree beside the container.\n"
-      "Examples:\n"
+  Command c = app.add("fetch", "Fetch from web servers what a viewer would get within a time");
+  add_options(c, *args);
+  c.examples(
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
-      "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got\n"
+      "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
+  c.notes(
+      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of another "
+      "server. The package is read from the first server that answers. A server that knows no ranges is "
+      "asked "
+      "for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
-  c->callback([args, &exit_code] {
-    std::signal(SIGINT, [](int) {
-      interrupted = 1;
-      std::signal(SIGINT, SIG_DFL);  // a second one ends the process
-    });
-    args->delivery.needs_link = false;
-    const double limit_s = parse_duration(args->delivery.time, "--time");
-    Fetched f;
-    try {
-      f = fetch(*args);
-    } catch (const InputError&) {
-      if (interrupted == 0) throw;
-      std::cerr << "interrupted\n";
-      exit_code = 130;
-      return;
-    }
-    if (args->json)
-      std::cout << fetch_json(f, limit_s).dump() << '\n';
-    else
-      print(f, limit_s);
-    exit_code = f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
-  });
+  c.on_run([args] { return run(*args); });
 }
 
 }  // namespace texmesh

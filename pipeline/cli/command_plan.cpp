@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -7,8 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/delivery_options.h"
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/units.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
@@ -143,84 +143,82 @@ std::vector<std::string> why_not(const DeliveryPlan& plan, const Gate& gate, dou
   return reasons;
 }
 
-}  // namespace
-
-void add_plan_command(CLI::App& app, int& exit_code) {
-  auto args = std::make_shared<PlanArguments>();
-  CLI::App* c =
-      app.add_subcommand("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
-  add_delivery_options(*c, *args, true);
-  c->add_option("--budget", args->budget,
-                "Bytes instead of time: the mesh and the textures that look best together in 500kB");
-  c->add_flag("--json", args->json, "One JSON object (schemas/plan.v1.schema.json)");
-  c->footer(
-      "Plays the transfer over a model of the network; the package alone decides. The predicted SSIM comes "
-      "from what\n"
-      "compile measured.\n"
-      "Examples:\n"
-      "  texmesh plan bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --rtt 40\n"
-      "  texmesh plan https://host/bust.texmesh --display 400 --time 1.5 --trace monday.csv --rtt 80\n"
-      "  texmesh plan bust.texmesh --display 800 --budget 500kB\n"
-      "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
-  c->callback([args, &exit_code] {
-    const bool budget = !args->budget.empty();
-    args->needs_link = !budget;
-    const DeliveryRequest request = delivery_request(*args);
-    const std::uint64_t bytes = budget ? parse_bytes(args->budget, "--budget") : 0;
-    PackageReader package(open_store(args->package));
-    if (!budget) {
-      const DeliveryPlan plan = plan_delivery(package, request);
-      std::cout << (args->json ? plan_json(package, plan).dump() + "\n" : plan_text(package, plan));
-      exit_code = kExitOk;
-      return;
-    }
-    const DeliveryPlan plan = plan_budget(package, request, bytes);
-    Json j = plan_json(package, plan);
-    for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
-    std::cout << (args->json ? j.dump() + "\n" : budget_text(package, plan));
-    exit_code = plan.bytes() <= bytes ? kExitOk : kExitDifferent;
-  });
+int run_plan(PlanArguments& args) {
+  const bool budget = !args.budget.empty();
+  args.needs_link = !budget;
+  const DeliveryRequest request = delivery_request(args);
+  const std::uint64_t bytes = budget ? parse_bytes(args.budget, "--budget") : 0;
+  PackageReader package(open_store(args.package));
+  if (!budget) {
+    const DeliveryPlan plan = plan_delivery(package, request);
+    std::cout << (args.json ? plan_json(package, plan).dump() + "\n" : plan_text(package, plan));
+    return kExitOk;
+  }
+  const DeliveryPlan plan = plan_budget(package, request, bytes);
+  Json j = plan_json(package, plan);
+  for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
+  std::cout << (args.json ? j.dump() + "\n" : budget_text(package, plan));
+  return plan.bytes() <= bytes ? kExitOk : kExitDifferent;
 }
 
-void add_check_command(CLI::App& app, int& exit_code) {
+int run_check(const CheckArguments& args) {
+  const DeliveryRequest request = delivery_request(args);
+  Gate gate{args.min_ssim, args.min_texture_ssim};
+  if (!args.max_first_picture.empty())
+    gate.max_first_picture_s = parse_duration(args.max_first_picture, "--max-first-picture");
+  if (!args.max_bytes.empty()) gate.max_bytes = parse_bytes(args.max_bytes, "--max-bytes");
+  PackageReader package(open_store(args.package));
+  const DeliveryPlan plan = plan_delivery(package, request);
+  const std::vector<std::string> reasons = why_not(plan, gate, request.time_limit_s);
+  if (args.json) {
+    Json j = plan_json(package, plan);
+    j["good"] = reasons.empty();
+    j["reasons"] = reasons;
+    std::cout << j.dump() << '\n';
+  } else {
+    std::cout << plan_text(package, plan);
+    for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
+    if (reasons.empty()) std::cout << "good enough\n";
+  }
+  return reasons.empty() ? kExitOk : kExitDifferent;
+}
+
+}  // namespace
+
+void add_plan_command(Command& app) {
+  auto args = std::make_shared<PlanArguments>();
+  Command c = app.add("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
+  add_delivery_options(c, *args, true);
+  c.option("--budget", args->budget,
+           "Bytes instead of time: the mesh and the textures that look best together in 500kB")
+      .value_name("SIZE");
+  c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
+  c.examples(
+      "  texmesh plan bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --rtt 40\n"
+      "  texmesh plan https://host/bust.texmesh --display 400 --time 1.5 --trace monday.csv --rtt 80\n"
+      "  texmesh plan bust.texmesh --display 800 --budget 500kB");
+  c.notes(
+      "plan plays the transfer over a model of the network and needs nothing but the package. The predicted "
+      "SSIM comes from what compile measured.\n"
+      "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
+  c.on_run([args] { return run_plan(*args); });
+}
+
+void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
-  CLI::App* c =
-      app.add_subcommand("check", "Fail when a package does not show well enough in a time: a gate for CI");
-  add_delivery_options(*c, *args, true);
-  c->add_option("--min-ssim", args->min_ssim, "Least predicted SSIM of the rendered object")
-      ->check(NumberIn(0, 1));
-  c->add_option("--min-texture-ssim", args->min_texture_ssim, "Least surface-weighted SSIM of the textures")
-      ->check(NumberIn(0, 1));
-  c->add_option("--max-first-picture", args->max_first_picture,
-                "Latest time of the first picture: 1s, 800ms");
-  c->add_option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB");
-  c->add_flag("--json", args->json, "One JSON object (schemas/plan.v1.schema.json)");
-  c->footer(
-      "Example:\n"
-      "  texmesh check bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --min-ssim 0.95 "
-      "--max-first-picture 1s\n"
-      "Exit code: 0 good enough, 4 not, 1 when the package cannot be read, 2 usage.");
-  c->callback([args, &exit_code] {
-    const DeliveryRequest request = delivery_request(*args);
-    Gate gate{args->min_ssim, args->min_texture_ssim};
-    if (!args->max_first_picture.empty())
-      gate.max_first_picture_s = parse_duration(args->max_first_picture, "--max-first-picture");
-    if (!args->max_bytes.empty()) gate.max_bytes = parse_bytes(args->max_bytes, "--max-bytes");
-    PackageReader package(open_store(args->package));
-    const DeliveryPlan plan = plan_delivery(package, request);
-    const std::vector<std::string> reasons = why_not(plan, gate, request.time_limit_s);
-    if (args->json) {
-      Json j = plan_json(package, plan);
-      j["good"] = reasons.empty();
-      j["reasons"] = reasons;
-      std::cout << j.dump() << '\n';
-    } else {
-      std::cout << plan_text(package, plan);
-      for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
-      if (reasons.empty()) std::cout << "good enough\n";
-    }
-    exit_code = reasons.empty() ? kExitOk : kExitDifferent;
-  });
+  Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
+  add_delivery_options(c, *args, true);
+  c.option("--min-ssim", args->min_ssim, "Least predicted SSIM of the rendered object").number_in(0, 1);
+  c.option("--min-texture-ssim", args->min_texture_ssim, "Least surface-weighted SSIM of the textures")
+      .number_in(0, 1);
+  c.option("--max-first-picture", args->max_first_picture, "Latest time of the first picture: 1s, 800ms")
+      .value_name("TIME");
+  c.option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB").value_name("SIZE");
+  c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
+  c.examples(
+      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --min-ssim 0.95 --max-first-picture 1s");
+  c.notes("Exit code: 0 good enough, 4 not good enough, 1 when the package cannot be read, 2 usage.");
+  c.on_run([args] { return run_check(*args); });
 }
 
 }  // namespace texmesh

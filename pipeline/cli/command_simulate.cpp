@@ -1,12 +1,12 @@
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/decide/htc_theorem.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/delivery_options.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -263,43 +263,50 @@ void simulate_package(const SimulateArguments& a) {
   for (const std::string& w : plan.warnings) std::cout << "warning: " << w << '\n';
 }
 
+int run(const SimulateArguments& args) {
+  const bool experiment = !args.table.empty() || args.theorem;
+  if (!experiment && args.package.empty())
+    throw UsageError("PACKAGE", "", "a package, --table or --theorem", "none of them");
+  if (experiment && !args.package.empty())
+    throw UsageError("PACKAGE", "", "no package with --table and --theorem", args.package);
+  if (!args.table.empty()) print_table_4_2(args);
+  if (args.theorem) print_theorem(args);
+  if (!experiment) simulate_package(args);
+  return kExitOk;
+}
+
+void add_output_options(Command& c, SimulateArguments& args) {
+  c.option("--plot", args.plot, "Write an SVG: quality and time by fragment, throughput, credit")
+      .value_name("FILE");
+  Option json = c.flag("--json", args.json, "Print one JSON object (schemas/simulate.v1.schema.json)");
+  c.flag("--csv", args.csv, "Print every decision, run or row as a line").excludes(json);
+  c.group("The thesis's experiments");
+  Option table = c.option("--table", args.table, "4.2: the experiment of Table 4.2 instead of a package")
+                     .one_of_explained({"4.2"})
+                     .value_name("4.2");
+  c.flag("--theorem", args.theorem, "What Theorem 4.1 says and what holds, over random links")
+      .excludes(table);
+  c.option("--seeds", args.seeds, "Runs per row of the table").integer_in(1, 10000).shows_default();
+}
+
 }  // namespace
 
-void add_simulate_command(CLI::App& app, int& exit_code) {
+void add_simulate_command(Command& app) {
   auto args = std::make_shared<SimulateArguments>();
-  CLI::App* c = app.add_subcommand("simulate", "Play a transfer over a model of a network");
-  add_delivery_options(*c, *args, false);
-  auto* table = c->add_option("--table", args->table, "4.2: the thesis's experiment instead of a package")
-                    ->check(CLI::IsMember({"4.2"}));
-  c->add_flag("--theorem", args->theorem, "What Theorem 4.1 says and what holds, over random links")
-      ->excludes(table);
-  c->add_option("--seeds", args->seeds, "Runs per row of the table")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  c->add_option("--plot", args->plot, "SVG file: quality and time by fragment, throughput, credit");
-  auto* json = c->add_flag("--json", args->json, "One JSON object (schemas/simulate.v1.schema.json)");
-  c->add_flag("--csv", args->csv, "Every decision, run or row as a line")->excludes(json);
-  c->footer(
-      "Deviation is of the time limit: positive when the transfer ended early. --table and --theorem play "
-      "the\n"
-      "method itself (of the options they take --order, --seeds and the form of the output).\n"
-      "Examples:\n"
+  Command c = app.add("simulate", "Play a transfer over a model of a network");
+  add_delivery_options(c, *args, false);
+  add_output_options(c, *args);
+  c.examples(
       "  texmesh simulate bust.texmesh --time 5 --bandwidth 2Mbit/s --rtt 50 --policy htca\n"
       "  texmesh simulate bust.texmesh --time 5 --trace monday.csv --policy price --plot monday.svg\n"
-      "  texmesh simulate bust.texmesh --time 5 --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror "
-      "1Mbit/s,dead=2s\n"
-      "  texmesh simulate --table 4.2 --json\n"
-      "Exit code: 0, 1 when the package or trace cannot be read, 2 usage.");
-  c->callback([args, &exit_code] {
-    if (args->table.empty() && !args->theorem && args->package.empty())
-      throw CLI::RequiredError("a package, --table or --theorem");
-    if (!args->package.empty() && (args->theorem || !args->table.empty()))
-      throw CLI::ExcludesError("package", "--table and --theorem, which take none");
-    if (!args->table.empty()) print_table_4_2(*args);
-    if (args->theorem) print_theorem(*args);
-    if (!args->package.empty()) simulate_package(*args);
-    exit_code = kExitOk;
-  });
+      "  texmesh simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 1Mbit/s,dead=2s\n"
+      "  texmesh simulate --table 4.2 --json");
+  c.notes(
+      "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem "
+      "play "
+      "the method itself (of the options they take --order, --seeds and the form of the output).\n"
+      "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
+  c.on_run([args] { return run(*args); });
 }
 
 }  // namespace texmesh

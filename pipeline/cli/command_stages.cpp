@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/exit_codes.h"
@@ -57,17 +57,17 @@ void print_dot() {
 
 }  // namespace
 
-void add_stages_command(CLI::App& app, int& exit_code) {
+void add_stages_command(Command& app) {
   struct Arguments {
     bool json = false, dot = false, schema = false;
   };
   auto args = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("stages", "Print the graph of stages that compile runs");
-  c->add_flag("--json", args->json, "As JSON");
-  c->add_flag("--dot", args->dot, "As a Graphviz graph");
-  c->add_flag("--profile-schema", args->schema, "The JSON schema of profiles (options files)");
-  c->footer("Examples:\n  texmesh stages\n  texmesh stages --dot | dot -Tsvg > stages.svg");
-  c->callback([args, &exit_code] {
+  Command c = app.add("stages", "Print the graph of stages that compile runs");
+  c.flag("--json", args->json, "Print JSON");
+  c.flag("--dot", args->dot, "Print a Graphviz graph");
+  c.flag("--profile-schema", args->schema, "Print the JSON schema of profiles, which are files of options");
+  c.examples("  texmesh stages\n  texmesh stages --dot | dot -Tsvg > stages.svg");
+  c.on_run([args] {
     if (args->schema)
       std::cout << profile_schema();
     else if (args->json)
@@ -76,7 +76,7 @@ void add_stages_command(CLI::App& app, int& exit_code) {
       print_dot();
     else
       print_table();
-    exit_code = kExitOk;
+    return kExitOk;
   });
 }
 

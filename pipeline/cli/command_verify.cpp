@@ -1,12 +1,12 @@
 #include <sys/resource.h>
 
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
@@ -36,8 +36,7 @@ void limit_memory(std::uint64_t mib) {
 #endif
 }
 
-/// A package that cannot even be opened is a finding of its own, so that the others are looked at all the
-/// same.
+/// A package that cannot be opened is a finding of its own: the other packages are checked all the same.
 VerifyReport verify_path(const std::string& path, const RunContext& context) {
   try {
     const auto store = open_store(path);
@@ -75,9 +74,7 @@ void print(const std::string& path, const VerifyReport& r, bool quiet) {
 
 int run_verify(const Arguments& args) {
   limit_memory(args.memory_mib);
-  RunContext context;
-  context.threads =
-      args.jobs > 0 ? args.jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const RunContext context = context_of(args.jobs);
   bool clean = true;
   Json all = Json::array();
   for (const std::string& path : args.packages) {
@@ -95,30 +92,22 @@ int run_verify(const Arguments& args) {
 
 }  // namespace
 
-void add_verify_command(CLI::App& app, int& exit_code) {
+void add_verify_command(Command& app) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* c =
-      app.add_subcommand("verify", "Check every byte of packages: digests, documents, meshes, images");
-  c->add_option("packages", args->packages, ".texmesh files or unpacked folders")
-      ->required()
-      ->type_name("PKG...");
-  c->add_option("--jobs,-j", args->jobs, "Threads (default: one per core)")
-      ->check(CLI::Range(1, 1024))
-      ->type_name("N");
-  c->add_option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit")
-      ->capture_default_str()
-      ->type_name("MIB");
-  c->add_flag("--json", args->json, "One JSON object with all findings");
-  c->add_flag("--quiet,-q", args->quiet, "Say nothing about sound packages");
-  c->footer(
-      "Looks at everything and reports everything: each finding names the entry, the place in it, what was "
-      "expected, what\n"
-      "was found and [the rule]. Meshes and every texture fragment are decoded.\n"
-      "Examples:\n"
+  Command c = app.add("verify", "Check every byte of packages: digests, documents, meshes, images");
+  c.option("PACKAGES", args->packages, ".texmesh files or unpacked folders").required();
+  add_jobs_option(c, args->jobs);
+  c.option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit").shows_default().value_name("MIB");
+  c.flag("--json", args->json, "Print one JSON object with all findings");
+  c.flag("-q,--quiet", args->quiet, "Say nothing about sound packages");
+  c.examples(
       "  texmesh verify out/*.texmesh\n"
-      "  texmesh verify www/bust --json\n"
+      "  texmesh verify www/bust --json");
+  c.notes(
+      "verify decodes every mesh and every texture fragment and reports every finding. A finding names the "
+      "entry, the place in the entry, what was expected, what was found and [the rule].\n"
       "Exit code: 0 when all packages are sound, 1 when there is a finding, 2 usage.");
-  c->callback([args, &exit_code] { exit_code = run_verify(*args); });
+  c.on_run([args] { return run_verify(*args); });
 }
 
 }  // namespace texmesh

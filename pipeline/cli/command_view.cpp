@@ -2,13 +2,13 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options/command_line.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/view/view_server.h"
 
@@ -27,7 +27,7 @@ std::string url_host(const std::string& host) {
 
 void announce(const Arguments& args, const Site& site, const std::string& base) {
   const std::vector<std::string> packages = site.packages();
-  // Once more: a query is decoded before what it holds is taken for a URL.
+  // The package's path is encoded twice: the page decodes the query before it takes the value for a URL.
   const std::string page = packages.size() == 1 ? base + "?pkg=" + percent_encoded(packages[0]) : base;
   if (args.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -58,37 +58,38 @@ void view(const Arguments& args) {
   int signal = 0;
   ::sigwait(&ends, &signal);
   server.stop();
-  // Connections that browsers keep open would hold the library's threads for seconds; nothing here needs an
-  // end.
+  // Connections that browsers keep open would hold the library's threads for seconds. Nothing here needs
+  // an end.
   ::_exit(kExitOk);
 }
 
 }  // namespace
 
-void add_view_command(CLI::App& app, int& exit_code) {
+void add_view_command(Command& app) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("view", "Look at packages in a browser: serves them and the viewer");
-  c->add_option("package", args->package,
-                "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
-      ->required();
-  c->add_option("--host", args->host, "Address to listen on; others than this machine's own let others in")
-      ->capture_default_str();
-  c->add_option("--port", args->port, "Port; 0 = any free one")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
-  c->add_option("--viewer", args->viewer, "Folder with the built viewer, instead of the one of this build")
-      ->type_name("DIR");
-  c->add_flag("--open", args->open, "Open the page with xdg-open");
-  c->add_flag("--json", args->json, "Print one JSON object with the URLs, for programs");
-  c->footer(
-      "Prints the page's URL and serves until Ctrl-C. Only the viewer's files and packages can be reached.\n"
-      "Examples:\n"
+  Command c = app.add("view", "Look at packages in a browser: serves the packages and the viewer");
+  c.option("PACKAGE", args->package,
+           "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
+      .required();
+  c.option("--host", args->host,
+           "Address to listen on; an address other than this machine's own lets other machines in")
+      .shows_default()
+      .value_name("ADDRESS");
+  c.option("--port", args->port, "Port; 0 = any free port").integer_in(0, 65535).shows_default();
+  c.option("--viewer", args->viewer, "Folder with the built viewer, instead of the viewer of this build")
+      .value_name("DIR");
+  c.flag("--open", args->open, "Open the page with xdg-open");
+  c.flag("--json", args->json, "Print one JSON object with the URLs");
+  c.examples(
       "  texmesh view bust.texmesh\n"
-      "  texmesh view packages/ --port 8080 --open\n"
-      "Exit code: 0, 1 when the package or the viewer is not there or the port is taken, 2 usage.");
-  c->callback([args, &exit_code] {
+      "  texmesh view packages/ --port 8080 --open");
+  c.notes(
+      "view prints the page's URL and serves until Ctrl-C. Only the viewer's files and packages can be "
+      "reached.\n"
+      "Exit code: 0, 1 when the package or the viewer is missing or the port is taken, 2 usage.");
+  c.on_run([args] {
     view(*args);
-    exit_code = kExitOk;
+    return kExitOk;
   });
 }
 

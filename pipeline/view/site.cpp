@@ -222,11 +222,12 @@ std::string viewer_folder(const std::string& wanted) {
   if (!wanted.empty()) candidates = {wanted};
   for (const fs::path& c : candidates)
     if (fs::is_regular_file(c / "index.html", error)) return c.lexically_normal().string();
-  throw InputError(
-      wanted.empty() ? "the viewer" : wanted, "",
-      "its built files (cmake --build build/release --target viewer; needs node and npm), beside "
-      "this build or in share/texmesh/viewer",
-      "no index.html");
+  fs::path build = (folder / "..").lexically_normal().parent_path();
+  if (!fs::is_regular_file(build / "CMakeCache.txt", error)) build = "build/release";
+  throw InputError(wanted.empty() ? "the viewer" : wanted, "",
+                   "the built viewer; to build the viewer, run: cmake --build " + build.string() +
+                       " --target viewer (it needs node and npm)",
+                   "no index.html");
 }
 
 std::string percent_encoded(const std::string& path) {

@@ -231,7 +231,7 @@ double strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy)
 
 std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
                                     PerceptualStatistic strategy) {
-  if (strategy == PerceptualStatistic::kP95 || strategy == PerceptualStatistic::kP99)
+  if (strategy == PerceptualStatistic::kP95)
     throw StageError("perceptual_values", "statistic", "average, conservative or aggressive",
                      std::string(enum_name(strategy)));
   const std::size_t n = step.size();
@@ -249,7 +249,6 @@ std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
 
 std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic) {
   if (statistic == PerceptualStatistic::kP95) return values.p95;
-  if (statistic == PerceptualStatistic::kP99) return values.p99;
   return cumulative_table(values.step, statistic);
 }
 

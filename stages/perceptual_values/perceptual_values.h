@@ -12,13 +12,13 @@ namespace texmesh {
 
 inline constexpr int kPerceptualValuesVersion = 3;
 
-/// Which table decides what is just noticeable: the relative distance between two scales (kP95, kP99), or one
-/// of the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2).
-enum class PerceptualStatistic : std::uint8_t { kP95, kP99, kAverage, kConservative, kAggressive };
+/// Which table decides what is just noticeable. kP95: the relative distance between two scales. The
+/// others are the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2):
+/// average, conservative = the largest change, aggressive = the smallest one.
+enum class PerceptualStatistic : std::uint8_t { kP95, kAverage, kConservative, kAggressive };
 template <>
 struct EnumNames<PerceptualStatistic> {
-  static constexpr std::array<std::string_view, 5> names{"p95", "p99", "average", "conservative",
-                                                         "aggressive"};
+  static constexpr std::array<std::string_view, 4> names{"p95", "average", "conservative", "aggressive"};
 };
 
 /// Displayed height in px at which judges' JND holds by default: the thesis's stimuli stood side by side on
@@ -38,8 +38,8 @@ struct PerceptualValuesOptions {
     v("jnd_reference_px", s.jnd_reference_px, Range{1, 100000},
       "displayed height of the object in px at which that difference is just noticeable");
     v("statistic", s.statistic,
-      "what decides about major scales: p95 of the relative distance, p99 for close views, or the thesis's "
-      "average, conservative (largest) and aggressive (smallest) change of the skeleton distance");
+      "what decides about major scales: p95 of the relative distance, or the thesis's average, "
+      "conservative (largest) and aggressive (smallest) change of the skeleton distance");
     v("samples", s.samples, Range{100, 1000000}, "points compared per pair of scales");
     v("kept_scales", s.kept_scales, Range{1, 40},
       "scales a package holds, about; steps of about 2x between them");

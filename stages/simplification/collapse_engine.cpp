@@ -97,8 +97,7 @@ void CollapseEngine::prefetch_next() const {
 double CollapseEngine::shape_cost(std::uint32_t u, std::uint32_t v) const {
   const Vec3d p = mesh_.point(v), moved = p - mesh_.point(u);
   const Quadric& q = cost_.quadric(u);
-  const double weight =
-      options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
+  const double weight = options_.persistence_weight * persistence_[u];
   return (q.at(p) + kDistanceWeight * q.weight * dot(moved, moved)) * (1 + weight);
 }
 
@@ -148,8 +147,7 @@ CollapseEngine::Choice CollapseEngine::choose(CollapseRing& ring, WedgeMap& map)
       choice.exact = false;
     } else if (n.state == State::kBounded && cost_.has_attributes()) {
       // The rest of the cost is only asked for where the shape's part is the least.
-      const double weight =
-          options_.order == CollapseOrder::kQem ? 0 : options_.persistence_weight * persistence_[u];
+      const double weight = options_.persistence_weight * persistence_[u];
       const CollapseCost::Distortion d = cost_.distortion(ring, map);
       n.cost += fade_ * d.cost * (1 + weight);
       n.state = State::kPriced;

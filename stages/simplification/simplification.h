@@ -13,10 +13,10 @@ namespace texmesh {
 
 inline constexpr int kSimplificationVersion = 5;
 
-enum class CollapseOrder : std::uint8_t { kTexmesh, kQem, kThesis };
+enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
 template <>
 struct EnumNames<CollapseOrder> {
-  static constexpr std::array<std::string_view, 3> names{"texmesh", "qem", "thesis"};
+  static constexpr std::array<std::string_view, 2> names{"texmesh", "thesis"};
 };
 
 struct SimplificationOptions {
@@ -43,11 +43,9 @@ struct SimplificationOptions {
   int coarsest_vertices = 400;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("order", s.order,
-      "texmesh = quadrics weighted by persistence; qem = quadrics alone; thesis = scale map, closest "
-      "neighbour");
+    v("order", s.order, "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour");
     v("persistence_weight", s.persistence_weight, Range{0, 10},
-      "cost of removing a vertex grows by this per scale it persists");
+      "cost of removing a vertex grows by this per scale it persists; 0 = quadrics alone");
     v("uv_weight", s.uv_weight, Range{0, 10}, "weight of the texture's distortion against the shape's");
     v("normal_weight", s.normal_weight, Range{0, 10}, "weight of the normals' distortion");
     v("colour_weight", s.colour_weight, Range{0, 10}, "weight of the vertex colours' distortion");

@@ -22,9 +22,9 @@ TEST(JndProfile, BecomesOptions) {
 
 TEST(JndProfile, AbsentFieldsKeepTheirValues) {
   CompileOptions options;
-  options.perceptual_values.statistic = PerceptualStatistic::kP99;
+  options.perceptual_values.statistic = PerceptualStatistic::kAverage;
   read(options, R"({"version":1,"jnd":0.2})");
-  EXPECT_EQ(options.perceptual_values.statistic, PerceptualStatistic::kP99);
+  EXPECT_EQ(options.perceptual_values.statistic, PerceptualStatistic::kAverage);
   EXPECT_EQ(options.perceptual_values.jnd_reference_px, kJndReferencePx);
 }
 

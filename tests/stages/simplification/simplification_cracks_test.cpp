@@ -59,7 +59,7 @@ Mesh wounded(const Mesh& whole, const Wounds& wounds) {
 void expect_whole(const Mesh& mesh, double left, const char* name) {
   SCOPED_TRACE(name);
   const ConditionedMesh conditioned = condition(mesh);
-  for (CollapseOrder order : {CollapseOrder::kTexmesh, CollapseOrder::kQem, CollapseOrder::kThesis}) {
+  for (CollapseOrder order : {CollapseOrder::kTexmesh, CollapseOrder::kThesis}) {
     SimplificationOptions options;
     options.order = order;
     const NestedScales scales = run(conditioned, options);

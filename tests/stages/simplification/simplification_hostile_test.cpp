@@ -309,7 +309,7 @@ TEST(Simplification, NormalsGuideTheCollapse) {
   const auto right_share = [&](double weight) {
     SimplificationOptions options;
     options.normal_weight = weight;
-    options.order = CollapseOrder::kQem;
+    options.persistence_weight = 0;
     const NestedScales scales = run(mesh, options);
     expect_sound(scales, true);
     const Mesh middle = extract_scale(scales, scales.scales[scales.scales.size() / 2]);
@@ -333,7 +333,7 @@ TEST(Simplification, AlphaGuidesTheCollapse) {
   const auto right_share = [&](double weight) {
     SimplificationOptions options;
     options.colour_weight = weight;
-    options.order = CollapseOrder::kQem;
+    options.persistence_weight = 0;
     const NestedScales scales = run(mesh, options);
     expect_sound(scales, true);
     const Mesh middle = extract_scale(scales, scales.scales[scales.scales.size() / 2]);

@@ -1,4 +1,4 @@
-#include "pipeline/cli/units.h"
+#include "pipeline/cli/options/units.h"
 
 #include <fmt/format.h>
 #include <map>

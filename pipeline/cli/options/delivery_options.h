@@ -4,11 +4,10 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 
-namespace CLI {
-class App;
-}
-
 namespace texmesh {
+
+class Command;
+class Option;
 
 /// What plan, check and simulate ask about how a package is looked at and over what.
 struct DeliveryArguments {
@@ -22,7 +21,15 @@ struct DeliveryArguments {
   bool hard_limits = false, slow_start = false, connect_costs = false, json = false;
   bool needs_link = true;  // false: a budget in bytes, or a real network
 };
-void add_delivery_options(CLI::App& command, DeliveryArguments& args, bool package_required);
+void add_delivery_options(Command& command, DeliveryArguments& args, bool package_required);
+
+// Single options of these, for commands that take some of them only.
+Option add_display_option(Command& command, DeliveryArguments& args);
+void add_time_option(Command& command, DeliveryArguments& args);
+Option add_scale_option(Command& command, DeliveryArguments& args);
+Option add_policy_option(Command& command, DeliveryArguments& args);
+Option add_window_option(Command& command, DeliveryArguments& args);
+
 /// UsageError names the flag.
 DeliveryRequest delivery_request(const DeliveryArguments& args);
 /// "at 1.25 s", or "never" for what a network does not bring.
