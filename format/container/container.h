@@ -21,10 +21,10 @@ class ByteSource {
   virtual std::vector<std::uint8_t> read(std::uint64_t offset, std::uint64_t bytes) = 0;
 };
 std::unique_ptr<ByteSource> open_file_source(const std::string& path);  // InputError
-std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes,
-                                          std::string name = "package");  // keeps the span, not a copy
-std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes,
-                                          std::string name = "package");  // keeps the bytes
+/// Keeps the span, not a copy.
+std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name = "package");
+/// Keeps the bytes.
+std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name = "package");
 
 struct ContainerEntry {
   std::string path;

@@ -94,10 +94,6 @@ class DecodingChannel {
   std::vector<PartDecoder> parts_;
 };
 
-[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
-  throw FormatError(kSplitStreamName, place, expected, found);
-}
-
 std::vector<int> components_of(const SplitStreamHead& head) {
   std::vector<int> components;
   for (const SplitAttribute& a : head.attributes) components.push_back(split_components(a.kind));
@@ -108,9 +104,9 @@ std::vector<int> components_of(const SplitStreamHead& head) {
 SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limits) {
   const SplitScale& last = head.scales.at(head.scales.size() - 1);
   if (last.points > limits.points)
-    fail("points", "at most " + std::to_string(limits.points), std::to_string(last.points));
+    fail_split_stream("points", "at most " + std::to_string(limits.points), std::to_string(last.points));
   if (last.faces > limits.faces || last.wedges > 3ull * limits.faces)
-    fail("faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
+    fail_split_stream("faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
   return {last.points, last.faces};
 }
 
@@ -165,13 +161,13 @@ std::size_t SplitStreamReader::next_block() const { return state_->block; }
 void SplitStreamReader::add_block(ByteSpan block) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
-  if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
+  if (s.block >= s.head.blocks.size()) fail_split_stream(place, "no more blocks", "one");
   const SplitBlock& b = s.head.blocks[s.block];
   if (block.size() != b.bytes())
-    fail(place, std::to_string(b.bytes()) + " bytes", std::to_string(block.size()));
+    fail_split_stream(place, std::to_string(b.bytes()) + " bytes", std::to_string(block.size()));
   const Sha256 digest = sha256(block);
   if (!std::equal(b.digest.begin(), b.digest.end(), digest.begin()))
-    fail(place, "bytes of the digest in the head", "others");
+    fail_split_stream(place, "bytes of the digest in the head", "others");
   std::vector<ByteSpan> parts;
   std::size_t at = 0;
   for (std::uint32_t size : b.parts) {
@@ -184,13 +180,13 @@ void SplitStreamReader::add_block(ByteSpan block) {
 void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
-  if (s.block >= s.head.blocks.size()) fail(place, "no more blocks", "one");
+  if (s.block >= s.head.blocks.size()) fail_split_stream(place, "no more blocks", "one");
   const SplitBlock& b = s.head.blocks[s.block];
   if (parts.size() != b.parts.size())
-    fail(place, std::to_string(b.parts.size()) + " parts", std::to_string(parts.size()));
+    fail_split_stream(place, std::to_string(b.parts.size()) + " parts", std::to_string(parts.size()));
   for (std::size_t i = 0; i < parts.size(); ++i)
     if (parts[i].size() != b.parts[i] && (i == 0 || !parts[i].empty()))
-      fail(place, std::to_string(b.parts[i]) + " bytes", std::to_string(parts[i].size()));
+      fail_split_stream(place, std::to_string(b.parts[i]) + " bytes", std::to_string(parts[i].size()));
   if (parts[1].size() != b.parts[1]) s.complete = false;
   if (s.block == 0 || s.block == s.head.scales[s.scale].blocks) {
     if (s.block > 0) ++s.scale;
@@ -206,8 +202,8 @@ void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   if (s.block != scale.blocks) return;
   const auto require = [&](const char* what, std::size_t expected, std::size_t found) {
     if (expected != found)
-      fail("scale " + std::to_string(scale.scale), std::to_string(expected) + " " + what,
-           std::to_string(found));
+      fail_split_stream("scale " + std::to_string(scale.scale), std::to_string(expected) + " " + what,
+                        std::to_string(found));
   };
   require("points", scale.points, s.mesh.points().size());
   require("wedges", scale.wedges, s.mesh.wedge_point().size());
@@ -226,8 +222,8 @@ void SplitStreamReader::read_to_scale(std::size_t index, ByteSpan stream) {
   while (state_->block < end) {
     const SplitBlock& b = state_->head.blocks[state_->block];
     if (b.offset > stream.size() || b.bytes() > stream.size() - b.offset)
-      fail("block " + std::to_string(state_->block), "bytes up to " + std::to_string(b.offset + b.bytes()),
-           std::to_string(stream.size()));
+      fail_split_stream("block " + std::to_string(state_->block),
+                        "bytes up to " + std::to_string(b.offset + b.bytes()), std::to_string(stream.size()));
     add_block(stream.subspan(static_cast<std::size_t>(b.offset), static_cast<std::size_t>(b.bytes())));
   }
 }

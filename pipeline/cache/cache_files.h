@@ -12,7 +12,7 @@
 //   ac/<k[0:2]>/<key>        a record: the key's parts in the clear, the outputs' digests, its own digest
 //   cas/<d[0:2]>/<digest>    the bytes of an output
 //   notes/<k[0:2]>/<key>     small facts that are not results
-//   memo/<name>              what the last run of a collection left (pipeline/build_memo.h)
+//   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins so is computed
 //   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while
 //   pruning running/<name>           one per running build, locked while it lives; its time is the build's

@@ -32,7 +32,8 @@ Period period_of(const Material& material, int set) {
     period.restrict_by(0, whole ? period_of(t.wrap_s) : 0);
     period.restrict_by(1, whole ? period_of(t.wrap_t) : 0);
   });
-  if (!used) period.move = {0, 0};  // coordinates for somebody else, who knows what they mean
+  // No texture uses these coordinates: only the application that they are for knows what they mean.
+  if (!used) period.move = {0, 0};
   return period;
 }
 

@@ -45,8 +45,8 @@ class LineReader {
  private:
   std::string_view rest_;
   std::size_t number_;
-  const char* line_feed_ =
-      nullptr;  // the first "\n" at or after rest_, its end when there is none; nullptr = not looked for
+  // The first "\n" at or after rest_, its end when there is none; nullptr = not looked for.
+  const char* line_feed_ = nullptr;
 };
 
 /// A text shortened for a message, with control characters replaced.

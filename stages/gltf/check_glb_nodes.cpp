@@ -6,7 +6,7 @@
 #include <limits>
 #include <tuple>
 
-#include "stages/gltf/check_glb_primitive.h"
+#include "format/base/box.h"
 
 namespace texmesh {
 namespace {
@@ -108,7 +108,7 @@ class NodeChecker {
 
   void collect_positions(GlbFacts& facts) {
     std::vector<Vec3d>& all = facts.positions;
-    GlbBox box;
+    Box3d box;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const Matrix m = world_matrix(i);
       if (!nodes_[i].contains("mesh")) continue;

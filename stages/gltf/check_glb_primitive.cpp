@@ -125,7 +125,7 @@ class PrimitiveChecker {
   }
 
   /// glTF requires min and max of POSITION; viewers place their camera by them.
-  void check_stated_box(const Json& accessor_json, const GlbBox& box, const std::string& place) {
+  void check_stated_box(const Json& accessor_json, const Box3d& box, const std::string& place) {
     const double slack = 1e-5 * length(box.max - box.min) + 1e-30;
     for (const char* key : {"min", "max"}) {
       const auto it = accessor_json.find(key);

@@ -8,8 +8,8 @@
 
 namespace texmesh {
 
-/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB. Included by
-/// .cpp files of that stage only, because it brings the JSON library along.
+/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB. Only .cpp
+/// files include this header, because it brings the JSON library along.
 class GlbWriter {
  public:
   using Json = nlohmann::ordered_json;

@@ -14,7 +14,7 @@ namespace texmesh {
 // the time; what a transfer takes less or more, dT, is spread over the fragments to come with weights 1/2,
 // 1/3, ..., the nearest most, and the size that fits a fragment's time decides its rung.
 //
-// The plan does no I/O and knows no clock: its user tells it what the time is. Plain double arithmetic and
+// The plan does no I/O and reads no clock: the caller gives the time. Plain double arithmetic and
 // format/base/portable_math.h: the same decisions bit for bit in C++ and TypeScript (delivery/vectors).
 
 /// How rungs are chosen. kHtc: the method. kGuard: the method over the plan of least loss instead of

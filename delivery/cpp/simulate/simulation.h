@@ -19,8 +19,8 @@ struct SimulationResult {
   std::uint64_t bytes = 0;
   std::uint32_t skipped = 0;   // by decision, or not decided when it ended; given up ones, too
   std::uint32_t given_up = 0;  // asked for, and never delivered
-  double loss = 0,
-         planned_loss = 0;  // sums of the offers' losses: as shown, and if all were at their planned size
+  // Sums of the offers' losses: as shown, and if all were at their planned size.
+  double loss = 0, planned_loss = 0;
   std::vector<HtcStep> steps;
   std::vector<std::int32_t> rungs;  // by offer
 };
@@ -66,9 +66,9 @@ BandwidthTrace random_trace(double mean_bytes_s, double cv, double rho, double s
 struct Table42Row {
   double beta0_kb_s = 0, t0_s = 0;
   double static_percent = 0;  // what a transfer that does not adapt leaves of the limit, in the mean
-  double deviation_percent =
-      0;                     // mean of |deviation| over the seeds, a throughput sample per fragment, cv 0.2
-  double worst_percent = 0;  // its largest
+  // Mean of |deviation| over the seeds, a throughput sample per fragment, cv 0.2.
+  double deviation_percent = 0;
+  double worst_percent = 0;                                     // its largest
   double trace_deviation_percent = 0, trace_worst_percent = 0;  // traces by time: cv 0.3, 0.1 s, rho 0.9
   double mean_loss = 0;
 };

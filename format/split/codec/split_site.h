@@ -11,8 +11,12 @@ namespace texmesh {
 
 inline constexpr const char* kSplitStreamName = "mesh/stream.bin";
 
+[[noreturn]] inline void fail_split_stream(const std::string& place, const std::string& expected,
+                                           const std::string& found) {
+  throw FormatError(kSplitStreamName, place, expected, found);
+}
 [[noreturn]] inline void fail_split_stream(const std::string& expected, const std::string& found) {
-  throw FormatError(kSplitStreamName, "", expected, found);
+  fail_split_stream("", expected, found);
 }
 
 /// Bounds the codec's steps by the size of the mesh. Otherwise a few bytes could ask many points, or go round

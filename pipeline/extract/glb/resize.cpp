@@ -91,8 +91,8 @@ void put_normal(const float* mean, std::uint8_t* to) {
     n[c] = static_cast<double>(mean[c]) / 127.5 - 1;
     squared += n[c] * n[c];
   }
-  const double length =
-      squared > 1e-4 ? std::sqrt(squared) : 1;  // vectors that cancel out stay what they are
+  // Vectors that cancel out stay what they are.
+  const double length = squared > 1e-4 ? std::sqrt(squared) : 1;
   for (std::size_t c = 0; c < 3; ++c)
     to[c] = static_cast<std::uint8_t>(std::clamp(std::floor((n[c] / length + 1) * 127.5 + 0.5), 0.0, 255.0));
 }

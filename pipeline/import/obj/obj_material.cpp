@@ -279,8 +279,8 @@ struct Converter {
     if (!rough.used() && !metal.used()) return;
     out.metallic_roughness_texture = rough.used() ? rough : metal;
     out.metallic_roughness_texture.image = combine_roughness_metallic(model, rough.image, metal.image);
-    if (rough.used())
-      out.roughness = 1;  // the map says it all: Pr beside it is what viewers without maps show
+    // The map says it all: Pr beside it is what viewers without maps show.
+    if (rough.used()) out.roughness = 1;
     if (metal.used()) out.metallic = 1;
   }
 

@@ -154,7 +154,7 @@ std::size_t ply_type_bytes(PlyType type) {
   return 8;
 }
 
-int PlyElement::find(std::initializer_list<std::string_view> names) const {
+int PlyElement::find_property(std::initializer_list<std::string_view> names) const {
   for (std::string_view wanted : names)
     for (std::size_t i = 0; i < properties.size(); ++i)
       if (properties[i].name == wanted) return static_cast<int>(i);

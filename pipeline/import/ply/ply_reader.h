@@ -28,8 +28,8 @@ struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
   std::vector<PlyProperty> properties;
-  int find(std::initializer_list<std::string_view> names)
-      const;  // index of the first property so named, -1 = none
+  /// Index of the first property so named, -1 = none.
+  int find_property(std::initializer_list<std::string_view> names) const;
 };
 
 enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };

@@ -30,8 +30,10 @@ struct ColourColumns {
   std::array<float, 256> table{};  // linear light of an 8-bit value
 
   explicit ColourColumns(const PlyElement& element) {
-    column = {element.find({"red", "r", "diffuse_red"}), element.find({"green", "g", "diffuse_green"}),
-              element.find({"blue", "b", "diffuse_blue"}), element.find({"alpha", "a", "diffuse_alpha"})};
+    column = {element.find_property({"red", "r", "diffuse_red"}),
+              element.find_property({"green", "g", "diffuse_green"}),
+              element.find_property({"blue", "b", "diffuse_blue"}),
+              element.find_property({"alpha", "a", "diffuse_alpha"})};
     for (std::size_t i = 0; i < 4; ++i) {
       if (column[i] < 0) continue;
       const PlyProperty& p = element.properties[static_cast<std::size_t>(column[i])];
@@ -53,12 +55,12 @@ struct ColourColumns {
   }
 };
 
-int scalar(const PlyElement& e, std::initializer_list<std::string_view> names) {
-  const int i = e.find(names);
+int find_scalar(const PlyElement& e, std::initializer_list<std::string_view> names) {
+  const int i = e.find_property(names);
   return i >= 0 && !e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
 }
-int list(const PlyElement& e, std::initializer_list<std::string_view> names) {
-  const int i = e.find(names);
+int find_list(const PlyElement& e, std::initializer_list<std::string_view> names) {
+  const int i = e.find_property(names);
   return i >= 0 && e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
 }
 
@@ -124,12 +126,15 @@ class SurfaceReader {
 
   void read_vertices(const PlyElement& element) {
     check_count(element, options_.max_vertices);
-    const std::array<int, 3> xyz{scalar(element, {"x"}), scalar(element, {"y"}), scalar(element, {"z"})};
+    const std::array<int, 3> xyz{find_scalar(element, {"x"}), find_scalar(element, {"y"}),
+                                 find_scalar(element, {"z"})};
     if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0)
       throw InputError(file_, "element vertex", "properties x, y and z", "not all of them");
-    const std::array<int, 3> n{scalar(element, {"nx"}), scalar(element, {"ny"}), scalar(element, {"nz"})};
-    const std::array<int, 2> st{scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
-                                scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
+    const std::array<int, 3> n{find_scalar(element, {"nx"}), find_scalar(element, {"ny"}),
+                               find_scalar(element, {"nz"})};
+    const std::array<int, 2> st{
+        find_scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
+        find_scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
     const ColourColumns colours(element);
     const bool has_normals = n[0] >= 0 && n[1] >= 0 && n[2] >= 0, has_uv = st[0] >= 0 && st[1] >= 0;
     for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -162,9 +167,9 @@ class SurfaceReader {
   }
 
   void read_faces(const PlyElement& element) {
-    const int corners = list(element, {"vertex_indices", "vertex_index"});
+    const int corners = find_list(element, {"vertex_indices", "vertex_index"});
     if (corners < 0) throw InputError(file_, "element face", "a list vertex_indices", "none");
-    const int texcoord = list(element, {"texcoord"}), texnumber = scalar(element, {"texnumber"});
+    const int texcoord = find_list(element, {"texcoord"}), texnumber = find_scalar(element, {"texnumber"});
     const ColourColumns colours(element);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
@@ -219,7 +224,7 @@ class SurfaceReader {
   }
 
   void read_strips(const PlyElement& element) {
-    const int corners = list(element, {"vertex_indices", "vertex_index"});
+    const int corners = find_list(element, {"vertex_indices", "vertex_index"});
     if (corners < 0) throw InputError(file_, "element tristrips", "a list vertex_indices", "none");
     for (std::uint64_t i = 0; i < element.count; ++i) {
       rows_.next(row_);

@@ -1,18 +1,10 @@
 #include "format/base/half.h"
 
-#include "format/documents/allocation.h"
-#include "format/documents/quality_table.h"
-#include "format/documents/tables.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "tests/format/documents/tables_fixture.h"
 
 namespace texmesh {
 namespace {

@@ -1,16 +1,12 @@
 #include "format/container/layout.h"
 
-#include "format/documents/index.h"
-#include "format/documents/manifest.h"
 #include "format/documents/textures.h"
 
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
+#include <algorithm>
 
-#include "format/base/errors.h"
 #include "format/container/container.h"
-#include "tests/format/documents/manifest_fixture.h"
 
 namespace texmesh {
 namespace {

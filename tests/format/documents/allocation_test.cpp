@@ -1,6 +1,5 @@
 #include "format/documents/allocation.h"
 
-#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 
 #include <gtest/gtest.h>
@@ -10,8 +9,6 @@
 #include <limits>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/base/half.h"
 #include "tests/format/documents/tables_fixture.h"
 
 namespace texmesh {

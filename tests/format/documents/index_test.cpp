@@ -1,8 +1,5 @@
 #include "format/documents/index.h"
 
-#include "format/documents/manifest.h"
-#include "format/documents/textures.h"
-
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

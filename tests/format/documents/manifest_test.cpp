@@ -1,5 +1,4 @@
 #include "format/documents/manifest.h"
-#include "format/documents/index.h"
 #include "format/documents/textures.h"
 
 #include <gtest/gtest.h>

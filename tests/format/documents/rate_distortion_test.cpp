@@ -7,7 +7,6 @@
 
 #include "format/documents/allocation.h"
 #include "format/documents/rate_distortion.h"
-#include "format/documents/size_curve.h"
 #include "format/documents/tables.h"
 #include "tests/format/documents/tables_fixture.h"
 

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
 #include "tests/format/documents/tables_fixture.h"
 

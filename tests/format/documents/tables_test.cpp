@@ -1,6 +1,4 @@
 #include "format/documents/tables.h"
-#include "format/documents/allocation.h"
-#include "format/documents/quality_table.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +8,6 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
-#include "format/base/half.h"
 #include "tests/format/documents/tables_fixture.h"
 
 namespace texmesh {

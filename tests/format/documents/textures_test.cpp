@@ -1,6 +1,5 @@
 #include "format/documents/textures.h"
 
-#include "format/documents/index.h"
 #include "format/documents/manifest.h"
 
 #include <gtest/gtest.h>

@@ -5,16 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "format/base/errors.h"
-#include "pipeline/import/finish_model.h"
-#include "pipeline/import/import.h"
-#include "pipeline/import/import_images.h"
-#include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/text_scan.h"
-#include "tests/support/images.h"
-#include "tests/support/memory_resolver.h"
-#include "tests/support/meshes.h"
-
 namespace texmesh {
 namespace {
 
