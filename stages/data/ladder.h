@@ -18,9 +18,6 @@ struct SizeKnots {
   }
 };
 
-/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
-inline constexpr int kLosslessQuality = 100;
-
 /// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
 struct LadderRung {
   int quality = 0;  // IJG's scale; of the baseline JPEG of equal error for progressive files

@@ -13,6 +13,7 @@
 #include "stages/jpeg/bit_writer.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_stream.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {

@@ -9,6 +9,7 @@
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/data/ladder.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {

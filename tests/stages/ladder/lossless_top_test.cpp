@@ -11,6 +11,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "tests/support/images.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {
