@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <set>
 #include <utility>
@@ -333,6 +335,64 @@ TEST(GraphRun, WaitsForWhoeverComputesTheSameAndTakesTheResult) {
   EXPECT_EQ(first.run(store, "abc", {}, 1), "aabcR+a");
   EXPECT_EQ(first.ran, Ran{});  // everything came from the other one
   EXPECT_TRUE(other.ran.contains("left"));
+}
+
+/// Two consumers of one stage want its two results at once, and the store has lost both of them.
+struct LostResults : MemoryStore {
+  std::mutex lost_mutex;
+  std::condition_variable changed;
+  std::set<std::string> asked_for;
+  bool loses = false;
+
+  /// Answers when both results have been asked for. Waits for a bounded time: where the graph lets one consumer
+  /// ask at a time, the second request comes only after the first answer.
+  SharedBytes load(const StoredBlob& blob) override {
+    if (!loses || !blob.name.starts_with("split.") || blob.name.ends_with("notes"))
+      return MemoryStore::load(blob);
+    std::unique_lock lock(lost_mutex);
+    asked_for.insert(blob.name);
+    changed.notify_all();
+    changed.wait_for(lock, std::chrono::milliseconds(500), [&] { return asked_for.size() == 2; });
+    return nullptr;
+  }
+};
+
+TEST(GraphRun, AStageWhoseResultsAreLostRunsOnceForAllItsConsumers) {
+  LostResults store;
+  std::atomic<int> runs{0};
+  int unguarded = 0;  // as the state behind a source is; the thread sanitizer watches it
+  const auto split = [&](const StageInputs& in) {
+    ++runs;
+    ++unguarded;
+    const Text& text = in.get<Text>("source");
+    return StageOutputs{{object(text.substr(0, 1)), object(text.substr(1))}, {}};
+  };
+  const auto copy_of = [](const std::string& input) {
+    return [input](const StageInputs& in) { return StageOutputs{{object(in.get<Text>(input) + "'")}, {}}; };
+  };
+  const auto join = [](const StageInputs& in) {
+    return StageOutputs{{object(in.get<Text>("first") + in.get<Text>("second"))}, {}};
+  };
+  const std::vector<Stage> stages{
+      {"split", 1, "", {"source"}, {artefact<Text>("split.a"), artefact<Text>("split.b")}, {}, {}, true, split},
+      {"first", 1, "", {"split.a"}, {artefact<Text>("first")}, {"ssf"}, {}, true, copy_of("split.a")},
+      {"second", 1, "", {"split.b"}, {artefact<Text>("second")}, {"ssf"}, {}, true, copy_of("split.b")},
+      {"join", 1, "", {"first", "second"}, {artefact<Text>("join")}, {}, {}, true, join}};
+  const auto run = [&](const CompileOptions& options) {
+    RunContext context;
+    context.threads = 2;
+    GraphRun graph(stages, options, store, context);
+    graph.give("source", object(Text("abc")), sha256({}), 3);
+    return *static_cast<const Text*>(graph.run("join").get());
+  };
+  EXPECT_EQ(run({}), "a'bc'");
+  EXPECT_EQ(runs, 1);
+  store.loses = true;
+  CompileOptions options;  // both consumers run again; the stage before them is found in the store
+  options.ssf.scales = 7;
+  EXPECT_EQ(run(options), "a'bc'");
+  EXPECT_EQ(runs, 2);
+  EXPECT_EQ(unguarded, 2);
 }
 
 /// A collection of fake models, "geometry|texture" each: import splits them, one stage works on either half
