@@ -39,6 +39,11 @@ bool names_field(const std::vector<std::string>& listed, const OptionField& fiel
 
 }  // namespace
 
+/// The order of locks, outermost first: `schedule`; the `running` of a stage, held while that stage is looked
+/// up, loaded or run, so that no stage runs twice at once however many results it has; then one of `mutex`,
+/// `observer_mutex` and the store's own. Whoever holds the `running` of a stage takes only those of stages
+/// before it, whose results it reads. The graph has no circle, so no two threads wait for each other.
+/// `schedule` is never held while a `running` is taken.
 struct GraphRun::State {
   struct Slot {                       // one artefact
     std::size_t producer = kOutside;  // index into nodes
@@ -49,7 +54,6 @@ struct GraphRun::State {
     std::vector<std::pair<std::string, std::string>> parts;  // see give()
     bool known = false;                                      // digest stands
     int uses_left = 0;
-    std::shared_ptr<std::recursive_mutex> mutex = std::make_shared<std::recursive_mutex>();
   };
   struct Node {
     const Stage* stage = nullptr;
@@ -58,13 +62,14 @@ struct GraphRun::State {
     Notes notes;
     bool done = false;
     std::exception_ptr error;
+    std::shared_ptr<std::mutex> running = std::make_shared<std::mutex>();  // see the order of locks
   };
 
   State(const std::vector<Stage>& stages, const CompileOptions& opts, Store& st, const RunContext& ctx,
         StageObserver obs)
       : options(opts), store(st), context(ctx), observer(std::move(obs)) {
     for (std::size_t i = 0; i < stages.size(); ++i) {
-      nodes.push_back({&stages[i], {}, {}, {}, false, nullptr});
+      nodes.emplace_back().stage = &stages[i];
       for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
         Slot& slot = slots[stages[i].outputs[k].name];
         slot.producer = i;
@@ -138,13 +143,16 @@ struct GraphRun::State {
       const std::lock_guard lock(mutex);
       slot = &slots.at(name);
     }
-    const std::lock_guard own(*slot->mutex);
+    if (slot->producer == kOutside) {
+      if (!slot->object) throw std::logic_error("artefact " + name + " was not given");
+      return slot->object;
+    }
+    Node& node = nodes[slot->producer];
+    const std::lock_guard exclusive(*node.running);
     {
       const std::lock_guard lock(mutex);
       if (slot->object) return slot->object;
     }
-    if (slot->producer == kOutside) throw std::logic_error("artefact " + name + " was not given");
-    Node& node = nodes[slot->producer];
     if (Object stored = object_from_store(node, slot->output)) {
       const std::lock_guard lock(mutex);
       return slot->object = std::move(stored);
@@ -213,6 +221,7 @@ struct GraphRun::State {
 
   /// Brings one stage up to date.
   void settle(Node& node) {
+    const std::lock_guard exclusive(*node.running);
     const Stage& stage = *node.stage;
     const Key key = key_of(stage);
     if (!stage.stored) {  // derived: its key stands for its bytes, and it runs when somebody fetches it
