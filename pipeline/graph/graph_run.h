@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/graph/key.h"
 #include "pipeline/graph/store.h"
 
 namespace texmesh {
@@ -37,9 +38,6 @@ struct StageExplanation {
   std::string waits_for;  // kUnknown: the artefact
 };
 using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
-
-/// The keys that the stages of one model had, by stage name.
-using StageKeys = std::map<std::string, Sha256>;
 
 /// Runs a stage graph for one model over a store. Stages whose inputs are known run side by side, at most
 /// context.threads at a time; a stage whose key is in the store is not run, and its result is not even loaded

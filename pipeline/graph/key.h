@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -35,6 +36,9 @@ class Key {
 
 /// A key from its preimage, with the same parts in the same order; nothing when it is no preimage.
 std::optional<Key> key_from_preimage(const std::string& preimage);
+
+/// The keys that the stages of one model had, by stage name.
+using StageKeys = std::map<std::string, Sha256>;
 
 /// The digest of a key that has these parts.
 Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts);
