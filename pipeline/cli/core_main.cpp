@@ -9,13 +9,13 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/units.h"
 #include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/worker_child.h"
 #include "pipeline/io/exit_codes.h"
 
 int main(int argc, char** argv) {
   using namespace texmesh;
   if (argc == 2 && std::string(argv[1]) == "worker")
-    return worker_main();  // started by compile, see pipeline/compile/worker.h
+    return worker_main();  // started by compile, see pipeline/compile/worker_child.h
 
   CLI::App app{"texmesh compiles textured 3D scans into packages that any static web server can stream."};
   app.set_version_flag("--version", "texmesh " + tool_version() + ", package format " +
