@@ -25,6 +25,8 @@ class Key {
   Key& add_input(std::string_view role, const Sha256& digest, std::uint64_t bytes);
   Sha256 digest() const;
   const std::vector<std::pair<std::string, std::string>>& parts() const { return parts_; }
+  /// The parts behind those that the constructor made (schema, stage, version).
+  std::vector<std::pair<std::string, std::string>> added_parts() const;
   /// The parts as a JSON object of strings.
   std::string preimage() const;
 

@@ -10,8 +10,6 @@
 
 namespace texmesh {
 
-inline constexpr int kDecodeImageVersion = 3;
-
 struct ImageLimits {
   std::uint32_t max_side_px = 65500;
   std::uint64_t max_pixels = 20000ull * 20000ull;
@@ -37,6 +35,7 @@ const char* image_extension(ImageFormat format);
 /// second or fourth that says nothing of itself is its alpha; CMYK becomes RGB, palettes RGB or RGBA.
 Image probe_image(std::string name, std::vector<std::uint8_t> bytes, const ImageLimits& limits);
 
+/// Whoever changes the pixels raises kFillVersion (stages/fill/fill.h).
 /// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,
 /// NaN is 0), with the channel count of the file (1..4), top row first, no colour conversion beyond
 /// `encoding`, alpha not multiplied in. Rows and columns are those of the file whatever its EXIF orientation

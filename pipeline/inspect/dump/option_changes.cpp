@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 
 namespace texmesh {

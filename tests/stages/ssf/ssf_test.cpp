@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "format/base/archive.h"
+#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/condition/condition.h"
 #include "stages/ssf/heat_kernel.h"
@@ -305,6 +306,23 @@ TEST(Ssf, DegenerateInputs) {
   const ScaleMap map = run(needles);
   for (std::size_t i = 0; i < map.sigma.size(); ++i)
     EXPECT_TRUE(std::isfinite(map.sigma[i]) && std::isfinite(map.convergence[i]));
+}
+
+TEST(RangeScan, AGridFollowsItsPositionsIntoTheConditionedMesh) {
+  RangeGrid grid;
+  grid.columns = 5;
+  grid.rows = 1;
+  grid.position = {0, 1, kNoIndex, 2, 3};
+  ConditionedMesh mesh;  // position 1 is gone, 3 has a copy that a split added
+  mesh.position_source = {0, 2, 3, 3};
+  const RangeGrid moved = grid_on_conditioned(grid, 4, mesh);
+  EXPECT_EQ(moved.position, (std::vector<std::uint32_t>{0, kNoIndex, kNoIndex, 1, 2}));
+  EXPECT_EQ(moved.columns, 5u);
+  grid.position[0] = 4;
+  EXPECT_THROW(grid_on_conditioned(grid, 4, mesh), StageError);
+  grid.position[0] = 0;
+  mesh.position_source[0] = 9;
+  EXPECT_THROW(grid_on_conditioned(grid, 4, mesh), StageError);
 }
 
 TEST(RangeScan, CrossingsFallWithTheScale) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/option_changes.h"
 #include "pipeline/inspect/dump/package_figures.h"
