@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/graph/graph_run.h"
-#include "pipeline/io/file_resolver.h"
+#include "pipeline/graph/key.h"
+#include "pipeline/io/file_request.h"
 
 namespace texmesh {
 

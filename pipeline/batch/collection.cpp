@@ -11,6 +11,8 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 
 namespace texmesh {
 namespace {

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/compile/options.h"
-
 namespace texmesh {
+
+struct CompileOptions;
 
 /// One model of a collection.
 struct CollectionModel {

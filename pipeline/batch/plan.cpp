@@ -8,6 +8,8 @@
 #include "format/base/sha256.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/batch/find_models.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
@@ -20,7 +22,7 @@ bool is_collection(const std::string& input) {
   return fs::path(input).extension() == ".json" && fs::is_regular_file(input) && !is_range_scan(input);
 }
 
-/// Options after the command line's flags, as text; one text for all models that share an object.
+/// Resolved options after the command line's flags, as text; one text for all models that share an object.
 class Profiles {
  public:
   explicit Profiles(const PlanRequest& request) : request_(request) {}
@@ -29,7 +31,7 @@ class Profiles {
     if (!text) {
       CompileOptions all = *options;
       if (request_.apply_flags) request_.apply_flags(all);
-      std::string profile = write_profile(all);
+      std::string profile = write_profile(resolve_options(std::move(all)));
       text = by_text_.try_emplace(profile, std::make_shared<const std::string>(profile)).first->second;
       kept_.push_back(options);  // so that no other object gets its address
     }
@@ -43,13 +45,13 @@ class Profiles {
   std::vector<std::shared_ptr<const CompileOptions>> kept_;
 };
 
-void add_collection(const std::string& file, const PlanRequest& request, Profiles& profiles,
-                    BatchPlan& plan) {
+void add_collection(const std::string& file, const PlanRequest& request, const CompileOptions& base,
+                    Profiles& profiles, BatchPlan& plan) {
   const auto bytes = read_input_file(file, kMaxCollectionBytes);
   const fs::path folder = fs::path(file).parent_path();
   const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
   for (const CollectionModel& m :
-       read_collection(std::string(bytes.begin(), bytes.end()), file, request.base, list)) {
+       read_collection(std::string(bytes.begin(), bytes.end()), file, base, list)) {
     const std::string input = (folder / m.input).string();
     plan.models.push_back(
         {input, (fs::path(request.output) / m.output).string(), input, profiles.of(m.options)});
@@ -82,11 +84,12 @@ void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
 
 BatchPlan plan_batch(const PlanRequest& request) {
   BatchPlan plan;
+  const auto base = request.base ? request.base : std::make_shared<const CompileOptions>();
   Profiles profiles(request);
   std::vector<std::string> others;
   for (const std::string& input : request.inputs)
     if (is_collection(input))
-      add_collection(input, request, profiles, plan);
+      add_collection(input, request, *base, profiles, plan);
     else
       others.push_back(input);
   const bool names_package =
@@ -95,11 +98,10 @@ BatchPlan plan_batch(const PlanRequest& request) {
     throw InputError(request.output, "", "a folder for the packages of a collection",
                      "the name of one package");
   if (!others.empty()) {
-    const auto shared = std::make_shared<const CompileOptions>(request.base);
     for (ModelPath& m : find_models(others, request.output)) {
       std::string name =
           request.inputs.size() == 1 && names_package ? fs::path(m.input).filename().string() : m.input;
-      plan.models.push_back({std::move(m.input), std::move(m.output), std::move(name), profiles.of(shared)});
+      plan.models.push_back({std::move(m.input), std::move(m.output), std::move(name), profiles.of(base)});
     }
   }
   refuse_shared_outputs(plan);

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/compile/options.h"
-
 namespace texmesh {
+
+struct CompileOptions;
 
 /// One model of a run.
 struct PlannedModel {
@@ -18,7 +18,7 @@ struct PlannedModel {
 struct PlanRequest {
   std::vector<std::string> inputs;                   // models, folders, collections
   std::string output;                                // package or folder
-  CompileOptions base;                               // defaults and --profile
+  std::shared_ptr<const CompileOptions> base;        // of the profile, not resolved; null = defaults
   std::function<void(CompileOptions&)> apply_flags;  // the command line's options, which win over everything
   // This run's part: models whose package's name falls on `shard` of 0 .. shards - 1.
   int shard = 0, shards = 1;

@@ -17,7 +17,9 @@
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/compile/jnd_profile.h"
+#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 
@@ -122,9 +124,7 @@ CompileOptions base_options(const CompileArguments& args) {
 /// Flags win over everything that a file says.
 void apply_flags(const CompileArguments& args, CompileOptions& options) {
   std::vector<OptionField> fields = list_options(options);
-  for (const auto& [path, text] : args.options)
-    for (OptionField& f : fields)
-      if (f.path() == path) set_option(f, text, "--" + path);
+  for (const auto& [path, text] : args.options) set_option(*find_option(fields, path), text, "--" + path);
   check_options(options, "command line");
 }
 
@@ -159,9 +159,9 @@ PlanRequest plan_request(const CompileArguments& args) {
   PlanRequest request;
   request.inputs = args.inputs;
   request.output = args.output;
-  request.base = base_options(args);
+  request.base = std::make_shared<const CompileOptions>(base_options(args));
   request.apply_flags = [&args](CompileOptions& options) { apply_flags(args, options); };
-  CompileOptions check = request.base;  // wrong flags are an error even where there is nothing to compile
+  CompileOptions check = *request.base;  // wrong flags are an error even where there is nothing to compile
   apply_flags(args, check);
   read_shard(args.shard, request);
   return request;

@@ -10,6 +10,8 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -42,9 +44,8 @@ CompileOptions gather_options(const Arguments& args) {
   for (const std::string& setting : args.settings) {
     const std::size_t equals = setting.find('=');
     const std::string path = setting.substr(0, equals);
-    const auto field =
-        std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
-    if (equals == std::string::npos || field == fields.end())
+    OptionField* field = find_option(fields, path);
+    if (equals == std::string::npos || !field)
       throw InputError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help-all lists",
                        setting);
     set_option(*field, setting.substr(equals + 1), "--set " + path);

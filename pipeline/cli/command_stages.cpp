@@ -6,7 +6,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
-#include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/exit_codes.h"
 
@@ -21,36 +21,37 @@ std::string joined(const std::vector<std::string>& names) {
   return s;
 }
 
-std::vector<std::string> output_names(const Stage& s) {
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& named) {
   std::vector<std::string> names;
-  for (const Artefact& a : s.outputs) names.push_back(a.name);
+  for (const T& n : named) names.push_back(n.name);
   return names;
 }
 
 void print_table() {
-  for (const Stage& s : stage_table())
+  for (const Stage& s : default_stage_table())
     std::cout << fmt::format("{:<18} v{:<4} {}\n{:<25}from {}\n", s.name, s.version, s.summary, "",
-                             joined(s.inputs));
+                             joined(names_of(s.inputs)));
 }
 
 void print_json() {
   Json list = Json::array();
-  for (const Stage& s : stage_table())
+  for (const Stage& s : default_stage_table())
     list.push_back({{"stage", s.name},
                     {"version", s.version},
                     {"summary", s.summary},
-                    {"inputs", s.inputs},
-                    {"outputs", output_names(s)},
-                    {"options", s.options},
-                    {"libraries", s.libraries},
+                    {"inputs", names_of(s.inputs)},
+                    {"outputs", names_of(s.outputs)},
+                    {"options", names_of(s.options)},
+                    {"libraries", names_of(s.libraries)},
                     {"stored", s.stored}});
   std::cout << Json{{"stages", list}}.dump(2) << '\n';
 }
 
 void print_dot() {
   std::cout << "digraph texmesh {\n  rankdir=LR;\n";
-  for (const Stage& s : stage_table())
-    for (const std::string& input : s.inputs)
+  for (const Stage& s : default_stage_table())
+    for (const std::string& input : names_of(s.inputs))
       std::cout << fmt::format("  \"{}\" -> \"{}\";\n", input.substr(0, input.find('.')), s.name);
   std::cout << "}\n";
 }

@@ -9,8 +9,9 @@
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies.h"
+#include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/stage_table.h"
+#include "pipeline/graph/make_stage.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
@@ -36,28 +37,24 @@ using Choices = std::vector<StudiedChoice>;
 
 /// Runs the graph as far as the tables, through compile's cache, and the study behind it.
 Choices study_model(const QualityArguments& args) {
-  Stage study;
-  study.name = "study";
-  study.inputs = {"condition", "import.materials", "fragmentation", "fill", "ladder", "previews", "lut"};
-  study.outputs = {{"study", nullptr, nullptr}};
-  study.stored = false;
-  study.run = [&args](const StageInputs& in) {
-    return StageOutputs{
-        {object(study_allocation(
-            in.get<ConditionedMesh>("condition"), in.get<std::vector<Material>>("import.materials"),
-            in.get<Fragments>("fragmentation"), in.get<std::vector<Pixels>>("fill"), in.get<Ladder>("ladder"),
-            in.get<Previews>("previews"), in.get<PackageTables>("lut"), args.options, in.context))},
-        {}};
+  const auto study = [&args](const ConditionedMesh& mesh, const std::vector<Material>& materials,
+                             const Fragments& fragments, const std::vector<Pixels>& planes,
+                             const Ladder& ladder, const Previews& previews, const PackageTables& tables,
+                             const RunContext& context) {
+    return study_allocation(mesh, materials, fragments, planes, ladder, previews, tables, args.options,
+                            context);
   };
-  const std::vector<Stage> graph = graph_towards(std::move(study));
+  constexpr Artefact<Choices> kStudy{"study"};
+  Stage stage =
+      make_stage({kStudy.name, 1, "fragments, rungs -> what choices of rungs look like"},
+                 inputs(kConditionedMesh, kMaterials, kFragments, kFilledPlanes, kLadder, kPreviews, kTables),
+                 derived(kStudy), options(), {}, study);
   CompileRequest request;
   request.input = args.model;
-  const std::unique_ptr<Store> store = args.cache.off
-                                           ? std::make_unique<NullStore>()
-                                           : open_disk_store(default_cache_folder(args.cache.folder));
+  const std::unique_ptr<Store> store =
+      args.no_cache ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(args.cache));
   Notes notes;
-  const Object result = run_stages(request, graph, "study", *store, context_of(args.jobs), {}, notes);
-  return *static_cast<const Choices*>(result.get());
+  return *run_towards(request, std::move(stage), kStudy, *store, context_of(args.jobs), {}, notes);
 }
 
 /// Uniform and what is compared with it, side by side, the source last.

@@ -6,7 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "format/container/format_version.h"
+#include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/library_versions.h"
+#include "pipeline/compile/profile.h"
+#include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
@@ -52,9 +55,9 @@ class ModelSource {
   explicit ModelSource(const CompileRequest& request)
       : path_(request.input), options_(request.options.import), known_(request.known) {}
 
-  void open(const CompileOptions& options, Store& store, const RunContext& context, bool may_write_notes) {
+  void open(Store& store, const RunContext& context, bool may_write_notes) {
     look_at_model();
-    const Sha256 note_key = list_key(options);
+    const Sha256 note_key = list_key();
     if (const auto note = store.find_note(note_key); note && unchanged_since(*note)) return;
     imported_ = std::make_shared<ImportedModel>(import(context, requests_));
     if (may_write_notes) store.put_note(note_key, to_json(requests_).dump());
@@ -70,14 +73,12 @@ class ModelSource {
         key.add_input("file " + to_wire(r.uri), r.digest, r.bytes);
       else
         key.add("input file " + to_wire(r.uri), "not there");
-    std::vector<std::pair<std::string, std::string>> parts = key.parts();
-    parts.erase(parts.begin(), parts.begin() + 3);  // schema, stage and version are the reading stage's own
-    return parts;
+    return key.added_parts();
   }
   Sha256 digest() const { return digest_of_parts(parts()); }
 
   Source source() {
-    return {[this](const RunContext& context) {
+    return {[this](const ImportOptions&, const RunContext& context) {
       if (imported_) return std::move(*std::exchange(imported_, nullptr));
       Requests again;
       ImportedModel model = import(context, again);
@@ -129,13 +130,13 @@ class ModelSource {
     main_ = found;
   }
 
-  Sha256 list_key(const CompileOptions& options) const {
+  Sha256 list_key() const {
     Key key("import-files", kImportVersion);
     key.add("extension", lower_extension(path_));
     key.add_input("model", main_.digest, main_.bytes);
-    CompileOptions copy = options;
-    for (const OptionField& f : list_options(copy))
-      if (f.stage == "import") key.add(f.path(), option_text(f));
+    OptionTexts texts;
+    append_field_texts("import", options_, texts);
+    for (auto& [path, text] : texts) key.add(std::move(path), std::move(text));
     return key.digest();
   }
 
@@ -186,7 +187,7 @@ class ModelSource {
 /// What made the package, without dates, hosts or paths.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
   Json stages = Json::object(), libraries = Json::object();
-  for (const Stage& s : stage_table())
+  for (const Stage& s : default_stage_table())
     if (s.stored) stages[s.name] = s.version;
   for (const auto& [name, version] : library_versions()) libraries[name] = version;
   return Json{{"version", 1},
@@ -206,31 +207,43 @@ void refuse_warnings(const Notes& notes, const std::string& input) {
                        n.code + ": " + n.text);
 }
 
-void give_inputs(GraphRun& graph, ModelSource& source, const std::string& provenance_json) {
-  graph.give("source", object(source.source()), source.digest(), 0, source.parts());
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(provenance_json.data()),
-                        provenance_json.size());
-  graph.give("provenance", object(provenance_json), sha256(bytes), provenance_json.size());
-}
+/// The graph over one model.
+class ModelGraph {
+ public:
+  ModelGraph(ModelSource& source, std::vector<Stage> stages, const CompileOptions& options, Store& store,
+             const RunContext& context, const StageObserver& observer)
+      : stages_(std::move(stages)), graph_(stages_, store, context, observer) {
+    graph_.give(kSource, source.source(), source.digest(), 0, source.parts());
+    const std::string json = provenance(source, options);
+    graph_.give(kProvenance, json, sha256({reinterpret_cast<const std::uint8_t*>(json.data()), json.size()}),
+                json.size());
+  }
+  GraphRun& operator*() { return graph_; }
+  GraphRun* operator->() { return &graph_; }
 
-CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Store& store,
-                         const RunContext& context, const StageObserver& observer) {
-  GraphRun graph(stage_table(), request.options, store, context, observer);
-  give_inputs(graph, source, provenance(source, request.options));
-  graph.explain(request.earlier_keys, request.explainer);
-  const Object package = graph.run("package");
-  const auto& bytes = *static_cast<const std::vector<std::uint8_t>*>(package.get());
+ private:
+  std::vector<Stage> stages_;
+  GraphRun graph_;  // refers to stages_, which therefore stands first
+};
+
+CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& options,
+                              ModelSource& source, Store& store, const RunContext& context,
+                              const StageObserver& observer) {
+  source.open(store, context, true);
+  ModelGraph graph(source, stage_table(options), options, store, context, observer);
+  graph->explain(request.earlier_keys, request.explainer);
+  const std::shared_ptr<const Bytes> package = graph->run(kPackage);
 
   CompileOutcome outcome;
-  outcome.package_bytes = bytes.size();
-  outcome.package_digest = sha256(bytes);
-  outcome.notes = graph.notes();
+  outcome.package_bytes = package->size();
+  outcome.package_digest = sha256(*package);
+  outcome.notes = graph->notes();
   outcome.files = source.files();
-  outcome.keys = graph.keys();
+  outcome.keys = graph->keys();
   if (request.strict) refuse_warnings(outcome.notes, request.input);
   if (request.output.empty()) return outcome;
-  outcome.unchanged = file_holds(request.output, bytes);
-  if (!outcome.unchanged) write_output_file(request.output, bytes, request.temporary);
+  outcome.unchanged = file_holds(request.output, *package);
+  if (!outcome.unchanged) write_output_file(request.output, *package, request.temporary);
   return outcome;
 }
 
@@ -238,36 +251,36 @@ CompileOutcome run_graph(const CompileRequest& request, ModelSource& source, Sto
 
 CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
                              const StageObserver& observer) {
+  const CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
   try {
-    source.open(request.options, store, context, true);
-    return run_graph(request, source, store, context, observer);
+    return compile_source(request, options, source, store, context, observer);
   } catch (...) {
     if (request.files_of_failure) request.files_of_failure(source.files());
     throw;
   }
 }
 
-Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
-                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes) {
+void run_towards(const CompileRequest& request, Stage last, Store& store, const RunContext& context,
+                 const StageObserver& observer, const std::function<void(GraphRun&)>& use) {
+  const CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
-  source.open(request.options, store, context, true);
-  GraphRun graph(stages, request.options, store, context, observer);
-  give_inputs(graph, source, provenance(source, request.options));
-  Object result = graph.run(wanted);
-  notes = graph.notes();
-  return result;
+  source.open(store, context, true);
+  ModelGraph graph(source, graph_towards(std::move(last), options), options, store, context, observer);
+  use(*graph);
 }
 
-std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request,
-                                                                      Store& store,
-                                                                      const RunContext& context) {
+std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& store,
+                                          const RunContext& context) {
+  const CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
-  source.open(request.options, store, context, false);
-  GraphRun graph(stage_table(), request.options, store, context, {});
-  give_inputs(graph, source, provenance(source, request.options));
-  graph.explain(request.earlier_keys, {});
-  return graph.forecast();
+  source.open(store, context, false);
+  ModelGraph graph(source, stage_table(options), options, store, context, {});
+  graph->explain(request.earlier_keys, {});
+  std::vector<StageForecast> forecasts;
+  for (auto& [stage, explanation] : graph->forecast())
+    forecasts.push_back({stage->name, std::move(explanation)});
+  return forecasts;
 }
 
 }  // namespace texmesh

@@ -5,16 +5,16 @@
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/graph_run.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/file_request.h"
 
 namespace texmesh {
 
 struct CompileRequest {
-  std::string input;      // path of the model file
-  std::string output;     // path of the package; "" = compile, check, write nothing
-  std::string temporary;  // sibling of output that is renamed to it; "" = a name of its own
-  CompileOptions options;
-  bool strict = false;  // warnings are errors
+  std::string input;       // path of the model file
+  std::string output;      // path of the package; "" = compile, check, write nothing
+  std::string temporary;   // sibling of output that is renamed to it; "" = a name of its own
+  CompileOptions options;  // resolved or not
+  bool strict = false;     // warnings are errors
   std::vector<FileRequest>
       known;                 // digests of an earlier run, by stamp: such files are not read to learn them
   StageKeys earlier_keys;    // of an earlier run, to explain against
@@ -28,8 +28,7 @@ struct CompileOutcome {
   Sha256 package_digest{};
   bool unchanged = false;  // the output already held these bytes and was left alone
   Notes notes;
-  std::vector<FileRequest>
-      files;  // what the result depends on: the model (uri ""), then what it refers to, found or not
+  std::vector<FileRequest> files;  // what the result depends on: the model (uri ""), then what it refers to
   StageKeys keys;
 };
 
@@ -39,16 +38,33 @@ struct CompileOutcome {
 CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
                              const StageObserver& observer);
 
-/// Runs any graph over the model `request.input`, which it is given as "source" (and what made it as
-/// "provenance"), through the same store and keys as compile_model; returns the object of artefact `wanted`.
-/// `stages` must outlive the call. Errors as compile_model.
-Object run_stages(const CompileRequest& request, const std::vector<Stage>& stages, const std::string& wanted,
-                  Store& store, const RunContext& context, const StageObserver& observer, Notes& notes);
+/// Runs `last` and the stages before it over the model `request.input`, through the same store and keys as
+/// compile_model. Errors as compile_model.
+void run_towards(const CompileRequest& request, Stage last, Store& store, const RunContext& context,
+                 const StageObserver& observer, const std::function<void(GraphRun&)>& use);
+
+/// The same for one artefact of `last`.
+template <class T>
+std::shared_ptr<const T> run_towards(const CompileRequest& request, Stage last, Artefact<T> wanted,
+                                     Store& store, const RunContext& context, const StageObserver& observer,
+                                     Notes& notes) {
+  std::shared_ptr<const T> result;
+  run_towards(request, std::move(last), store, context, observer, [&](GraphRun& graph) {
+    result = graph.run(wanted);
+    notes = graph.notes();
+  });
+  return result;
+}
+
+/// What compile_model would do with a stage.
+struct StageForecast {
+  std::string stage;
+  StageExplanation explanation;
+};
 
 /// What compile_model would do, by stage, without running a stage or writing anything. The input is read, and
 /// parsed where the store does not remember what it refers to.
-std::vector<std::pair<const Stage*, StageExplanation>> forecast_model(const CompileRequest& request,
-                                                                      Store& store,
-                                                                      const RunContext& context);
+std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& store,
+                                          const RunContext& context);
 
 }  // namespace texmesh

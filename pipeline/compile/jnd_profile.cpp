@@ -5,6 +5,8 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {
@@ -42,8 +44,7 @@ void set_field(CompileOptions& options, const ProfileField& field, const Json& v
                const std::string& file) {
   const std::string place = std::string("/") + field.name;
   std::vector<OptionField> fields = list_options(options);
-  const auto option = std::find_if(fields.begin(), fields.end(),
-                                   [&](const OptionField& f) { return f.path() == field.option; });
+  OptionField* option = find_option(fields, field.option);
   const bool is_text = std::holds_alternative<EnumField>(option->value);
   if (is_text ? !value.is_string() : !value.is_number())
     throw InputError(file, place, is_text ? "a text" : "a number", value.dump().substr(0, 60));

@@ -3,9 +3,9 @@
 #include <span>
 #include <string>
 
-#include "pipeline/compile/options.h"
-
 namespace texmesh {
+
+struct CompileOptions;
 
 /// Reads a JND profile (schemas/jnd-profile.v1.schema.json): what an experiment with judges found to be just
 /// noticeable, and under which conditions. Its numbers become the options perceptual_values.jnd,

@@ -1,14 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <optional>
-#include <span>
+#include <set>
 #include <string>
-#include <string_view>
-#include <variant>
-#include <vector>
 
-#include "format/base/fields.h"
 #include "pipeline/import/import.h"
 #include "stages/condition/condition.h"
 #include "stages/fragmentation/fragmentation.h"
@@ -27,7 +20,8 @@ namespace texmesh {
 
 /// Every option that can change a package, by stage. A profile file, the command line, the cache keys,
 /// provenance and `dump` all speak of these fields under the same names: `ssf.scales` is
-/// {"ssf":{"scales":..}} and --ssf.scales.
+/// {"ssf":{"scales":..}} and --ssf.scales. The generic view of the fields is in option_fields.h, JSON in
+/// profile.h.
 struct CompileOptions {
   ImportOptions import;
   ConditionOptions condition;
@@ -42,6 +36,10 @@ struct CompileOptions {
   ScalesOptions scales;
   QualityOptions quality;
   PackageOptions package;
+
+  /// Paths of the fields that a profile or a flag has set, to whatever value: resolve_options() leaves them
+  /// alone.
+  std::set<std::string> set_by_user;
 
   /// Calls f(stage name, options struct) for every stage, in the order of the graph.
   template <class S, class F>
@@ -62,39 +60,13 @@ struct CompileOptions {
   }
 };
 
-/// A field whose C++ type is an enum, seen as text.
-struct EnumField {
-  std::span<const std::string_view> names;
-  std::function<std::size_t()> get;
-  std::function<void(std::size_t)> set;
-};
-
-/// One option as the generic code sees it. Pointers lead into the CompileOptions that list_options was given.
-struct OptionField {
-  std::string stage, name, help;
-  std::optional<Range> range;
-  std::variant<bool*, int*, double*, std::string*, std::vector<int>*, std::vector<double>*, EnumField> value;
-  std::string path() const { return stage + "." + name; }
-};
-std::vector<OptionField> list_options(CompileOptions& options);
-
-/// Text of a field's value as JSON, after defaults: what keys, provenance and --explain compare.
-std::string option_text(const OptionField& field);
-
-/// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
-void set_option(OptionField& field, const std::string& text, const std::string& source);
-
-/// Reads a profile (schemas/profile.v1.schema.json) over the given options; absent fields keep their values.
-/// Strict: unknown fields, wrong types and values out of range throw InputError{file_name, JSON pointer,
-/// ...}.
-void read_profile(CompileOptions& options, const std::string& json, const std::string& file_name);
-
-/// Every option, after defaults, as a profile: what provenance records.
-std::string write_profile(const CompileOptions& options);
-
-/// The JSON schema of profiles, generated from the fields; schemas/profile.v1.schema.json is this text (a
-/// test).
-std::string profile_schema();
+/// The options that are used: defaults that depend on other options are replaced by what follows from those.
+///  - fragmentation.min_fragment_px is kLeastProgressiveSide with ladder.mode progressive.
+///  - ladder.uncovered is kept with fragmentation.fill none: the source's own texels stay, whatever they
+///  cost.
+/// A field that the user has set stays as it is, and so does one that differs from its default. Resolved
+/// options resolve to themselves. Keys, provenance and workers' jobs hold resolved options.
+CompileOptions resolve_options(CompileOptions options);
 
 /// Checks that go beyond one field (rungs strictly rising, quality_min <= quality_max ...). InputError.
 void check_options(const CompileOptions& options, const std::string& source);

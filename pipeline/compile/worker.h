@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/graph/graph_run.h"
-#include "pipeline/io/file_resolver.h"
+#include "pipeline/graph/key.h"
+#include "pipeline/io/file_request.h"
 
 namespace texmesh {
 
@@ -87,13 +87,5 @@ struct PoolSettings {
 /// temporary file; what had not finished is kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished);
-
-/// The child's side: reads a job from standard input, writes event lines to standard output, returns the exit
-/// code.
-int worker_main();
-
-/// How files and keys travel between the two.
-std::string files_to_json(const std::vector<FileRequest>& files);
-std::vector<FileRequest> files_from_json(const std::string& json);  // what is malformed is left out
 
 }  // namespace texmesh

@@ -15,7 +15,9 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/profile.h"
+#include "pipeline/compile/worker_child.h"
+#include "pipeline/compile/worker_messages.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"
@@ -105,12 +107,12 @@ int report_error(EventWriter& events, const char* kind, const Error& e) {
   return kExitModelFailed;
 }
 
-Json explanation_event(const Stage& stage, const StageExplanation& e) {
+Json explanation_event(const std::string& stage, const StageExplanation& e) {
   static constexpr const char* kVerdicts[] = {"hit", "runs", "unknown"};
   Json changes = Json::array();
   for (const KeyChange& c : e.changes) changes.push_back({{"part", c.label}, {"from", c.from}, {"to", c.to}});
   Json event{{"event", "stage-explained"},
-             {"stage", stage.name},
+             {"stage", stage},
              {"verdict", kVerdicts[static_cast<int>(e.verdict)]},
              {"history", e.has_history},
              {"changes", std::move(changes)}};
@@ -178,14 +180,14 @@ int compile(const Json& job, EventWriter& events) {
   const std::unique_ptr<Store> store = store_of(job);
   if (job.at("forecast").get<bool>()) {
     for (const auto& [stage, explanation] : forecast_model(request, *store, context))
-      events.write(explanation_event(*stage, explanation));
+      events.write(explanation_event(stage, explanation));
     report_store(events, *store);
     events.write({{"event", "result"}, {"unchanged", true}, {"bytes", 0}});
     return kExitOk;
   }
   if (job.at("explain").get<bool>())
     request.explainer = [&events](const Stage& stage, const StageExplanation& e) {
-      events.write(explanation_event(stage, e));
+      events.write(explanation_event(stage.name, e));
     };
   request.files_of_failure = [&events](const std::vector<FileRequest>& files) {
     events.write(

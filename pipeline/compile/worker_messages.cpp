@@ -1,12 +1,111 @@
-// What parent and child tell each other about files.
+#include "pipeline/compile/worker_messages.h"
+
+#include <unistd.h>
+
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/compile/worker.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 namespace {
+
 using Json = nlohmann::ordered_json;
+
+/// The layers of a job; null stands for one that is left out, so that their numbers stay.
+Json layers_of(const CacheSettings& cache, const std::set<std::string>& left_out) {
+  Json layers = Json::array();
+  for (const std::string& place : cache.layers)
+    layers.push_back(left_out.contains(place) ? Json() : Json(to_wire(place)));
+  return layers;
+}
+
+void apply_stage_event(const Json& e, double now_s, WorkerReport& report) {
+  const std::string stage = e.value("stage", "");
+  if (e.value("event", "") == "stage-started") {
+    report.spans.push_back({stage, now_s, now_s, false, true});
+    return;
+  }
+  const bool hit = e.value("result", "") == "hit";
+  ++(hit ? report.stages_hit : report.stages_ran);
+  const auto open = std::find_if(report.spans.rbegin(), report.spans.rend(),
+                                 [&](const StageSpan& s) { return s.stage == stage; });
+  if (hit || open == report.spans.rend()) {
+    report.spans.push_back({stage, now_s, now_s, hit});
+  } else {
+    open->end_s = now_s;
+    open->running = false;
+  }
+}
+
+void apply_inputs_event(const Json& e, WorkerReport& report) {
+  report.files = files_from_json(e.value("files", ""));
+  from_hex(e.value("package", ""), report.package_digest);
+  const Json keys = e.value("keys", Json::object());
+  for (const auto& [stage, key] : keys.items())
+    if (Sha256 digest; key.is_string() && from_hex(key.get<std::string>(), digest))
+      report.keys[stage] = digest;
+}
+
+}  // namespace
+
+std::string job_to_json(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits,
+                        int threads, const std::set<std::string>& layers_left_out) {
+  Json keys = Json::object();
+  for (const auto& [stage, key] : job.earlier_keys) keys[stage] = to_hex(key);
+  return Json{{"input", to_wire(job.input)},
+              {"output", to_wire(job.output)},
+              {"temporary", to_wire(temporary)},
+              {"profile", *job.profile},
+              {"cache", to_wire(job.cache.folder)},
+              {"layers", layers_of(job.cache, layers_left_out)},
+              {"upload", job.cache.upload},
+              {"strict", job.strict},
+              {"parent", ::getpid()},
+              {"explain", job.explain},
+              {"forecast", job.forecast},
+              {"known", files_to_json(job.known)},
+              {"keys", keys},
+              {"threads", threads},
+              {"wall_s", limits.wall_s},
+              {"memory_bytes", limits.memory_bytes},
+              {"cpu_s", limits.cpu_s}}
+      .dump();
+}
+
+bool apply_event(const std::string& line, double now_s, WorkerReport& report) {
+  const Json e = Json::parse(line, nullptr, false);
+  if (!e.is_object()) return true;
+  const std::string event = e.value("event", "");
+  if (event == "inputs") {
+    apply_inputs_event(e, report);
+    return false;
+  }
+  if (event == "layer-left-out") {
+    report.layers_left_out.push_back(e.value("layer", -1));
+    return false;
+  }
+  if (event == "stage-started" || event == "stage-finished") {
+    apply_stage_event(e, now_s, report);
+  } else if (event == "result") {
+    report.package_bytes = e.value("bytes", std::uint64_t{0});
+    report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
+  } else if (event == "error") {
+    report.error_kind = e.value("kind", "");
+    report.error_file = e.value("file", "");
+    report.error_place = e.value("place", "");
+    report.error_expected = e.value("expected", "");
+    report.error_found = e.value("found", "");
+    report.error_message = e.value("message", "");
+  }
+  return true;
+}
+
+std::string error_event(const WorkerReport& r) {
+  return Json{{"event", "error"},          {"kind", r.error_kind},         {"file", r.error_file},
+              {"place", r.error_place},    {"expected", r.error_expected}, {"found", r.error_found},
+              {"message", r.error_message}}
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string files_to_json(const std::vector<FileRequest>& files) {

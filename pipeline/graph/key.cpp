@@ -3,7 +3,11 @@
 #include <nlohmann/json.hpp>
 
 namespace texmesh {
+namespace {
+constexpr std::ptrdiff_t kConstructorParts = 3;
+}
 
+/// Adds kConstructorParts parts.
 Key::Key(std::string_view stage, int stage_version) {
   add("key schema", std::to_string(kKeySchema));
   add("stage", std::string(stage));
@@ -17,6 +21,10 @@ Key& Key::add(std::string label, std::string value) {
 
 Key& Key::add_input(std::string_view role, const Sha256& digest, std::uint64_t bytes) {
   return add("input " + std::string(role), to_hex(digest) + " " + std::to_string(bytes));
+}
+
+std::vector<std::pair<std::string, std::string>> Key::added_parts() const {
+  return {parts_.begin() + kConstructorParts, parts_.end()};
 }
 
 Sha256 Key::digest() const { return digest_of_parts(parts_); }

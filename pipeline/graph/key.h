@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,6 +25,8 @@ class Key {
   Key& add_input(std::string_view role, const Sha256& digest, std::uint64_t bytes);
   Sha256 digest() const;
   const std::vector<std::pair<std::string, std::string>>& parts() const { return parts_; }
+  /// The parts behind those that the constructor made (schema, stage, version).
+  std::vector<std::pair<std::string, std::string>> added_parts() const;
   /// The parts as a JSON object of strings.
   std::string preimage() const;
 
@@ -35,6 +38,9 @@ class Key {
 
 /// A key from its preimage, with the same parts in the same order; nothing when it is no preimage.
 std::optional<Key> key_from_preimage(const std::string& preimage);
+
+/// The keys that the stages of one model had, by stage name.
+using StageKeys = std::map<std::string, Sha256>;
 
 /// The digest of a key that has these parts.
 Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts);

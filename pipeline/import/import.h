@@ -8,6 +8,7 @@
 
 #include "format/base/fields.h"
 #include "format/model/model.h"
+#include "pipeline/io/resolver.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -54,17 +55,6 @@ struct ImportOptions {
       "says that they are ignored");
     v("up", s.up, "up axis of the source: keep and y leave coordinates alone, z turns them to glTF's y up");
   }
-};
-
-/// Gives import the files a model refers to. The pipeline's resolver opens beneath the model's folder only;
-/// tests use memory. What was asked for, found or not, becomes part of the cache key.
-class Resolver {
- public:
-  virtual ~Resolver() = default;
-  /// The bytes of `uri` (relative, already percent-decoded where the format says so), nothing when there is
-  /// no such file. Throws InputError when the name is not allowed (absolute, drive letter, scheme, "..",
-  /// symbolic link, not a regular file) or the file exceeds max_bytes.
-  virtual std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) = 0;
 };
 
 /// What the source's format says about meshes without normals (glTF: flat), for ConditionOptions::normals.

@@ -6,22 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "format/base/sha256.h"
-#include "pipeline/import/import.h"
+#include "pipeline/io/file_request.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
-
-/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
-/// bytes become part of the cache key: the same requests with the same answers give the same model.
-struct FileRequest {
-  std::string uri;  // as the model names it; "" = the model itself
-  bool found = false;
-  Sha256 digest{};
-  std::uint64_t bytes = 0;
-  FileStamp stamp;  // when it was read; no part of any key
-  friend bool operator==(const FileRequest&, const FileRequest&) = default;
-};
 
 /// Opens files beneath one folder only: openat2 with RESOLVE_BENEATH, RESOLVE_NO_SYMLINKS and
 /// RESOLVE_NO_MAGICLINKS, or, where the kernel or a sandbox has no openat2, component by component with

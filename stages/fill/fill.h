@@ -10,6 +10,9 @@
 
 namespace texmesh {
 
+/// Raise, too, when stages/image decodes images to other pixels than before.
+inline constexpr int kFillVersion = 1;
+
 /// What blocks of 16 x 16 texels become that are covered in part: kSparse makes their uncovered texels such
 /// that any codec finds few coefficients (fill_blocks.h); kSmooth leaves the smooth fill, for an encoder that
 /// knows which texels are free, as the ladder's baseline JPEG does, and costs a sixth of the time.

@@ -8,8 +8,6 @@
 
 namespace texmesh {
 
-inline constexpr int kDecodeImageVersion = 3;
-
 /// What samples become: kAsIs for data (normals, roughness); kSrgb for colours: float files (EXR, float TIFF)
 /// hold linear light where every other image of a material is sRGB encoded, and images with
 /// Image::honour_profile go by their ICC profile or gamma (stages/image/colour_profile.h).
@@ -21,6 +19,7 @@ enum class FloatEncoding : std::uint8_t { kAsIs, kSrgb };
 /// second or fourth that says nothing of itself is its alpha; CMYK becomes RGB, palettes RGB or RGBA.
 Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits);
 
+/// Whoever changes the pixels raises kFillVersion (stages/fill/fill.h).
 /// Decodes to 8 bits per channel (16-bit and float images are scaled and rounded; float is clamped to 0..1,
 /// NaN is 0), with the channel count of the file (1..4), top row first, no colour conversion beyond
 /// `encoding`, alpha not multiplied in. Rows and columns are those of the file whatever its EXIF orientation

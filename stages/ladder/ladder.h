@@ -74,6 +74,12 @@ struct LadderOptions {
   }
 };
 
+/// Whether the encoder knows which texels are uncovered and makes them cheap itself, so that their fill need
+/// not.
+inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
+  return mode == LadderMode::kJpeg && uncovered == Uncovered::kFree;
+}
+
 /// Encodes every covered fragment at the rungs of its plane's role.
 /// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
 ///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where

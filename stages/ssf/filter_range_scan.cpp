@@ -262,6 +262,27 @@ class RangeFilter {
 
 }  // namespace
 
+RangeGrid grid_on_conditioned(const RangeGrid& grid, std::size_t source_positions,
+                              const ConditionedMesh& mesh) {
+  const auto check = [&](std::uint32_t position) {
+    if (position >= source_positions)
+      throw StageError("ssf", "range grid", "positions below " + std::to_string(source_positions),
+                       std::to_string(position));
+  };
+  std::vector<std::uint32_t> conditioned(source_positions, kNoIndex);
+  for (std::size_t i = mesh.position_source.size(); i-- > 0;) {
+    check(mesh.position_source[i]);
+    conditioned[mesh.position_source[i]] = static_cast<std::uint32_t>(i);
+  }
+  RangeGrid out = grid;
+  for (std::uint32_t& p : out.position) {
+    if (p == kNoIndex) continue;
+    check(p);
+    p = conditioned[p];
+  }
+  return out;
+}
+
 ScaleMap filter_range_scan(const RangeGrid& range, std::size_t position_count, const SsfOptions& options,
                            const RunContext& context) {
   return RangeFilter(range, position_count, options, context).run();

@@ -19,6 +19,7 @@
 #include "pipeline/batch/collection.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"

@@ -5,61 +5,43 @@
 #include <fstream>
 
 #include "format/container/layout.h"
+#include "pipeline/compile/artefacts.h"
+#include "pipeline/graph/make_stage.h"
 
 namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-using Images = std::vector<Image>;
-using Materials = std::vector<Material>;
+constexpr Artefact<DebugView> kView{"debug"};
 
-constexpr const char* kView = "debug";
-
-std::vector<std::string> inputs_of(DebugQuantity what) {
-  switch (what) {
-    case DebugQuantity::kPersistence:
-      return {"condition", "ssf"};
-    case DebugQuantity::kSkeleton:
-    case DebugQuantity::kRadius:
-      return {"condition", "skeletonization"};
-    case DebugQuantity::kCollapseError:
-      return {"simplification"};
-    case DebugQuantity::kFragments:
-      break;
-  }
-  return {"condition", "import.materials", "import.images", "fragmentation"};
+/// The stage that makes the view of a quantity from what it reads.
+template <class... Read>
+Stage view_stage(Inputs<Read...> read, DebugView (*view)(const Read&...)) {
+  return make_stage({kView.name, 1, "what a stage computed, to look at"}, read, derived(kView), options(), {},
+                    [view](const Read&... objects, const RunContext&) { return view(objects...); });
 }
 
-DebugView make_view(const StageInputs& in, DebugQuantity what) {
+Stage view_stage_of(DebugQuantity what) {
   switch (what) {
     case DebugQuantity::kPersistence:
-      return view_persistence(in.get<ConditionedMesh>("condition"), in.get<ScaleMap>("ssf"));
+      return view_stage(inputs(kConditionedMesh, kScaleMap), view_persistence);
     case DebugQuantity::kSkeleton:
-      return view_skeleton(in.get<ConditionedMesh>("condition"), in.get<Skeleton>("skeletonization"));
+      return view_stage(inputs(kConditionedMesh, kSkeleton), view_skeleton);
     case DebugQuantity::kRadius:
-      return view_radius(in.get<ConditionedMesh>("condition"), in.get<Skeleton>("skeletonization"));
+      return view_stage(inputs(kConditionedMesh, kSkeleton), view_radius);
     case DebugQuantity::kCollapseError:
-      return view_collapse_error(in.get<NestedScales>("simplification"));
+      return view_stage(inputs(kNestedScales), view_collapse_error);
     case DebugQuantity::kFragments:
       break;
   }
-  return view_fragments(in.get<ConditionedMesh>("condition"), in.get<Materials>("import.materials"),
-                        in.get<Images>("import.images"), in.get<Fragments>("fragmentation"));
+  return view_stage(inputs(kConditionedMesh, kMaterials, kImages, kFragments), view_fragments);
 }
 
 }  // namespace
 
 DebugView view_input(const CompileRequest& request, DebugQuantity what, Store& store,
                      const RunContext& context, const StageObserver& observer, Notes& notes) {
-  Stage view;
-  view.name = kView;
-  view.inputs = inputs_of(what);
-  view.outputs = {{kView, nullptr, nullptr}};
-  view.stored = false;
-  view.run = [what](const StageInputs& in) { return StageOutputs{{object(make_view(in, what))}, {}}; };
-  const std::vector<Stage> graph = graph_towards(std::move(view));
-  const Object result = run_stages(request, graph, kView, store, context, observer, notes);
-  return *static_cast<const DebugView*>(result.get());
+  return *run_towards(request, view_stage_of(what), kView, store, context, observer, notes);
 }
 
 DebugView view_package(const std::string& path, DebugQuantity what, const RunContext& context) {

@@ -116,14 +116,14 @@ bool is_image(const std::string& uri) {
 class Causes {
  public:
   explicit Causes(const std::vector<Difference>& differences) : differences_(differences) {
-    for (const Stage& s : stage_table())
-      for (const Artefact& output : s.outputs) makers_[output.name] = &s;
+    for (const Stage& s : default_stage_table())
+      for (const StageOutput& output : s.outputs) makers_[output.name] = &s;
   }
 
   std::vector<std::size_t> of(const std::string& stage) {
     reached_.clear();
     seen_.clear();
-    for (const Stage& s : stage_table())
+    for (const Stage& s : default_stage_table())
       if (s.name == stage) visit(s, "");
     return {reached_.begin(), reached_.end()};
   }
@@ -133,8 +133,8 @@ class Causes {
     if (!seen_.insert(s.name + "/" + artefact).second) return;
     for (std::size_t i = 0; i < differences_.size(); ++i)
       if (touches(differences_[i], s, artefact)) reached_.insert(i);
-    for (const std::string& input : s.inputs)
-      if (const auto it = makers_.find(input); it != makers_.end()) visit(*it->second, input);
+    for (const ArtefactName& input : s.inputs)
+      if (const auto it = makers_.find(input.name); it != makers_.end()) visit(*it->second, input.name);
   }
 
   static bool touches(const Difference& d, const Stage& s, const std::string& artefact) {
@@ -142,12 +142,14 @@ class Causes {
       case Kind::kInput:
         return s.name == "import" && (artefact == "import.images" || d.name.empty() || !is_image(d.name));
       case Kind::kOption:
-        return std::any_of(s.options.begin(), s.options.end(),
-                           [&](const std::string& o) { return d.name == o || d.name.starts_with(o + "."); });
+        return std::any_of(s.options.begin(), s.options.end(), [&](const StageOption& o) {
+          return d.name == o.name || d.name.starts_with(o.name + ".");
+        });
       case Kind::kStageVersion:
         return d.name == s.name;
       case Kind::kLibrary:
-        return std::find(s.libraries.begin(), s.libraries.end(), d.name) != s.libraries.end();
+        return std::any_of(s.libraries.begin(), s.libraries.end(),
+                           [&](const StageLibrary& l) { return l.name == d.name; });
       case Kind::kTool:
       case Kind::kFormat:
         return s.name == "package";
@@ -164,7 +166,7 @@ class Causes {
 std::vector<StageDifference> by_stage(const PackageDiff& diff) {
   Causes causes(diff.differences);
   std::vector<StageDifference> stages;
-  for (const Stage& s : stage_table()) {
+  for (const Stage& s : default_stage_table()) {
     StageDifference d{s.name, 0, {}, {}};
     for (const EntryDifference& e : diff.entries)
       if (e.stage == s.name) {

@@ -3,6 +3,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 
 namespace texmesh {

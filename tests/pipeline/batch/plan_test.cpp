@@ -7,6 +7,8 @@
 #include "format/base/errors.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/batch/plan.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "tests/support/command.h"
 
 namespace texmesh {

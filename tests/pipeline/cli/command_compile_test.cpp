@@ -96,7 +96,7 @@ TEST_F(CompileCommand, SameBytesThroughTheCacheAndNothingRunsTwice) {
   };
   const CommandResult first = run();
   EXPECT_EQ(read_text(out), package_);
-  EXPECT_EQ(stages(first, "ran").size(), 14u) << first.output;
+  EXPECT_EQ(stages(first, "ran").size(), 15u) << first.output;
   const auto written = fs::last_write_time(out);
   const CommandResult second = run();
   EXPECT_EQ(second.exit_code, 0);
@@ -138,6 +138,10 @@ TEST_F(CompileCommand, ProgressiveTexturesWorkOrAreWarnedOf) {
   EXPECT_NE((small.output + small.errors).find("too small for progressive files"), std::string::npos)
       << small.output << small.errors;
   EXPECT_EQ(codec_of(read_text(folder_ / "small.texmesh")), "jpeg");
+  // The default's own value counts as well when somebody has asked for it.
+  EXPECT_EQ(
+      codec_of(compile({"--no-cache", "--ladder", "progressive", "--fragmentation.min_fragment_px", "128"})),
+      "jpeg");
 }
 
 TEST_F(CompileCommand, TheLosslessTopKeepsTheSource) {

@@ -4,6 +4,7 @@
 #include <regex>
 #include <sstream>
 
+#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 #include "tests/support/command.h"
 

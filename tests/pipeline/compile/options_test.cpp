@@ -2,21 +2,23 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
 #include "format/base/errors.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/option_json.h"
+#include "pipeline/compile/profile.h"
 
 namespace texmesh {
 namespace {
 
 OptionField& field(std::vector<OptionField>& fields, const std::string& path) {
-  auto it =
-      std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
-  if (it == fields.end()) throw std::out_of_range(path);
-  return *it;
+  OptionField* found = find_option(fields, path);
+  if (!found) throw std::out_of_range(path);
+  return *found;
 }
 
 TEST(Options, EveryFieldHasAHelpTextAndAUniquePath) {
@@ -61,6 +63,40 @@ TEST(Options, FlagsAndProfilesMeanTheSame) {
       R"({"version":1,"ssf":{"scales":12},"ladder":{"rungs":[8,18,53]},"scales":{"mesh_codec":"none"},"package":{"title":"12"}})",
       "p");
   EXPECT_EQ(write_profile(by_flag), write_profile(by_profile));
+}
+
+TEST(Options, ADefaultFollowsFromOtherOptionsAndWhatTheUserSetsDoesNot) {
+  CompileOptions o;
+  EXPECT_EQ(write_profile(resolve_options(o)), write_profile(o));
+  o.ladder.mode = LadderMode::kProgressive;
+  EXPECT_EQ(resolve_options(o).fragmentation.min_fragment_px, 256);
+  auto fields = list_options(o);
+  set_option(field(fields, "fragmentation.min_fragment_px"), "128", "--fragmentation.min_fragment_px");
+  EXPECT_EQ(resolve_options(o).fragmentation.min_fragment_px, 128);  // the default's value, but chosen
+  o.fragmentation.min_fragment_px = 64;
+  o.set_by_user.clear();
+  EXPECT_EQ(resolve_options(o).fragmentation.min_fragment_px, 64);
+
+  o.fragmentation.fill = Fill::kNone;
+  EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kKept);
+  read_profile(o, R"({"version":1,"ladder":{"uncovered":"free"}})", "p");
+  EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kFree);
+}
+
+TEST(Options, ResolvedOptionsTravelAsAProfile) {
+  CompileOptions o, back;
+  o.ladder.mode = LadderMode::kProgressive;
+  read_profile(o, R"({"version":1,"fragmentation":{"min_fragment_px":128}})", "p");
+  const std::string profile = write_profile(resolve_options(o));
+  read_profile(back, profile, "job");
+  EXPECT_EQ(write_profile(resolve_options(back)), profile);
+  EXPECT_EQ(back.fragmentation.min_fragment_px, 128);
+}
+
+TEST(Options, KeysAndDocumentsWriteValuesTheSameWay) {
+  CompileOptions o;
+  o.package.title = "Bust \"A\" \xc3\xa9";
+  for (const OptionField& f : list_options(o)) EXPECT_EQ(option_text(f), option_json(f).dump()) << f.path();
 }
 
 struct Bad {

@@ -4,21 +4,62 @@
 
 #include <set>
 
+#include "pipeline/compile/declare_options.h"
+#include "pipeline/compile/option_fields.h"
+
 namespace texmesh {
 namespace {
 
 TEST(StageTable, EveryInputIsMadeBeforeItIsUsedAndEveryOptionIsRead) {
   std::set<std::string> made{"source", "provenance"}, read;
-  for (const Stage& s : stage_table()) {
-    for (const std::string& input : s.inputs)
-      EXPECT_TRUE(made.contains(input)) << s.name << " reads " << input;
-    for (const Artefact& a : s.outputs) EXPECT_TRUE(made.insert(a.name).second) << a.name;
-    read.insert(s.options.begin(), s.options.end());
+  for (const Stage& s : default_stage_table()) {
+    for (const ArtefactName& input : s.inputs)
+      EXPECT_TRUE(made.contains(input.name)) << s.name << " reads " << input.name;
+    for (const StageOutput& output : s.outputs) EXPECT_TRUE(made.insert(output.name).second) << output.name;
+    for (const StageOption& option : s.options)
+      for (const auto& [path, text] : option.fields) read.insert(path);
     EXPECT_GE(s.version, 1);
   }
   CompileOptions o;
   for (const OptionField& f : list_options(o))
-    EXPECT_TRUE(read.contains(f.stage)) << f.path() << " is in no key";
+    EXPECT_TRUE(read.contains(f.path())) << f.path() << " is in no key";
+}
+
+TEST(StageTable, AnOptionHasTheNameOfThePlaceWhereItStands) {
+  const CompileOptions o;
+  EXPECT_EQ(option_name(o, o.import), "import");
+  EXPECT_EQ(option_name(o, o.ladder.mode), "ladder.mode");
+  EXPECT_EQ(option_name(o, o.perceptual_values.jnd), "perceptual_values.jnd");
+  const double elsewhere = o.perceptual_values.jnd;
+  EXPECT_THROW(option_name(o, elsewhere), std::logic_error);
+}
+
+/// Texts of all options in keys, by stage.
+std::map<std::string, OptionTexts> key_texts(const CompileOptions& options) {
+  std::map<std::string, OptionTexts> texts;
+  for (const Stage& s : stage_table(resolve_options(options)))
+    for (const StageOption& option : s.options)
+      texts[s.name].insert(texts[s.name].end(), option.fields.begin(), option.fields.end());
+  return texts;
+}
+
+TEST(StageTable, OptionsThatResolveToTheSameHaveTheSameKeys) {
+  CompileOptions by_default, explicitly;
+  by_default.ladder.mode = explicitly.ladder.mode = LadderMode::kProgressive;
+  by_default.fragmentation.fill = explicitly.fragmentation.fill = Fill::kNone;
+  explicitly.fragmentation.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
+  explicitly.ladder.uncovered = Uncovered::kKept;
+  EXPECT_EQ(key_texts(by_default), key_texts(explicitly));
+  explicitly.fragmentation.min_fragment_px = 64;
+  EXPECT_NE(key_texts(by_default), key_texts(explicitly));
+}
+
+TEST(StageTable, AStageInTheMiddleNeedsOnlyWhatStandsBeforeIt) {
+  const std::vector<Stage>& table = default_stage_table();
+  const std::vector<Stage> graph = graph_towards(table[3], {});
+  std::vector<std::string> names;
+  for (const Stage& s : graph) names.push_back(s.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"import", "condition", "ssf"}));
 }
 
 }  // namespace

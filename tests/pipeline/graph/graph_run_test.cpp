@@ -3,14 +3,39 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <set>
+#include <stdexcept>
 #include <utility>
+
+#include "pipeline/graph/make_stage.h"
 
 namespace texmesh {
 namespace {
 
 using Text = std::string;
+
+constexpr Artefact<Text> kSource{"source"}, kLeft{"left"}, kRight{"right"}, kMiddle{"middle"}, kJoin{"join"};
+
+/// Options as a stage declares them; the graph knows their texts alone.
+struct ZimFake {
+  int difference = 20;
+  double share = 0.5;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("difference", s.difference, Range{0, 100}, "");
+    v("share", s.share, Range{0, 1}, "");
+  }
+};
+struct FakeOptions {
+  int scales = 20;
+  int unread = 0;
+  ZimFake zim;
+};
+
+std::vector<StageLibrary> fake_libraries() { return {{"draco", "1"}}; }
 
 /// A graph of text stages: left and right read the source, middle is derived, join reads all.
 struct Fake {
@@ -19,7 +44,7 @@ struct Fake {
   std::string left_suffix;  // changes what "left" computes without changing its key: a silent change of code
   std::string fail;
 
-  StageOutputs text(const std::string& name, Text value) {
+  Results<Text> text(const std::string& name, Text value) {
     {
       const std::lock_guard lock(mutex);
       ran.insert(name);
@@ -27,67 +52,44 @@ struct Fake {
     if (fail == name) throw StageError(name, "", "success", "failure");
     Notes notes;
     if (name == "left") add_warning(notes, "left-note", "", value);
-    return {{object(std::move(value))}, notes};
+    return {std::move(value), notes};
   }
 
-  std::vector<Stage> table() {
-    auto get = [](const StageInputs& in, const char* n) { return in.get<Text>(n); };
+  std::vector<Stage> table(const FakeOptions& o = {}) {
+    const auto left = [this](const Text& source, int, const RunContext&) {
+      return text("left", source.substr(0, 1) + left_suffix);
+    };
+    const auto right = [this](const Text& source, const ZimFake&, const RunContext&) {
+      return text("right", source + "R");
+    };
+    const auto middle = [this](const Text& a, const Text& b, const RunContext&) {
+      return text("middle", a + b);
+    };
+    const auto join = [this](const Text& a, const Text& b, const RunContext&) {
+      return text("join", a + "+" + b);
+    };
     return {
-        {"left",
-         1,
-         "",
-         {"source"},
-         {artefact<Text>("left")},
-         {"ssf.scales"},
-         {},
-         true,
-         [=, this](const StageInputs& in) {
-           return text("left", get(in, "source").substr(0, 1) + left_suffix);
-         }},
-        {"right",
-         1,
-         "",
-         {"source"},
-         {artefact<Text>("right")},
-         {"zim"},
-         {"draco"},
-         true,
-         [=, this](const StageInputs& in) { return text("right", get(in, "source") + "R"); }},
-        {"middle",
-         1,
-         "",
-         {"left", "right"},
-         {{"middle", nullptr, nullptr}},
-         {},
-         {},
-         false,
-         [=, this](const StageInputs& in) { return text("middle", get(in, "left") + get(in, "right")); }},
-        {"join",
-         1,
-         "",
-         {"middle", "left"},
-         {artefact<Text>("join")},
-         {},
-         {},
-         true,
-         [=, this](const StageInputs& in) {
-           return text("join", get(in, "middle") + "+" + get(in, "left"));
-         }},
+        make_stage({"left", 1, ""}, inputs(kSource), outputs(kLeft),
+                   options(OptionValue("ssf.scales", o.scales)), {}, left),
+        make_stage({"right", 1, ""}, inputs(kSource), outputs(kRight), options(OptionValue("zim", o.zim)),
+                   fake_libraries(), right),
+        make_stage({"middle", 1, ""}, inputs(kLeft, kRight), derived(kMiddle), options(), {}, middle),
+        make_stage({"join", 1, ""}, inputs(kMiddle, kLeft), outputs(kJoin), options(), {}, join),
     };
   }
 
-  Text run(Store& store, const Text& source, const CompileOptions& options = {}, int threads = 2,
+  Text run(Store& store, const Text& source, const FakeOptions& o = {}, int threads = 2,
            Notes* notes = nullptr) {
     ran.clear();
     RunContext context;
     context.threads = threads;
-    const std::vector<Stage> stages = table();
-    GraphRun graph(stages, options, store, context);
-    const std::vector<std::uint8_t> bytes(source.begin(), source.end());
-    graph.give("source", object(source), sha256(bytes), bytes.size());
-    const Object result = graph.run("join");
+    const std::vector<Stage> stages = table(o);
+    GraphRun graph(stages, store, context);
+    const Bytes bytes(source.begin(), source.end());
+    graph.give(kSource, source, sha256(bytes), bytes.size());
+    const auto result = graph.run(kJoin);
     if (notes) *notes = graph.notes();
-    return *static_cast<const Text*>(result.get());
+    return *result;
   }
 };
 
@@ -127,14 +129,14 @@ TEST(GraphRun, AnEqualResultStopsTheWave) {
   EXPECT_EQ(fake.run(store, "axy"), "aaxyR+a");
   EXPECT_EQ(fake.ran, (Ran{"join", "left", "middle", "right"}));
   // An option that only "left" reads: it runs, gives the same, and nothing after it does.
-  CompileOptions options;
-  options.ssf.scales = 7;
+  FakeOptions options;
+  options.scales = 7;
   EXPECT_EQ(fake.run(store, "axy", options), "aaxyR+a");
   EXPECT_EQ(fake.ran, Ran{"left"});
-  options.ssf.band = 3;  // nobody reads it
+  options.unread = 3;
   fake.run(store, "axy", options);
   EXPECT_EQ(fake.ran, Ran{});
-  options.zim.difference = 30;  // "right" lists the whole section
+  options.zim.difference = 30;  // "right" declares the whole section
   fake.run(store, "axy", options);
   EXPECT_EQ(fake.ran, Ran{"right"});
 }
@@ -182,7 +184,7 @@ TEST(GraphRun, AResultThatDoesNotDecodeIsComputedAgainAndReplaced) {
     std::multiset<std::string> rejected;
     bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
       auto wrong = outputs;
-      const auto garbage = std::make_shared<const std::vector<std::uint8_t>>(300, 0x67);
+      const auto garbage = std::make_shared<const Bytes>(300, 0x67);
       if (outputs.front().first == victim) wrong.front().second = garbage;
       if (outputs.front().first == notes_of) wrong.back().second = garbage;
       return MemoryStore::put(key, wrong);
@@ -220,15 +222,14 @@ TEST(GraphRun, WhatFollowsAResultThatDoesNotDecodeIsKeptUnderItsRightKey) {
   MemoryStore poisoned;
   const std::vector<Stage> stages = fake.table();
   const RunContext context;
-  const CompileOptions options;
-  GraphRun graph(stages, options, store, context);
-  graph.give("source", object(Text("abc")), sha256(std::vector<std::uint8_t>{'a', 'b', 'c'}), 3);
-  graph.run("join");
+  GraphRun graph(stages, store, context);
+  graph.give(kSource, Text("abc"), sha256(Bytes{'a', 'b', 'c'}), 3);
+  graph.run(kJoin);
   const Sha256 left = graph.keys().at("left"), join = graph.keys().at("join");
   const auto key = key_from_preimage(*store.preimage(left));
   ASSERT_TRUE(key);
   const auto bytes = [](const char* s) {
-    return std::make_shared<const std::vector<std::uint8_t>>(s, s + std::char_traits<char>::length(s));
+    return std::make_shared<const Bytes>(s, s + std::char_traits<char>::length(s));
   };
   auto outputs = *store.find(left);
   poisoned.put(*key, {{"left", bytes("no text")}, {"left.notes", store.load(outputs.back())}});
@@ -245,24 +246,23 @@ TEST(GraphRun, CancelledBeforeAnyWork) {
   RunContext context;
   context.cancelled = &cancelled;
   const std::vector<Stage> stages = fake.table();
-  const CompileOptions options;
-  GraphRun graph(stages, options, store, context);
-  graph.give("source", object(Text("abc")), sha256({}), 0);
-  EXPECT_THROW(graph.run("join"), Cancelled);
+  GraphRun graph(stages, store, context);
+  graph.give(kSource, Text("abc"), sha256({}), 0);
+  EXPECT_THROW(graph.run(kJoin), Cancelled);
   EXPECT_EQ(fake.ran, Ran{});
 }
 
 TEST(GraphRun, ExplainsWhatHasChangedSinceTheEarlierRun) {
   Fake fake;
   MemoryStore store;
-  const std::vector<Stage> stages = fake.table();
-  const auto run = [&](const CompileOptions& options, const StageKeys& earlier, StageKeys* keys) {
+  const auto run = [&](const FakeOptions& options, const StageKeys& earlier, StageKeys* keys) {
     std::map<std::string, StageExplanation> told;
     const RunContext context;
-    GraphRun graph(stages, options, store, context);
-    graph.give("source", object(Text("abc")), sha256({}), 3);
+    const std::vector<Stage> stages = fake.table(options);
+    GraphRun graph(stages, store, context);
+    graph.give(kSource, Text("abc"), sha256({}), 3);
     graph.explain(earlier, [&](const Stage& s, const StageExplanation& e) { told[s.name] = e; });
-    graph.run("join");
+    graph.run(kJoin);
     if (keys) *keys = graph.keys();
     return told;
   };
@@ -274,8 +274,8 @@ TEST(GraphRun, ExplainsWhatHasChangedSinceTheEarlierRun) {
   EXPECT_EQ(keys.size(), 3u);  // the derived stage has no entry of its own
   told = run({}, keys, nullptr);
   EXPECT_EQ(told.at("left").verdict, Verdict::kHit);
-  CompileOptions options;
-  options.ssf.scales = 7;
+  FakeOptions options;
+  options.scales = 7;
   told = run(options, keys, nullptr);
   EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
   EXPECT_TRUE(told.at("left").has_history);
@@ -289,11 +289,11 @@ TEST(GraphRun, ExplainsWhatHasChangedSinceTheEarlierRun) {
 TEST(GraphRun, AForecastRunsNothing) {
   Fake fake;
   MemoryStore store;
-  const std::vector<Stage> stages = fake.table();
-  const auto forecast = [&](const CompileOptions& options) {
+  const auto forecast = [&](const FakeOptions& options) {
     const RunContext context;
-    GraphRun graph(stages, options, store, context);
-    graph.give("source", object(Text("abc")), sha256({}), 3);
+    const std::vector<Stage> stages = fake.table(options);
+    GraphRun graph(stages, store, context);
+    graph.give(kSource, Text("abc"), sha256({}), 3);
     std::map<std::string, StageExplanation> told;
     for (const auto& [stage, e] : graph.forecast()) told[stage->name] = e;
     return told;
@@ -307,10 +307,10 @@ TEST(GraphRun, AForecastRunsNothing) {
   EXPECT_EQ(fake.ran, Ran{});
   {
     const RunContext context;
-    const CompileOptions options;
-    GraphRun graph(stages, options, store, context);
-    graph.give("source", object(Text("abc")), sha256({}), 3);
-    graph.run("join");
+    const std::vector<Stage> stages = fake.table();
+    GraphRun graph(stages, store, context);
+    graph.give(kSource, Text("abc"), sha256({}), 3);
+    graph.run(kJoin);
   }
   for (const auto& [name, e] : forecast({})) EXPECT_EQ(e.verdict, Verdict::kHit) << name;
 }
@@ -335,6 +335,94 @@ TEST(GraphRun, WaitsForWhoeverComputesTheSameAndTakesTheResult) {
   EXPECT_TRUE(other.ran.contains("left"));
 }
 
+/// Two consumers of one stage want its two results at once, and the store has lost both of them.
+struct LostResults : MemoryStore {
+  std::mutex lost_mutex;
+  std::condition_variable changed;
+  std::set<std::string> asked_for;
+  bool loses = false;
+
+  /// Answers when both results have been asked for. Waits for a bounded time: where the graph lets one
+  /// consumer ask at a time, the second request comes only after the first answer.
+  SharedBytes load(const StoredBlob& blob) override {
+    if (!loses || !blob.name.starts_with("split.") || blob.name.ends_with("notes"))
+      return MemoryStore::load(blob);
+    std::unique_lock lock(lost_mutex);
+    asked_for.insert(blob.name);
+    changed.notify_all();
+    changed.wait_for(lock, std::chrono::milliseconds(500), [&] { return asked_for.size() == 2; });
+    return nullptr;
+  }
+};
+
+TEST(GraphRun, AStageWhoseResultsAreLostRunsOnceForAllItsConsumers) {
+  static constexpr Artefact<Text> kA{"split.a"}, kB{"split.b"}, kFirst{"first"}, kSecond{"second"};
+  LostResults store;
+  std::atomic<int> runs{0};
+  int unguarded = 0;  // as the state behind a source is; the thread sanitizer watches it
+  const auto split = [&](const Text& text, const RunContext&) {
+    ++runs;
+    ++unguarded;
+    return Results<Text, Text>({text.substr(0, 1), text.substr(1)}, {});
+  };
+  const auto copy = [](const Text& text, int, const RunContext&) { return text + "'"; };
+  const auto join = [](const Text& a, const Text& b, const RunContext&) { return a + b; };
+  const auto run = [&](int changed) {
+    const OptionValue option("ssf.scales", changed);
+    const std::vector<Stage> stages{
+        make_stage({"split", 1, ""}, inputs(kSource), outputs(kA, kB), options(), {}, split),
+        make_stage({"first", 1, ""}, inputs(kA), outputs(kFirst), options(option), {}, copy),
+        make_stage({"second", 1, ""}, inputs(kB), outputs(kSecond), options(option), {}, copy),
+        make_stage({"join", 1, ""}, inputs(kFirst, kSecond), outputs(kJoin), options(), {}, join)};
+    RunContext context;
+    context.threads = 2;
+    GraphRun graph(stages, store, context);
+    graph.give(kSource, Text("abc"), sha256({}), 3);
+    return *graph.run(kJoin);
+  };
+  EXPECT_EQ(run(20), "a'bc'");
+  EXPECT_EQ(runs, 1);
+  store.loses = true;
+  EXPECT_EQ(run(7), "a'bc'");  // both consumers run again; the stage before them is found in the store
+  EXPECT_EQ(runs, 2);
+  EXPECT_EQ(unguarded, 2);
+}
+
+TEST(GraphRun, ArtefactsOfOtherTypesAreRefusedBeforeAnythingRuns) {
+  static constexpr Artefact<int> kLeftNumber{"left"}, kSourceNumber{"source"}, kJoinNumber{"join"};
+  Fake fake;
+  MemoryStore store;
+  const RunContext context;
+  std::vector<Stage> stages = fake.table();
+  {
+    GraphRun graph(stages, store, context);
+    EXPECT_THROW(graph.give(kSourceNumber, 3, sha256({}), 0), std::logic_error);
+    EXPECT_THROW(graph.run(kJoinNumber), std::logic_error);
+  }
+  stages.push_back(make_stage({"reader", 1, ""}, inputs(kLeftNumber), outputs(Artefact<Text>{"reader"}),
+                              options(), {}, [](int, const RunContext&) { return Text(); }));
+  EXPECT_THROW(GraphRun(stages, store, context), std::logic_error);
+  stages.pop_back();
+  stages.push_back(stages[0]);  // "left" would be made twice
+  EXPECT_THROW(GraphRun(stages, store, context), std::logic_error);
+  EXPECT_EQ(fake.ran, Ran{});
+}
+
+TEST(GraphRun, TheKeyHoldsEveryFieldOfWhatTheFunctionGets) {
+  ZimFake zim;
+  zim.share = 0.25;
+  const Stage stage = make_stage({"s", 1, ""}, inputs(kSource), outputs(kLeft),
+                                 options(OptionValue("zim", zim), OptionValue("ladder.mode", Text("jpeg"))),
+                                 {}, [](const Text&, const ZimFake& z, const Text& mode, const RunContext&) {
+                                   return mode + std::to_string(z.difference);
+                                 });
+  ASSERT_EQ(stage.options.size(), 2u);
+  EXPECT_EQ(stage.options[0].fields, (OptionTexts{{"zim.difference", "20"}, {"zim.share", "0.25"}}));
+  EXPECT_EQ(stage.options[1].fields, (OptionTexts{{"ladder.mode", "\"jpeg\""}}));
+  const StageResult result = stage.run(std::vector<Object>{make_object(Text())}, {});
+  EXPECT_EQ(*static_cast<const Text*>(result.objects.at(0).get()), "jpeg20");
+}
+
 /// A collection of fake models, "geometry|texture" each: import splits them, one stage works on either half
 /// (that of the texture reads zim.difference, and only textures that begin with 'x' depend on it), join takes
 /// both.
@@ -343,52 +431,41 @@ struct FakeCollection {
   std::vector<Text> models;
   MemoryStore store;
 
-  StageOutputs text(const std::string& name, std::vector<Text> values) {
-    ran.insert(name);
-    StageOutputs outputs;
-    for (Text& v : values) outputs.objects.push_back(object(std::move(v)));
-    return outputs;
+  std::vector<Stage> table(const FakeOptions& o) {
+    static constexpr Artefact<Text> kShape{"import.geometry"}, kImage{"import.texture"},
+        kGeometry{"geometry"}, kTexture{"texture"};
+    const auto import = [this](const Text& s, const RunContext&) {
+      ran.insert("import");
+      return Results<Text, Text>({s.substr(0, s.find('|')), s.substr(s.find('|') + 1)}, {});
+    };
+    const auto geometry = [this](const Text& shape, const RunContext&) {
+      ran.insert("geometry");
+      return shape + "G";
+    };
+    const auto texture = [this](const Text& t, const ZimFake& zim, const RunContext&) {
+      ran.insert("texture");
+      return t + "T" + (t.starts_with('x') ? std::to_string(zim.difference) : Text());
+    };
+    const auto join = [this](const Text& a, const Text& b, const RunContext&) {
+      ran.insert("join");
+      return a + b;
+    };
+    return {make_stage({"import", 1, ""}, inputs(kSource), outputs(kShape, kImage), options(), {}, import),
+            make_stage({"geometry", 1, ""}, inputs(kShape), outputs(kGeometry), options(), {}, geometry),
+            make_stage({"texture", 1, ""}, inputs(kImage), outputs(kTexture),
+                       options(OptionValue("zim", o.zim)), {}, texture),
+            make_stage({"join", 1, ""}, inputs(kGeometry, kTexture), outputs(kJoin), options(), {}, join)};
   }
 
-  std::vector<Stage> table() {
-    const auto import = [this](const StageInputs& in) {
-      const Text& s = in.get<Text>("source");
-      return text("import", {s.substr(0, s.find('|')), s.substr(s.find('|') + 1)});
-    };
-    const auto geometry = [this](const StageInputs& in) {
-      return text("geometry", {in.get<Text>("import.geometry") + "G"});
-    };
-    const auto texture = [this](const StageInputs& in) {
-      const Text& t = in.get<Text>("import.texture");
-      return text("texture",
-                  {t + "T" + (t.starts_with('x') ? std::to_string(in.options.zim.difference) : Text())});
-    };
-    const auto join = [this](const StageInputs& in) {
-      return text("join", {in.get<Text>("geometry") + in.get<Text>("texture")});
-    };
-    return {{"import",
-             1,
-             "",
-             {"source"},
-             {artefact<Text>("import.geometry"), artefact<Text>("import.texture")},
-             {},
-             {},
-             true,
-             import},
-            {"geometry", 1, "", {"import.geometry"}, {artefact<Text>("geometry")}, {}, {}, true, geometry},
-            {"texture", 1, "", {"import.texture"}, {artefact<Text>("texture")}, {"zim"}, {}, true, texture},
-            {"join", 1, "", {"geometry", "texture"}, {artefact<Text>("join")}, {}, {}, true, join}};
-  }
-
-  void run(const CompileOptions& options = {}) {
+  void run(const FakeOptions& o = {}) {
     ran.clear();
-    const std::vector<Stage> stages = table();
+    const std::vector<Stage> stages = table(o);
     const RunContext context;
     for (const Text& source : models) {
-      GraphRun graph(stages, options, store, context);
-      const std::vector<std::uint8_t> bytes(source.begin(), source.end());
-      graph.give("source", object(source), sha256(bytes), bytes.size());
-      graph.run("join");
+      GraphRun graph(stages, store, context);
+      const Bytes bytes(source.begin(), source.end());
+      graph.give(kSource, source, sha256(bytes), bytes.size());
+      graph.run(kJoin);
     }
   }
 };
@@ -406,7 +483,7 @@ TEST(GraphRun, OfAThousandModelsOnlyWhatDependsOnAChangeRuns) {
   collection.models[617] = "g617|another";  // one texture of one model
   collection.run();
   EXPECT_EQ(collection.ran, (Ran{"import", "join", "texture"}));
-  CompileOptions options;  // one option: its stage everywhere, and what follows where the bytes differ
+  FakeOptions options;  // one option: its stage everywhere, and what follows where the bytes differ
   options.zim.difference = 31;
   collection.run(options);
   EXPECT_EQ(collection.ran.count("texture"), static_cast<std::size_t>(kModels));

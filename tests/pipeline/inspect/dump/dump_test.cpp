@@ -3,6 +3,7 @@
 #include "format/documents/allocation.h"
 #include "format/documents/rate_distortion.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/option_changes.h"
 #include "pipeline/inspect/dump/package_figures.h"

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "format/base/errors.h"
+#include "format/base/no_index.h"
+#include "stages/data/conditioned_mesh.h"
 #include "tests/stages/ssf/ssf_checks.h"
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
@@ -14,6 +17,23 @@ namespace texmesh {
 namespace {
 
 using namespace testing;  // NOLINT: fixtures
+
+TEST(RangeScan, AGridFollowsItsPositionsIntoTheConditionedMesh) {
+  RangeGrid grid;
+  grid.columns = 5;
+  grid.rows = 1;
+  grid.position = {0, 1, kNoIndex, 2, 3};
+  ConditionedMesh mesh;  // position 1 is gone, 3 has a copy that a split added
+  mesh.position_source = {0, 2, 3, 3};
+  const RangeGrid moved = grid_on_conditioned(grid, 4, mesh);
+  EXPECT_EQ(moved.position, (std::vector<std::uint32_t>{0, kNoIndex, kNoIndex, 1, 2}));
+  EXPECT_EQ(moved.columns, 5u);
+  grid.position[0] = 4;
+  EXPECT_THROW(grid_on_conditioned(grid, 4, mesh), StageError);
+  grid.position[0] = 0;
+  mesh.position_source[0] = 9;
+  EXPECT_THROW(grid_on_conditioned(grid, 4, mesh), StageError);
+}
 
 TEST(RangeScan, CrossingsFallWithTheScale) {
   // One row of 360 samples, as Fig. 2.2: fine, middle and coarse structure.

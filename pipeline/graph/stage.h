@@ -1,0 +1,54 @@
+#pragma once
+#include <functional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "format/base/bytes.h"
+#include "format/base/note.h"
+#include "pipeline/graph/artefact.h"
+#include "pipeline/graph/option_text.h"
+#include "stages/base/run_context.h"
+
+namespace texmesh {
+
+/// One result of a stage, and how it gets into and out of the store; both functions are empty for derived
+/// data.
+struct StageOutput : ArtefactName {
+  std::function<Bytes(const void*)> encode;
+  std::function<Object(ByteSpan)> decode;  // throws FormatError
+};
+
+/// Options that a stage reads: a whole section ("ssf") or a single field ("ladder.mode").
+struct StageOption {
+  std::string name;
+  OptionTexts fields;  // "ssf.scales": "20", for the key
+};
+
+/// A library whose version changes the stage's bytes.
+struct StageLibrary {
+  std::string name, version;
+};
+
+/// What a stage's function gives.
+struct StageResult {
+  std::vector<Object> objects;  // in the order of Stage::outputs
+  Notes notes;
+};
+
+/// One node of the graph, as make_stage() makes it. Its key consists of name, version, options, libraries and
+/// the digests of its inputs; `run` has the options inside and gets nothing but its inputs.
+struct Stage {
+  std::string name;
+  int version = 1;
+  std::string summary;  // one line for `texmesh stages`
+  std::vector<ArtefactName> inputs;
+  std::vector<StageOutput> outputs;
+  std::vector<StageOption> options;
+  std::vector<StageLibrary> libraries;
+  bool stored = true;  // false: derived data, computed when somebody needs it, never kept
+  std::function<StageResult(std::span<const Object> inputs, const RunContext& context)> run;
+};
+
+}  // namespace texmesh
