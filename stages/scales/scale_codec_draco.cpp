@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "stages/scales/scale_codecs.h"
 
@@ -140,20 +141,18 @@ class DracoPrimitive {
     const int id = add_attribute(mesh_, draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32, false,
                                  primitive_.wedges.size(), position);
     quantised_.push_back({id, coding_.position, 3});
-    Vec3f lo{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
-             std::numeric_limits<float>::infinity()};
-    Vec3f hi = lo * -1.0f;
+    Box3f box;
     for (std::uint32_t i = 0; i < primitive_.wedges.size(); ++i) {
       const Vec3f p = coding_.position.bits > 0 ? coding_.position.rounded(position(i)) : position(i);
-      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+      box.extend(p);
     }
     attributes_.push_back({"POSITION",
                            id,
                            {{"componentType", 5126},
                             {"count", 0},
                             {"type", "VEC3"},
-                            {"min", {lo.x, lo.y, lo.z}},
-                            {"max", {hi.x, hi.y, hi.z}}}});
+                            {"min", {box.min.x, box.min.y, box.min.z}},
+                            {"max", {box.max.x, box.max.y, box.max.z}}}});
   }
 
   void add_normals() {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "stages/scales/scale_codecs.h"
 
@@ -104,13 +105,11 @@ class PlainPrimitive {
   std::size_t positions() {
     const Mesh& m = coding_.mesh;
     const bool on_grid = coding_.positions_are_indices();
-    Vec3f lo{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
-             std::numeric_limits<float>::infinity()};
-    Vec3f hi = lo * -1.0f;
+    Box3f box;
     auto position = [&](std::size_t i) {
       const Vec3f p = m.positions[m.wedge_position[primitive_.wedges[i]]];
       const Vec3f q = on_grid ? coding_.position.place(p) : p;
-      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], q[k]), hi[k] = std::max(hi[k], q[k]);
+      box.extend(q);
       return q;
     };
     const Stream s = on_grid ? make_stream<std::uint16_t, 3>(n_, 8,
@@ -131,11 +130,13 @@ class PlainPrimitive {
                   {"count", n_},
                   {"type", "VEC3"}};
     if (on_grid) {
-      accessor["min"] = {static_cast<int>(lo.x), static_cast<int>(lo.y), static_cast<int>(lo.z)};
-      accessor["max"] = {static_cast<int>(hi.x), static_cast<int>(hi.y), static_cast<int>(hi.z)};
+      accessor["min"] = {static_cast<int>(box.min.x), static_cast<int>(box.min.y),
+                         static_cast<int>(box.min.z)};
+      accessor["max"] = {static_cast<int>(box.max.x), static_cast<int>(box.max.y),
+                         static_cast<int>(box.max.z)};
     } else {
-      accessor["min"] = {lo.x, lo.y, lo.z};
-      accessor["max"] = {hi.x, hi.y, hi.z};
+      accessor["min"] = {box.min.x, box.min.y, box.min.z};
+      accessor["max"] = {box.max.x, box.max.y, box.max.z};
     }
     return writer_.add_accessor(std::move(accessor));
   }

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/box.h"
+#include "format/base/errors.h"
+
 namespace texmesh {
 namespace {
 
@@ -32,7 +35,7 @@ double finest_part_edge(const Mesh& mesh, double whole) {
   struct Part {
     double edges = 0;
     std::size_t count = 0;
-    Vec3f lo, hi;
+    Box3f box;
   };
   std::vector<Part> parts(mesh.part_names.size());
   for (std::size_t t = 0; t < mesh.triangles.size() && !parts.empty(); ++t) {
@@ -40,16 +43,14 @@ double finest_part_edge(const Mesh& mesh, double whole) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3f p = mesh.positions[mesh.wedge_position[mesh.triangles[t][k]]];
       const Vec3f q = mesh.positions[mesh.wedge_position[mesh.triangles[t][(k + 1) % 3]]];
-      if (part.count == 0) part.lo = part.hi = p;
-      for (int c = 0; c < 3; ++c)
-        part.lo[c] = std::min(part.lo[c], p[c]), part.hi[c] = std::max(part.hi[c], p[c]);
+      part.box.extend(p);
       part.edges += length(q - p);
       ++part.count;
     }
   }
   double finest = 0;
   for (const Part& part : parts) {
-    if (part.count == 0 || length(part.hi - part.lo) * 4096 < whole) continue;
+    if (part.count == 0 || part.box.diagonal() * 4096 < whole) continue;
     const double mean = part.edges / static_cast<double>(part.count);
     if (finest == 0 || mean < finest) finest = mean;
   }
@@ -89,12 +90,10 @@ Vec3f QuantisationGrid::place(Vec3f p) const {
 
 QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits) {
   QuantisationGrid grid;
-  Vec3f hi = grid.origin = mesh.positions.at(0);
-  for (Vec3f p : mesh.positions)
-    for (int k = 0; k < 3; ++k)
-      grid.origin[k] = std::min(grid.origin[k], p[k]), hi[k] = std::max(hi[k], p[k]);
-  const Vec3f size = hi - grid.origin;
-  grid.range = std::max({size.x, size.y, size.z});
+  if (mesh.positions.empty()) throw StageError("scales", "mesh", "positions", "none");
+  const Box3f box = bounding_box(mesh.positions);
+  grid.origin = box.min;
+  grid.range = box.longest_side();
   if (!(grid.range > 0)) grid.range = 1;
   if (options.position_bits > 0) {
     grid.bits = std::clamp(options.position_bits, kLeastAskedBits, max_bits);
@@ -109,7 +108,7 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
       std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
   // The farthest that a point moves is half the diagonal of a cell.
   grid.bits = bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range);
-  if (const double part = finest_part_edge(mesh, length(size)); part > 0 && grid.bits <= max_bits)
+  if (const double part = finest_part_edge(mesh, box.diagonal()); part > 0 && grid.bits <= max_bits)
     grid.bits = std::max(grid.bits, std::min(max_bits, bits_for(grid.range, part / 8 * 2 / std::sqrt(3.0))));
   if (grid.bits <= max_bits) grid.bits = std::max(grid.bits, std::min(max_bits, options.least_position_bits));
   while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
