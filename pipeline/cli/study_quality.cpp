@@ -51,8 +51,9 @@ Choices study_model(const QualityArguments& args) {
                  derived(kStudy), options(), {}, study);
   CompileRequest request;
   request.input = args.model;
-  const std::unique_ptr<Store> store =
-      args.no_cache ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(args.cache));
+  const std::unique_ptr<Store> store = args.cache.off
+                                           ? std::make_unique<NullStore>()
+                                           : open_disk_store(default_cache_folder(args.cache.folder));
   Notes notes;
   return *run_towards(request, std::move(stage), kStudy, *store, context_of(args.jobs), {}, notes);
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/model/model.h"
 #include "pipeline/graph/artefact.h"

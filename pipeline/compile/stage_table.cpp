@@ -48,11 +48,6 @@ Planes fill_fragments(const Fragments& fragments, const Images& images, Fill fil
   return fill_planes(fragments, images, fill, context, part);
 }
 
-Predictors predict_fragments(const Fragments& fragments, const Planes& planes, const ZimOptions& options,
-                             const RunContext& context) {
-  return predict_quality(fragments, planes, options, context);
-}
-
 Previews preview_fragments(const Fragments& fragments, const Planes& planes, int quality,
                            Subsampling subsampling, const RunContext& context) {
   return make_previews(fragments, planes, {quality, subsampling}, context);
@@ -121,8 +116,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
             {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
       stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP"},  //
-            inputs(kFragments, kFilledPlanes), outputs(kPredictors), read_of(o, o.zim), {},
-            predict_fragments),
+            inputs(kFragments, kFilledPlanes), outputs(kPredictors), read_of(o, o.zim), {}, predict_quality),
       stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture"},
             inputs(kFragments, kFilledPlanes), outputs(kPreviews),
             read_of(o, o.ladder.preview_quality, o.ladder.subsampling), {"libjpeg-turbo"}, preview_fragments),

@@ -60,6 +60,7 @@ ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& optio
 /// The distance that feature points of a scale keep from one another on the coarser levels: 0.8 sigma /
 /// error_ratio, in the unit of sigma.
 double feature_spacing(double sigma, const SsfOptions& options);
+
 /// The grid of a range scan with positions of the conditioned mesh in place of those of the mesh before,
 /// which had `source_positions`. Where a position has several copies, a sample goes to the first one; where
 /// condition dropped it, the sample has none (kNoIndex). Throws StageError for an index out of range.
