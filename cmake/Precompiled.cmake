@@ -9,7 +9,7 @@ function(texmesh_precompile target)  # target, then headers beside those of the 
 endfunction()
 
 # Sources that run once a command, and never once a vertex or texel: what -O1 leaves out of them nobody can measure, and it
-# takes two thirds of the time to compile.
+# takes two thirds of the time to compile. With -O1 g++ 12 sees more overflows that are not there (CMakeLists.txt).
 function(texmesh_seldom_run)  # sources
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O1)
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "-O1;-Wno-array-bounds")
 endfunction()

@@ -2,6 +2,8 @@
 set(house ${CMAKE_CURRENT_SOURCE_DIR}/house)
 add_test(NAME house_layers COMMAND ${house}/check_layers ${PROJECT_SOURCE_DIR})
 add_test(NAME house_layers_self_test COMMAND ${house}/check_layers --self-test)
+add_test(NAME house_sizes COMMAND ${house}/check_sizes ${PROJECT_SOURCE_DIR})
+add_test(NAME house_sizes_self_test COMMAND ${house}/check_sizes --self-test)
 add_test(NAME house_headers COMMAND ${house}/check_headers ${PROJECT_SOURCE_DIR} ${CMAKE_CXX_COMPILER})
 add_test(NAME house_format COMMAND ${house}/check_format ${PROJECT_SOURCE_DIR})
 set_tests_properties(house_format PROPERTIES SKIP_RETURN_CODE 77)

@@ -7,7 +7,7 @@
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

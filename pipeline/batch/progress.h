@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "pipeline/batch/plan.h"
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

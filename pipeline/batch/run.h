@@ -6,7 +6,7 @@
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/cache/prune.h"
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

@@ -3,7 +3,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/worker_child.h"
+#include "pipeline/compile/workers/worker_child.h"
 
 namespace texmesh {
 namespace {
@@ -38,7 +38,7 @@ void add_commands(Command& program) {
 int main(int argc, char** argv) {
   using namespace texmesh;
   if (argc == 2 && std::string(argv[1]) == "worker")
-    return worker_main();  // started by compile, see pipeline/compile/worker_child.h
+    return worker_main();  // started by compile, see pipeline/compile/workers/worker_child.h
 
   CommandLine line(kProgramSummary);
   line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +

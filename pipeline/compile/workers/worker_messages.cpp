@@ -1,4 +1,4 @@
-#include "pipeline/compile/worker_messages.h"
+#include "pipeline/compile/workers/worker_messages.h"
 
 #include <unistd.h>
 

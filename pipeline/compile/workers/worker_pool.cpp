@@ -14,9 +14,9 @@
 #include <set>
 
 #include "format/base/errors.h"
-#include "pipeline/compile/child_process.h"
-#include "pipeline/compile/worker.h"
-#include "pipeline/compile/worker_messages.h"
+#include "pipeline/compile/workers/child_process.h"
+#include "pipeline/compile/workers/worker.h"
+#include "pipeline/compile/workers/worker_messages.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/compile/worker.h"
+#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

@@ -1,4 +1,4 @@
-#include "pipeline/compile/child_process.h"
+#include "pipeline/compile/workers/child_process.h"
 
 #include <fcntl.h>
 #include <spawn.h>
