@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "format/base/bytes.h"
+#include "format/documents/textures.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/bit_writer.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_stream.h"
-#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {

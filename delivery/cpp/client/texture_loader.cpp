@@ -9,7 +9,7 @@
 namespace texmesh {
 namespace {
 
-// As delivery/web/src/groups.ts.
+// As delivery/web/src/decide/request_groups.ts.
 constexpr double kLeastRequest_s = 0.006;  // a request is worth at least so much of the link
 constexpr double kHiddenRtts = 0.6;        // that six connections at once hide
 constexpr double kLeastDecisions = 48;

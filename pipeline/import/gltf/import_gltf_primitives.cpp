@@ -109,7 +109,7 @@ VertexData PrimitiveReader::vertices() const {
   VertexData data;
   const Json* draco = draco_extension(document_, place_);
   if (draco) {
-    const std::string place = at(std::string("extensions/") + kDraco);
+    const std::string place = at("extensions/" + std::string(kDraco));
     const auto normalized = [&](const std::string& name) {
       const auto it = primitive_.attributes.find(name);
       return name == "COLOR_0" || (it != primitive_.attributes.end() &&

@@ -5,11 +5,11 @@
 #include <set>
 
 #include "format/container/layout.h"
+#include "format/documents/textures.h"
 #include "pipeline/inspect/provenance.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/data/ladder.h"
-#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {

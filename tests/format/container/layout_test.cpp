@@ -11,30 +11,6 @@
 namespace texmesh {
 namespace {
 
-TextureInfo texture(std::uint32_t plane, int rungs) {
-  TextureInfo t;
-  t.image = plane / 2;
-  t.role = plane % 2 ? "alpha" : "base-colour";
-  t.name = "wall \xc3\xa4.jpg";
-  t.colour_space = plane % 2 ? "linear" : "srgb";
-  t.channels = plane % 2 ? 1 : 3;
-  t.width_px = 1000;
-  t.height_px = 500;
-  t.fragment_width_px = t.fragment_height_px = 256;
-  t.columns = 4;
-  t.rows = 2;
-  t.grid_reason = "because";
-  t.preview_width_px = 62;
-  t.preview_height_px = 31;
-  t.preview.path = preview_path(plane);
-  t.tables.path = table_streams_path(plane);
-  for (int r = 0; r < rungs; ++r) {
-    t.rung_quality.push_back(5 + 10 * r);
-    t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(r));
-  }
-  return t;
-}
-
 TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
   EXPECT_EQ(parse_entry_path(mesh_path(7)).kind, EntryKind::kMesh);
   EXPECT_EQ(parse_entry_path(mesh_path(7)).number, 7u);

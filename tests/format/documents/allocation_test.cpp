@@ -15,8 +15,6 @@ namespace texmesh {
 namespace {
 
 using testing::make_tables;
-PackageTables small() { return {{make_tables(3, 2, 2, 1), make_tables(1, 1, 1, 0)}}; }
-
 PlaneTables allocation_case(std::uint8_t allocation) {
   PlaneTables t = make_tables(4, 1, 2, 1);
   t.allocation = allocation;

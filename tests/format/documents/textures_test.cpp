@@ -17,8 +17,6 @@ using testing::as_bytes;
 using testing::make_manifest;
 using Json = nlohmann::ordered_json;
 
-Manifest read(const std::string& json) { return read_manifest(as_bytes(json)); }
-
 TextureInfo texture(std::uint32_t plane, int rungs) {
   TextureInfo t;
   t.image = plane / 2;

@@ -7,11 +7,11 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/documents/textures.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "tests/support/images.h"
-#include "format/documents/textures.h"
 
 namespace texmesh {
 namespace {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/box.h"
 #include "stages/geometry/tetrahedron.h"
 #include "stages/geometry/triangle_tree.h"
 #include "stages/skeletonization/shape_thickness.h"
@@ -146,10 +147,9 @@ TEST(Tetrahedron, MeetsWhatHasAPointInIt) {
       ++missed;
     }
     if (inside > 0) {
-      Vec3d lo = triangle[0], hi = lo;
-      for (Vec3d p : triangle)
-        for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
-      EXPECT_TRUE(solid.may_meet_box(lo, hi));
+      Box3d box;
+      for (const Vec3d& p : triangle) box.extend(p);
+      EXPECT_TRUE(solid.may_meet_box(box));
     }
   }
   EXPECT_GT(met, 30);
@@ -161,9 +161,10 @@ TEST(Tetrahedron, KnowsWhatIsAroundItAndWhatItIsAround) {
   EXPECT_TRUE(unit.meets({Vec3d{0.1, 0.1, 0.1}, Vec3d{0.2, 0.1, 0.1}, Vec3d{0.1, 0.2, 0.1}}));
   EXPECT_TRUE(unit.meets({Vec3d{-9, -9, 0.1}, Vec3d{9, -9, 0.1}, Vec3d{0, 20, 0.1}}));
   EXPECT_FALSE(unit.meets({Vec3d{-9, -9, 1.1}, Vec3d{9, -9, 1.1}, Vec3d{0, 20, 1.1}}));
-  EXPECT_TRUE(unit.may_meet_box({-5, -5, -5}, {5, 5, 5}));
-  EXPECT_FALSE(unit.may_meet_box({0.6, 0.6, 0.6}, {1, 1, 1}));  // inside its box, outside its slanted side
-  EXPECT_FALSE(unit.may_meet_box({-1, 0, 0}, {-0.1, 1, 1}));
+  EXPECT_TRUE(unit.may_meet_box(Box3d{{-5, -5, -5}, {5, 5, 5}}));
+  EXPECT_FALSE(
+      unit.may_meet_box(Box3d{{0.6, 0.6, 0.6}, {1, 1, 1}}));  // inside its box, outside its slanted side
+  EXPECT_FALSE(unit.may_meet_box(Box3d{{-1, 0, 0}, {-0.1, 1, 1}}));
 }
 
 TEST(TriangleTree, MeetsAgreesWithTryingAll) {

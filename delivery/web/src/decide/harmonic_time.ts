@@ -2,7 +2,7 @@ import { Throughput, ThroughputOptions } from '../http/throughput';
 import { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlanOptions } from './plan_types';
 import { UncheckedPlan } from './unchecked_plan';
 
-// UncheckedPlan as it is offered to others (delivery/cpp/harmonic_time.h): arguments are checked, and there are the variants of the
+// UncheckedPlan as it is offered to others (delivery/cpp/decide/harmonic_time.h): arguments are checked, and there are the variants of the
 // thesis that load() does not use.
 
 export type { FragmentOffer, HtcOrder, HtcStep, Policy, TimePlanOptions };

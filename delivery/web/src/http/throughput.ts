@@ -1,4 +1,4 @@
-/** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/throughput.h. */
+/** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
   /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
   add(bytes: number, seconds: number): void;

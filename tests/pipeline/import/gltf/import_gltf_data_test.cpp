@@ -8,6 +8,7 @@
 #include <set>
 
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/import/import.h"
 
 namespace texmesh {
 namespace {

@@ -1,4 +1,4 @@
-// Unit vectors as points of an octahedron: format/split_stream.cpp.
+// Unit vectors as points of an octahedron: format/split/split_stream.cpp.
 
 /** A coordinate of the octahedron's vector, scaled to `centre`, rounded towards zero. */
 function scaled(value: number, centre: number, total: number): number {

@@ -6,7 +6,7 @@ import { type SplitLimits, SplitState } from './split_state';
 import { type CodedAttribute, SplitValues } from './split_values';
 import { SplitVertices } from './split_vertices';
 
-/** The reader's side of format/split_codec.h: points are asked in the same order, every decision is read from the stream. */
+/** The reader's side of format/split/codec/split_codec.h: points are asked in the same order, every decision is read from the stream. */
 export class SplitCodec {
   private readonly state_: SplitState;
   private readonly vertices_: SplitVertices;

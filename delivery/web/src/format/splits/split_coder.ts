@@ -1,4 +1,4 @@
-// The entropy decoder of mesh/stream.bin: format/split_coder.h, with 32-bit numbers.
+// The entropy decoder of mesh/stream.bin: format/split/split_coder.h, with 32-bit numbers.
 
 /** Adaptive probabilities that a bit is 1, by index. */
 export class BitModels {

@@ -1,4 +1,4 @@
-// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split_codec.h, and how many contexts
+// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/codec/split_models.h, and how many contexts
 // each kind has.
 
 export const degrees = 14;
