@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <set>
 
-#include "pipeline/io/file_resolver.h"
 #include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
 namespace {
