@@ -9,15 +9,36 @@ function(texmesh_install_component export folders)
   foreach(folder ${folders})
     set_target_properties(texmesh_${folder} PROPERTIES EXPORT_NAME ${folder})
     install(TARGETS texmesh_${folder} EXPORT ${export} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/texmesh
-      FILES_MATCHING PATTERN *.h PATTERN node_modules EXCLUDE PATTERN web EXCLUDE)
   endforeach()
   install(EXPORT ${export} NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE ${export}.cmake)
 endfunction()
 
+# Installs the headers of a layer whose paths within it match one of the regular expressions.
+function(texmesh_install_headers layer)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${layer}/*.h)
+  foreach(header ${headers})
+    foreach(regex ${ARGN})
+      if(header MATCHES "^${layer}/${regex}$")
+        get_filename_component(folder ${header} DIRECTORY)
+        install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/texmesh/${folder})
+      endif()
+    endforeach()
+  endforeach()
+endfunction()
+
 texmesh_install_component(texmeshDelivery "format;delivery")
+texmesh_install_headers(format ".*")
+texmesh_install_headers(delivery/cpp ".*")
 if(TEXMESH_COMPILER)
   texmesh_install_component(texmeshCompiler "stages;pipeline")
+  # Of the stages the data, and of each its one public header (tests/house/check_layers).
+  texmesh_install_headers(stages "data/.*" "base/run_context\\.h")
+  foreach(stage condition skeletonization ssf simplification perceptual_values fragmentation fill zim previews ladder lut
+      scales quality package)
+    texmesh_install_headers(stages "${stage}/${stage}\\.h")
+  endforeach()
+  texmesh_install_headers(pipeline "(io|graph|cache|compile|batch|inspect)/.*" "import/import\\.h" "extract/extract\\.h"
+    "extract/glb/.*")
   install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh {

@@ -8,6 +8,7 @@
 #include "format/split/codec/split_models.h"
 #include "format/split/codec/split_site.h"
 #include "format/split/codec/split_value_codec.h"
+#include "format/split/split_stream.h"
 
 namespace texmesh {
 
