@@ -84,9 +84,8 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
 /// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
 ///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
 ///   such texels are free, so that only covered texels cost bytes.
-/// - Tables are trained on covered fragments spread over the plane. They have a code for every symbol, so
-/// that
-///   no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
+/// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
+///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
 /// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
 /// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).
