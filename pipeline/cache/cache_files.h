@@ -13,10 +13,10 @@
 //   cas/<d[0:2]>/<digest>    the bytes of an output
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
-//   locks/<k[0:3]>           flock: held while a key that begins so is computed
-//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while
-//   pruning running/<name>           one per running build, locked while it lives; its time is the build's
-//   start quarantine/<name>        what was found damaged
+//   locks/<k[0:3]>           flock: held while a key that begins with these digits is computed
+//   gate                     flock: shared by lookups and puts of records and blobs, exclusive for pruning
+//   running/<name>           one per running build, locked until the build ends; its time is the start's
+//   quarantine/<name>        objects that were found damaged
 namespace texmesh {
 
 /// Path of an object within a cache folder; `kind` is ac, cas or notes.

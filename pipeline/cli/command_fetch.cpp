@@ -341,10 +341,9 @@ void add_fetch_command(Command& app) {
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
-      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of another "
-      "server. The package is read from the first server that answers. A server that knows no ranges is "
-      "asked "
-      "for whole rungs of the tree beside the container.\n"
+      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of "
+      "another server. The package is read from the first server that answers. A server that knows no "
+      "ranges is asked for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
   c.on_run([args] { return run(*args); });
