@@ -25,12 +25,12 @@ std::string object_path(const char* kind, const Sha256& digest);
 /// The whole of a regular file; nothing when it is not there, longer than max_bytes or cannot be read.
 std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
 
-/// Puts `bytes` under a name that nobody has: an unnamed temporary file, fdatasync, link, fsync of the
-/// folder. A file that is there already stays, whoever wrote it, and counts as success when it is as long.
-/// False when it cannot be done; nothing is left then, whatever kills the process.
+/// Puts `bytes` under a new name: an unnamed temporary file, fdatasync, link, fsync of the folder. A file
+/// that has the name already stays, and counts as success when it is as long as `bytes`. False when that
+/// fails. A failure, or the end of the process at any point, leaves nothing behind.
 bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
 
-/// Text with its digest behind it, so that a cut or flipped one is noticed; and back.
+/// Text with its digest behind it, so that a cut or changed text is noticed; and back.
 std::string seal(const std::string& body);
 std::optional<std::string> unseal(std::span<const std::uint8_t> bytes);
 
@@ -45,7 +45,7 @@ std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, cons
 /// The same for a record whose key the caller knows by its name only (pruning).
 std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes);
 
-/// flock on a file that is made when it is not there; released with the object.
+/// flock on a file, which is made where it is missing. Released with the object.
 class FileLock {
  public:
   enum class Mode : std::uint8_t { kShared, kExclusive };
@@ -58,9 +58,9 @@ class FileLock {
   /// Does not wait.
   static FileLock attempt(const std::string& path, Mode mode);
   bool held() const { return fd_ >= 0; }
-  /// attempt() failed because somebody else holds it, not because locks do not work.
+  /// attempt() failed because somebody else holds the lock, not because locks do not work.
   bool busy() const { return busy_; }
-  /// The file that is locked is the one that stands under this path now, not one that was removed meanwhile.
+  /// Whether the locked file still stands under this path and was not removed meanwhile.
   bool is_of(const std::string& path) const;
 
  private:

@@ -93,7 +93,7 @@ Object GraphRun::run_object(const ArtefactName& wanted) {
         if (p.stages[i].stored) p.artefacts.release_inputs(p.stages[i]);
       });
   scheduler.run_all(std::clamp(p.context.threads, 1, kMostThreads));
-  if (const auto left = scheduler.left(); !left.empty())
+  if (const auto left = scheduler.tasks_not_run(); !left.empty())
     throw std::logic_error("stage " + p.stages[left.front()].name + " waits for an input that nothing gives");
   return p.executor.fetch(wanted.name);
 }

@@ -7,9 +7,9 @@
 
 namespace texmesh {
 
-// How a stage is declared. One declaration names what its function gets, what its key holds and what it
-// gives; the compiler refuses a function whose parameters are not exactly the declared inputs, then the
-// values of the declared options, then the context:
+// How a stage is declared. One declaration names the inputs and options of the stage's function, the parts of
+// the stage's key, and the results. The compiler refuses a function that cannot be called with the declared
+// inputs, then the values of the declared options, then the context:
 //
 //   make_stage({"ssf", kSsfVersion, "mesh -> scale map"}, inputs(kConditioned), outputs(kScaleMap),
 //              options(OptionValue("ssf", ssf_options)), {}, filter_scale_space);
@@ -72,8 +72,8 @@ Options<T...> options(OptionValue<T>... values) {
   return {{std::move(values)...}};
 }
 
-/// What a stage's function gives: its results in the order of the outputs, and notes. A single result stands
-/// for itself; its notes are those that it carries, if it carries any.
+/// What a stage's function returns: the results in the order of the outputs, and notes. A function with one
+/// result may return the result alone; the notes are then the result's own, where it has a member `notes`.
 template <class... T>
 struct Results {
   Results(std::tuple<T...> all, Notes more) : values(std::move(all)), notes(std::move(more)) {}
