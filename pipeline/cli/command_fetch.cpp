@@ -56,7 +56,7 @@ struct Fetched {
 class FragmentWriter {
  public:
   FragmentWriter(PackageReader& package, const std::string& folder) : package_(package), folder_(folder) {}
-  void take(const LoadedFragment& f) {
+  void add(const LoadedFragment& f) {
     if (folder_.empty()) return;
     auto& streams = streams_[{f.plane, f.fragment}];
     const Codec codec = package_.textures()[f.plane].codec;
@@ -223,7 +223,7 @@ Fetched fetch(const FetchArguments& a) {
   const std::vector<PlaneChoice> planes =
       texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
   load.cancelled = http.cancelled;
-  load.on_fragment = [&](const LoadedFragment& fragment) { writer.take(fragment); };
+  load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
   f.end_s = seconds_since(start);
   if (const double seconds = parse_duration(a.refine, "--refine"); seconds > 0 && !f.load.cancelled)

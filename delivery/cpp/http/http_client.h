@@ -40,8 +40,8 @@ struct HttpAnswer {
 };
 /// Whether the request is worth another try.
 bool may_retry(const HttpAnswer& answer);
-/// In a few words, for messages.
-std::string what_came(const HttpAnswer& answer);
+/// The answer in a few words, for messages.
+std::string describe_answer(const HttpAnswer& answer);
 
 /// Bytes first .. first + bytes - 1.
 struct HttpRange {
