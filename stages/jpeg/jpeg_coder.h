@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-/// What a coder makes.
+/// The kind of JPEG that a coder makes.
 struct JpegKind {
   std::uint32_t channels = 3;  // 1 or 3
   int quality = 75;            // IJG, 1..100
@@ -35,19 +35,19 @@ class JpegCoder {
   JpegCoder& operator=(const JpegCoder&) = delete;
 
   void use_tables(const HuffmanTables& tables);
-  /// Those in use; a new coder has the typical ones of ISO 10918-1 annex K.3, which have a code for every
-  /// symbol.
+  /// The Huffman tables in use. A new coder has the typical tables of ISO 10918-1 annex K.3, which have a
+  /// code for every symbol.
   HuffmanTables tables() const;
-  /// By component, zigzag order.
+  /// The quantisers by component, in zigzag order.
   std::vector<std::array<std::uint16_t, 64>> quantisers() const;
-  /// For each of those tables, the symbols that coding any image can take: quantisers bound the coefficients,
-  /// so coarse ones leave few.
+  /// For each Huffman table, the symbols that coding any image can take: quantisers bound the coefficients,
+  /// so coarse quantisers leave few symbols.
   std::vector<std::vector<std::uint8_t>> possible_symbols() const;
-  /// All that images of one size and kind have in common: SOI [APP14] DQT [DHT] SOF [SOS] EOI. A progressive
-  /// coder's has neither DHT nor SOS: every scan has its own.
+  /// The head that images of one size and kind have in common: SOI [APP14] DQT [DHT] SOF [SOS] EOI. The head
+  /// of a progressive coder has neither DHT nor SOS: every scan has its own.
   std::vector<std::uint8_t> head_stream(std::uint32_t width_px, std::uint32_t height_px);
-  /// Appends what follows that head, its SOI and the EOI around it: SOI data EOI. Coded with the tables in
-  /// use, in which every symbol needs a code. For a progressive coder: the scans alone, without SOI and EOI.
+  /// Appends the data that follows the head, as SOI data EOI. Codes with the tables in use, which need a code
+  /// for every symbol. A progressive coder appends the scans alone, without SOI and EOI.
   void append_body(const PixelWindow& image, std::vector<std::uint8_t>& out);
   /// A whole JFIF file with optimised tables of its own.
   std::vector<std::uint8_t> complete(const PixelWindow& image);

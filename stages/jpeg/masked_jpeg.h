@@ -18,17 +18,19 @@ using MaskedRung = std::vector<BlockCoding>;
 MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::uint16_t, 64>>& quantisers,
                        const HuffmanTables& tables);
 
-/// Whether every texel of the window is covered: then JpegCoder codes it.
+/// Whether every texel of the window is covered. JpegCoder codes such windows.
 bool wholly_covered(const PixelWindow& image);
 
 /// Codes images at many rungs at once; sides are multiples of 16. The decoder's samples at covered texels are
 /// what counts:
-/// - Blocks without a covered texel take two codes: no AC, and the DC before them unless that is far off.
-/// - Blocks covered in part get coefficients that are cheap and right where it shows (MaskedBlock). Uncovered
-///   texels weigh a little towards what the window has there, so that they stay near the fill's colours.
-/// - Blocks covered wholly lose coefficients that cost more than they show.
-/// A halved chroma sample weighs as much as the covered texels that interpolation takes from it.
-/// Same bytes for the same input; one object per thread.
+/// - Blocks without a covered texel take two codes: no AC, and the DC of the block before unless that is far
+///   off.
+/// - Blocks covered in part get coefficients that are cheap and right at covered texels (MaskedBlock).
+///   Uncovered texels have a small weight towards the window's values, so that they stay near the fill's
+///   colours.
+/// - Blocks covered wholly lose coefficients whose bytes are worth more than their effect.
+/// A halved chroma sample weighs as much as the covered texels that interpolation takes from it. Same bytes
+/// for the same input; one object per thread.
 class MaskedJpeg {
  public:
   explicit MaskedJpeg(const JpegKind& kind);

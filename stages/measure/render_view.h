@@ -26,7 +26,7 @@ struct MipTexture {
   std::uint32_t first_level = 0;
   std::vector<Level> levels;  // first_level, first_level + 1, ... 1 x 1
 };
-/// Completes the chain from its first level, which must be there.
+/// Makes the further levels of the chain from its first level, which must be there.
 void build_mips(MipTexture& texture);
 
 /// One sample of a view: where it lies and what to look up; independent of the texture's content.
@@ -42,7 +42,7 @@ struct ViewSample {
 /// What a view shows of a mesh. 2 x 2 samples a pixel.
 struct ViewBuffer {
   std::uint32_t side_px = 0;
-  std::vector<ViewSample> samples;  // those that hit, in raster order
+  std::vector<ViewSample> samples;  // the samples that hit, in raster order
   std::vector<std::uint8_t> hits;   // per pixel: 0..4
 };
 
