@@ -49,9 +49,9 @@ struct LadderOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
-      "jpeg = a baseline JPEG for every fragment and rung; progressive = one progressive JPEG for every "
-      "fragment, of which each rung is a beginning; fragments then have 256 px or more, unless "
-      "min_fragment_px is set; webp = lossy WebP for colours");
+      "jpeg = baseline JPEGs; progressive = one progressive JPEG per fragment, of which each rung is a "
+      "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "
+      "colours");
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "JPEG qualities of normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "JPEG qualities of occlusion, roughness, metalness");
