@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "pipeline/graph/artefact_table.h"
 #include "pipeline/graph/stage_executor.h"
@@ -26,6 +27,7 @@ struct GraphRun::Parts {
   const RunContext& context;
   ArtefactTable artefacts;
   StageExecutor executor;
+  bool has_run = false;
 };
 
 GraphRun::GraphRun(const std::vector<Stage>& stages, Store& store, const RunContext& context,
@@ -84,6 +86,7 @@ std::vector<std::pair<const Stage*, StageExplanation>> GraphRun::forecast() {
 
 Object GraphRun::run_object(const ArtefactName& wanted) {
   Parts& p = *parts_;
+  if (std::exchange(p.has_run, true)) throw std::logic_error("a graph runs once");
   p.artefacts.check_type(wanted);
   p.artefacts.add_use(wanted.name);
   StageScheduler scheduler(

@@ -8,8 +8,9 @@
 namespace texmesh {
 
 // How a stage is declared. One declaration names the inputs and options of the stage's function, the parts of
-// the stage's key, and the results. The compiler refuses a function that cannot be called with the declared
-// inputs, then the values of the declared options, then the context:
+// the stage's key, and the results. The compiler refuses a function whose parameters are not the declared
+// inputs, then the declared options, then the context, each of exactly its type: a conversion would hand the
+// function another value than the key holds.
 //
 //   make_stage({"ssf", kSsfVersion, "mesh -> scale map"}, inputs(kConditioned), outputs(kScaleMap),
 //              options(OptionValue("ssf", ssf_options)), {}, filter_scale_space);
@@ -109,11 +110,21 @@ StageOutput stored_output(Artefact<T> artefact) {
   return output;
 }
 
+/// Whether a plain function has exactly these parameters, references and const apart. Others (lambdas of
+/// tests) are held by is_invocable_r alone.
+template <class F, class... Expected>
+struct TakesExactly : std::true_type {};
+template <class R, class... A, class... Expected>
+struct TakesExactly<R (*)(A...), Expected...>
+    : std::is_same<std::tuple<std::remove_cvref_t<A>...>, std::tuple<Expected...>> {};
+
 /// The function that the graph calls: inputs get their types back, options stand behind them.
 template <class... I, class... O, class... P, class F>
 auto bind_function(Inputs<I...>, const std::tuple<O...>*, Options<P...> options, F function) {
   static_assert(std::is_invocable_r_v<Results<O...>, F, const I&..., const P&..., const RunContext&>,
                 "a stage's function takes its inputs, its options and the context, and gives its outputs");
+  static_assert(TakesExactly<F, I..., P..., RunContext>::value,
+                "a stage's function has parameters of exactly the types of its inputs and options");
   return [options = std::move(options), function = std::move(function)](std::span<const Object> objects,
                                                                         const RunContext& context) {
     const auto call = [&]<std::size_t... K>(std::index_sequence<K...>)->Results<O...> {
