@@ -1,12 +1,12 @@
 import { choicesFromAddress, readable } from './choices';
-import { warmDecoders } from './decoders';
+import { warmDecoders } from './session/decoders';
 import { byId } from './dom';
 import * as format from './format';
 import type { Live } from './live';
 import { hideMessage, offerPackages, showError } from './message';
-import { Panel } from './panel';
-import { Session } from './session';
-import { Stage } from './stage';
+import { Panel } from './panel/panel';
+import { Session } from './session/session';
+import { Stage } from './stage/stage';
 import { toggleTheme } from './theme';
 
 const kPhases: Record<string, string> = {

@@ -1,6 +1,6 @@
 import './style.css';
 import { byId } from './dom';
-import { graphics } from './gpu';
+import { graphics } from './stage/gpu';
 import { showError } from './message';
 import { startTheme } from './theme';
 

@@ -1,9 +1,9 @@
 import { etaOf } from 'texmesh';
 import type { PlaneTables, TextureInfo } from 'texmesh';
-import * as format from './format';
-import type { Live } from './live';
-import { make } from './dom';
-import { colour, onTheme } from './theme';
+import * as format from '../format';
+import type { Live } from '../live';
+import { make } from '../dom';
+import { colour, onTheme } from '../theme';
 
 export type ColourBy = 'eta' | 'rung' | 'bytes' | 'skipped';
 

@@ -1,6 +1,6 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
-import { colour, onTheme } from './theme';
+import { colour, onTheme } from '../theme';
 
 /** One curve: its colour is a variable of style.css. */
 export interface Curve {

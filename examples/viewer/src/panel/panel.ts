@@ -1,14 +1,14 @@
 import { stepFunction } from 'texmesh';
 import type { Manifest, PlaneTables } from 'texmesh';
-import { capsWith, kPolicies, kTimes } from './choices';
-import type { Choices } from './choices';
-import { make } from './dom';
-import { FragmentMap } from './fragment-map';
-import type { ColourBy } from './fragment-map';
-import * as format from './format';
-import { bytesByKind, kKinds } from './live';
-import type { Live } from './live';
-import { Plot } from './plots';
+import { capsWith, kPolicies, kTimes } from '../choices';
+import type { Choices } from '../choices';
+import { make } from '../dom';
+import { FragmentMap } from './fragment_map';
+import type { ColourBy } from './fragment_map';
+import * as format from '../format';
+import { bytesByKind, kKinds } from '../live';
+import type { Live } from '../live';
+import { Plot } from './plot';
 
 export interface PanelActions {
   choose: (choices: Choices) => void;

@@ -2,11 +2,11 @@ import { equivalentQuality, open, predictedSsim, surfaceWeights } from 'texmesh'
 import type { Object3D } from 'three';
 import type { DecisionEvent, LoadedModel, LoadOptions, TexmeshPackage } from 'texmesh';
 import { gltfLoader } from './decoders';
-import { isMetallic } from './light';
-import { emptyLive } from './live';
-import type { Live } from './live';
-import type { Choices } from './choices';
-import type { Stage } from './stage';
+import { isMetallic } from '../stage/light';
+import { emptyLive } from '../live';
+import type { Live } from '../live';
+import type { Choices } from '../choices';
+import type { Stage } from '../stage/stage';
 
 /** One package on the stage: opens it, loads it as chosen, and keeps in `live` what the panel shows. */
 export class Session {
