@@ -30,6 +30,13 @@ export function count(n: number): string {
   return n.toLocaleString('en').replaceAll(',', '\u202f');
 }
 
+/** Three digits: 150000 -> 150k. */
+export function short(n: number): string {
+  if (n >= 9.995e5) return `${Number((n / 1e6).toPrecision(3))}M`;
+  if (n >= 1000) return `${Number((n / 1000).toPrecision(3))}k`;
+  return String(Math.round(n));
+}
+
 export function px(n: number): string {
   return n >= 1e8 ? 'any size' : `${count(Math.round(n))} px`;
 }

@@ -32,7 +32,10 @@ export interface PlotOptions {
   legend?: boolean;
 }
 
-/** A plot of uPlot that follows its box's width and the theme. Data: x, then one row per curve; null = no point. */
+/** The row of x, then one row for each curve; null = no point. */
+export type PlotData = (number | null)[][];
+
+/** A plot of uPlot that follows its box's width and the theme. */
 export class Plot {
   private plot: uPlot | null = null;
   private data: uPlot.AlignedData = [[]];
@@ -49,10 +52,10 @@ export class Plot {
   }
 
   /** What is drawn already is not drawn again. */
-  set(data: (number | null)[][]): void {
+  set(data: PlotData): void {
     const mark = this.options.mark?.();
     const moved = mark?.x !== this.mark?.x || mark?.y !== this.mark?.y || mark?.label !== this.mark?.label;
-    const same = equal(data, this.data as (number | null)[][]);
+    const same = equal(data, this.data as PlotData);
     this.mark = mark;
     if (same && this.plot) {
       if (moved) this.plot.redraw(false, false);

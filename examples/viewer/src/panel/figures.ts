@@ -1,0 +1,43 @@
+import { make } from '../dom';
+import * as format from '../format';
+import type { Live } from '../live';
+
+const kFigures = [
+  ['scale', 'scale shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'], ['time', 'complete after'],
+  ['ssim', 'predicted SSIM'],
+] as const;
+type Figure = (typeof kFigures)[number][0];
+
+/** The numbers at the top of the panel. */
+export class Figures {
+  readonly box: HTMLElement;
+  private readonly values = new Map<Figure, HTMLElement>();
+
+  constructor() {
+    const list = make('dl', { class: 'figures' });
+    for (const [key, name] of kFigures) {
+      const value = make('dd', { id: `figure-${key}` }, '–');
+      this.values.set(key, value);
+      list.append(make('div', {}, make('dt', {}, name), value));
+    }
+    this.box = make('section', {}, list);
+  }
+
+  show(l: Live): void {
+    const scale = l.manifest?.scales.find((s) => s.scale === l.scale);
+    this.set('scale', l.scale === null ? '–' : `S${l.scale}`, scale ? `${format.short(scale.triangles)} tri` : '');
+    this.set('size', l.displayedPx > 0 ? format.px(l.displayedPx) : '–');
+    this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–', l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
+    this.set('first', secondsOrDash(l.firstPictureS));
+    this.set('time', secondsOrDash(l.doneS), Number.isFinite(l.limitS) && Number.isFinite(l.doneS) ? `of ${format.seconds(l.limitS)}` : '');
+    this.set('ssim', Number.isFinite(l.predictedSsim) ? l.predictedSsim.toFixed(3) : '–');
+  }
+
+  private set(figure: Figure, text: string, more = ''): void {
+    this.values.get(figure)?.replaceChildren(text, ...(more ? [make('small', {}, ` ${more}`)] : []));
+  }
+}
+
+function secondsOrDash(s: number): string {
+  return Number.isFinite(s) ? format.seconds(s) : '–';
+}
