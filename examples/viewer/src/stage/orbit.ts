@@ -1,0 +1,98 @@
+import { Box3, MathUtils, PerspectiveCamera, Spherical, Vector3 } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+const kFieldOfViewDegrees = 32;
+const kTurnDegrees = 6; // per press of an arrow key
+const kNearer = 0.85; // per press of +
+
+/** A camera that goes round the object by mouse, touch and keyboard. Calls `onMove` when the camera has moved. */
+export class Orbit {
+  readonly camera = new PerspectiveCamera(kFieldOfViewDegrees, 1, 0.01, 100);
+  private readonly controls: OrbitControls;
+  private readonly bounds = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+
+  constructor(canvas: HTMLCanvasElement, private readonly onMove: () => void) {
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.addEventListener('change', () => onMove());
+    canvas.addEventListener('keydown', (e) => this.key(e));
+  }
+
+  /** The point that the camera goes round. */
+  get target(): Vector3 {
+    return this.controls.target;
+  }
+
+  /** Carries on the gliding after a movement; while the camera glides, `onMove` is called. */
+  glide(): void {
+    this.controls.update();
+  }
+
+  /** Frames a new object: its box in the scene's units. */
+  frame(min: readonly number[], max: readonly number[]): void {
+    this.bounds.min.fromArray(min as number[]);
+    this.bounds.max.fromArray(max as number[]);
+    this.home();
+  }
+
+  /** The whole object, the sphere round its box, from a little above, its front to the left. */
+  home(): void {
+    const centre = this.bounds.getCenter(new Vector3());
+    const radius = Math.max(this.bounds.getSize(new Vector3()).length() / 2, 1e-9);
+    const half = MathUtils.degToRad(kFieldOfViewDegrees) / 2;
+    const narrow = Math.min(1, this.camera.aspect);
+    const distance = radius / Math.sin(Math.atan(Math.tan(half) * narrow));
+    this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72), MathUtils.degToRad(28))).add(centre);
+    this.camera.near = distance / 500;
+    this.camera.far = distance * 20;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.controls.minDistance = radius / 50;
+    this.controls.maxDistance = distance * 8;
+    this.moved();
+  }
+
+  /** Turns the camera round the object, degrees. */
+  turn(right: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.target);
+    const s = new Spherical().setFromVector3(offset);
+    s.theta += MathUtils.degToRad(right);
+    s.phi = MathUtils.clamp(s.phi - MathUtils.degToRad(up), 0.02, Math.PI - 0.02);
+    this.camera.position.setFromSpherical(s).add(this.target);
+    this.moved();
+  }
+
+  /** Comes nearer by a factor below 1, goes away by one above. */
+  zoom(factor: number): void {
+    const offset = this.camera.position.clone().sub(this.target);
+    const length = MathUtils.clamp(offset.length() * factor, this.controls.minDistance, this.controls.maxDistance);
+    this.camera.position.copy(this.target).add(offset.setLength(length));
+    this.moved();
+  }
+
+  private moved(): void {
+    this.controls.update();
+    this.onMove();
+  }
+
+  private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    const step = e.shiftKey ? kTurnDegrees * 3 : kTurnDegrees;
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => this.turn(-step, 0),
+      ArrowRight: () => this.turn(step, 0),
+      ArrowUp: () => this.turn(0, step),
+      ArrowDown: () => this.turn(0, -step),
+      '+': () => this.zoom(kNearer),
+      '=': () => this.zoom(kNearer),
+      '-': () => this.zoom(1 / kNearer),
+      '0': () => this.home(),
+      Home: () => this.home(),
+    };
+    const action = actions[e.key];
+    if (!action) return;
+    e.preventDefault();
+    action();
+  }
+}
