@@ -1,0 +1,57 @@
+import { readable } from './choices';
+import { byId } from './dom';
+import * as format from './format';
+import type { Live } from './live';
+
+const kPhases: Record<string, string> = {
+  opening: 'Opening', 'first-picture': 'First picture', tables: 'Tables', mesh: 'Mesh', textures: 'Textures', refining: 'Refining', done: '',
+  cancelled: 'Stopped', failed: 'Failed',
+};
+
+/** Writes what stands over and under the picture: title, progress, status, problems. */
+export function showStatus(live: Live, packageUrl: string): void {
+  showTitle(live, live.title || shortName(packageUrl));
+  const phase = kPhases[live.phase] ?? live.phase;
+  const busy = !['done', 'failed', 'cancelled'].includes(live.phase);
+  showProgress(shareLoaded(live), busy);
+  byId('phase').textContent = busy ? phase : live.phase === 'done' ? 'Complete' : phase; // what screen readers say
+  showProblem(live);
+  byId('status').textContent = [phase, live.bytes > 0 ? `${format.bytes(live.bytes)} in ${live.requests} requests` : '',
+    Number.isFinite(live.doneS) && !busy ? `complete after ${format.seconds(live.doneS)}` : ''].filter(Boolean).join(' · ');
+}
+
+/** A package's name by its URL. */
+function shortName(url: string): string {
+  return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
+}
+
+function showTitle({ manifest, packageBytes }: Live, name: string): void {
+  byId('name').textContent = name;
+  if (!manifest) return;
+  const finest = manifest.scales[0];
+  const textures = manifest.previews.length;
+  byId('subtitle').textContent = [
+    finest ? `${format.count(finest.triangles)} triangles` : '', textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
+    format.bytes(packageBytes)].filter(Boolean).join(' · ');
+  document.title = `${name} · texmesh`;
+}
+
+/** With a time limit the share of the time that has passed, without one the share of the bytes that have come. */
+function shareLoaded(live: Live): number {
+  if (Number.isFinite(live.limitS)) return Math.min((performance.now() - live.startedAt) / 1000 / live.limitS, 1);
+  return live.expected > 0 ? Math.min(live.bytes / live.expected, 1) : 0.02;
+}
+
+function showProgress(share: number, busy: boolean): void {
+  const bar = byId('progress');
+  bar.hidden = !busy;
+  bar.setAttribute('aria-valuenow', (100 * share).toFixed(0));
+  (bar.firstElementChild as HTMLElement).style.width = `${(100 * share).toFixed(1)}%`;
+}
+
+function showProblem({ problem, problems }: Live): void {
+  const line = byId('problem');
+  line.hidden = problem === '';
+  const said = problems > 1 ? `${problems} problems, the last: ${problem}` : problem;
+  if (line.textContent !== said) line.textContent = said;
+}
