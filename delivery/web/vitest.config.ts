@@ -1,4 +1,9 @@
+import { fileURLToPath } from 'node:url';
 import { defineConfig } from 'vitest/config';
 
-// The viewer's choices are tested from here, too: beyond this folder.
-export default defineConfig({ server: { fs: { strict: false } }, test: { include: ['tests/**/*.test.ts'], environment: 'node', testTimeout: 20000 } });
+// Functions of the viewer are tested from here, too: their files stand beyond this folder and import the library by its name.
+export default defineConfig({
+  resolve: { alias: { texmesh: fileURLToPath(new URL('src/index.ts', import.meta.url)) } },
+  server: { fs: { strict: false } },
+  test: { include: ['tests/**/*.test.ts'], environment: 'node', testTimeout: 20000 },
+});

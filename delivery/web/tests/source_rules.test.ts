@@ -1,15 +1,18 @@
 import { readFileSync, readdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { expect, it } from 'vitest';
+import { describe, expect, it } from 'vitest';
+import { root } from './support/files';
 import { Sources, circles, importsOf, most, roomsBelow, tooLarge, wrongWays } from './support/source_rules';
 
 // What the source tree promises a reader: rooms in an order, no circles, nothing too long to take in.
 
-const folder = (name: string): string => join(dirname(fileURLToPath(import.meta.url)), '..', name);
-const filesOf = (name: string, ending: string): string[] =>
-  (readdirSync(folder(name), { recursive: true }) as string[]).map((file) => file.replaceAll('\\', '/')).filter((file) => file.endsWith(ending));
-const sources: Sources = new Map(filesOf('src', '.ts').map((file) => [file, readFileSync(join(folder('src'), file), 'utf8')]));
+const web = join(dirname(fileURLToPath(import.meta.url)), '..');
+const filesOf = (folder: string, ending: string): string[] =>
+  (readdirSync(folder, { recursive: true }) as string[]).map((file) => file.replaceAll('\\', '/')).filter((file) => file.endsWith(ending));
+const sourcesOf = (folder: string): Sources => new Map(filesOf(folder, '.ts').map((file) => [file, readFileSync(join(folder, file), 'utf8')]));
+const sources = sourcesOf(join(web, 'src'));
+const viewer = sourcesOf(join(root, 'examples/viewer/src'));
 const planted = (...files: [name: string, text: string][]): Sources => new Map([...sources, ...files]);
 
 it('the rooms are those that there are', () => {
@@ -22,7 +25,7 @@ it('rooms import from the rooms below them only', () => expect(wrongWays(sources
 it('no function, class, file or folder is too large', () => expect(tooLarge(sources)).toEqual([]));
 
 it('a test file in a folder has the name of a source file', () => {
-  const tests = filesOf('tests', '.test.ts').filter((file) => file.includes('/'));
+  const tests = filesOf(join(web, 'tests'), '.test.ts').filter((file) => file.includes('/'));
   expect(tests.length).toBeGreaterThan(20);
   expect(tests.filter((file) => !sources.has(file.replace('.test.ts', '.ts')))).toEqual([]);
 });
@@ -44,4 +47,20 @@ it('what is planted too large is found', () => {
   expect(tooLarge(planted(['http/file.ts', lines(most.fileLines + 1)]))).toEqual(['http/file.ts: 401 lines of 400']);
   const many = Array.from({ length: most.filesInFolder + 1 }, (_, i): [string, string] => [`http/more/${i}.ts`, lines(1)]);
   expect(tooLarge(planted(...many))).toEqual(['http/more: 25 files of 24']);
+});
+
+describe("the viewer's sources", () => {
+  it('are found with their imports', () => {
+    expect([...viewer.keys()]).toEqual(expect.arrayContaining(['main.ts', 'panel/panel.ts', 'session/session.ts', 'stage/stage.ts']));
+    expect(importsOf(viewer).get('main.ts')).toContain('app.ts');
+  });
+  it('have no imports that go round in a circle', () => expect(circles(viewer)).toEqual([]));
+  it('are no larger than those of the library', () => expect(tooLarge(viewer)).toEqual([]));
+  it('are found with a planted circle, class and function', () => {
+    const lines = 'void 0;\n'.repeat(most.functionLines - 1);
+    const bad = new Map([...viewer, ['back.ts', "import { make } from './dom';\n"], ['dom.ts', `import './back';\n${viewer.get('dom.ts')}`],
+      ['session/class.ts', `export class Long {\n${'a = 0;\n'.repeat(most.classLines - 1)}}\n`], ['panel/long.ts', `export function long() {\n${lines}}\n`]]);
+    expect(circles(bad)).toEqual(['dom.ts -> back.ts -> dom.ts']);
+    expect(tooLarge(bad)).toEqual(['session/class.ts:1: 251 lines of 250', 'panel/long.ts:1: 81 lines of 80']);
+  });
 });

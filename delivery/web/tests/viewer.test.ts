@@ -1,14 +1,25 @@
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { readText, root } from './support/files';
+import { type Manifest, type PackageData, PackageReader, type PlaneTables, type QualityTable, equivalentQuality, predictedSsim } from '../src/reader';
+import { golden, readText, root } from './support/files';
 
 interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number | null; rung: number | null }
-const { capsWith, choicesFromAddress, kPolicies, readable } = (await import(join(root, 'examples/viewer/src/choices.ts'))) as {
+interface Turn { at: number; plannedS: number; actualS: number; skipped: boolean }
+interface Shown { base: number; plane: number; role: string; rungs: Int16Array }
+const viewer = (file: string): Promise<unknown> => import(join(root, 'examples/viewer/src', file));
+const { capsWith, choicesFromAddress, kPolicies, readable } = (await viewer('choices.ts')) as {
   capsWith(bytesPerSecond: number): [string, number][];
   choicesFromAddress(query: URLSearchParams): Choices;
   kPolicies: [string, string][];
   readable(url: string): string;
 };
+const { meanColourDssim, pictureSsim } = (await viewer('session/prediction.ts')) as {
+  meanColourDssim(planes: Shown[], tables: readonly (PlaneTables | undefined)[]): number;
+  pictureSsim(data: PackageData, table: QualityTable, state: { scale: number; planes: Shown[] }): number;
+};
+const { stepData } = (await viewer('panel/scale_plot.ts')) as { stepData(m: Manifest): number[][] };
+const { ladderData } = (await viewer('panel/ladder_plot.ts')) as { ladderData(t: PlaneTables): number[][] };
+const { turnData } = (await viewer('panel/time_plots.ts')) as { turnData(turns: Turn[], of: (t: Turn) => (number | null)[]): (number | null)[][] | null };
 const at = (query: string): Choices => choicesFromAddress(new URLSearchParams(query));
 
 describe("the viewer's choices", () => {
@@ -32,6 +43,75 @@ describe("the viewer's choices", () => {
   it('a URL with broken escapes is shown as it stands', () => {
     expect(readable('%')).toBe('%');
     expect(readable('a%20b')).toBe('a b');
+  });
+});
+
+/** Two fragments of equal surface and two rungs; `more` in place of some of it. */
+const tables = (more: Partial<PlaneTables> = {}): PlaneTables => ({
+  columns: 2, rows: 1, incremental: false, order: Uint16Array.of(1, 0), rungQuality: Uint8Array.of(20, 80), tableBytes: Uint32Array.of(5, 7),
+  sizeBytes: Uint32Array.of(10, 20, 30, 40), dssim: Float32Array.of(0.25, 0.125, 0.125, 0.0625), skipDssim: Float32Array.of(0.5, 0.75),
+  coveredTexels: Uint32Array.of(100, 100), surfaceFraction: Float32Array.of(0.5, 0.5), ...more,
+} as PlaneTables);
+const shown = (role: string, ...rungs: number[]): Shown => ({ base: 0, plane: 0, role, rungs: Int16Array.from(rungs) });
+
+describe("the viewer's prediction", () => {
+  it('takes the loss of each fragment as the fragment is shown, by its surface', () => {
+    expect(meanColourDssim([shown('base-colour', 1, 0)], [tables()])).toBe((0.125 + 0.125) / 2);
+    expect(meanColourDssim([shown('base-colour', -1, 1)], [tables()])).toBe((0.5 + 0.0625) / 2);
+    expect(meanColourDssim([shown('emissive', 0, 0)], [tables({ surfaceFraction: Float32Array.of(0, 1) })])).toBe(0.125);
+    // Format 1.0 does not say what a preview loses.
+    expect(meanColourDssim([shown('base-colour', -1, -1)], [tables({ skipDssim: new Float32Array() })])).toBe(1);
+  });
+  it('leaves out textures without colour, and planes that were not read', () => {
+    expect(meanColourDssim([shown('normal', 0, 0), shown('base-colour', 1, 1)], [tables()])).toBe((0.125 + 0.0625) / 2);
+    for (const planes of [[], [shown('normal', 0, 0)]]) expect(meanColourDssim(planes, [tables()])).toBeNaN();
+    expect(meanColourDssim([shown('base-colour', 0, 0)], [undefined])).toBeNaN();
+  });
+  it('is what the measured table says of a uniform quality with the same loss', async () => {
+    const reader = await PackageReader.openBytes(golden('v1.1-scan'));
+    const [data, table] = [await reader.data(), await reader.quality()];
+    const role = data.textures[0].role;
+    const fragments = data.tables[0]!.columns * data.tables[0]!.rows;
+    const of = (rung: number, scale = 0): number =>
+      pictureSsim(data, table, { scale, planes: [{ base: 0, plane: 0, role, rungs: new Int16Array(fragments).fill(rung) }] });
+    const top = data.tables[0]!.rungQuality.length - 1;
+    data.tables[0]!.rungQuality.forEach((quality, rung) => {
+      const loss = meanColourDssim([{ base: 0, plane: 0, role, rungs: new Int16Array(fragments).fill(rung) }], data.tables);
+      expect(of(rung)).toBe(predictedSsim(table, 0, equivalentQuality(data, [{ base: 0, plane: 0 }], loss)));
+      expect(of(rung)).toBeCloseTo(predictedSsim(table, 0, quality), 3);
+    });
+    expect(of(-1)).toBeLessThan(of(0));
+    expect(of(0)).toBeLessThan(of(top));
+    expect(pictureSsim(data, table, { scale: 0, planes: [] })).toBe(predictedSsim(table, 0, 100)); // no texture loses nothing
+  });
+});
+
+describe("the viewer's plots", () => {
+  it('of scales ask by each rule for triangles of a scale, for no fewer on a larger display', async () => {
+    const { manifest } = await PackageReader.openBytes(golden('v1.1-scan'));
+    const [x, ...rules] = stepData(manifest);
+    expect(rules.length).toBe(3);
+    expect(x).toEqual([...x].sort((a, b) => a - b));
+    expect([x[0] >= 16, x.at(-1)! >= 4096]).toEqual([true, true]);
+    const triangles = manifest.scales.map((s) => s.triangles);
+    for (const rule of rules) {
+      expect(rule.length).toBe(x.length);
+      expect(rule).toEqual([...rule].sort((a, b) => a - b)); // larger displays need more
+      for (const v of rule) expect(triangles).toContain(v);
+    }
+  });
+  it('of the ladder add up bytes, with those of the rungs below where a rung continues them', () => {
+    const sums = [10 + 20 + 5, 30 + 40 + 7];
+    const ssim = [1 - (0.25 + 0.125) / 2, 1 - (0.125 + 0.0625) / 2];
+    expect(ladderData(tables())).toEqual([[20, 80], sums, ssim]);
+    expect(ladderData(tables({ incremental: true }))).toEqual([[20, 80], [sums[0], sums[0] + sums[1]], ssim]);
+    expect(ladderData(tables({ order: new Uint16Array() }))).toEqual([[20, 80], [5, 7], [1, 1]]); // nothing is stored
+  });
+  it('of time are in the order in which fragments came, without those that were skipped', () => {
+    const turn = (t: number, skipped = false): Turn => ({ at: t, plannedS: 10 * t, actualS: 100 * t, skipped });
+    const of = (t: Turn): (number | null)[] => [t.plannedS, t.at > 2 ? null : t.actualS];
+    expect(turnData([turn(3), turn(2, true), turn(1)], of)).toEqual([[1, 3], [10, 30], [100, null]]);
+    expect(turnData([turn(1), turn(2, true)], of)).toBe(null);
   });
 });
 
