@@ -1,6 +1,6 @@
 import type { Policy } from 'texmesh';
 
-/** What a person may choose; null or Infinity: as the library thinks best. */
+/** What a person may choose. Infinity: no limit; null: the library chooses. */
 export interface Choices {
   timeS: number;
   capBytesPerSecond: number;
@@ -9,8 +9,8 @@ export interface Choices {
   rung: number | null;
 }
 
-/** Longer limits are none. */
-const mostTimeS = 3600;
+/** A longer time limit counts as none. */
+const kMostTimeS = 3600;
 export const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
 const kCaps: [string, number][] = [
   ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
@@ -21,13 +21,13 @@ export const kPolicies: [Policy, string][] = [
   ['static', 'static'],
 ];
 
-/** The links to choose from; one that an address asks for is among them. */
+/** The bandwidths to choose from, `bytesPerSecond` among them. */
 export function capsWith(bytesPerSecond: number): [string, number][] {
   if (kCaps.some(([, v]) => v === bytesPerSecond)) return kCaps;
   return [...kCaps, [`${Number((bytesPerSecond / 125000).toPrecision(3))} Mbit/s`, bytesPerSecond]];
 }
 
-/** Choices may stand in the address, so that what one sees can be sent to somebody. What is no choice is left out. */
+/** The choices that the page's address makes, so that a link shows others the same. A value that cannot be chosen counts as none. */
 export function choicesFromAddress(query: URLSearchParams): Choices {
   const number = (name: string): number | null => {
     const v = query.get(name);
@@ -41,7 +41,7 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
   const mbit = number('mbit');
   const named = query.get('policy') === 'htca' ? 'htc' : query.get('policy');
   return {
-    timeS: query.get('time') === 'none' || (time ?? 0) > mostTimeS ? Infinity : time !== null && time > 0 ? time : 4,
+    timeS: query.get('time') === 'none' || (time ?? 0) > kMostTimeS ? Infinity : time !== null && time > 0 ? time : 4,
     capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
     policy: kPolicies.find(([p]) => p === named)?.[0] ?? 'guard',
     scale: whole('scale'),
@@ -49,7 +49,7 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
   };
 }
 
-/** A URL as people read it; one with broken escapes as it stands. */
+/** A URL without its escapes; a URL with broken escapes is left as it is. */
 export function readable(url: string): string {
   try {
     return decodeURIComponent(url);

@@ -19,7 +19,7 @@ export interface Transfer {
   end: number;
 }
 
-/** All that the panel shows of a load. */
+/** All that the panel shows of a load; NaN: not known yet. */
 export interface Live {
   manifest: Manifest | null;
   textures: TextureInfo[];
@@ -44,8 +44,9 @@ export interface Live {
   skipped: Map<number, Set<number>>;
   turns: Turn[];
   transfers: Transfer[];
-  /** The last thing that went wrong without ending the load (or ended it with a picture on the screen), and how many did. */
+  /** The last error that left a picture on the screen. */
   problem: string;
+  /** How many such errors there were. */
   problems: number;
 }
 

@@ -48,7 +48,7 @@ export async function offerPackages(): Promise<boolean> {
     const answer = await fetch('packages.json', { cache: 'no-cache' });
     if (answer.ok) list = ((await answer.json()) as { packages?: Listed[] }).packages ?? [];
   } catch {
-    // no list, or none that can be read: the address has to say
+    // Without a list that can be read, the address has to name a package.
   }
   const items = list.filter((p) => typeof p.url === 'string').map((p) => {
     const name = p.name ?? readable(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');

@@ -1,4 +1,4 @@
-/** Light or dark: as the system has it until somebody chooses, then what was chosen. */
+/** Light or dark: the system's theme until a person chooses one. */
 
 const kKey = 'texmesh-theme';
 const system = matchMedia('(prefers-color-scheme: dark)');
@@ -12,7 +12,7 @@ function stored(): string | null {
   }
 }
 
-/** Colours that were asked for: asking makes the page work out its styles. */
+/** Colours that were read: reading one makes the page work out its styles. */
 const known = new Map<string, string>();
 
 function apply(theme = stored() ?? (system.matches ? 'dark' : 'light')): void {
@@ -31,7 +31,7 @@ export function toggleTheme(): void {
   try {
     localStorage.setItem(kKey, next);
   } catch {
-    // for this page alone, then
+    // the choice holds for this page alone
   }
   apply(next);
 }

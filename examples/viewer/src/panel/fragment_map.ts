@@ -20,7 +20,7 @@ export function rampColour(t: number): string {
   return `rgb(${mix(0)} ${mix(1)} ${mix(2)})`;
 }
 
-/** The texture's grid, each fragment in the colour of what it is asked about. Not a plot: a picture of the image. */
+/** A picture of a texture's fragments, each in the colour of its rung, importance, bytes, or of being skipped. */
 export class FragmentMap {
   readonly box = make('div', { class: 'map' });
   private readonly canvas = make('canvas', { role: 'img', 'aria-label': 'Fragments of the texture' });
@@ -29,16 +29,16 @@ export class FragmentMap {
   private by: ColourBy = 'rung';
   private plane = 0;
   private live: Live | null = null;
-  private asked = false;
-  private said = '';
+  private frameAsked = false;
+  private legendText = '';
 
   constructor() {
     this.box.append(this.canvas, this.legend, this.hint);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    this.canvas.addEventListener('pointermove', (e) => this.point(e));
-    this.canvas.addEventListener('pointerdown', (e) => this.point(e));
+    this.canvas.addEventListener('pointermove', (e) => this.describe(e));
+    this.canvas.addEventListener('pointerdown', (e) => this.describe(e));
     this.canvas.addEventListener('pointerleave', (e) => {
-      if (e.pointerType === 'mouse') this.hint.textContent = ''; // a finger that is lifted has leave to read
+      if (e.pointerType === 'mouse') this.hint.textContent = ''; // after a touch the words stay, to be read
     });
     onTheme(() => this.draw());
   }
@@ -51,10 +51,10 @@ export class FragmentMap {
   }
 
   draw(): void {
-    if (this.asked) return;
-    this.asked = true;
+    if (this.frameAsked) return;
+    this.frameAsked = true;
     requestAnimationFrame(() => {
-      this.asked = false;
+      this.frameAsked = false;
       this.paint();
     });
   }
@@ -124,7 +124,7 @@ export class FragmentMap {
         return (f) => (!stored[f] ? null : bytesOf(f) === 0 ? skipped : rampColour(Math.sqrt(bytesOf(f) / most)));
       }
       case 'skipped':
-        this.words([['k1', 'here'], ['warm', 'skipped by the plan'], ['skipped', 'not yet']]);
+        this.nameColours([['k1', 'here'], ['warm', 'skipped by the plan'], ['skipped', 'not yet']]);
         return (f) => (!stored[f] ? null : (rungs?.[f] ?? -1) >= 0 ? here : skippedSet?.has(f) ? left : skipped);
     }
   }
@@ -138,26 +138,26 @@ export class FragmentMap {
   }
 
   private ramp(low: string, high: string, skip: boolean): void {
-    if (this.legendIsOf(`ramp ${low} ${high} ${skip}`)) return;
+    if (this.legendHas(`ramp ${low} ${high} ${skip}`)) return;
     const stops = [0, 0.25, 0.5, 0.75, 1].map(rampColour).join(', ');
     const bar = make('span', { class: 'ramp', style: `background: linear-gradient(to right, ${stops})` });
     this.legend.replaceChildren(low, bar, high, ...(skip ? [make('span', { class: 'skip' }), 'preview'] : []));
   }
 
-  private words(names: [string, string][]): void {
-    if (this.legendIsOf(`words ${names}`)) return;
+  private nameColours(names: [string, string][]): void {
+    if (this.legendHas(`words ${names}`)) return;
     this.legend.replaceChildren(
       ...names.flatMap(([c, text]) => [make('span', { class: 'skip', style: `background: var(--${c})` }), text]));
   }
 
-  /** Whether the legend says this already; else it will. */
-  private legendIsOf(what: string): boolean {
-    const is = this.said === what;
-    this.said = what;
-    return is;
+  /** Whether the legend has this text already; notes the text. */
+  private legendHas(text: string): boolean {
+    const has = this.legendText === text;
+    this.legendText = text;
+    return has;
   }
 
-  private point(e: PointerEvent): void {
+  private describe(e: PointerEvent): void {
     const parts = this.parts();
     if (!parts) return;
     const { info, tables } = parts;

@@ -6,25 +6,25 @@ const kExtensions = [
   'KHR_parallel_shader_compile', 'WEBGL_debug_renderer_info',
 ];
 
-/** A page waits for a busy GPU no longer than this. */
+/** Longest wait for a busy GPU. */
 const kMostIdleMs = 500;
 
-/** The page's other work comes first. */
+/** Resolves after a turn of the page: other work of the page comes first. */
 export const turn = (ms = 0): Promise<void> => new Promise((go) => setTimeout(go, ms));
 
-/** Device pixels per CSS pixel of the picture: more than two only cost time. */
+/** Device pixels per CSS pixel of the picture, at most two: more cost time and are not seen. */
 export const pixelRatio = (): number => Math.min(devicePixelRatio, 2);
 
 let made: WebGL2RenderingContext | null = null;
 
 /**
- * The canvas's WebGL 2, made once. Making it and asking for an extension are calls that wait for the browser's GPU process, 0.2 s in all
- * where there is no graphics card, and longer once that has a page to draw: so this comes first of all, while the rest of the page
- * is being fetched. Throws where there is none.
+ * The canvas's WebGL 2 context, made by the first call. Throws where the browser has none. Making a context and asking for an extension
+ * are calls that wait for the browser's GPU process: 0.2 s in all without a graphics card, longer once that process has a page to draw.
+ * So the page makes its context first of all, while the rest of the page is being fetched.
  */
 export function graphics(canvas: HTMLCanvasElement): WebGL2RenderingContext {
   if (made) return made;
-  // The right size from the start: another one would make its buffers anew.
+  // The right size from the start: a change of size makes the buffers anew.
   const box = (canvas.parentElement ?? canvas).getBoundingClientRect();
   if (box.width >= 1 && box.height >= 1) {
     canvas.width = Math.floor(box.width * pixelRatio());
@@ -36,7 +36,7 @@ export function graphics(canvas: HTMLCanvasElement): WebGL2RenderingContext {
   return made;
 }
 
-/** Resolves when the GPU has done what it was asked for: a question holds the page up until then, this does not. */
+/** Resolves when the GPU has done all its work so far, or after `mostMs`. The page goes on meanwhile; a question to the GPU would hold the page up. */
 export async function idle(gl: WebGL2RenderingContext, mostMs = kMostIdleMs): Promise<void> {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   if (!fence) return; // a lost context
