@@ -6,7 +6,7 @@ import { colour, onTheme } from '../theme';
 export interface Curve {
   label: string;
   colour: string;
-  /** `band`: steps so broad that others can be seen on them. */
+  /** `band`: steps so broad that other curves can be seen on them. */
   kind?: 'line' | 'band' | 'points' | 'bars' | 'dashes';
   value: (v: number) => string;
   /** Index of the y axis: 0 left, 1 right. */
@@ -22,12 +22,20 @@ interface Mark {
 
 export interface PlotOptions {
   height?: number;
-  /** `name`: of its value under the pointer, where the label is too long. */
-  x: { label: string; name?: string; value: (v: number) => string; log?: boolean; ticks?: (v: number) => string; splits?: number[]; range?: [number, number] };
+  x: {
+    label: string;
+    /** Name of the value under the pointer, where the label is too long. */
+    name?: string;
+    value: (v: number) => string;
+    log?: boolean;
+    ticks?: (v: number) => string;
+    splits?: number[];
+    range?: [number, number];
+  };
   /** `close`: the axis begins near the least value, not at 0. */
   y: { label: string; ticks: (v: number) => string; log?: boolean; min?: number; max?: number; close?: boolean }[];
   curves: Curve[];
-  /** Where things stand now: a vertical line, and a dot of the first axis. */
+  /** Where the load stands now: a vertical line, and a dot on the first y axis. */
   mark?: () => Mark | null;
   legend?: boolean;
 }
@@ -51,7 +59,7 @@ export class Plot {
     onTheme(() => this.rebuild());
   }
 
-  /** What is drawn already is not drawn again. */
+  /** Draws the data, unless the plot shows them already. */
   set(data: PlotData): void {
     const mark = this.options.mark?.();
     const moved = mark?.x !== this.mark?.x || mark?.y !== this.mark?.y || mark?.label !== this.mark?.label;
@@ -112,7 +120,9 @@ function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
       },
     };
     axes.push({
-      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, size: (_u, values) => Math.max(34, 12 + 6.5 * Math.max(0, ...(values ?? []).map((v) => v.length))), ...(y.log ? { splits: decades } : {}), label: y.label, labelSize: 16, space: 26, grid: { show: i === 0, stroke: line, width: 1 },
+      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, label: y.label, labelSize: 16, space: 26, ...(y.log ? { splits: decades } : {}),
+      size: (_u, values) => Math.max(34, 12 + 6.5 * Math.max(0, ...(values ?? []).map((v) => v.length))),
+      grid: { show: i === 0, stroke: line, width: 1 },
       values: (_u, splits) => splits.map((v) => (v == null ? '' : y.ticks(v))),
     });
   });
