@@ -1,4 +1,5 @@
 import { choicesFromAddress } from './choices';
+import { Comparison } from './comparison';
 import { byId } from './dom';
 import { hideMessage, offerPackages, showError } from './message';
 import { Panel } from './panel/panel';
@@ -6,7 +7,7 @@ import { warmDecoders } from './session/decoders';
 import { Session } from './session/session';
 import { Stage } from './stage/stage';
 import { showStatus } from './status';
-import { Comparison, wireTools } from './tools';
+import { wireTools } from './tools';
 
 /** The status is written no more often than this: writing lays the page out anew. */
 const kStatusMs = 100;
