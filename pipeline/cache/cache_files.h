@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/graph/store.h"
+#include "pipeline/io/file_stamp.h"
 
 // The cache folder's own files: what stands where, how a file is published, what a record looks like.
 //
@@ -14,9 +15,11 @@
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins so is computed
-//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive while
-//   pruning running/<name>           one per running build, locked while it lives; its time is the build's
-//   start quarantine/<name>        what was found damaged
+//   locks/quarantine         flock: held while a damaged file is moved away
+//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive
+//                            while pruning
+//   running/<name>           one per running build, locked while it lives; its time is the build's start
+//   quarantine/<name>        what was found damaged
 namespace texmesh {
 
 /// Path of an object within a cache folder; `kind` is ac, cas or notes.
@@ -29,6 +32,18 @@ std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std
 /// folder. A file that is there already stays, whoever wrote it, and counts as success when it is as long.
 /// False when it cannot be done; nothing is left then, whatever kills the process.
 bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
+
+/// What became of a file that was found damaged.
+struct QuarantineResult {
+  enum class Fate : std::uint8_t { kMoved, kReplaced, kFailed };
+  Fate fate = Fate::kMoved;
+  std::string reason;  // kFailed: why the file could not be moved
+};
+/// Moves a damaged file of the cache at `folder` to quarantine/. `read` is the file's stamp from before its
+/// bytes were read. Threads and processes may have read the same damaged file: one of them gets kMoved, the
+/// others get kReplaced. kReplaced leaves what stands under the path by now: it may be sound.
+QuarantineResult move_to_quarantine(const std::string& folder, const std::string& path,
+                                    const FileStamp& read);
 
 /// Text with its digest behind it, so that a cut or flipped one is noticed; and back.
 std::string seal(const std::string& body);
