@@ -8,15 +8,13 @@
 #include <thread>
 
 #include "pipeline/cache/cache_files.h"
+#include "tests/pipeline/cache/cache_fixtures.h"
 #include "tests/support/command.h"
 
 namespace texmesh::testing {
 namespace {
 namespace fs = std::filesystem;
 using Fate = QuarantineResult::Fate;
-
-SharedBytes bytes_of(const std::string& s) { return std::make_shared<const Bytes>(s.begin(), s.end()); }
-Key key_of(const std::string& option) { return Key("ladder", 3).add("option ladder.rungs", option); }
 
 /// A cache in which one blob is the output of two results, under two names.
 class SharedBlob : public ::testing::Test {
