@@ -23,9 +23,8 @@ bool wholly_covered(const PixelWindow& image);
 
 /// Codes an image at many rungs at once. The sides of the image are multiples of 16 px. Only the error at
 /// covered texels counts:
-/// - A block without a covered texel has no AC coefficient. Its DC is that of the block before, unless that
-/// DC is
-///   far off. So the block takes two codes.
+/// - A block without a covered texel takes two codes. It has no AC coefficient, and its DC is that of the
+///   block before unless that is far off.
 /// - A block that is covered in part gets cheap coefficients whose error is small at the covered texels
 ///   (MaskedBlock). Uncovered texels have a small weight, so that they stay near the colours of the fill.
 /// - A block that is wholly covered loses every coefficient that costs more than it shows.

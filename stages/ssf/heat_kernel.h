@@ -9,7 +9,7 @@
 namespace texmesh {
 
 /// The Laplace-Beltrami operator L of a surface: (L f)_i = sum_j rate_ij (f_i - f_j). L is positive
-/// semi-definite. The rows of a sparse matrix stand one after the other.
+/// semi-definite. The matrix is sparse and stored by rows.
 struct HeatOperator {
   std::vector<std::uint32_t> first;   // [vertices + 1]: where the row of a vertex begins in column and rate
   std::vector<std::uint32_t> column;  // neighbours of the vertex, rising within a row
@@ -61,11 +61,12 @@ enum class HeatPrecision : std::uint8_t {
 int heat_terms(double time, double bound);
 
 /// Runs heat flow from `start` to each of `times` and returns one HeatFlow for each time. `times` rise
-/// strictly and are larger than `start`. `points` are the points x at time `start`. exp(-(a + b) L) = exp(-b
-/// L) exp(-a L), so a long flow can be run in parts. One Chebyshev recurrence serves both members of HeatFlow
-/// and all times. Each of its matrix products takes x, y and z together. The response expands t lambda exp(-t
-/// lambda) directly, not from the smoothed points. Equal input gives equal results for any number of threads.
-/// Throws Cancelled.
+/// strictly and are larger than `start`. `points` are the points x at time `start`. A long flow can be run
+/// in parts: exp(-(a + b) L) = exp(-b L) exp(-a L).
+/// One Chebyshev recurrence serves both members of HeatFlow and all times. Each of its matrix products takes
+/// x, y and z together. The response is not made from the smoothed points: its kernel,
+/// t lambda exp(-t lambda), is expanded directly.
+/// Equal input gives equal results for any number of threads. Throws Cancelled.
 std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec3d> points, double start,
                               std::span<const double> times, const RunContext& context,
                               HeatPrecision precision = HeatPrecision::kFloat);
