@@ -27,7 +27,8 @@ function(texmesh_install_headers layer)
 endfunction()
 
 texmesh_install_component(texmeshDelivery "format;delivery")
-texmesh_install_headers(format ".*")
+# Of the split stream the mesh and its reader; coders are nobody's business but the reader's.
+texmesh_install_headers(format "(base|model|container|documents)/.*" "split/split_(mesh|stream|reader)\\.h")
 texmesh_install_headers(delivery/cpp ".*")
 if(TEXMESH_COMPILER)
   texmesh_install_component(texmeshCompiler "stages;pipeline")
@@ -37,8 +38,13 @@ if(TEXMESH_COMPILER)
       scales quality package)
     texmesh_install_headers(stages "${stage}/${stage}\\.h")
   endforeach()
-  texmesh_install_headers(pipeline "(io|graph|cache|compile|batch|inspect)/.*" "import/import\\.h" "extract/extract\\.h"
-    "extract/glb/.*")
+  # Of the pipeline what a program calls, and what those headers name; tests/house/check_install sees that none misses.
+  texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
+    "batch/(plan|run)\\.h" "cache/(disk_store|cache_layer|prune)\\.h" "inspect/(dump/dump|verify/verify|diff/diff)\\.h"
+    "extract/extract\\.h"
+    "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/worker\\.h" "batch/progress\\.h"
+    "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
+    "extract/glb/(extracted|image_codecs|plane_pixels)\\.h")
   install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)

@@ -5,7 +5,9 @@
 #include "format/base/errors.h"
 
 namespace texmesh {
-std::optional<std::size_t> first_bracket_deeper_than(std::span<const std::uint8_t> json, int max_depth) {
+
+JsonShape scan_json_shape(std::span<const std::uint8_t> json, int max_depth) {
+  JsonShape shape;
   int depth = 0;
   bool quoted = false;
   for (std::size_t i = 0; i < json.size(); ++i) {
@@ -16,18 +18,24 @@ std::optional<std::size_t> first_bracket_deeper_than(std::span<const std::uint8_
     } else if (c == '"') {
       quoted = true;
     } else if (c == '{' || c == '[') {
-      if (++depth > max_depth) return i;
+      ++shape.values;
+      if (++depth > max_depth) {
+        shape.too_deep = i;
+        return shape;
+      }
     } else if (c == '}' || c == ']') {
       --depth;
+    } else if (c == ',') {
+      ++shape.values;
     }
   }
-  return std::nullopt;
+  return shape;
 }
 
 nlohmann::ordered_json parse_bounded_json(std::span<const std::uint8_t> bytes, const std::string& document,
                                           int max_depth) {
   using Json = nlohmann::ordered_json;
-  if (first_bracket_deeper_than(bytes, max_depth))
+  if (scan_json_shape(bytes, max_depth).too_deep)
     throw FormatError(document, "", "JSON at most " + std::to_string(max_depth) + " levels deep", "more");
   try {
     return Json::parse(bytes.begin(), bytes.end());

@@ -7,11 +7,16 @@
 
 namespace texmesh {
 
-/// The byte of the first bracket outside of strings that nests deeper than `max_depth`; nothing when there is
-/// none. Up to the first syntax error, where a parser ends, brackets are counted as the parser counts them.
+/// How deep and how large a JSON text is, told without parsing it. Up to the first syntax error, where a
+/// parser ends, brackets are counted as the parser counts them.
+struct JsonShape {
+  /// The byte of the first bracket outside of strings that nests deeper than allowed. The count ends there.
+  std::optional<std::size_t> too_deep;
+  std::uint64_t values = 0;  // brackets that open and commas: at least the number of values but one
+};
 /// (A parser callback would do, but with one nlohmann's parser goes over an array's elements again after
 /// each: minutes for a collection of 100,000 models.)
-std::optional<std::size_t> first_bracket_deeper_than(std::span<const std::uint8_t> json, int max_depth);
+JsonShape scan_json_shape(std::span<const std::uint8_t> json, int max_depth);
 
 /// Parses JSON that a stranger wrote: nested at most `max_depth` deep, UTF-8, nothing behind the value.
 /// Throws FormatError{document, byte, ...}.

@@ -13,9 +13,9 @@ namespace texmesh {
 using Bytes = std::vector<std::uint8_t>;
 using ByteSpan = std::span<const std::uint8_t>;
 
-// Little-endian building and bounded reading of binary entries: shared by the codecs of this
-// folder, no interface.
+// Little-endian writing and bounded reading of the package's binary entries.
 
+/// Builds an entry.
 class BytesOut {
  public:
   void number(std::uint64_t value, int width) {
@@ -26,20 +26,20 @@ class BytesOut {
   void u32(std::uint64_t v) { number(v, 4); }
   void u64(std::uint64_t v) { number(v, 8); }
   void f32(float v) { number(std::bit_cast<std::uint32_t>(v), 4); }
-  void raw(std::span<const std::uint8_t> v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
+  void raw(ByteSpan v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
   void text(std::string_view v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
   std::size_t size() const { return bytes_.size(); }
   /// The bytes; the writer is empty afterwards.
-  std::vector<std::uint8_t> finish() { return std::move(bytes_); }
+  Bytes finish() { return std::move(bytes_); }
 
  private:
-  std::vector<std::uint8_t> bytes_;
+  Bytes bytes_;
 };
 
-/// Throws FormatError(name, "byte N", ...) instead of reading past the end.
+/// Reads an entry. Throws FormatError(name, "byte N", ...) instead of reading past the end.
 class BytesIn {
  public:
-  BytesIn(std::span<const std::uint8_t> bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
+  BytesIn(ByteSpan bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
   std::uint64_t number(int width) {
     const auto p = raw(static_cast<std::size_t>(width));
     std::uint64_t v = 0;
@@ -52,7 +52,7 @@ class BytesIn {
   std::uint32_t u32() { return static_cast<std::uint32_t>(number(4)); }
   std::uint64_t u64() { return number(8); }
   float f32() { return std::bit_cast<float>(u32()); }
-  std::span<const std::uint8_t> raw(std::uint64_t bytes) {
+  ByteSpan raw(std::uint64_t bytes) {
     if (bytes > left()) fail(std::to_string(bytes) + " bytes", std::to_string(left()) + " bytes");
     const auto part = bytes_.subspan(at_, static_cast<std::size_t>(bytes));
     at_ += static_cast<std::size_t>(bytes);
@@ -80,7 +80,7 @@ class BytesIn {
   }
 
  private:
-  std::span<const std::uint8_t> bytes_;
+  ByteSpan bytes_;
   std::string name_;
   std::size_t at_ = 0;
 };

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 void check_depth(std::span<const std::uint8_t> bytes, const std::string& file) {
-  if (const auto byte = first_bracket_deeper_than(bytes, kMaxJsonDepth))
+  if (const auto byte = scan_json_shape(bytes, kMaxJsonDepth).too_deep)
     throw FormatError(file, "byte " + std::to_string(*byte),
                       "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
 }

@@ -172,7 +172,7 @@ struct RangeGrid {
   std::vector<float> radius;             // rows x columns, object units; <= 0 = no sample
   float alpha_step_rad = 0, y_step = 0;  // spacing; y in object units
   bool full_turn = true;
-  std::vector<std::uint32_t> position;  // per sample: index of the mesh position, 0xffffffff = none
+  std::vector<std::uint32_t> position;  // per sample: index of the mesh position, kNoIndex = none
   friend bool operator==(const RangeGrid&, const RangeGrid&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {

@@ -26,8 +26,8 @@ class Progress {
   Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain);
 
   void begin(std::vector<ProgressModel> models);
-  void recalled(std::size_t model, const WorkerReport& report,
-                const std::string& output);  // no need to run it
+  /// The model need not run.
+  void recalled(std::size_t model, const WorkerReport& report, const std::string& output);
   void started(std::size_t model, const std::string& output);
   void event(std::size_t model, const std::string& json_line);
   /// Something about the cache that no single model has met.

@@ -14,12 +14,11 @@
 //   cas/<d[0:2]>/<digest>    the bytes of an output
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
-//   locks/<k[0:3]>           flock: held while a key that begins so is computed
+//   locks/<k[0:3]>           flock: held while a key that begins with these digits is computed
 //   locks/quarantine         flock: held while a damaged file is moved away
-//   gate                     flock: shared while a record and its blobs are looked at or put, exclusive
-//                            while pruning
-//   running/<name>           one per running build, locked while it lives; its time is the build's start
-//   quarantine/<name>        what was found damaged
+//   gate                     flock: shared by lookups and puts of records and blobs, exclusive for pruning
+//   running/<name>           one per running build, locked until the build ends; its time is the start's
+//   quarantine/<name>        objects that were found damaged
 namespace texmesh {
 
 /// Path of an object within a cache folder; `kind` is ac, cas or notes.
@@ -28,9 +27,9 @@ std::string object_path(const char* kind, const Sha256& digest);
 /// The whole of a regular file; nothing when it is not there, longer than max_bytes or cannot be read.
 std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
 
-/// Puts `bytes` under a name that nobody has: an unnamed temporary file, fdatasync, link, fsync of the
-/// folder. A file that is there already stays, whoever wrote it, and counts as success when it is as long.
-/// False when it cannot be done; nothing is left then, whatever kills the process.
+/// Puts `bytes` under a new name: an unnamed temporary file, fdatasync, link, fsync of the folder. A file
+/// that has the name already stays, and counts as success when it is as long as `bytes`. False when that
+/// fails. A failure, or the end of the process at any point, leaves nothing behind.
 bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
 
 /// What became of a file that was found damaged.
@@ -45,7 +44,7 @@ struct QuarantineResult {
 QuarantineResult move_to_quarantine(const std::string& folder, const std::string& path,
                                     const FileStamp& read);
 
-/// Text with its digest behind it, so that a cut or flipped one is noticed; and back.
+/// Text with its digest behind it, so that a cut or changed text is noticed; and back.
 std::string seal(const std::string& body);
 std::optional<std::string> unseal(std::span<const std::uint8_t> bytes);
 
@@ -60,7 +59,7 @@ std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, cons
 /// The same for a record whose key the caller knows by its name only (pruning).
 std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes);
 
-/// flock on a file that is made when it is not there; released with the object.
+/// flock on a file, which is made where it is missing. Released with the object.
 class FileLock {
  public:
   enum class Mode : std::uint8_t { kShared, kExclusive };
@@ -73,9 +72,9 @@ class FileLock {
   /// Does not wait.
   static FileLock attempt(const std::string& path, Mode mode);
   bool held() const { return fd_ >= 0; }
-  /// attempt() failed because somebody else holds it, not because locks do not work.
+  /// attempt() failed because somebody else holds the lock, not because locks do not work.
   bool busy() const { return busy_; }
-  /// The file that is locked is the one that stands under this path now, not one that was removed meanwhile.
+  /// Whether the locked file still stands under this path and was not removed meanwhile.
   bool is_of(const std::string& path) const;
 
  private:

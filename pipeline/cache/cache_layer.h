@@ -7,13 +7,13 @@
 
 namespace texmesh {
 
-/// A place behind the local cache: a shared folder or a plain HTTP server. Nothing that it gives is believed
-/// before it is verified; that it cannot be reached is no error.
+/// A place behind the local cache: a shared folder or a plain HTTP server. Objects of a layer are verified
+/// before they are used. A layer that cannot be reached is no error.
 class CacheLayer {
  public:
   virtual ~CacheLayer() = default;
   virtual std::string name() const = 0;
-  /// An object (`kind`: ac, cas or notes); nothing when it is not there. Throws LayerError when the layer
+  /// An object (`kind`: ac, cas or notes); nothing when the layer has none. Throws LayerError when the layer
   /// does not work.
   virtual std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
                                                        std::uint64_t max_bytes) = 0;
@@ -32,10 +32,10 @@ struct LayerPatience {
   static constexpr double kBytesPerSecond = 100'000;
 };
 
-/// What a model may lose to a layer: a quarter of its time limit (seconds, 0 = none).
+/// A build waits for a layer a quarter of the model's time limit at most (seconds, 0 = no limit).
 LayerPatience patience_within(double limit_s);
 
-/// A folder laid out as a cache folder; nothing is ever written to it.
+/// A folder laid out as a cache folder. A layer never writes to the folder.
 std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
 
 /// GET and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote must be
@@ -45,21 +45,21 @@ std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
 /// messages. InputError for what is no such URL.
 std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience = {});
 
-/// InputError for what names no layer, without touching it.
+/// InputError for a text that names no layer. Touches no layer.
 void check_layer(const std::string& place);
 
 /// http(s)://... or a folder.
 std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience = {});
 
 enum class LayerUse : std::uint8_t {
-  kFetch,   // what a layer gives is kept locally, and found there from then on
-  kUpload,  // that, and results that were computed are put into every HTTP layer
-  kLook,    // what a layer gives is verified and not kept; load() fetches it again
+  kFetch,   // results from a layer are kept locally and found there from then on
+  kUpload,  // as kFetch, and computed results are put into every HTTP layer
+  kLook,    // results from a layer are verified and not kept; load() fetches them again
 };
 
-/// The local store with layers behind it, asked in order when the local one misses. What a layer gives is
-/// verified. A layer that fails is left out for the rest of the process, with one event that holds its number
-/// in `layers`; a null one is left out from the beginning.
+/// The local store with layers behind it, which are asked in order when the local store misses. A layer that
+/// fails is left out for the rest of the process, with one event that holds the layer's number in `layers`. A
+/// null layer is left out from the beginning.
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
                                      std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use);
 

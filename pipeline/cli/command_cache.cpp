@@ -127,8 +127,7 @@ void add_cache_command(Command& app) {
   });
   c.notes(
       "Builds prune the folder (compile --cache-size, --cache-age). Pruning never touches what a running "
-      "build "
-      "uses.\n"
+      "build uses.\n"
       "The folder may be deleted: everything in it can be computed again.");
 }
 

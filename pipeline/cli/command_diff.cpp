@@ -29,9 +29,9 @@ void add_diff_command(Command& app) {
       "  texmesh diff old.texmesh new.texmesh --json | jq '.recorded'");
   c.notes(
       "diff compares entries by digest, and the records of what the packages were made from: inputs, "
-      "options, "
-      "versions of stages and libraries. For each stage whose entries differ diff names the recorded "
-      "differences that can reach the stage. diff does not decode meshes and textures; verify does.\n"
+      "options, versions of stages and libraries. For each stage whose entries differ diff names the "
+      "recorded differences that can reach the stage. diff does not decode meshes and textures; verify "
+      "does.\n"
       "Exit code: 0 the same package, 4 different, 1 a package cannot be read, 2 usage.");
   c.on_run([args] {
     PackageReader a(open_store(args->packages[0])), b(open_store(args->packages[1]));

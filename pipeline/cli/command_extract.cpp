@@ -103,12 +103,11 @@ void add_extract_command(Command& app) {
   c.notes(
       "--bytes chooses scale, size of the textures and their quality together: candidates are rendered and "
       "compared with the package's best (FLIP), and the file is filled up to the last 2 %. Many triangles "
-      "with "
-      "a small texture nearly always look better than the reverse.\n"
+      "with a small texture nearly always look better than the reverse.\n"
       "Meshes stay Draco coded (KHR_draco_mesh_compression), and WebP needs EXT_texture_webp. For viewers "
       "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
-      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the package "
-      "cannot give a file within 2 % below --bytes (extract writes the nearest possible file then).");
+      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
+      "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then).");
   c.on_run([args] { return run(*args); });
 }
 

@@ -56,7 +56,7 @@ struct Fetched {
 class FragmentWriter {
  public:
   FragmentWriter(PackageReader& package, const std::string& folder) : package_(package), folder_(folder) {}
-  void take(const LoadedFragment& f) {
+  void add(const LoadedFragment& f) {
     if (folder_.empty()) return;
     auto& streams = streams_[{f.plane, f.fragment}];
     const Codec codec = package_.textures()[f.plane].codec;
@@ -223,7 +223,7 @@ Fetched fetch(const FetchArguments& a) {
   const std::vector<PlaneChoice> planes =
       texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
   load.cancelled = http.cancelled;
-  load.on_fragment = [&](const LoadedFragment& fragment) { writer.take(fragment); };
+  load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
   f.end_s = seconds_since(start);
   if (const double seconds = parse_duration(a.refine, "--refine"); seconds > 0 && !f.load.cancelled)
@@ -341,10 +341,9 @@ void add_fetch_command(Command& app) {
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
-      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of another "
-      "server. The package is read from the first server that answers. A server that knows no ranges is "
-      "asked "
-      "for whole rungs of the tree beside the container.\n"
+      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of "
+      "another server. The package is read from the first server that answers. A server that knows no "
+      "ranges is asked for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
   c.on_run([args] { return run(*args); });

@@ -303,8 +303,7 @@ void add_simulate_command(Command& app) {
       "  texmesh simulate --table 4.2 --json");
   c.notes(
       "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem "
-      "play "
-      "the method itself (of the options they take --order, --seeds and the form of the output).\n"
+      "play the method itself and take --order, --seeds and the form of the output only.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
   c.on_run([args] { return run(*args); });
 }

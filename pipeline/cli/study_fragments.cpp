@@ -77,9 +77,9 @@ std::string fragment_text(const StudiedImage& image) {
     within += good, large += is_large, large_within += good && is_large;
   }
   return fmt::format(
-      "{}: {} x {} px{}\n{}  with shared tables the fragments are no larger than one standard file in {} of "
-      "{} "
-      "rows; of those with fragments of 128 px and more in {} of {}\n",
+      "{}: {} x {} px{}\n"
+      "{}  with shared tables the fragments are no larger than one standard file in {} of {} rows; of "
+      "those with fragments of 128 px and more in {} of {}\n",
       image.path, image.width_px, image.height_px,
       image.alpha ? "; its alpha channel, which packages hold as a texture of its own, is left out" : "",
       table.text(), within, image.rows.size(), large_within, large);
@@ -186,15 +186,12 @@ void add_fragments_study(Command& study) {
       "  texmesh study fragments atlas.jpg\n"
       "  texmesh study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv");
   c.notes(
-      "Columns: one file with the standard's Huffman tables (std) and with tables of its own (opt); the sum "
-      "of the fragments as such files; and the fragments as packages hold them, abbreviated streams behind "
-      "one "
-      "shared table stream, which is counted. \"over std %\" is how much more a sum takes than one such "
-      "file; "
-      "less is negative.\n"
+      "Columns: one file with the standard's Huffman tables (std) and with tables of its own (opt); the "
+      "sum of the fragments as such files; and the fragments as packages hold them, abbreviated streams "
+      "behind one shared table stream, which is counted. \"over std %\" is how much more a sum takes than "
+      "one such file; less is negative.\n"
       "Sides of fragments are multiples of 16: the image's edges are repeated to fill the last fragments, "
-      "and "
-      "small images are cut into fewer than n x n.\n"
+      "and small images are cut into fewer than n x n.\n"
       "Exit code: 0, 1 when an image cannot be read, 2 usage, 3 internal error.");
   c.on_run([args] { return check_and_run(*args); });
 }

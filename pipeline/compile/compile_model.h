@@ -15,11 +15,11 @@ struct CompileRequest {
   std::string temporary;   // sibling of output that is renamed to it; "" = a name of its own
   CompileOptions options;  // resolved or not
   bool strict = false;     // warnings are errors
-  std::vector<FileRequest>
-      known;                 // digests of an earlier run, by stamp: such files are not read to learn them
+  // Digests of an earlier run, by stamp. A file whose stamp is known is not read to learn its digest.
+  std::vector<FileRequest> known;
   StageKeys earlier_keys;    // of an earlier run, to explain against
   StageExplainer explainer;  // may be empty
-  // Told, when compiling fails, which files had been looked at: what would have to change for another result.
+  // Called when compiling fails, with the files that were looked at. The same files fail again.
   std::function<void(const std::vector<FileRequest>&)> files_of_failure;
 };
 

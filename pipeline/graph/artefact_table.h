@@ -12,8 +12,8 @@
 
 namespace texmesh {
 
-/// The artefacts of one run of a graph: who makes each, what stands for it in keys, and its object while
-/// somebody needs it. Safe from several threads.
+/// The artefacts of one run of a graph: of each, the stage that makes the artefact, the digest or parts that
+/// stand for it in keys, and its object while a stage needs the object. Safe from several threads.
 class ArtefactTable {
  public:
   static constexpr std::size_t kGiven = static_cast<std::size_t>(-1);
@@ -23,12 +23,12 @@ class ArtefactTable {
     std::size_t output = 0;      // of that stage
   };
 
-  /// `stages` must outlive the table. Throws std::logic_error where an artefact is made twice, or read as
-  /// another type than it is made.
+  /// `stages` must outlive the table. Throws std::logic_error where an artefact is made twice, or is made as
+  /// one type and read as another.
   explicit ArtefactTable(const std::vector<Stage>& stages);
 
-  /// An artefact from outside the graph; `parts` stand for it in keys where there are any, else digest and
-  /// bytes. Throws std::logic_error for another type than the stages read.
+  /// Takes an artefact from outside the graph. In keys `parts` stand for the artefact where there are any,
+  /// else digest and bytes. Throws std::logic_error for another type than the stages read.
   void give(const ArtefactName& artefact, Object object, const Sha256& digest, std::uint64_t bytes,
             std::vector<std::pair<std::string, std::string>> parts);
 
@@ -36,25 +36,25 @@ class ArtefactTable {
   void check_type(const ArtefactName& artefact) const;
   Origin origin_of(const std::string& artefact) const { return slots_.at(artefact).origin; }
 
-  /// What stands for a stage's results in keys from now on: the blobs that hold them, or, for derived data,
-  /// the stage's own key.
+  /// From now on these stand for a stage's results in keys: the blobs that hold the results, or, for derived
+  /// data, the stage's own key.
   void publish_blobs(const Stage& stage, const std::vector<StoredBlob>& blobs);
   void publish_key(const Stage& stage, const Sha256& key);
 
   bool is_known(const std::string& artefact) const;
-  /// The first input that nothing stands for yet; "" when there is none.
+  /// The first input that is not known yet; "" when all are known.
   std::string first_unknown_input(const Stage& stage) const;
   /// All inputs must be known.
   Key key_of(const Stage& stage) const;
 
   /// The object at hand, or null.
   Object object(const std::string& artefact) const;
-  /// Keeps an object until the artefact's last use is over; one that has no use left is not kept.
+  /// Keeps an object until the artefact's last use is over. An object without a further use is not kept.
   void keep(const std::string& artefact, Object object);
   /// One more use of an artefact than the stages' own.
   void add_use(const std::string& artefact);
-  /// Ends a stage's uses of its inputs. Derived data ends its uses of its own inputs only with its last use:
-  /// it may still have to be computed from them.
+  /// Ends a stage's uses of its inputs. The inputs of derived data are in use until the last use of the
+  /// derived data, which may still have to be computed.
   void release_inputs(const Stage& stage);
 
  private:

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-/// One labelled part of a key that is not what it was; "" = was not there, is not there.
+/// One labelled part of a key that has changed; "" where the key had, or has, no such part.
 struct KeyChange {
   std::string label, from, to;
 };
@@ -19,8 +19,8 @@ struct KeyChange {
 struct StageExplanation {
   enum class Verdict : std::uint8_t {
     kHit,      // the result is in the store
-    kRuns,     // it is not
-    kUnknown,  // forecasts only: depends on what an earlier stage will give
+    kRuns,     // the result is not in the store
+    kUnknown,  // forecasts only: depends on the result of an earlier stage that runs
   };
   Verdict verdict = Verdict::kHit;
   bool has_history = false;        // a key of an earlier run of this stage for this model is known
@@ -29,7 +29,7 @@ struct StageExplanation {
 };
 using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
 
-/// Compares a stage's key with the one of an earlier run, whose parts the store remembers.
+/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
 StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
                              const StageKeys& earlier, Store& store);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "pipeline/graph/artefact_table.h"
 #include "pipeline/graph/stage_executor.h"
@@ -26,6 +27,7 @@ struct GraphRun::Parts {
   const RunContext& context;
   ArtefactTable artefacts;
   StageExecutor executor;
+  bool has_run = false;
 };
 
 GraphRun::GraphRun(const std::vector<Stage>& stages, Store& store, const RunContext& context,
@@ -84,6 +86,7 @@ std::vector<std::pair<const Stage*, StageExplanation>> GraphRun::forecast() {
 
 Object GraphRun::run_object(const ArtefactName& wanted) {
   Parts& p = *parts_;
+  if (std::exchange(p.has_run, true)) throw std::logic_error("a graph runs once");
   p.artefacts.check_type(wanted);
   p.artefacts.add_use(wanted.name);
   StageScheduler scheduler(
@@ -93,7 +96,7 @@ Object GraphRun::run_object(const ArtefactName& wanted) {
         if (p.stages[i].stored) p.artefacts.release_inputs(p.stages[i]);
       });
   scheduler.run_all(std::clamp(p.context.threads, 1, kMostThreads));
-  if (const auto left = scheduler.left(); !left.empty())
+  if (const auto left = scheduler.tasks_not_run(); !left.empty())
     throw std::logic_error("stage " + p.stages[left.front()].name + " waits for an input that nothing gives");
   return p.executor.fetch(wanted.name);
 }

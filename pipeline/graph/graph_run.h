@@ -11,10 +11,10 @@
 
 namespace texmesh {
 
-/// Runs a graph of stages for one model over a store. Stages whose inputs are known run side by side, at most
-/// context.threads at a time; a stage whose key is in the store is not run, and its result is not even loaded
-/// unless somebody needs it. Objects are dropped after their last use. Of options the graph knows the texts
-/// that its stages declare for their keys, and nothing else.
+/// Runs a graph of stages for one model over a store, once. Stages whose inputs are known run side by side,
+/// at most context.threads at a time. A stage whose key is in the store is not run, and its result is loaded
+/// only when another stage needs it. Objects are dropped after their last use. Of options the graph knows
+/// only the texts that the stages declare for their keys.
 class GraphRun {
  public:
   /// `stages`, `store` and `context` must outlive the run. Throws std::logic_error where the stages'
@@ -23,8 +23,8 @@ class GraphRun {
            StageObserver observer = {});
   ~GraphRun();
 
-  /// An artefact from outside the graph, with the digest that stands for it in keys. `parts` stand there
-  /// instead where there are any: what the digest is made of, so that explain() can say which of them has
+  /// Hands over an artefact from outside the graph. In keys its digest stands for the artefact, or, where
+  /// there are any, `parts` do: the parts that the digest is made of, so that explain() can say which has
   /// changed.
   template <class T>
   void give(Artefact<T> artefact, T value, const Sha256& digest, std::uint64_t bytes,
@@ -32,8 +32,8 @@ class GraphRun {
     give_object(ArtefactName(artefact), make_object(std::move(value)), digest, bytes, std::move(parts));
   }
 
-  /// What a stage's key is compared with, and who is told, for every stage, before it runs. Called from any
-  /// thread, one call at a time.
+  /// The keys that the stages' keys are compared with, and the listener that hears of every stage before the
+  /// stage runs. The listener is called from any thread, one call at a time.
   void explain(StageKeys earlier, StageExplainer explainer);
 
   /// What run() would do, in table order, without running anything or changing the store.

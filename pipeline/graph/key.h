@@ -14,8 +14,9 @@ namespace texmesh {
 /// Raise when the way keys are made changes.
 inline constexpr int kKeySchema = 1;
 
-/// What a stage run depends on, as labelled parts; the key is the SHA-256 over the length-prefixed labels and
-/// values in order. The parts are kept beside each cache entry so that a miss can be explained.
+/// Everything that a stage run depends on, as labelled parts. The key's digest is the SHA-256 over the
+/// length-prefixed labels and values in order. The parts are kept beside each cache entry, so that a miss can
+/// be explained.
 class Key {
  public:
   Key(std::string_view stage, int stage_version);

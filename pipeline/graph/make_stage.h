@@ -7,9 +7,10 @@
 
 namespace texmesh {
 
-// How a stage is declared. One declaration names what its function gets, what its key holds and what it
-// gives; the compiler refuses a function whose parameters are not exactly the declared inputs, then the
-// values of the declared options, then the context:
+// How a stage is declared. One declaration names the inputs and options of the stage's function, the parts of
+// the stage's key, and the results. The compiler refuses a function whose parameters are not the declared
+// inputs, then the declared options, then the context, each of exactly its type: a conversion would hand the
+// function another value than the key holds.
 //
 //   make_stage({"ssf", kSsfVersion, "mesh -> scale map"}, inputs(kConditioned), outputs(kScaleMap),
 //              options(OptionValue("ssf", ssf_options)), {}, filter_scale_space);
@@ -72,8 +73,8 @@ Options<T...> options(OptionValue<T>... values) {
   return {{std::move(values)...}};
 }
 
-/// What a stage's function gives: its results in the order of the outputs, and notes. A single result stands
-/// for itself; its notes are those that it carries, if it carries any.
+/// What a stage's function returns: the results in the order of the outputs, and notes. A function with one
+/// result may return the result alone; the notes are then the result's own, where it has a member `notes`.
 template <class... T>
 struct Results {
   Results(std::tuple<T...> all, Notes more) : values(std::move(all)), notes(std::move(more)) {}
@@ -109,11 +110,21 @@ StageOutput stored_output(Artefact<T> artefact) {
   return output;
 }
 
+/// Whether a plain function has exactly these parameters, references and const apart. Others (lambdas of
+/// tests) are held by is_invocable_r alone.
+template <class F, class... Expected>
+struct TakesExactly : std::true_type {};
+template <class R, class... A, class... Expected>
+struct TakesExactly<R (*)(A...), Expected...>
+    : std::is_same<std::tuple<std::remove_cvref_t<A>...>, std::tuple<Expected...>> {};
+
 /// The function that the graph calls: inputs get their types back, options stand behind them.
 template <class... I, class... O, class... P, class F>
 auto bind_function(Inputs<I...>, const std::tuple<O...>*, Options<P...> options, F function) {
   static_assert(std::is_invocable_r_v<Results<O...>, F, const I&..., const P&..., const RunContext&>,
                 "a stage's function takes its inputs, its options and the context, and gives its outputs");
+  static_assert(TakesExactly<F, I..., P..., RunContext>::value,
+                "a stage's function has parameters of exactly the types of its inputs and options");
   return [options = std::move(options), function = std::move(function)](std::span<const Object> objects,
                                                                         const RunContext& context) {
     const auto call = [&]<std::size_t... K>(std::index_sequence<K...>)->Results<O...> {

@@ -28,8 +28,8 @@ class StageExecutor {
   StageExplanation explanation_of(const Stage& stage, const Key& key,
                                   StageExplanation::Verdict verdict) const;
 
-  /// Makes the results of a stage known: finds them in the store, or runs the stage and stores them. Derived
-  /// data is known by its key alone, and computed when fetch() asks for it. All inputs must be known.
+  /// Makes the results of a stage known: finds the results in the store, or runs the stage and stores the
+  /// results. Derived data is known by its key alone and computed by fetch(). All inputs must be known.
   void bring_up_to_date(std::size_t stage);
 
   /// The object of an artefact that is known: at hand, from the store, or by running its stage (again).

@@ -9,8 +9,8 @@
 
 namespace texmesh {
 
-// A stage's results in a store: one blob per output, and the stage's notes as the last. Whatever the store
-// holds under a right key and with right digests, but that is no result of the stage, is rejected.
+// A stage's results in a store: one blob per output, and the stage's notes as the last blob. Blobs with the
+// right key and digests that are no results of the stage all the same are rejected.
 
 /// What a store has of one run of a stage.
 struct FoundResults {
@@ -18,7 +18,7 @@ struct FoundResults {
   Notes notes;
 };
 
-/// Nothing where the store has no such run, or not all of it.
+/// Nothing where the store has no such run, or only some blobs of the run.
 std::optional<FoundResults> find_results(Store& store, const Stage& stage, const Sha256& key);
 
 /// The blobs of such a run, as far as the store can tell without loading anything; rejects nothing.
@@ -27,7 +27,7 @@ std::optional<std::vector<StoredBlob>> look_for_results(Store& store, const Stag
 /// One result of a run that was found.
 struct LoadedResult {
   Object object;             // null: the store has lost it
-  bool is_rejected = false;  // it was no result; the store does not give this run again
+  bool is_rejected = false;  // the blob was no result; the store does not give this run again
 };
 LoadedResult load_result(Store& store, const Stage& stage, std::size_t output, const Sha256& key,
                          const std::vector<StoredBlob>& blobs);

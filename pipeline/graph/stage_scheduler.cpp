@@ -6,14 +6,14 @@ namespace texmesh {
 
 void StageScheduler::run_all(int threads) {
   std::vector<std::thread> others;
-  for (int i = 1; i < threads; ++i) others.emplace_back([this] { work(); });
-  work();
+  for (int i = 1; i < threads; ++i) others.emplace_back([this] { run_ready_tasks(); });
+  run_ready_tasks();
   for (std::thread& t : others) t.join();
   for (const Task& task : tasks_)
     if (task.error) std::rethrow_exception(task.error);
 }
 
-std::vector<std::size_t> StageScheduler::left() const {
+std::vector<std::size_t> StageScheduler::tasks_not_run() const {
   std::vector<std::size_t> left;
   for (std::size_t i = 0; i < tasks_.size(); ++i)
     if (!tasks_[i].is_taken) left.push_back(i);
@@ -21,7 +21,7 @@ std::vector<std::size_t> StageScheduler::left() const {
 }
 
 /// One thread: takes the first ready task until none is left.
-void StageScheduler::work() {
+void StageScheduler::run_ready_tasks() {
   std::unique_lock lock(mutex_);
   for (;;) {
     std::size_t next = tasks_.size();

@@ -11,25 +11,25 @@ namespace texmesh {
 /// Runs numbered tasks on several threads, each once, as soon as it is ready.
 class StageScheduler {
  public:
-  /// `is_ready` is called under the scheduler's lock, `run` is not. A task can become ready only by another's
-  /// end.
+  /// `is_ready` is called under the scheduler's lock, `run` is not. A task becomes ready only when another
+  /// task ends.
   StageScheduler(std::size_t tasks, std::function<bool(std::size_t)> is_ready,
                  std::function<void(std::size_t)> run)
       : is_ready_(std::move(is_ready)), run_(std::move(run)), tasks_(tasks) {}
 
-  /// Returns when all tasks have run, or, after one has failed or where none is ready, when those that run
-  /// have ended. Rethrows the first task's error, by number.
+  /// Returns when all tasks have run. After a failure, or when no task is ready, returns as soon as the
+  /// running tasks have ended. Rethrows the error of the first task that failed, by number.
   void run_all(int threads);
 
   /// Tasks that have not run because they never became ready.
-  std::vector<std::size_t> left() const;
+  std::vector<std::size_t> tasks_not_run() const;
 
  private:
   struct Task {
     bool is_taken = false;
     std::exception_ptr error;
   };
-  void work();
+  void run_ready_tasks();
 
   std::function<bool(std::size_t)> is_ready_;
   std::function<void(std::size_t)> run_;

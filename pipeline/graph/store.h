@@ -23,8 +23,8 @@ struct StoredBlob {
 };
 using SharedBytes = std::shared_ptr<const Bytes>;
 
-/// Held while a key is computed, so that processes that share a store compute it once. Ends with the object,
-/// and with the process however that ends.
+/// Held while a key's results are computed, so that processes that share a store compute the results once. A
+/// claim ends with the object, and with the process however the process ends.
 class Claim {
  public:
   virtual ~Claim() = default;
@@ -37,9 +37,9 @@ struct StoreEvent {
   int layer = -1;  // "cache-layer-unreachable": its number
 };
 
-/// Results of stage runs by key. A lookup never throws for what it finds: an absent, incomplete or damaged
-/// entry is a miss. put() may fail quietly too (a full disk costs only the next build's time); it then
-/// returns false. Safe from several threads.
+/// Results of stage runs by key. A lookup never throws: an absent, incomplete or damaged entry is a miss.
+/// put() does not throw either; it returns false when it fails, which costs only the next build's time. Safe
+/// from several threads.
 class Store {
  public:
   virtual ~Store() = default;
@@ -50,18 +50,18 @@ class Store {
   virtual bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) = 0;
   /// The parts of a key that was put once (Key::preimage), whether its blobs are still there or not.
   virtual std::optional<std::string> preimage(const Sha256& key) = 0;
-  /// What find() gave for the key is sound by its digests, but no result of this stage (`reason`): whoever
-  /// wrote it was wrong. Such an entry is not given again.
+  /// The blobs that find() gave for the key have their digests but are no results of the stage (`reason`).
+  /// The store does not give the entry again.
   virtual void reject(const Sha256& /*key*/, const std::vector<StoredBlob>& /*found*/,
                       const std::string& /*reason*/) {}
   /// Small facts that are not results (which files an import asked for), by key; verified by their own
   /// digest. A later put_note replaces an earlier one.
   virtual std::optional<std::string> find_note(const Sha256& key) = 0;
   virtual bool put_note(const Sha256& key, const std::string& text) = 0;
-  /// Waits until nobody else holds the key; null where there is nothing to share or locks do not work. Throws
-  /// Cancelled. A thread that holds a claim must not wait for another one.
+  /// Waits until nobody else holds the key; null where nobody shares the store or locks do not work. Throws
+  /// Cancelled. A thread that holds a claim must not ask for another claim.
   virtual std::unique_ptr<Claim> claim(const Sha256&, const RunContext&) { return nullptr; }
-  /// What has happened since the last call.
+  /// The events since the last call.
   virtual std::vector<StoreEvent> take_events() { return {}; }
 };
 

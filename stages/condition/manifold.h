@@ -27,8 +27,8 @@ struct ManifoldSplit {
 /// Gives every fan of triangles around a position a position of its own. The result is an oriented 2-manifold
 /// with boundary: an edge has one triangle, or two that run through it in opposite directions, and the
 /// triangles of a position form one fan.
-/// - Where more triangles meet at an edge, those stay together that share wedges, material and direction
-///   best.
+/// - Where more triangles meet at an edge, the pairs that agree best in wedges, material and direction stay
+///   together.
 /// - The two triangles of a two-sided sheet are never joined to each other.
 /// - The fan with the lowest triangle keeps the old number. Nothing moves.
 /// O(n log n).

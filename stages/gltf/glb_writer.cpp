@@ -6,18 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "stages/gltf/glb_container.h"
+
 namespace texmesh {
-namespace {
-
-void put_u32(std::vector<std::uint8_t>& out, std::size_t x) {
-  for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(x >> shift));
-}
-
-void pad(std::vector<std::uint8_t>& out, std::uint8_t with) {
-  while (out.size() % 4 != 0) out.push_back(with);
-}
-
-}  // namespace
 
 struct GlbWriter::Elements {
   Json views = Json::array(), accessors = Json::array();
@@ -32,7 +23,7 @@ GlbWriter::~GlbWriter() = default;
 GlbWriter::Json& GlbWriter::array(const std::string& name) { return elements_->arrays.at(name); }
 
 std::size_t GlbWriter::add_bytes(std::span<const std::uint8_t> bytes) {
-  pad(bin_, 0);
+  pad_to_four(bin_, 0);
   const std::size_t offset = bin_.size();
   bin_.insert(bin_.end(), bytes.begin(), bytes.end());
   return offset;
@@ -74,7 +65,7 @@ double GlbWriter::shortest(float x) {
 
 std::vector<std::uint8_t> GlbWriter::finish() const {
   std::vector<std::uint8_t> bin = bin_;
-  pad(bin, 0);
+  pad_to_four(bin, 0);
   Json root;
   root["asset"] = {{"version", "2.0"}, {"generator", "texmesh"}};
   if (!used_.empty()) root["extensionsUsed"] = used_;
@@ -92,21 +83,7 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
     root["buffers"].push_back({{"byteLength", fallback_bytes_},
                                {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
 
-  const std::string text = root.dump(-1, ' ', false, Json::error_handler_t::replace);
-  std::vector<std::uint8_t> json(text.begin(), text.end());
-  pad(json, ' ');
-  std::vector<std::uint8_t> out;
-  out.reserve(28 + json.size() + bin.size());
-  put_u32(out, 0x46546c67);  // "glTF"
-  put_u32(out, 2);
-  put_u32(out, 28 + json.size() + bin.size());
-  put_u32(out, json.size());
-  put_u32(out, 0x4e4f534a);  // "JSON"
-  out.insert(out.end(), json.begin(), json.end());
-  put_u32(out, bin.size());
-  put_u32(out, 0x004e4942);  // "BIN"
-  out.insert(out.end(), bin.begin(), bin.end());
-  return out;
+  return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), bin);
 }
 
 }  // namespace texmesh

@@ -1,5 +1,6 @@
 #pragma once
-// Inside stages only. The interface hides libjpeg-turbo's headers and its longjmp.
+// Inside stages only: libjpeg-turbo's compressor behind an interface that neither leaks its headers nor its
+// longjmp.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,23 +13,20 @@
 
 namespace texmesh {
 
-/// The kind of images that a coder compresses.
+/// The kind of JPEG that a coder makes.
 struct JpegKind {
   std::uint32_t channels = 3;  // 1 or 3
   int quality = 75;            // IJG, 1..100
   Subsampling subsampling = Subsampling::k420;
-  /// The three channels hold data. The coder stores them without conversion to YCbCr and without subsampling.
-  /// An Adobe marker in the stream says so; every decoder knows that marker.
-  /// The alternatives were measured at equal bytes, on maps that had never been JPEGs. YCbCr 4:4:4 turns
-  /// normals by 1.1 to 1.5 times the angle and has 1.3 to 2 times the error in other data. YCbCr 4:2:0 turns
-  /// normals by 1.1 to 2.5 times the angle and has 1.6 to 4.5 times the error in other data.
+  /// Three channels of data, coded as they are instead of as YCbCr, without subsampling. Streams say so by an
+  /// Adobe marker, which every decoder knows. Measured at equal bytes on maps that never were JPEGs: 4:4:4
+  /// YCbCr turns normals by 1.1 to 1.5 times as much and has 1.3 to 2 times the error in other data; 4:2:0
+  /// 1.1 to 2.5 and 1.6 to 4.5 times.
   bool rgb = false;
-  bool progressive =
-      false;  // successive approximation; progressive_scans() in jpeg_coder.cpp lists the scans
+  bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
 };
 
-/// Compresses many images of one kind. One object serves one thread. Errors are StageErrors. Equal input
-/// gives equal bytes.
+/// Compresses many images of one kind. Not for concurrent use. Throws StageError.
 class JpegCoder {
  public:
   explicit JpegCoder(const JpegKind& kind);
@@ -36,26 +34,24 @@ class JpegCoder {
   JpegCoder(const JpegCoder&) = delete;
   JpegCoder& operator=(const JpegCoder&) = delete;
 
-  /// Sets the Huffman tables that append_body() codes with.
   void use_tables(const HuffmanTables& tables);
-  /// The Huffman tables in use. A new coder has the typical tables of ISO 10918-1 annex K.3. Those tables
-  /// have a code for every symbol.
+  /// The Huffman tables in use. A new coder has the typical tables of ISO 10918-1 annex K.3, which have a
+  /// code for every symbol.
   HuffmanTables tables() const;
-  /// The quantisers of every component, in zigzag order.
+  /// The quantisers by component, in zigzag order.
   std::vector<std::array<std::uint16_t, 64>> quantisers() const;
-  /// For each Huffman table, the symbols that an image can need. Quantisers bound the coefficients, so coarse
-  /// quantisers leave few symbols.
+  /// For each Huffman table, the symbols that coding any image can take: quantisers bound the coefficients,
+  /// so coarse quantisers leave few symbols.
   std::vector<std::vector<std::uint8_t>> possible_symbols() const;
-  /// The part of a file that depends on the size of the image only: SOI [APP14] DQT [DHT] SOF [SOS] EOI. A
-  /// progressive coder leaves out DHT and SOS, because every scan brings its own.
+  /// The head that images of one size and kind have in common: SOI [APP14] DQT [DHT] SOF [SOS] EOI. The head
+  /// of a progressive coder has neither DHT nor SOS: every scan has its own.
   std::vector<std::uint8_t> head_stream(std::uint32_t width_px, std::uint32_t height_px);
-  /// Appends the part of a file that follows head_stream(), between an SOI and an EOI: SOI data EOI. The
-  /// Huffman tables in use must have a code for every symbol of the image. A progressive coder appends the
-  /// scans, without SOI and EOI.
+  /// Appends the data that follows the head, as SOI data EOI. Codes with the tables in use, which need a code
+  /// for every symbol. A progressive coder appends the scans alone, without SOI and EOI.
   void append_body(const PixelWindow& image, std::vector<std::uint8_t>& out);
-  /// A whole JFIF file, whose Huffman tables are optimised for the image.
+  /// A whole JFIF file with optimised tables of its own.
   std::vector<std::uint8_t> complete(const PixelWindow& image);
-  /// Adds the symbols of the image to `counts`. The coder must not be progressive.
+  /// Adds the symbols that coding the image takes. Not for progressive coders.
   void count_symbols(const PixelWindow& image, SymbolCounts& counts);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// Inside stages only. Baseline JPEG data of images that have uncovered texels, which nobody sees.
+// Inside stages only: baseline JPEG data of images in which nobody sees the uncovered texels.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -11,37 +11,38 @@
 
 namespace texmesh {
 
-/// How the blocks of one rung are coded. One element for each component.
+/// How one rung's blocks are coded, by component.
 using MaskedRung = std::vector<BlockCoding>;
 
-/// `quantisers`: one array for each component, in zigzag order. `tables`: as for JpegCoder::use_tables().
+/// `quantisers` by component, zigzag order; tables as JpegCoder::use_tables() takes them.
 MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::uint16_t, 64>>& quantisers,
                        const HuffmanTables& tables);
 
-/// True when every texel of the window is covered. JpegCoder codes such windows.
+/// Whether every texel of the window is covered. JpegCoder codes such windows.
 bool wholly_covered(const PixelWindow& image);
 
-/// Codes an image at many rungs at once. The sides of the image are multiples of 16 px. Only the error at
-/// covered texels counts:
-/// - A block without a covered texel takes two codes. It has no AC coefficient, and its DC is that of the
-///   block before unless that is far off.
-/// - A block that is covered in part gets cheap coefficients whose error is small at the covered texels
-///   (MaskedBlock). Uncovered texels have a small weight, so that they stay near the colours of the fill.
-/// - A block that is wholly covered loses every coefficient that costs more than it shows.
-/// Chroma of half resolution: a sample's weight is the number of covered texels that interpolate from the
-/// sample. One object serves one thread. Equal input gives equal bytes.
+/// Codes images at many rungs at once; sides are multiples of 16. The decoder's samples at covered texels are
+/// what counts:
+/// - Blocks without a covered texel take two codes: no AC, and the DC of the block before unless that is far
+///   off.
+/// - Blocks covered in part get coefficients that are cheap and right at covered texels (MaskedBlock).
+///   Uncovered texels have a small weight towards the window's values, so that they stay near the fill's
+///   colours.
+/// - Blocks covered wholly lose coefficients whose bytes are worth more than their effect.
+/// A halved chroma sample weighs as much as the covered texels that interpolation takes from it. Same bytes
+/// for the same input; one object per thread.
 class MaskedJpeg {
  public:
   explicit MaskedJpeg(const JpegKind& kind);
-  /// Appends the image at rung r to streams[r], as JpegCoder::append_body() does: SOI data EOI.
+  /// Appends SOI data EOI of rung r to streams[r], as JpegCoder::append_body() does.
   void append_bodies(const PixelWindow& image, std::span<const MaskedRung> rungs,
                      std::span<std::vector<std::uint8_t>> streams);
-  /// Adds the symbols of the image at rung r to counts[r].
+  /// Adds the symbols that coding the image at rung r takes to counts[r].
   void count_symbols(const PixelWindow& image, std::span<const MaskedRung> rungs,
                      std::span<SymbolCounts> counts);
 
  private:
-  /// The samples of a component, after the level shift.
+  /// Samples of a component, level shift taken off.
   struct Component {
     std::uint32_t width = 0, height = 0;
     std::vector<float> values;
@@ -56,9 +57,9 @@ class MaskedJpeg {
                   std::span<const MaskedRung> rungs, std::span<Sink> sinks);
 
   JpegKind kind_;
-  bool halved_;  // chroma has half the resolution
+  bool halved_;  // chroma
   std::vector<Component> components_;
-  std::vector<float> weights_, halved_weights_;  // of samples of full and of half resolution
+  std::vector<float> weights_, halved_weights_;  // of samples; of those of halved chroma
   std::vector<std::array<int, 3>> dc_before_;    // [rung][component]
   MaskedBlock block_;
 };

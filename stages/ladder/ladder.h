@@ -49,13 +49,13 @@ struct LadderOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
-      "jpeg = independent baseline JPEGs per rung; progressive = one file per fragment that rungs cut, "
-      "where fragments have 256 px or more, which they then have unless min_fragment_px is set; webp = "
-      "lossy WebP for colours");
+      "jpeg = baseline JPEGs; progressive = one progressive JPEG per fragment, of which each rung is a "
+      "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "
+      "colours");
     v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
-    v("normal_rungs", s.normal_rungs, Range{1, 100}, "the same for normal maps");
-    v("data_rungs", s.data_rungs, Range{1, 100}, "the same for occlusion, roughness, metalness");
-    v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "the same for alpha channels");
+    v("normal_rungs", s.normal_rungs, Range{1, 100}, "JPEG qualities of normal maps");
+    v("data_rungs", s.data_rungs, Range{1, 100}, "JPEG qualities of occlusion, roughness, metalness");
+    v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "JPEG qualities of alpha channels");
     v("progressive_quality", s.progressive_quality, Range{10, 100},
       "JPEG quality of a colour texture's whole progressive files; data use their highest rung");
     v("subsampling", s.subsampling, "chroma resolution of colour textures: 420 halves it, 444 keeps it");
@@ -66,9 +66,9 @@ struct LadderOptions {
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
     v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
-      "a mip's rung is stored where it lies on the hull of bytes and 1 - SSIM of all rungs and mips, and "
-      "that rises by more than this share without it, or where displays of the mip's size need it; -1 = "
-      "store all");
+      "a mip's rung is stored when the hull of 1 - SSIM over bytes, of all rungs and mips, would rise by "
+      "more than this share without the rung, or when displays of the mip's size need the rung; -1 = store "
+      "all rungs");
     v("lossless_top", s.lossless_top,
       "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }
@@ -84,9 +84,8 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
 /// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
 ///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
 ///   such texels are free, so that only covered texels cost bytes.
-/// - Tables are trained on covered fragments spread over the plane. They have a code for every symbol, so
-/// that
-///   no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
+/// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
+///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
 /// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
 /// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).

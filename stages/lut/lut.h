@@ -41,10 +41,11 @@ struct LutOptions {
       "default rungs");
     v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
     v("normal_quality_min", s.normal_quality_min, Range{1, 100},
-      "the same for normal maps, where it is more than quality_min; at most quality_max");
+      "least quality asked for in normal maps; quality_min where that is more, quality_max where that is "
+      "less");
     v("data_quality_min", s.data_quality_min, Range{1, 100},
-      "the same for occlusion, roughness, metalness and other data");
-    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, "the same for alpha channels");
+      "as normal_quality_min, for occlusion, roughness, metalness and other data");
+    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, "as normal_quality_min, for alpha channels");
     v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
   }
 };

@@ -7,7 +7,7 @@
 
 namespace texmesh {
 
-/// What of a picture FLIP compares; of a reference it is computed once.
+/// The parts of a picture that FLIP compares. They are computed once for a reference.
 struct FlipPicture {
   std::uint32_t side_px = 0;
   std::vector<Vec3f> lab;                    // as the eye filters it, Hunt-adjusted

@@ -33,7 +33,7 @@ struct MeasuredQuality {
 
 /// Renders kept scales x sampled rungs from fixed views. Compares each picture with that of S_0 and the
 /// source's texture, over the pixels that either covers: SSIM of luma, and a FLIP-like colour difference
-/// (image_compare.h).
+/// (stages/measure/image_compare.h).
 /// - Pictures: orthographic, 2 x 2 samples a pixel; the object's bounding sphere fills 0.96 of the side.
 ///   Colour = base colour factor x vertex colour x base colour texture (filtered to the sample's footprint,
 ///   in linear light) x a head-light, plus emission. Both sides of a triangle show. Alpha is ignored.

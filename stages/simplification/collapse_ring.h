@@ -39,7 +39,7 @@ class CollapseRing {
 
   explicit CollapseRing(const CollapseMesh& mesh) : mesh_(mesh), mark_(mesh.point_count()) {}
 
-  /// Looks at point u: everything below is about it from now on, until the mesh changes.
+  /// Looks at point u. Until the mesh changes, every function below is about u.
   void gather(std::uint32_t u);
   void prefetch(std::uint32_t neighbour) const { __builtin_prefetch(&mark_[neighbour]); }
   std::uint32_t centre() const { return centre_; }
@@ -56,7 +56,7 @@ class CollapseRing {
   }
   /// Fills `map` from the faces that the collapse into the neighbour removes. False, and `map` for no
   /// neighbour, when not every wedge is mapped to one wedge. A junction of charts may move along a seam or
-  /// border all the same: the wedges of the charts that are not beside the edge then keep their attributes.
+  /// border all the same; the wedges of charts that are not beside the edge then keep their attributes.
   bool map_wedges(std::uint32_t slot, WedgeMap& map) const;
   /// The position of the neighbour's group that a position of the centre's group goes to.
   std::uint32_t destination(const Neighbour& n, std::uint32_t position) const;

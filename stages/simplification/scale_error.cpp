@@ -60,7 +60,7 @@ class ErrorMeter {
         sample_surface(mesh_.positions, mesh_.wedge_position, scale.triangles, kErrorSamples);
     const auto back = distances(
         samples.size(), [&](std::size_t i) { return original_(place(mesh_, scale.triangles, samples[i])); });
-    double square = 0, largest = 0, deviation = 0;  // the last with the limits
+    double square = 0, largest = 0, deviation = 0;  // only the deviation has the limits
     for (const auto* side : {&there, &back})
       for (double d : *side) square += d * d, largest = std::max(largest, d);
     for (double d : back) deviation = std::max(deviation, d);
@@ -68,7 +68,7 @@ class ErrorMeter {
       deviation = std::max(deviation, std::min(there[i], limit[surface_[i].component]));
     const auto count = static_cast<double>(std::max<std::size_t>(there.size() + back.size(), 1));
     scale.error_rms = static_cast<float>(std::sqrt(square / count));
-    // What is within the deviation so far changes neither number: some bound is enough of it.
+    // A distance within the deviation so far changes neither number, so a bound of that distance is enough.
     const auto far =
         distances(vertices_.size(), [&](std::size_t i) { return coarse(vertices_[i].point, deviation); });
     for (std::size_t i = 0; i < far.size(); ++i) {

@@ -52,13 +52,14 @@ struct SimplificationOptions {
     v("seam_weight", s.seam_weight, Range{0, 1000}, "weight of seams of the texture");
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
-      "no scale deviates more than this fraction of the diagonal; of what vanishes whole the size counts");
+      "no scale deviates by more than this fraction of the diagonal; a component that vanishes deviates by "
+      "its size");
     v("max_shift", s.max_shift, Range{0.0001, 1},
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
-      "share of the vertices that the coarsest scale is asked for at most");
+      "most vertices that the coarsest scale is asked to have, as a share of all");
     v("coarsest_vertices", s.coarsest_vertices, Range{0, 1000000},
-      "no scale is asked for fewer vertices, nor for less than a 20th of them where that is less still");
+      "no scale is asked to have fewer vertices than this, or than a 20th of all where that is less");
     v("min_triangles", s.min_triangles, Range{1, 1000000}, "no scale is asked to have fewer triangles");
   }
 };

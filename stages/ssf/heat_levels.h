@@ -16,7 +16,7 @@ struct HeatLevel {
   HeatOperator laplacian;
 };
 
-/// The level of every vertex.
+/// The level that has every vertex.
 HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> corners, double spacing,
                        double rate_cap);
 
@@ -31,12 +31,13 @@ HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> cor
 HeatLevel coarsen(const HeatLevel& fine, double radius, double rate_cap);
 
 /// Whether the level is still the right one for heat that has flowed as far as sigma: up to 2.4 error_ratio
-/// spacings it is nearer to the truth than the next coarser one. Levels of few vertices carry everything.
+/// spacings the level is nearer to the truth than the next coarser one. Levels of few vertices carry
+/// everything.
 bool carries(const HeatLevel& level, double sigma, double error_ratio);
-/// Radius to coarsen by for a level whose first sigma this is.
+/// The radius to coarsen by, for a level whose first sigma is `sigma`.
 double seed_radius(double sigma, double error_ratio);
-/// Largest sigma of the state that a level should start from whose first sigma this is. What the level's
-/// operator makes of points that another operator smoothed is roughest at first, and gone by then.
+/// The largest sigma of the state from which a level with this first sigma should start. Points that another
+/// operator smoothed are rough at first under the level's operator; by `first_sigma` the roughness is gone.
 double handover_sigma(double first_sigma);
 
 }  // namespace texmesh

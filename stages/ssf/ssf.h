@@ -37,10 +37,10 @@ struct SsfOptions {
     v("error_ratio", s.error_ratio, Range{2, 1000},
       "least ratio of sigma and vertex spacing on the coarser levels of the solver; 1000 = one level");
     v("max_terms", s.max_terms, Range{100, 100000},
-      "most Chebyshev terms of a level; its fastest rates are slowed down to fit");
+      "most Chebyshev terms of a level; the level's fastest rates are slowed down to fit");
     v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
     v("range_band", s.range_band, Range{0, 6},
-      "range scans: as band, at most 1 = the Laplacian of Gaussian alone");
+      "range scans: the same ratio as band; at most 1 = the Laplacian of Gaussian alone");
   }
 };
 

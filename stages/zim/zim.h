@@ -21,9 +21,9 @@ struct ZimOptions {
     v("weight_intensity", s.weight_intensity, Range{0, 1}, "weight of (1 - I) in the masking predictor M");
     v("weight_complexity", s.weight_complexity, Range{0, 1}, "weight of zeta in the masking predictor M");
     v("weight_eta", s.weight_eta, Range{0, 100}, "weight of feature density in VQP, relative to the others");
-    v("weight_z", s.weight_z, Range{0, 100}, "the same of Z, the deviation of colours");
-    v("weight_i", s.weight_i, Range{0, 100}, "the same of I, the intensity");
-    v("weight_m", s.weight_m, Range{0, 100}, "the same of M, the masking");
+    v("weight_z", s.weight_z, Range{0, 100}, "weight of Z, the deviation of colours, in VQP");
+    v("weight_i", s.weight_i, Range{0, 100}, "weight of I, the intensity, in VQP");
+    v("weight_m", s.weight_m, Range{0, 100}, "weight of M, the masking, in VQP");
   }
 };
 

@@ -1,11 +1,10 @@
 // What sharing the bytes among fragments is worth, and how exact the size table is.
 //   allocation_bench [--log-width DG] NAME.texmesh ...
-//                                       bytes of thesis, log and rd over the same quality everywhere
-//   ("uniform",
-//                                       empty fragments not stored), at equal surface-weighted 1 - SSIM
-//   allocation_bench MODEL ...          sizes: table against streams; error of sizes between the rungs,
-//   against
-//                                       a second ladder of just those qualities; the model S = A R^Q + c
+//     bytes of thesis, log and rd over those of the same quality everywhere ("uniform", empty fragments not
+//     stored), at equal surface-weighted 1 - SSIM
+//   allocation_bench MODEL ...
+//     sizes: table against streams; error of sizes between the rungs, against a second ladder of just those
+//     qualities; the model S = A R^Q + c
 // Every figure is a ratio or an error within one run.
 #include <fmt/format.h>
 

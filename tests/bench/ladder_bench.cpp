@@ -1,11 +1,11 @@
 // The texture stages against plain libjpeg on the same pixels in the same run. Counters:
-//   cpu_ratio    CPU of the stage / CPU of ten whole-image encodes with standard tables (one thread); target
-//                <= 1.5
+//   cpu_ratio    CPU of the stage / CPU of ten whole-image encodes with standard tables, one thread;
+//                target <= 1.5
 //   bytes_ratio  bytes of the ladder, tables included / bytes of those ten files; target <= 1.0
 //   speedup      wall with one thread / wall with two
 //   two_s        wall with two threads in seconds
-// Each is of the best of a case's repetitions. `--large` adds a texture of 8192 px (some 40 s; target two_s
-// <= 6); what memory that takes ladder_figures_bench --time 8192 says.
+// Each counter is of the best of a case's repetitions. `--large` adds a texture of 8192 px (some 40 s; target
+// two_s <= 6). ladder_figures_bench --time 8192 says how much memory such a texture takes.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -2,9 +2,8 @@
 // import, condition, scale space, then the collapses to 50, 10 and 2 % of the vertices. Measured alike for
 // both, in the same run:
 //   rms    distance between the surfaces, sampled both ways, ours / meshoptimizer's
-//   shift  95th percentile over points of the original of how far its texture coordinate has moved on the
-//   coarse
-//          surface, in pixels of a 4096 px texture: each one's own
+//   shift  how far the texture coordinate of a point of the original has moved on the coarse surface, 95th
+//          percentile over points, in pixels of a 4096 px texture: ours and meshoptimizer's
 // "stuck": that side stopped before the count. Folders are searched for models.
 #include <meshoptimizer.h>
 

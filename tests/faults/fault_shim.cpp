@@ -1,14 +1,13 @@
 // Preloaded (LD_PRELOAD) into every process of a build, this counts the calls that change what stands beneath
 // given folders and lets one of them go wrong. The count is shared by all processes through a mapped file.
 //
-//   TEXMESH_FAULT_FILE    the shared file (faults/fault_plan.h), made by the test
+//   TEXMESH_FAULT_FILE    the shared file (tests/faults/fault_plan.h), made by the test
 //   TEXMESH_FAULT_UNDER   folders, separated by ':'; absolute, no symbolic links
 //   TEXMESH_FAULT_AT      the number of the call, from 1; 0 or absent = only count
 //   TEXMESH_FAULT_ACTION  kill   the whole process group dies before the call (of a write, in its middle)
 //                         eio    this call fails with EIO
-//                         full   from this call on everything that needs space fails with ENOSPC; a write
-//                         that is
-//                                the first writes its first half
+//                         full   from this call on everything that needs space fails with ENOSPC;
+//                                where this call is a write, the write's first half is written
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>

@@ -1,7 +1,7 @@
 // libFuzzer's entry (see tests/CMakeLists.txt for how to configure); then for instance
-//   build/fuzz/tests/format_fuzz --write-corpus corpus && build/fuzz/tests/format_fuzz -max_total_time=60
-//   corpus
-// The same target runs over the corpus and mutations of it as a normal test, system_format_fuzz_test.
+//   build/fuzz/tests/format_fuzz --write-corpus corpus
+//   build/fuzz/tests/format_fuzz -max_total_time=60 corpus
+// system_format_fuzz_test, an ordinary test, runs the same target over the corpus and its mutations.
 #include "tests/fuzz/format_fuzz.h"
 
 #include <cstdlib>

@@ -10,11 +10,11 @@
 
 namespace texmesh {
 
-/// How somebody looks at the object, and over what.
+/// How somebody looks at the object, and over which network.
 struct DeliveryRequest {
   double displayed_px = 1000;  // displayed height, device pixels
   StepRule rule = StepRule::kDefault;
-  bool measured = true;      // kDefault only: finer than that where finer_where_seen() says so
+  bool measured = true;      // kDefault only: a finer scale where finer_where_seen() says so
   int scale = -1;            // -1 = by the rule
   double time_limit_s = 5;   // from the first request on
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
@@ -22,7 +22,8 @@ struct DeliveryRequest {
   NetworkOptions network;
 };
 
-/// What a viewer will get. Times of what never comes, because every server dies before, are +infinity.
+/// What a viewer will get. The time of a part that never comes, because every server dies before, is
+/// +infinity.
 struct DeliveryPlan {
   int scale = 0;
   std::vector<PlaneChoice> planes;
@@ -41,27 +42,31 @@ struct DeliveryPlan {
   }
 };
 
-/// The scale is the rule's, or a coarser one where a simulation of both shows a better picture in the time:
-/// mesh first, then texture; or where the mesh itself comes too late. Deterministic.
+/// What comes within a time limit, mesh first, then textures. The scale is the rule's. A coarser scale takes
+/// its place where the rule's mesh comes too late, or where simulations of both scales show that the coarser
+/// one gives the better picture in the time. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
 /// The scale and the textures that look best in so many bytes, whatever the time: no scale finer than the
-/// display needs, mesh first, then texture. Where nothing fits the least there is, with a warning.
+/// display needs, mesh first, then texture. Where nothing fits: the least that the package has, with a
+/// warning.
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
-/// From a scale that the step function finds good enough to a finer one, as long as the package's measured
-/// table says that each is seen to be better (0.004 of SSIM with the best textures): the rules speak of
-/// distances, and shading tells more. The table holds for objects displayed at least as high as its pictures.
+/// `scale`, which the step function finds good enough, or a finer scale: takes the next finer one as long as
+/// the package's measured table says that the difference is seen (0.004 of SSIM with the best textures). The
+/// step function knows distances only, and shading tells more. The table holds for objects that are displayed
+/// at least as high as the table's pictures.
 int finer_where_seen(const QualityTable& table, int scale, double displayed_px);
-/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the
-/// package's measured table (scale number, log-quantiser of the quality), and below its lowest quality
-/// on the same line.
+/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
+/// measured table (scale number, logarithm of the quantiser). Below the table's lowest quality the last line
+/// goes on.
 double predicted_ssim(const QualityTable& table, int scale, double quality);
-/// The same for what the textures lose as they are displayed, mip_loss() included.
+/// The same for a loss of the textures as they are displayed, mip_loss() included.
 double predicted_ssim(PackageReader& package, double displayed_px, int scale, double texture_dssim);
-/// The scale that the request asks for: its own, or the rule's, or a finer one by measurement.
+/// The scale that the request asks for: DeliveryRequest::scale, or the rule's, or a finer scale by
+/// measurement.
 int wanted_scale(PackageReader& package, const DeliveryRequest& request);
-/// The uniform quality whose textures lose as much as these do: by interpolation over the
-/// uniform rungs' losses.
+/// The quality at which the textures lose `texture_dssim` when all fragments have it: interpolated between
+/// the losses of the rungs.
 double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
                           double texture_dssim);
 

@@ -10,11 +10,12 @@
 
 namespace texmesh {
 
-/// A fragment that has arrived, its digest checked. To be shown at once.
+/// A fragment that has arrived and has the digest of the tables. The caller can show it at once.
 struct LoadedFragment {
   std::uint32_t plane = 0, fragment = 0;
   std::int32_t rung = 0;
-  /// The rung's stream; of incremental codecs those of all rungs above the one held before, up to this one.
+  /// The rung's stream. Of incremental codecs: the streams of all rungs above the rung held before, up to
+  /// `rung`.
   std::vector<std::vector<std::uint8_t>> streams;
 };
 
@@ -25,8 +26,8 @@ struct LoadOptions {
   /// Seconds after the time limit at which the load ends, whatever is still on its way; -1 = a tenth of the
   /// limit, at least half a second and 8 round trips.
   double grace_s = -1;
-  /// Fragments that stand together in their pack are asked for and decided about together, so many bytes at
-  /// once; 0 = one by one. See group_bytes().
+  /// One request, and one decision, for so many bytes of fragments that stand together in their pack; 0 = for
+  /// every fragment its own. See group_bytes().
   double group_bytes = 0;
   std::function<bool()> cancelled;  // ends the load; what has arrived stays
   std::function<void(const LoadedFragment&)> on_fragment;
@@ -42,20 +43,21 @@ struct LoadReport {
   std::map<std::string, std::uint32_t> problems;  // why requests failed, and how many, tries included
 };
 
-/// Bytes that one request should bring, so that waiting for answers does not leave the link idle, and that
-/// leave a time limit decisions enough to make good at its end what went wrong at its beginning. The
-/// browser client's measure.
+/// Bytes that one request should bring: so many that the link is not idle between two answers, and so few
+/// that the decisions left at the end of a time limit can make up for a bad start. The browser client uses
+/// the same number.
 double group_bytes(double bytes_s, double rtt_s, double limit_s);
 
-/// What a client has of a package's textures, and how it gets more: fragments within a time limit, better
-/// ones after it, others when the display changes. What is held is not fetched again. Not thread-safe.
+/// The textures of a package that a client holds. Loads fragments within a time limit, upgrades fragments
+/// after the limit, and loads other fragments when the display changes. A fragment that is held is not
+/// fetched again. Not thread-safe.
 class TextureLoader {
  public:
-  /// `whole_rungs`: for servers without ranges; all fragments of a plane then come at one rung in one
-  /// request, which is an offer of the plan.
+  /// `whole_rungs` is for servers without ranges: one request, and one offer of the plan, is for all
+  /// fragments of a plane at one rung.
   TextureLoader(PackageReader& package, Transport& transport, bool whole_rungs = false);
 
-  /// Harmonic Time Compensation over what these planes still lack.
+  /// Loads the fragments that these planes still lack, by Harmonic Time Compensation.
   LoadReport load(const std::vector<PlaneChoice>& planes, const LoadOptions& options);
   /// After the deadline: upgrades in order of loss saved per byte, at most for so long and so many bytes.
   struct RefineLimits {
@@ -69,8 +71,8 @@ class TextureLoader {
   std::uint64_t bytes() const { return bytes_; }  // of streams, over all loads
 
  private:
-  /// An offer and what it stands for: fragments of a plane that stand together in its packs, all at the same
-  /// rungs, of which the first offered one is first_rung.
+  /// An offer and its fragments, which stand together in the packs of one plane. first_rung
+  /// is the rung that the offer lists first.
   struct Wanted {
     FragmentOffer offer;
     std::uint32_t plane = 0;

@@ -10,21 +10,24 @@
 namespace texmesh {
 
 // Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred
-// so that the whole ends at the time limit T_0, though throughput moves. Each fragment has a share theta_g of
-// the time; what a transfer takes less or more, dT, is spread over the fragments to come with weights 1/2,
-// 1/3, ..., the nearest most, and the size that fits a fragment's time decides its rung.
+// so that the last one arrives at the time limit T_0, though throughput moves. Each fragment has a share
+// theta_g of the time. A transfer that takes dT less or more than its time hands dT on: it is spread over the
+// next fragments with weights 1/2, 1/3, ..., the nearest most. The size that fits a fragment's time decides
+// the fragment's rung.
 //
-// The plan does no I/O and reads no clock: the caller gives the time. Plain double arithmetic and
-// format/base/portable_math.h: the same decisions bit for bit in C++ and TypeScript (delivery/vectors).
+// The plan does no I/O and reads no clock: the caller gives the time. The arithmetic is plain doubles and
+// format/base/portable_math.h, so C++ and TypeScript decide the same, bit for bit (delivery/vectors).
 
-/// How rungs are chosen. kHtc: the method. kGuard: the method over the plan of least loss instead of
-/// Eq. 3.2's, with sizes kept within a factor of that plan's share of what the link gives in the time left,
-/// which takes the swings out of noisy links. kPrice: one price of bytes in units of
-/// loss that rises when the plan is late. kProportional: sizes scaled by what is left of time over what is
-/// left to send. kStatic: the planned sizes, whatever happens.
+/// How rungs are chosen.
+/// - kHtc: the method, around the plan of Eq. 3.2.
+/// - kGuard: the method around the plan of least loss. A size stays within a factor of the plan's share of
+///   the bytes that the link gives in the time left, so that noisy links make sizes swing less.
+/// - kPrice: one price of bytes, in units of loss, that rises when the plan is late.
+/// - kProportional: planned sizes scaled by the time left over the bytes left.
+/// - kStatic: the planned sizes, whatever happens.
 enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic };
-/// Which end of the list is next: kCredit by the sign of the next credit (negative: the finest fragment,
-/// positive: the coarsest), kBeta0 by the last throughput against beta_0, kFinest always the finest.
+/// Which end of the list is next. kCredit: by the sign of the next credit (negative: the finest fragment,
+/// positive: the coarsest). kBeta0: by the last throughput against beta_0. kFinest: always the finest.
 enum class HtcOrder : std::uint8_t { kCredit, kBeta0, kFinest };
 
 struct HtcOptions {
@@ -35,8 +38,9 @@ struct HtcOptions {
   double rtt_s = 0;                                                    // round trip, measured or told
   int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2
   int max_in_flight = 64;
-  // true: never below low_rung, nothing skipped, as in the thesis. false: so while the time is enough for it,
-  // then the bottom of the ladder, then skipping; and never a rung that loses no less than skipping does.
+  // true: no rung below low_rung and no fragment skipped, as in the thesis. false: the same while there is
+  // time enough, then rungs down to the lowest, then skipping. A rung that loses as much as skipping is never
+  // chosen.
   bool hard_limits = false;
   double guard = 1.5;       // factor of kGuard, > 1
   double price_kappa = 10;  // how fast kPrice's price rises with delay
@@ -50,7 +54,7 @@ struct HtcStep {
   std::uint32_t bytes = 0;
   double credit_s = 0, theta_s = 0;  // credit_k and theta_k = theta_g + credit_k
   double target_bytes = 0;           // d_k asked for
-  double throughput_bytes_s = 0;     // beta_{k-1} it was asked with
+  double throughput_bytes_s = 0;     // beta_{k-1}, which the decision supposes
   double issued_s = 0;
   double done_s = -1;     // -1: in flight
   double spacing_s = 0;   // gamma_k: since the completion before (since the start for the first)
@@ -69,7 +73,7 @@ class HarmonicTimePlan {
   const HtcStep* next(double now_s);
   /// The request for this offer has ended. Completions may come in any order; times must not fall.
   void completed(std::uint32_t offer, double now_s);
-  /// The request failed and was given up: its time is spent, its fragment counts as skipped.
+  /// The request failed and was given up: the time is spent, and the fragment counts as skipped.
   void failed(std::uint32_t offer, double now_s);
 
   bool all_issued() const { return steps_.size() == offers_.size(); }
@@ -77,7 +81,7 @@ class HarmonicTimePlan {
   const std::vector<FragmentOffer>& offers() const { return offers_; }
   const std::vector<HtcStep>& steps() const { return steps_; }
   double throughput_bytes_s() const;
-  /// Pi: T_0 less the time taken = the residuals that no fragment was left to take. Once finished().
+  /// Pi: T_0 less the time taken. Once finished(), Pi equals the residuals for which no fragment was left.
   double surplus_s() const { return options_.time_limit_s - last_done_s_; }
   double unspent_s() const { return unspent_s_; }
   /// Chosen rung by offer; -1 skipped or not decided.
@@ -88,7 +92,7 @@ class HarmonicTimePlan {
  private:
   struct Credit {
     double value = 0;        // dT / zeta
-    std::size_t issued = 0;  // positions that were issued when it arose
+    std::size_t issued = 0;  // positions that were issued when the credit arose
   };
   void plan_prices();
   void plan_for_least_loss();
@@ -124,9 +128,9 @@ class HarmonicTimePlan {
   std::uint32_t left_ = 0, right_ = 0, mean_ = 0;  // remaining: [left_, right_) less what is taken
   std::vector<double> planned_;                    // d_g in bytes by offer, by the policy's plan
   double planned_total_ = 0, planned_left_ = 0;    // bytes
-  double smallest_left_ = 0;                       // bytes of the lowest rungs of what is not issued
-  double low_left_ = 0;                            // and of their low_rung
-  // kPrice: lambda_0; bytes of its plan, and those of them that were issued
+  double smallest_left_ = 0;                       // bytes of the offers not issued, at their lowest rungs
+  double low_left_ = 0;                            // the same at their low_rung
+  // kPrice: lambda_0; bytes of the policy's plan, and how many of these were issued
   double price_0_ = 0, price_total_ = 0, price_done_ = 0;
   std::vector<double> price_bytes_;
   std::uint32_t in_flight_ = 0;

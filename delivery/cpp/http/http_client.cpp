@@ -220,7 +220,7 @@ bool may_retry(const HttpAnswer& a) {
           ((a.status == 200 || a.status == 206) && !a.complete && !a.too_long));
 }
 
-std::string what_came(const HttpAnswer& a) {
+std::string describe_answer(const HttpAnswer& a) {
   if (a.status != 0 && a.status != 200 && a.status != 206) return "status " + std::to_string(a.status);
   if (!a.problem.empty()) return a.problem;
   return a.status == 0 ? "no answer" : "status " + std::to_string(a.status);

@@ -25,7 +25,7 @@ std::string shown_url(const std::string& url);
 /// An http or https URL.
 bool is_url(const std::string& text);
 
-/// What came back. `body` holds at most what was asked for.
+/// The answer to a request. `body` holds at most the bytes that were asked for.
 struct HttpAnswer {
   long status = 0;  // 0: no answer at all, see `problem`
   std::string problem;
@@ -33,15 +33,15 @@ struct HttpAnswer {
   std::string etag;                                 // strong ones only
   std::optional<std::uint64_t> first, last, total;  // of Content-Range
   bool complete = false;                            // the body ended as the server said it would
-  bool too_long = false;     // there was more than asked for, or a whole file: the transfer was ended
+  bool too_long = false;     // more than asked for, or a whole file, was coming: the transfer was ended
   bool timed_out = false;    // silent, or slower than the options allow
   double retry_after_s = 0;  // as the server says, 0 = not
   double first_byte_s = 0, received_s = 0;  // from the request's last byte to the answer's first and last
 };
-/// Worth another try.
+/// Whether the request is worth another try.
 bool may_retry(const HttpAnswer& answer);
-/// In a few words, for messages.
-std::string what_came(const HttpAnswer& answer);
+/// The answer in a few words, for messages.
+std::string describe_answer(const HttpAnswer& answer);
 
 /// Bytes first .. first + bytes - 1.
 struct HttpRange {
@@ -49,27 +49,28 @@ struct HttpRange {
   bool or_whole = false;  // a server that knows no ranges may send the whole file instead
 };
 
-/// GET requests, many at once, over at most so many connections to each server (more wait), which are kept
-/// open; HTTP/2 where a server offers it. Follows no redirects to other protocols. Not thread-safe.
+/// Makes GET requests, many at once, over at most so many connections to each server. Further requests wait.
+/// Connections are kept open, and speak HTTP/2 where the server does. Follows no redirects to other
+/// protocols. Not thread-safe.
 class HttpPool {
  public:
   HttpPool(const HttpOptions& options, int connections_per_server);
   ~HttpPool();
   HttpPool(const HttpPool&) = delete;
   HttpPool& operator=(const HttpPool&) = delete;
-  /// A range (a 206, if the server knows ranges; on a 200 the transfer ends at once and `body` is empty), or
-  /// the whole file without `range`. One try, no retries; `number` comes back with the answer. Of answers
-  /// that are no content (errors) the body is not kept.
+  /// Asks once for a range, or without `range` for the whole file. `number` comes back with the answer. A
+  /// server that knows ranges answers 206; on a 200 the transfer ends at once, and `body` is empty. The body
+  /// of an error is not kept.
   void start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
              std::uint64_t max_bytes, const std::string& if_range_etag = "");
   void cancel(std::uint64_t number);  // no answer will come
-  /// What has come of a request so far; it is gone with cancel().
+  /// The answer so far of a request under way; gone with cancel().
   const HttpAnswer* so_far(std::uint64_t number) const;
   struct Ended {
     std::uint64_t number = 0;
     HttpAnswer answer;
   };
-  /// The next that has ended, waiting for it at most so long; at once when nothing is under way.
+  /// Waits at most so long for the next request that ends; returns at once when none is under way.
   std::optional<Ended> wait(double seconds);
   bool idle() const;
   const HttpOptions& options() const;

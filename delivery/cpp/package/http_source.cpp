@@ -154,7 +154,7 @@ bool HttpSource::accept(Piece& p, HttpAnswer& a) {
     throw FormatError(name(), "", "the file that reading began with",
                       "status 200: it was replaced, or the server no longer answers ranges");
   if (a.status == 416) throw FormatError(name(), place, "a longer file", "status 416");
-  throw InputError(name(), place, "an answer with status 206", what_came(a));
+  throw InputError(name(), place, "an answer with status 206", describe_answer(a));
 }
 
 void HttpSource::check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {

@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-/// Ranges of a container, from the first of its servers that delivers them.
+/// Reads ranges of a container from the first server that delivers them.
 class HttpSource final : public ByteSource {
  public:
   /// `first`: the answer of urls[0] to a request for the first kBootstrapBytes, or a part of it.
@@ -25,7 +25,7 @@ class HttpSource final : public ByteSource {
 
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override;
 
-  /// Fetches all of these at once.
+  /// Fetches all of these ranges at once.
   void prefetch(std::vector<ByteRange> ranges);
 
  private:
@@ -36,17 +36,19 @@ class HttpSource final : public ByteSource {
   };
 
   void require(std::uint64_t offset, std::uint64_t bytes) const;
-  /// `pieces` and what is not known of a range behind them; the last one grows where it is near.
+  /// `pieces` with the parts of a range that are not known, behind them. Where the last piece ends near the
+  /// range, that piece grows.
   std::vector<Piece> missing(std::uint64_t offset, std::uint64_t bytes, std::vector<Piece> pieces) const;
-  /// Where what is known at `at` ends (`at` itself when nothing is), and where the next known part begins.
+  /// The end of the known part that holds `at` (`at` itself without such a part), and the begin of the next
+  /// one.
   std::pair<std::uint64_t, std::uint64_t> known_from(std::uint64_t at) const;
   void store(std::uint64_t begin, Bytes bytes);
   Bytes copy(std::uint64_t offset, std::uint64_t bytes) const;
 
-  /// What has come is kept, whether all comes or not.
+  /// Fetches the pieces. Bytes that have come are kept even when another piece fails.
   void fetch(std::vector<Piece> pieces);
   void start(std::size_t number, const Piece& p);
-  /// Whether the piece is complete; otherwise it is to be asked for again.
+  /// Takes an answer. False: the piece is not complete and must be asked for again.
   bool accept(Piece& p, HttpAnswer& a);
 
   void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes);

@@ -141,7 +141,7 @@ class UrlStore final : public HttpStore {
     if (a.too_long)
       throw FormatError(names, "byte 0", "at most " + std::to_string(kBootstrapBytes) + " bytes", "more");
     if (a.status == 416) throw FormatError(names, "byte 0", "a longer file", "status 416");
-    throw InputError(names, "byte 0", "an answer with status 206", what_came(a));
+    throw InputError(names, "byte 0", "an answer with status 206", describe_answer(a));
   }
 
   Bytes open_by(FirstAnswer first) {
@@ -197,7 +197,7 @@ class UrlStore final : public HttpStore {
                              " bytes from a server without ranges",
                          "more");
       if (!may_retry(a) || !retries.wait(a))
-        throw InputError(shown_url(url), "", "an answer with status 200", what_came(a));
+        throw InputError(shown_url(url), "", "an answer with status 200", describe_answer(a));
     }
   }
 

@@ -28,7 +28,7 @@ void HttpTree::fetch(std::vector<Wanted> wanted) {
                           "more");
       if (a.body.size() >= kProgressBytes && ranges_) retries[i] = HttpRetries(link_->options);
       if (!may_retry(a) || !retries[i].wait(a))
-        throw InputError(name() + wanted[i].path, "", "a file", what_came(a));
+        throw InputError(name() + wanted[i].path, "", "a file", describe_answer(a));
       start(i, wanted[i]);
     }
   } catch (...) {

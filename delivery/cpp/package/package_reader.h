@@ -39,8 +39,8 @@ class PackageStore {
 /// Meshes and packs are bounded by what the reader's store allows.
 std::uint64_t most_entry_bytes(const std::string& path);
 std::unique_ptr<PackageStore> open_container(std::unique_ptr<ByteSource> source);
-std::unique_ptr<PackageStore> open_folder(
-    const std::string& path);  // InputError; no symlinks are followed beneath it
+/// InputError when there is no such folder. No symbolic link beneath the folder is followed.
+std::unique_ptr<PackageStore> open_folder(const std::string& path);
 /// An http or https URL (http_store.h), a folder or a file, by what `path` is.
 std::unique_ptr<PackageStore> open_store(const std::string& path);
 
@@ -66,7 +66,7 @@ class PackageReader {
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
   std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
-  /// Index into manifest().scales; InputError that names the scales there are when it is none of them.
+  /// Index into manifest().scales. Without such a scale: InputError that names the scales there are.
   std::size_t scale_index(int scale) const;
   const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }
   /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read

@@ -183,11 +183,11 @@ class HttpTransport final : public Transport {
       if (a.status == 200 || a.too_long) open.parts[part].clear();
       outcome.problem = a.too_long    ? "more bytes than were asked for"
                         : a.complete  ? "fewer bytes than were asked for"
-                        : a.timed_out ? "timeout (" + what_came(a) + ")"
+                        : a.timed_out ? "timeout (" + describe_answer(a) + ")"
                                       : "the answer was cut off";
       return false;
     }
-    outcome.problem = a.timed_out ? "timeout (" + what_came(a) + ")" : what_came(a);
+    outcome.problem = a.timed_out ? "timeout (" + describe_answer(a) + ")" : describe_answer(a);
     if (a.status == 200) {
       outcome.for_good = true;
       outcome.problem = mirror.tree           ? "status 200: the server knows no ranges"

@@ -17,58 +17,60 @@ struct PackagePart {
   ByteRange range;  // within the entry
 };
 
-/// One thing to fetch. The number is the asker's own and comes back with what arrived.
+/// One request. The asker chooses the number, which comes back with the outcome.
 struct TransferRequest {
   std::uint32_t number = 0;
   std::uint64_t bytes = 0;
   std::vector<PackagePart> parts;  // a model of a network needs none
 };
 
-/// What carries requests to mirrors of one package: a network, or a model of one.
+/// Carries requests to the mirrors of one package: a network, or a model of a network.
 class Transport {
  public:
   struct Outcome {
     std::uint32_t number = 0;
     double time_s = 0;
-    bool good = false;                             // false: this mirror has failed to deliver it
+    bool good = false;                             // false: the mirror has failed to deliver
     std::vector<std::vector<std::uint8_t>> parts;  // as asked for
-    std::string problem;                           // why it is not good, in a few words
+    std::string problem;                           // why not good, in a few words
     double wait_s = 0;      // above 0: the mirror is to be left alone, at least for so long (429, 5xx)
-    bool for_good = false;  // it will never deliver: replaced by another file, knows no ranges
+    bool for_good = false;  // the mirror will never deliver: has another file by now, knows no ranges
   };
   virtual ~Transport() = default;
   virtual std::size_t mirrors() const = 0;  // at least one
   virtual double now_s() = 0;               // since the first use; never falls
-  /// What an earlier try of the same request brought is not asked for again.
+  /// Asks the mirror. Bytes that an earlier try of the same request brought are not asked for again.
   virtual void start(const TransferRequest& request, std::uint32_t mirror) = 0;
-  /// Outcome or not, the request is over.
+  /// Ends a request, whether its outcome is there or not.
   virtual void cancel(std::uint32_t number) = 0;
-  /// Bytes that have come of a request that is under way, or that are kept of one that broke.
+  /// Bytes of a request that have come so far: the request is under way, or broke and keeps them.
   virtual double received(std::uint32_t) { return 0; }
-  /// What ends first, or nothing when the time comes before. Nothing, too, when nothing can ever end: at once
-  /// where `until_s` is kForEver_s, else when that time comes.
+  /// The outcome that comes first; nothing when `until_s` comes before. When no request can ever end:
+  /// nothing, at once where `until_s` is kForEver_s, else at `until_s`.
   virtual std::optional<Outcome> wait(double until_s) = 0;
 };
 constexpr double kForEver_s = 1e9;
 
-/// What wants things fetched: the plan of a time limit, or the upgrades after it.
+/// Makes the requests: the plan of a time limit, or the upgrades after the limit.
 class RequestSource {
  public:
   virtual ~RequestSource() = default;
-  /// The next request while there is room for one; nothing: wait for those under way.
+  /// The next request, while there is room for one; nothing: wait for the requests under way.
   virtual std::optional<TransferRequest> next(double now_s) = 0;
-  /// What arrived; false when it is not what it should be (a digest that differs): it is then
-  /// asked for elsewhere.
+  /// Takes an outcome. False when the bytes are wrong (another digest): the request goes to another mirror
+  /// then.
   virtual bool arrived(const Transport::Outcome& outcome) = 0;
-  virtual void failed(std::uint32_t number, double now_s) = 0;  // given up
+  /// The request was given up.
+  virtual void failed(std::uint32_t number, double now_s) = 0;
   virtual bool finished() const = 0;
 };
 
 struct TransferOptions {
-  double rtt_s = 0;                 // round trip, told or measured
-  double initial_bytes_s = 1e5;     // of each mirror, until it has delivered something
-  int tries = 3;                    // of a request, over all mirrors, before it is given up; one that brings
-                                    // something anew begins the count again
+  double rtt_s = 0;              // round trip, told or measured
+  double initial_bytes_s = 1e5;  // of each mirror, until it has delivered something
+  /// Of a request, over all mirrors, before the request is given up. A try that brings new bytes begins the
+  /// count again.
+  int tries = 3;
   double until_s = kForEver_s;      // nothing is asked for or waited for after this
   std::function<bool()> cancelled;  // asked after every event and every tenth of a second
 };
@@ -81,16 +83,19 @@ struct TransferEnd {
   std::map<std::string, std::uint32_t> problems;  // why tries failed, and how many
 };
 
-/// Runs until the source has finished. A request goes to the mirror that is expected to deliver it first; one
-/// that delivers nothing for four times what it should take (at least 8 round trips and half a second) is
-/// asked elsewhere and left alone while another answers; when none is left all are tried again. A mirror that
-/// is busy is asked again after a pause that grows, or that it names. Every request ends: it arrives, or it
-/// is given up after its tries, or when nothing can arrive any more; the source hears of each. With a
-/// transport that is deterministic, so is this.
+/// Runs until the source has finished.
+/// - A request goes to the mirror that is expected to deliver first.
+/// - A mirror is late when it has delivered nothing for four times the expected time (at least 8 round trips
+///   and half a second). Its requests go to another mirror, and it is left alone as long as another answers.
+///   When no mirror is left, all are tried again.
+/// - A mirror that is busy is asked again after a pause that grows, or after the pause that the mirror names.
+/// - Every request ends: it arrives, or is given up after its tries or when nothing can arrive any more. The
+///   source hears of every end.
+/// Deterministic where the transport is.
 TransferEnd transfer(RequestSource& source, Transport& transport, const TransferOptions& options);
 
-/// A plan as a source of requests, its time counted from `start_s` of the transport's on; `parts` says what a
-/// step fetches, `accept` keeps what arrived (false: the bytes are wrong). Either may be empty.
+/// A plan as a source of requests. The plan's time 0 is `start_s` of the transport. `parts` says what a step
+/// fetches. `accept` keeps the bytes that arrived, and gives false when they are wrong. Either may be empty.
 class PlanSource final : public RequestSource {
  public:
   using Parts = std::function<std::vector<PackagePart>(std::uint32_t offer, std::int32_t rung)>;
@@ -106,7 +111,7 @@ class PlanSource final : public RequestSource {
   double start_s_;
   Parts parts_;
   Accept accept_;
-  std::vector<std::int32_t> rung_;  // by offer, of what was asked for
+  std::vector<std::int32_t> rung_;  // by offer: the rung that was asked for
 };
 
 }  // namespace texmesh

@@ -59,9 +59,9 @@ Option add_scale_option(Command& c, DeliveryArguments& a) {
 Option add_policy_option(Command& c, DeliveryArguments& a) {
   return c
       .option("--policy", a.policy,
-              "htca = the thesis's method. guard = that method over the plan of least loss, within 1.5 x of "
-              "that plan's share of what the link lasts to give. price = one price of bytes that rises with "
-              "delay. proportional = planned sizes scaled by the time that is left. static = does not adapt")
+              "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a "
+              "factor of 1.5 of that plan's share; price = one price of bytes, which rises when the transfer "
+              "is late; proportional = planned sizes scaled by the time left; static = planned sizes, always")
       .one_of_explained({"htca", "guard", "price", "proportional", "static"})
       .value_name("NAME")
       .shows_default();
@@ -119,13 +119,15 @@ void add_method_options(Command& c, DeliveryArguments& a) {
   c.group("Method");
   add_policy_option(c, a).rare();
   c.option("--order", a.order,
-           "Next fragment: credit = by the sign of the credit; beta0 = as first published; finest")
+           "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
+           "published; finest = always the finest")
       .one_of_explained({"credit", "beta0", "finest"})
       .value_name("NAME")
       .shows_default()
       .rare();
   c.option("--estimator", a.estimator,
-           "Throughput: last transfer, harmonic mean or ewma of several; auto = by the policy")
+           "Throughput: last = of the last transfer; harmonic = harmonic mean of several; ewma = mean that "
+           "forgets older transfers; auto = by the policy")
       .one_of_explained({"auto", "last", "harmonic", "ewma"})
       .value_name("NAME")
       .shows_default()
@@ -139,12 +141,14 @@ void add_method_options(Command& c, DeliveryArguments& a) {
       .rare();
   add_window_option(c, a).rare();
   c.flag("--hard-limits", a.hard_limits,
-         "Qualities stay within 5 .. 97 and nothing is skipped, however late it gets (default: while the "
-         "time is enough for that)")
+         "Qualities stay within 5 .. 97 and no fragment is skipped, however late the transfer is (default: "
+         "only while there is time enough)")
       .rare();
-  c.option("--rule", a.rule,
-           "What decides about the scale: default = the finer of jnd and error; measured = that scale, or a "
-           "finer scale that compile has measured to look better; edge = by the length of edges")
+  c.option(
+       "--rule", a.rule,
+       "Which scale is enough: jnd = by the just-noticeable difference; error = by an error of one pixel; "
+       "default = the finer of jnd and error; edge = by edges of one pixel; measured = as default, or a "
+       "finer scale that compile has measured to look better")
       .one_of_explained({"measured", "default", "jnd", "error", "edge"})
       .value_name("NAME")
       .shows_default()

@@ -20,7 +20,7 @@ struct WorkerLimits {
 /// Where results are kept.
 struct CacheSettings {
   std::string folder;               // "" = keep nothing
-  std::vector<std::string> layers;  // asked behind it: folders and URLs
+  std::vector<std::string> layers;  // asked behind the folder: folders and URLs
   bool upload = false;              // put what was computed into the layers that are URLs
 };
 
@@ -31,7 +31,7 @@ struct WorkerJob {
   CacheSettings cache;
   bool strict = false;
   bool explain = false;            // say of every stage why it runs or not
-  bool forecast = false;           // say it, and do nothing
+  bool forecast = false;           // only say so: run and write nothing
   std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
   StageKeys earlier_keys;
   std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
@@ -78,13 +78,15 @@ struct PoolSettings {
   bool stop_on_failure = false;  // no further child starts after a failure
 };
 
-/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a
-/// threaded parent), and returns a report per job in their order. Jobs that are predicted to take longest
-/// start first; at most `processors` run side by side, fewer when their predicted peaks do not fit the memory
-/// (one always runs), and the last ones get the processors that are free as threads. A cache layer that did
-/// not work for one child is not asked by those that start later. A child that dies, hangs or outgrows its
-/// limits costs its own model only. SIGINT and SIGTERM end all children within two seconds and leave no
-/// temporary file; what had not finished is kCancelled.
+/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a threaded
+/// parent). Returns a report per job, in the order of the jobs.
+/// - Jobs that are predicted to take longest start first. At most `processors` run side by side, fewer when
+///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as
+///   threads.
+/// - A child that dies, hangs or exceeds its limits costs its own model only.
+/// - A cache layer that did not work for one child is not asked by children that start later.
+/// - SIGINT and SIGTERM end all children within two seconds and leave no temporary file. Jobs that had not
+///   ended are kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished);
 

@@ -82,7 +82,7 @@ BudgetFile BudgetFiller::with_colours(const MeshCandidate& mesh, const BudgetFil
     add(file, source_.colours[k], pixels[k], std::move(images[k]), quality);
   std::sort(file.rows.begin(), file.rows.end(),
             [](const auto& a, const auto& b) { return a.image < b.image; });
-  file.glb = mesh.with(file.images);
+  file.glb = mesh.file_with(file.images);
   return file;
 }
 

@@ -33,7 +33,7 @@ class BudgetSearch {
     const TexturePoint& point = points_.at(best);
     return finish(mesh, source_.colours.empty()
                             ? point
-                            : colours_.coded_best(mesh, colour_bytes(source_, mesh), point));
+                            : colours_.best_of_other_codings(mesh, colour_bytes(source_, mesh), point));
   }
 
  private:
@@ -96,7 +96,7 @@ class BudgetSearch {
     const auto known = points_.find(best_);
     if (source_.colours.empty() || known == points_.end() || known->second.difference >= kNothing)
       return true;
-    const TexturePoint alike = colours_.quick(mesh, colour_bytes(source_, mesh), known->second);
+    const TexturePoint alike = colours_.same_size(mesh, colour_bytes(source_, mesh), known->second);
     return alike.difference < kWorthALook * least_;
   }
 
@@ -111,7 +111,7 @@ class BudgetSearch {
     const auto near = points_.find(best_);
     const bool known = near != points_.end() && near->second.difference < kNothing;
     const TexturePoint start = known ? near->second : TexturePoint{};
-    point = colours_.best(mesh, colour_bytes(source_, mesh), known ? &start : nullptr);
+    point = colours_.best_size(mesh, colour_bytes(source_, mesh), known ? &start : nullptr);
     return point.difference;
   }
 

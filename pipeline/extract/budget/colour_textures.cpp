@@ -74,21 +74,23 @@ float ColourTextures::sharpening(double share) const {
   return static_cast<float>(std::clamp(0.06 - 0.05 * portable::log(texels) / portable::log(2), 0.0, 0.16));
 }
 
-TexturePoint ColourTextures::best(const MeshCandidate& mesh, double bytes, const TexturePoint* near) {
-  return climbed(mesh, bytes, near ? near->step : likely_step(bytes), codings_.front(), kNothing);
+TexturePoint ColourTextures::best_size(const MeshCandidate& mesh, double bytes, const TexturePoint* near) {
+  return climb_sizes(mesh, bytes, near ? near->step : likely_step(bytes), codings_.front(), kNothing);
 }
 
-TexturePoint ColourTextures::coded_best(const MeshCandidate& mesh, double bytes, const TexturePoint& near) {
+TexturePoint ColourTextures::best_of_other_codings(const MeshCandidate& mesh, double bytes,
+                                                   const TexturePoint& near) {
   TexturePoint best = near;
   for (std::size_t k = 1; k < codings_.size(); ++k) {
-    const TexturePoint found = climbed(mesh, bytes, best.step, codings_[k], kWorthClimbing * best.difference);
+    const TexturePoint found =
+        climb_sizes(mesh, bytes, best.step, codings_[k], kWorthClimbing * best.difference);
     if (found.difference < best.difference) best = found;
   }
   return best;
 }
 
-TexturePoint ColourTextures::climbed(const MeshCandidate& mesh, double bytes, int step,
-                                     const ColourCoding& coding, double limit) {
+TexturePoint ColourTextures::climb_sizes(const MeshCandidate& mesh, double bytes, int step,
+                                         const ColourCoding& coding, double limit) {
   std::map<int, TexturePoint> tried;
   const auto at = [&](int s) -> const TexturePoint& {
     const auto [it, fresh] = tried.try_emplace(s);
@@ -102,7 +104,7 @@ TexturePoint ColourTextures::climbed(const MeshCandidate& mesh, double bytes, in
   return at(step);
 }
 
-TexturePoint ColourTextures::quick(const MeshCandidate& mesh, double bytes, const TexturePoint& near) {
+TexturePoint ColourTextures::same_size(const MeshCandidate& mesh, double bytes, const TexturePoint& near) {
   return measure(mesh, bytes, near.step, near.coding);
 }
 
@@ -120,7 +122,7 @@ std::vector<Pixels> ColourTextures::texels(const std::vector<std::size_t>& which
   std::vector<Pixels> out;
   for (const std::size_t i : which) {
     const PackageImage& image = source_.image(i);
-    const double most = std::min(share, source_.textures.largest(i));
+    const double most = std::min(share, source_.textures.largest_share(i));
     const std::uint32_t width = side_of(image.width_px, most), height = side_of(image.height_px, most);
     std::vector<std::uint8_t> coverage;
     if (format_ != FileImage::kPng) coverage = coverage_by(source_.source, image.image, width, height);

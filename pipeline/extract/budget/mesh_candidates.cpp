@@ -19,7 +19,8 @@ constexpr Coding kCodings[kMeshCodings] = {
 
 }  // namespace
 
-std::vector<std::uint8_t> MeshCandidate::with(const std::map<std::uint32_t, FileImageData>& images) const {
+std::vector<std::uint8_t> MeshCandidate::file_with(
+    const std::map<std::uint32_t, FileImageData>& images) const {
   StandaloneGlb out = *file;
   std::map<std::uint32_t, FileImageData> all;
   for (const std::uint32_t i : out.source_images()) all[i] = {FileImage::kWebp, {}};
@@ -36,7 +37,7 @@ DracoSteps MeshCandidates::steps_of(int coding) const {
   return {source_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour};
 }
 
-std::unique_ptr<StandaloneGlb> MeshCandidates::coded(int scale, int coding) const {
+std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, int coding) const {
   auto file = std::make_unique<StandaloneGlb>(source_.package.scale_glb(scale), mesh_path(scale));
   const bool lit_anew = scale > 0 && !source_.light.places.empty();
   if (file->has_draco() && (lit_anew || coding + 1 < kMeshCodings))
@@ -52,13 +53,13 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   c.scale = m.scales[key.scale].scale;
   c.triangles = m.scales[key.scale].triangles;
   c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
-  std::unique_ptr<StandaloneGlb> file = coded(c.scale, key.coding);
+  std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key.coding);
   c.model = read_model(*file, mesh_path(c.scale), source_.context);
   if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
-    file->add_level(*coded(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+    file->add_level(*recoded_scale(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
   c.file = std::move(file);
-  c.fixed_bytes = c.with({}).size();
+  c.fixed_bytes = c.file_with({}).size();
   c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);
   c.geometry = source_.difference(*c.views, source_.best_textures);
   return c;

@@ -12,7 +12,7 @@ namespace texmesh {
 /// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
 inline constexpr int kMeshCodings = 5;
 
-/// Which mesh: an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1.
+/// A scale, as an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1.
 struct MeshKey {
   std::size_t scale = 0;
   int coding = 0;
@@ -30,8 +30,8 @@ struct MeshCandidate {
   std::uint64_t fixed_bytes = 0;  // the file without its images' bytes
   double geometry = 0;            // difference with the best textures
 
-  /// The file with these images; those that are missing have no bytes.
-  std::vector<std::uint8_t> with(const std::map<std::uint32_t, FileImageData>& images) const;
+  /// The file with these images. An image that is not given has no bytes.
+  std::vector<std::uint8_t> file_with(const std::map<std::uint32_t, FileImageData>& images) const;
 };
 
 /// Makes candidates when they are first asked for, and keeps them until forget().
@@ -39,11 +39,11 @@ class MeshCandidates {
  public:
   explicit MeshCandidates(const BudgetSource& source) : source_(source) {}
   const MeshCandidate& at(const MeshKey& key);
-  void forget(const MeshKey& key) { made_.erase(key); }  // its pictures take tens of megabytes
+  void forget(const MeshKey& key) { made_.erase(key); }  // a candidate's pictures take tens of megabytes
 
  private:
   DracoSteps steps_of(int coding) const;
-  std::unique_ptr<StandaloneGlb> coded(int scale, int coding) const;
+  std::unique_ptr<StandaloneGlb> recoded_scale(int scale, int coding) const;
   const BudgetSource& source_;
   std::map<MeshKey, MeshCandidate> made_;
 };

@@ -18,7 +18,7 @@ struct DracoSteps {
   int colour_bits = 8;  // of the 8 that vertex colours have
 };
 
-/// One primitive of a file: its Draco stream and which attribute of it is which glTF attribute.
+/// One primitive of a file: its Draco stream, and the stream's id of every glTF attribute.
 struct DracoStream {
   std::vector<std::uint8_t> bytes;
   std::map<std::string, int> attributes;  // "POSITION" -> unique id
@@ -27,9 +27,9 @@ struct DracoStream {
 };
 
 /// Codes the primitives of one file anew on coarser grids that all of them share, so that borders between
-/// primitives stay closed. A stream that does not get smaller is kept, and with it all the others of the file
-/// (one grid for all). With `lit_as`, normals are fitted to it and nothing is kept, however many bytes come
-/// out. FormatError when a stream does not decode; StageError when Draco refuses.
+/// primitives stay closed. When one stream does not get smaller, all streams of the file stay as they are
+/// (one grid for all). With `lit_as`, normals are fitted to `lit_as`, and the new streams are used however
+/// many bytes they have. FormatError when a stream does not decode; StageError when Draco refuses.
 void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
                   const std::string& entry, const RunContext& context);
 

@@ -9,6 +9,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"
 
 namespace texmesh {
@@ -24,14 +25,6 @@ constexpr int kMaxJsonDepth = 64;
 std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
   return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16) |
          static_cast<std::uint32_t>(bytes[at + 3]) << 24;
-}
-
-void put_u32(Bytes& out, std::size_t x) {
-  for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(x >> shift));
-}
-
-void pad(Bytes& out, std::uint8_t with) {
-  while (out.size() % 4 != 0) out.push_back(with);
 }
 
 std::size_t number(const Json& object, const char* key) {
@@ -299,7 +292,7 @@ Bytes StandaloneGlb::finish() const {
   for (std::size_t k = 0; k < document_->views.size(); ++k) {
     if (place[k] < 0) continue;
     place[k] = static_cast<std::int64_t>(views.size());
-    pad(binary, 0);
+    pad_to_four(binary, 0);
     Json json = document_->views[k].json;
     Json& at = document_->views[k].meshopt ? json["extensions"][kMeshopt] : json;
     at["buffer"] = 0;
@@ -310,28 +303,14 @@ Bytes StandaloneGlb::finish() const {
   }
   for_each_key(root, "bufferView",
                [&](Json& view) { view = static_cast<std::size_t>(place[view.get<std::size_t>()]); });
-  pad(binary, 0);
+  pad_to_four(binary, 0);
   if (!views.empty()) root["bufferViews"] = views;
   root["buffers"] = Json::array({{{"byteLength", binary.size()}}});
   if (fallback_bytes_ > 0)
     root["buffers"].push_back(
         {{"byteLength", fallback_bytes_}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
 
-  const std::string text = root.dump(-1, ' ', false, Json::error_handler_t::replace);
-  Bytes json(text.begin(), text.end());
-  pad(json, ' ');
-  Bytes out;
-  out.reserve(28 + json.size() + binary.size());
-  put_u32(out, 0x46546c67);  // "glTF"
-  put_u32(out, 2);
-  put_u32(out, 28 + json.size() + binary.size());
-  put_u32(out, json.size());
-  put_u32(out, 0x4e4f534a);  // "JSON"
-  out.insert(out.end(), json.begin(), json.end());
-  put_u32(out, binary.size());
-  put_u32(out, 0x004e4942);  // "BIN"
-  out.insert(out.end(), binary.begin(), binary.end());
-  return out;
+  return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
 }
 
 }  // namespace texmesh

@@ -72,7 +72,7 @@ TextureSource::TextureSource(PackageReader& package, double most_texels, const R
   for (; texels > most_texels && first_level_ < 20; texels /= 4) ++first_level_;
 }
 
-double TextureSource::largest(std::size_t index) {
+double TextureSource::largest_share(std::size_t index) {
   return images_[index].colours ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
 }
 

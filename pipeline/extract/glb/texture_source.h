@@ -12,7 +12,8 @@
 
 namespace texmesh {
 
-/// Of colours that are made smaller (reduced()): what averaging blurs, and a little of what viewers do.
+/// Sharpening of colours that are made smaller (reduced()): it undoes the blur of averaging, and a little of
+/// the blur of viewers.
 inline constexpr float kSharpening = 0.06f;
 
 /// A source image of a package: one image of every file that is extracted.
@@ -27,20 +28,20 @@ struct PackageImage {
 };
 std::vector<PackageImage> package_images(PackageReader& package);
 
-/// Texels of a package's images at any size, from its best rungs. What was read stays in memory at the size
-/// that `most_texels` (over all colour images) allows.
+/// Texels of a package's images at any size, from the best rungs. Images that were read stay in memory, at
+/// the size that `most_texels` (over all colour images) allows.
 class TextureSource {
  public:
   TextureSource(PackageReader& package, double most_texels, const RunContext& context);
   const std::vector<PackageImage>& images() const { return images_; }
-  /// 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and at most those of the image;
-  /// where memory was bounded, larger ones are cut down, see largest(). `coverage` (bits as
-  /// TexturePlane::coverage, empty = all): what shows; the other texels are made cheap to code. `sharpening`
-  /// (see reduced()) is for colours alone.
+  /// An image with these sides, of 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and
+  /// at most the image's; where memory is bounded, larger sides are cut down, see largest_share(). `coverage`
+  /// (bits as TexturePlane::coverage, empty = all) holds the texels that a mesh shows; the other texels are
+  /// made cheap to code. `sharpening` (see reduced()) is for colours alone.
   Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
                 const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
   /// Largest share of an image's sides, 0 .. 1, that texels() gives.
-  double largest(std::size_t index);
+  double largest_share(std::size_t index);
 
  private:
   const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
@@ -57,8 +58,8 @@ class TextureSource {
 /// Colours and alpha as one image of 4 channels; both of one size.
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
 
-/// Which texels of an image of `width_px` x `height_px` a mesh shows with these materials, as
-/// TexturePlane::coverage. `image` is the materials' index of it.
+/// The texels of an image of `width_px` x `height_px` that a mesh shows with these materials, as
+/// TexturePlane::coverage. `image` is the index that the materials have for the image.
 std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Material>& materials,
                                       std::int32_t image, std::uint32_t width_px, std::uint32_t height_px);
 

@@ -1,6 +1,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "format/base/bounded_json.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
 namespace texmesh::gltf {
@@ -22,35 +23,14 @@ std::string_view text_of(ByteSpan bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-void check_brackets(const Source& source, std::string_view text) {
-  std::uint64_t values = 0;
-  int depth = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    switch (text[i]) {
-      case '"':
-        for (++i; i < text.size() && text[i] != '"'; ++i) i += text[i] == '\\';
-        break;
-      case '[':
-      case '{':
-        ++values;
-        if (++depth > kMaxDepth) {
-          source.fail("byte " + std::to_string(i), "JSON of at most 64 levels", "deeper nesting");
-        }
-        break;
-      case ']':
-      case '}':
-        --depth;
-        break;
-      case ',':
-        ++values;
-        break;
-      default:
-        break;
-    }
-  }
-  if (values > kMaxValues) {
-    source.fail("", "JSON of at most " + std::to_string(kMaxValues) + " values", std::to_string(values));
-  }
+void check_shape(const Source& source, std::string_view text) {
+  const JsonShape shape =
+      scan_json_shape({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, kMaxDepth);
+  if (shape.too_deep)
+    source.fail("byte " + std::to_string(*shape.too_deep), "JSON of at most 64 levels", "deeper nesting");
+  if (shape.values > kMaxValues)
+    source.fail("", "JSON of at most " + std::to_string(kMaxValues) + " values",
+                std::to_string(shape.values));
 }
 
 }  // namespace
@@ -112,7 +92,7 @@ Container split_container(const Source& source, ByteSpan bytes) {
 }
 
 Json parse_json(const Source& source, std::string_view text) {
-  check_brackets(source, text);
+  check_shape(source, text);
   try {
     Json document = Json::parse(text);
     if (!document.is_object()) source.fail("", "a JSON object", document.type_name());

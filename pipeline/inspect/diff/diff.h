@@ -45,8 +45,8 @@ struct PackageDiff {
 };
 
 /// What differs between two packages and why, from their indices and provenance; reads no meshes or textures.
-/// Causes follow the graph of this build's stages: what an entry can depend on, not what it must have
-/// depended on. FormatError for packages that cannot be read.
+/// Causes follow the graph of this build's stages: a cause can have changed an entry, but need not have.
+/// FormatError for packages that cannot be read.
 PackageDiff diff_packages(PackageReader& a, PackageReader& b);
 
 std::string diff_text(const PackageDiff& diff, const std::array<std::string, 2>& names);

@@ -1,5 +1,5 @@
-// dump, verify, pack and unpack as programs: exit codes, streams, documents. What they compute is tested in
-// inspect_*.
+// dump, verify, pack and unpack as programs: exit codes, streams, documents. tests/pipeline/inspect/ tests
+// what these commands compute.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -44,6 +44,19 @@ TEST(GraphRun, RunsEverythingOnceThenNothing) {
   ASSERT_EQ(first.size(), 1u);
 }
 
+TEST(GraphRun, RunsOnce) {
+  Fake fake;
+  MemoryStore store;
+  const RunContext context;
+  const std::vector<Stage> stages = fake.table();
+  GraphRun graph(stages, store, context);
+  graph.give(kSource, Text("s"), sha256({}), 1);
+  graph.run(kJoin);
+  const Ran ran = fake.ran;
+  EXPECT_THROW(graph.run(kJoin), std::logic_error);
+  EXPECT_EQ(fake.ran, ran);
+}
+
 TEST(GraphRun, AnEqualResultStopsTheWave) {
   Fake fake;
   MemoryStore store;

@@ -1,4 +1,4 @@
-// delivery/cpp/network_model for one server on a link of constant rate: the same arithmetic, the same bits.
+// delivery/cpp/simulate/network_model.h for one server on a link of constant rate: the same arithmetic, the same bits.
 
 /** A link as a plan supposes it. */
 export interface LinkOptions {

@@ -1,4 +1,4 @@
-// exp, log, sin, cos, atan2, pow with the same bits as format/portable_math: plain double arithmetic, where Math's
+// exp, log, sin, cos, atan2, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where Math's
 // functions differ from engine to engine. About 1e-15 relative.
 
 const ln2Hi = 6.93147180369123816490e-1;

@@ -66,7 +66,7 @@ function* texturesInTime(data: PackageData, quality: QualityTable, request: InTi
 
 /**
  * The wanted scale, or a coarser one where a simulation of both shows a better picture in the time or where the wanted mesh
- * comes too late; with the textures that go with it: delivery/cpp/delivery_plan. A generator, so that a page can breathe between its steps. undefined:
+ * comes too late; with the textures that go with it: delivery/cpp/client/delivery_plan.h. A generator, so that a page can breathe between its steps. undefined:
  * the package has no such scale.
  */
 export function* choiceInTime(data: PackageData, quality: QualityTable, request: InTimeRequest): Generator<void, InTime | undefined> {

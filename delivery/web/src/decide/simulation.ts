@@ -4,7 +4,7 @@ import { FragmentOffer, HtcStep, TimePlanOptions } from './plan_types';
 import { bytesAtRung } from './rung_choice';
 import { UncheckedPlan } from './unchecked_plan';
 
-// delivery/cpp/simulation for one server on a link of constant rate: the same arithmetic, the same bits.
+// delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the same bits.
 
 /** The course of a plan over a link. */
 export interface Simulated {

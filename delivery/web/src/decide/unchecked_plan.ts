@@ -7,7 +7,7 @@ import { bytesAtRung, cheapestRung, costAt, lowestShown, meanOffer } from './run
 
 // Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred so that
 // the whole ends at the time limit T_0, though throughput moves. The same decisions, bit for bit, as
-// delivery/cpp/harmonic_time. The plan does no I/O and knows no clock. HarmonicTimePlan is this plan with checked arguments.
+// delivery/cpp/decide/harmonic_time.h. The plan does no I/O and knows no clock. HarmonicTimePlan is this plan with checked arguments.
 
 const windowFactor = 1.5;
 const tripSamples = 64; // a window that follows every swing makes them worse

@@ -1,0 +1,16 @@
+#pragma once
+#include <string_view>
+
+#include "format/base/bytes.h"
+
+namespace texmesh {
+
+/// Appends bytes of the value `with` until the length is a multiple of 4, as chunks and accessors of a GLB
+/// need it.
+void pad_to_four(Bytes& out, std::uint8_t with);
+
+/// A GLB file of version 2 (glTF 2.0, section 4.4) with both chunks. Each chunk is padded: JSON by spaces,
+/// `binary` by zeros.
+Bytes glb_container(std::string_view json, ByteSpan binary);
+
+}  // namespace texmesh
