@@ -136,6 +136,21 @@ bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes
   return sync_folder(folder);
 }
 
+QuarantineResult move_to_quarantine(const std::string& folder, const std::string& path,
+                                    const FileStamp& read) {
+  using Fate = QuarantineResult::Fate;
+  // Nobody publishes over a file that is there, and nobody else moves one away while this is held.
+  const FileLock lock = FileLock::wait(folder + "/locks/quarantine", FileLock::Mode::kExclusive);
+  if (stamp_of(path) != read) return {Fate::kReplaced, ""};
+  std::error_code ec;
+  fs::create_directories(folder + "/quarantine", ec);
+  fs::rename(path, folder + "/quarantine/" + fs::path(path).filename().string(), ec);
+  if (!ec) return {};
+  // Where locks do not work, somebody else may have been faster.
+  return ec == std::errc::no_such_file_or_directory ? QuarantineResult{Fate::kReplaced, ""}
+                                                    : QuarantineResult{Fate::kFailed, ec.message()};
+}
+
 std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(as_bytes(body))) + "\n"; }
 
 std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/graph/store.h"
+#include "pipeline/io/file_stamp.h"
 
 // The cache folder's own files: what stands where, how a file is published, what a record looks like.
 //
@@ -14,6 +15,7 @@
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins with these digits is computed
+//   locks/quarantine         flock: held while a damaged file is moved away
 //   gate                     flock: shared by lookups and puts of records and blobs, exclusive for pruning
 //   running/<name>           one per running build, locked until the build ends; its time is the start's
 //   quarantine/<name>        objects that were found damaged
@@ -29,6 +31,18 @@ std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std
 /// that has the name already stays, and counts as success when it is as long as `bytes`. False when that
 /// fails. A failure, or the end of the process at any point, leaves nothing behind.
 bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
+
+/// What became of a file that was found damaged.
+struct QuarantineResult {
+  enum class Fate : std::uint8_t { kMoved, kReplaced, kFailed };
+  Fate fate = Fate::kMoved;
+  std::string reason;  // kFailed: why the file could not be moved
+};
+/// Moves a damaged file of the cache at `folder` to quarantine/. `read` is the file's stamp from before its
+/// bytes were read. Threads and processes may have read the same damaged file: one of them gets kMoved, the
+/// others get kReplaced. kReplaced leaves what stands under the path by now: it may be sound.
+QuarantineResult move_to_quarantine(const std::string& folder, const std::string& path,
+                                    const FileStamp& read);
 
 /// Text with its digest behind it, so that a cut or changed text is noticed; and back.
 std::string seal(const std::string& body);

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <thread>
 
 #include "format/base/errors.h"
@@ -70,11 +71,11 @@ class DiskStore : public Store {
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
     const FileLock gate = pass_gate();
     const std::string path = place("ac", key);
-    const auto bytes = read_whole(path);
-    if (!bytes) return std::nullopt;
-    auto record = read_record(*bytes, key);
+    const auto file = read(path);
+    if (!file) return std::nullopt;
+    auto record = read_record(file->bytes, key);
     if (!record) {
-      quarantine(path, "the record of a result does not have its digest");
+      quarantine(path, *file, "the record of a result does not have its digest");
       return std::nullopt;
     }
     for (const StoredBlob& b : record->outputs)
@@ -85,11 +86,10 @@ class DiskStore : public Store {
 
   SharedBytes load(const StoredBlob& blob) override {
     const std::string path = place("cas", blob.digest);
-    const auto stamp = stamp_of(path);
-    auto bytes = read_whole(path);
-    if (!bytes) return nullptr;
-    if (!is_verified(blob.digest, stamp) && !check(path, blob, *bytes)) return nullptr;
-    return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+    auto file = read(path);
+    if (!file) return nullptr;
+    if (!is_verified(blob.digest, file->stamp) && !check(path, blob, *file)) return nullptr;
+    return std::make_shared<const Bytes>(std::move(file->bytes));
   }
 
   bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
@@ -120,21 +120,21 @@ class DiskStore : public Store {
   void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override {
     const FileLock gate = pass_gate();
     const std::string path = place("ac", key);
-    const auto bytes = read_whole(path);
-    const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
+    const auto file = read(path);
+    const auto record = file ? read_record(file->bytes, key) : std::nullopt;
     if (record && record->outputs == found)  // not what somebody else has put in its place meanwhile
-      quarantine(path, "the record of a result names what is none (" + reason + ")");
+      quarantine(path, *file, "the record of a result names what is none (" + reason + ")");
   }
 
   std::optional<std::string> find_note(const Sha256& key) override {
     const std::string path = place("notes", key);
-    const auto bytes = read_whole(path);
-    if (!bytes) return std::nullopt;
-    auto text = unseal(*bytes);
+    const auto file = read(path);
+    if (!file) return std::nullopt;
+    auto text = unseal(file->bytes);
     if (text)
       touch(path);
     else
-      quarantine(path, "a note does not have its digest");
+      quarantine(path, *file, "a note does not have its digest");
     return text;
   }
 
@@ -185,6 +185,17 @@ class DiskStore : public Store {
     return folder_ + "/" + object_path(kind, digest);
   }
 
+  struct ReadFile {
+    FileStamp stamp;  // from before the bytes were read
+    Bytes bytes;
+  };
+  static std::optional<ReadFile> read(const std::string& path) {
+    const auto stamp = stamp_of(path);
+    auto bytes = stamp ? read_whole(path) : std::nullopt;
+    if (!bytes) return std::nullopt;
+    return ReadFile{*stamp, std::move(*bytes)};
+  }
+
   /// A use moves an entry to the young end of the queue, at most hourly (pruning knows of that hour).
   void touch(const std::string& path) const {
     if (!writes_) return;
@@ -202,15 +213,14 @@ class DiskStore : public Store {
 
   bool verify(const StoredBlob& blob) {
     const std::string path = place("cas", blob.digest);
-    const auto stamp = stamp_of(path);
-    if (is_verified(blob.digest, stamp)) return true;
-    const auto bytes = read_whole(path);
-    return bytes && check(path, blob, *bytes);
+    if (is_verified(blob.digest, stamp_of(path))) return true;
+    const auto file = read(path);
+    return file && check(path, blob, *file);
   }
 
-  bool check(const std::string& path, const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
-    if (bytes.size() != blob.bytes || sha256(bytes) != blob.digest) {
-      quarantine(path, "the result " + blob.name + " does not have its digest");
+  bool check(const std::string& path, const StoredBlob& blob, const ReadFile& file) {
+    if (file.bytes.size() != blob.bytes || sha256(file.bytes) != blob.digest) {
+      quarantine(path, file, "the result " + blob.name + " does not have its digest");
       return false;
     }
     touch(path);
@@ -221,18 +231,21 @@ class DiskStore : public Store {
     return true;
   }
 
-  void quarantine(const std::string& path, const std::string& what) {
+  /// Tells of every damaged file once, however many threads and processes have read it.
+  void quarantine(const std::string& path, const ReadFile& read, const std::string& what) {
     std::string fate = "left where it is";
+    bool moved = false;
     if (writes_) {
-      std::error_code ec;
-      fs::create_directories(folder_ + "/quarantine", ec);
-      const std::string name = fs::path(path).filename().string();
-      fs::rename(path, folder_ + "/quarantine/" + name, ec);
-      fate = (ec ? "it could not be moved away (" + ec.message() + ")" : "moved to quarantine/" + name) +
+      const QuarantineResult result = move_to_quarantine(folder_, path, read.stamp);
+      if (result.fate == QuarantineResult::Fate::kReplaced) return;  // whoever has moved it tells of it
+      moved = result.fate == QuarantineResult::Fate::kMoved;
+      fate = (moved ? "moved to quarantine/" + fs::path(path).filename().string()
+                    : "it could not be moved away (" + result.reason + ")") +
              ", computed again";
     }
     const std::lock_guard lock(mutex_);
-    events_.push_back({"cache-entry-damaged", what + "; " + fate});
+    if (moved || told_where_it_is_.insert(path).second)
+      events_.push_back({"cache-entry-damaged", what + "; " + fate});
   }
 
   bool not_written() {
@@ -250,6 +263,7 @@ class DiskStore : public Store {
   std::mutex mutex_;
   std::map<Sha256, FileStamp> verified_;  // only stamps that prove something
   std::vector<StoreEvent> events_;
+  std::set<std::string> told_where_it_is_;  // paths of damaged files that stay
   bool told_not_written_ = false;
 };
 

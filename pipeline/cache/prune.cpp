@@ -261,21 +261,25 @@ class Verification {
 
   std::vector<CacheDamage> run() {
     const std::vector<Entry> records = list(folder_, "ac");
-    for (const Entry& e : list(folder_, "cas")) check_blob(e);
-    for (const Entry& e : records) check_record(e);
-    for (const Entry& e : list(folder_, "notes")) check_note(e);
+    check_each(list(folder_, "cas"), &Verification::check_blob);
+    check_each(records, &Verification::check_record);
+    check_each(list(folder_, "notes"), &Verification::check_note);
     std::sort(damage_.begin(), damage_.end(),
               [](const CacheDamage& a, const CacheDamage& b) { return a.path < b.path; });
     return damage_;
   }
 
  private:
+  /// Listing may be long ago: a check gets the entry as it is just before the check reads it.
+  void check_each(const std::vector<Entry>& listed, void (Verification::*check)(const Entry&)) {
+    for (const Entry& e : listed)
+      if (const auto stamp = stamp_of(e.path)) (this->*check)({e.path, *stamp});
+  }
+
+  /// A build that has moved the file away meanwhile tells of it.
   void condemn(const Entry& e, const std::string& reason) {
-    std::error_code ec;
-    if (!stamp_of(e.path)) return;
-    fs::create_directories(folder_ + "/quarantine", ec);
-    fs::rename(e.path, folder_ + "/quarantine/" + name_of(e), ec);
-    damage_.push_back({fs::path(e.path).lexically_relative(folder_).string(), reason});
+    if (move_to_quarantine(folder_, e.path, e.stamp).fate != QuarantineResult::Fate::kReplaced)
+      damage_.push_back({fs::path(e.path).lexically_relative(folder_).string(), reason});
   }
 
   void check_blob(const Entry& e) {

@@ -1,5 +1,7 @@
 #include "pipeline/inspect/provenance.h"
 
+#include <nlohmann/json.hpp>
+
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
@@ -81,7 +83,7 @@ Provenance read_provenance(std::span<const std::uint8_t> json) {
   p.format_major = static_cast<int>(integer(format, "major", "/format", 65535));
   p.format_minor = static_cast<int>(integer(format, "minor", "/format", 65535));
   p.inputs = read_inputs(root);
-  p.options = read_options(root);
+  p.options = std::make_shared<const Json>(read_options(root));
   const Json stages = object_member(root, "stages"), libraries = object_member(root, "libraries");
   for (const auto& [name, value] : stages.items())
     p.stages.emplace_back(name, static_cast<int>(integer(stages, name.c_str(), "/stages", 1u << 30)));

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,7 +19,7 @@ struct Provenance {
   std::string tool;  // "texmesh 1.2.3"
   int format_major = 0, format_minor = 0;
   std::vector<Input> inputs;                                   // the model first
-  nlohmann::ordered_json options;                              // a profile with every option
+  std::shared_ptr<const nlohmann::ordered_json> options;       // a profile with every option, never null
   std::vector<std::pair<std::string, int>> stages;             // name, version
   std::vector<std::pair<std::string, std::string>> libraries;  // name, version
 };

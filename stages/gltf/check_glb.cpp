@@ -1,5 +1,7 @@
 #include "stages/gltf/check_glb.h"
 
+#include <nlohmann/json.hpp>
+
 #include "stages/gltf/check_glb_nodes.h"
 #include "stages/gltf/check_glb_primitive.h"
 #include "stages/gltf/check_glb_textures.h"

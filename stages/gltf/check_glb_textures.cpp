@@ -1,5 +1,7 @@
 #include "stages/gltf/check_glb_textures.h"
 
+#include <nlohmann/json.hpp>
+
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
 
@@ -64,6 +65,16 @@ T read_as(const std::uint8_t* p) {
 
 }  // namespace
 
+GlbDocument::GlbDocument(std::span<const std::uint8_t> bytes, std::string entry, Findings& findings,
+                         bool standalone)
+    : bytes_(bytes),
+      entry_(std::move(entry)),
+      findings_(findings),
+      standalone_(standalone),
+      root_(std::make_unique<Json>()) {}
+
+GlbDocument::~GlbDocument() = default;
+
 void GlbDocument::fail(const char* check, const std::string& field, const std::string& expected,
                        const std::string& found) {
   findings_.add(check, entry_, field, expected, found);
@@ -102,19 +113,19 @@ std::size_t GlbDocument::index(const Json& object, const char* key, std::size_t 
 }
 
 bool GlbDocument::uses_extension(const std::string& name) const {
-  const auto it = root_.find("extensionsUsed");
-  return it != root_.end() && it->is_array() && std::find(it->begin(), it->end(), Json(name)) != it->end();
+  const auto it = root_->find("extensionsUsed");
+  return it != root_->end() && it->is_array() && std::find(it->begin(), it->end(), Json(name)) != it->end();
 }
 
 bool GlbDocument::load() {
   return guarded("glb-container", "", [&] {
     if (!load_chunks() || !load_json()) throw Broken{};
     load_buffers();
-    const std::size_t views = array(root_, "bufferViews", "").size();
+    const std::size_t views = array(*root_, "bufferViews", "").size();
     views_.resize(views);
     for (std::size_t i = 0; i < views; ++i)
       guarded("glb-decode", "/bufferViews/" + std::to_string(i), [&] { load_view(i); });
-    const std::size_t accessors = array(root_, "accessors", "").size();
+    const std::size_t accessors = array(*root_, "accessors", "").size();
     accessors_.resize(accessors);
     for (std::size_t i = 0; i < accessors; ++i)
       guarded("glb-accessor", "/accessors/" + std::to_string(i), [&] { load_accessor(i); });
@@ -155,16 +166,16 @@ bool GlbDocument::load_chunks() {
 
 bool GlbDocument::load_json() {
   try {
-    root_ = parse_bounded_json(json_, entry_);
+    *root_ = parse_bounded_json(json_, entry_);
   } catch (const FormatError& e) {
     findings_.add("glb-json", entry_, e);
     return false;
   }
-  if (!root_.is_object()) fail("glb-json", "", "an object", root_.type_name());
-  const auto asset = root_.find("asset");
-  if (asset == root_.end() || !asset->is_object() || text_at(*asset, "version") != "2.0")
+  if (!root_->is_object()) fail("glb-json", "", "an object", root_->type_name());
+  const auto asset = root_->find("asset");
+  if (asset == root_->end() || !asset->is_object() || text_at(*asset, "version") != "2.0")
     fail("glb-json", "/asset/version", "\"2.0\"", "something else");
-  for (const Json& name : array(root_, "extensionsRequired", "")) {
+  for (const Json& name : array(*root_, "extensionsRequired", "")) {
     const std::string text = name.is_string() ? name.get<std::string>() : name.dump();
     const bool known =
         std::find(kReadExtensions.begin(), kReadExtensions.end(), text) != kReadExtensions.end();
@@ -177,7 +188,7 @@ bool GlbDocument::load_json() {
 }
 
 void GlbDocument::load_buffers() {
-  const Json& buffers = array(root_, "buffers", "");
+  const Json& buffers = array(*root_, "buffers", "");
   for (std::size_t i = 0; i < buffers.size(); ++i) {
     const std::string place = "/buffers/" + std::to_string(i);
     const std::uint64_t bytes = number(buffers[i], "byteLength", 0, place);
@@ -194,7 +205,7 @@ void GlbDocument::load_buffers() {
 }
 
 void GlbDocument::load_view(std::size_t i) {
-  const Json& json = root_["bufferViews"][i];
+  const Json& json = (*root_)["bufferViews"][i];
   const std::string place = "/bufferViews/" + std::to_string(i);
   View& view = views_[i];
   const std::size_t buffer = index(json, "buffer", buffer_bytes_.size(), place);
@@ -259,7 +270,7 @@ void GlbDocument::decode_meshopt(View& view, const Json& json, const std::string
 }
 
 void GlbDocument::load_accessor(std::size_t i) {
-  const Json& json = root_["accessors"][i];
+  const Json& json = (*root_)["accessors"][i];
   const std::string place = "/accessors/" + std::to_string(i);
   Accessor& a = accessors_[i];
   const std::uint64_t type = number(json, "componentType", 0, place), count = number(json, "count", 0, place);

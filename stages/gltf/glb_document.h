@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,14 +34,16 @@ class GlbDocument {
 
   /// `standalone`: GlbRules::kStandalone.
   GlbDocument(std::span<const std::uint8_t> bytes, std::string entry, Findings& findings,
-              bool standalone = false)
-      : bytes_(bytes), entry_(std::move(entry)), findings_(findings), standalone_(standalone) {}
+              bool standalone = false);
+  ~GlbDocument();
+  GlbDocument(const GlbDocument&) = delete;
+  GlbDocument& operator=(const GlbDocument&) = delete;
 
   /// Reads everything; false when the file is too broken to look at its elements.
   bool load();
 
   bool standalone() const { return standalone_; }
-  const Json& root() const { return root_; }
+  const Json& root() const { return *root_; }
   const std::vector<View>& views() const { return views_; }
   const std::vector<Accessor>& accessors() const { return accessors_; }
   bool uses_extension(const std::string& name) const;
@@ -92,7 +94,7 @@ class GlbDocument {
   std::string entry_;
   Findings& findings_;
   bool standalone_ = false;
-  Json root_;
+  std::unique_ptr<Json> root_;               // never null
   std::vector<std::uint64_t> buffer_bytes_;  // declared; 0 bytes readable for all but buffer 0
   std::vector<View> views_;
   std::vector<std::vector<std::uint8_t>> decoded_;

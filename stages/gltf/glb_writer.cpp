@@ -3,10 +3,24 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
+
+struct GlbWriter::Elements {
+  Json views = Json::array(), accessors = Json::array();
+  std::map<std::string, Json> arrays{{"nodes", Json::array()},     {"meshes", Json::array()},
+                                     {"materials", Json::array()}, {"textures", Json::array()},
+                                     {"images", Json::array()},    {"samplers", Json::array()}};
+};
+
+GlbWriter::GlbWriter() : elements_(std::make_unique<Elements>()) {}
+GlbWriter::~GlbWriter() = default;
+
+GlbWriter::Json& GlbWriter::array(const std::string& name) { return elements_->arrays.at(name); }
 
 std::size_t GlbWriter::add_bytes(std::span<const std::uint8_t> bytes) {
   pad_to_four(bin_, 0);
@@ -23,13 +37,13 @@ std::size_t GlbWriter::add_view(std::span<const std::uint8_t> bytes, std::size_t
 }
 
 std::size_t GlbWriter::add_json_view(Json view) {
-  views_.push_back(std::move(view));
-  return views_.size() - 1;
+  elements_->views.push_back(std::move(view));
+  return elements_->views.size() - 1;
 }
 
 std::size_t GlbWriter::add_accessor(Json accessor) {
-  accessors_.push_back(std::move(accessor));
-  return accessors_.size() - 1;
+  elements_->accessors.push_back(std::move(accessor));
+  return elements_->accessors.size() - 1;
 }
 
 void GlbWriter::use_extension(const std::string& name, bool required) {
@@ -58,12 +72,12 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
   if (!required_.empty()) root["extensionsRequired"] = required_;
   root["scene"] = 0;
   Json nodes = Json::array();
-  for (std::size_t i = 0; i < arrays_.at("nodes").size(); ++i) nodes.push_back(i);
+  for (std::size_t i = 0; i < elements_->arrays.at("nodes").size(); ++i) nodes.push_back(i);
   root["scenes"] = Json::array({{{"nodes", nodes}}});
   for (const char* name : {"nodes", "meshes", "materials", "textures", "images", "samplers"})
-    if (!arrays_.at(name).empty()) root[name] = arrays_.at(name);
-  if (!accessors_.empty()) root["accessors"] = accessors_;
-  if (!views_.empty()) root["bufferViews"] = views_;
+    if (!elements_->arrays.at(name).empty()) root[name] = elements_->arrays.at(name);
+  if (!elements_->accessors.empty()) root["accessors"] = elements_->accessors;
+  if (!elements_->views.empty()) root["bufferViews"] = elements_->views;
   root["buffers"] = Json::array({{{"byteLength", bin.size()}}});
   if (fallback_bytes_)
     root["buffers"].push_back({{"byteLength", fallback_bytes_},

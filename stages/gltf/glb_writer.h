@@ -1,18 +1,22 @@
 #pragma once
 #include <cstdint>
-#include <map>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace texmesh {
 
-/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB. Only .cpp
-/// files include this header, because it brings the JSON library along.
+/// A glTF 2.0 document that grows: what the scales stage needs of the format, written as a GLB.
 class GlbWriter {
  public:
   using Json = nlohmann::ordered_json;
+
+  GlbWriter();
+  ~GlbWriter();
+  GlbWriter(const GlbWriter&) = delete;
+  GlbWriter& operator=(const GlbWriter&) = delete;
 
   /// Appends to the binary chunk at a multiple of 4 bytes; returns the buffer view's index.
   std::size_t add_view(std::span<const std::uint8_t> bytes, std::size_t stride = 0, int target = 0);
@@ -24,7 +28,7 @@ class GlbWriter {
   void use_extension(const std::string& name, bool required);
 
   /// Materials, textures, images, samplers, meshes, nodes: arrays that the caller fills.
-  Json& array(const std::string& name) { return arrays_.at(name); }
+  Json& array(const std::string& name);
   /// A second buffer of this size that holds nothing (EXT_meshopt_compression's fallback); 0 = none.
   void set_fallback_buffer(std::size_t bytes) { fallback_bytes_ = bytes; }
 
@@ -36,11 +40,9 @@ class GlbWriter {
   static double shortest(float x);
 
  private:
+  struct Elements;
+  std::unique_ptr<Elements> elements_;
   std::vector<std::uint8_t> bin_;
-  Json views_ = Json::array(), accessors_ = Json::array();
-  std::map<std::string, Json> arrays_{{"nodes", Json::array()},     {"meshes", Json::array()},
-                                      {"materials", Json::array()}, {"textures", Json::array()},
-                                      {"images", Json::array()},    {"samplers", Json::array()}};
   std::vector<std::string> used_, required_;
   std::size_t fallback_bytes_ = 0;
 };

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 
+#include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
 

@@ -4,9 +4,9 @@
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/previews.h"
-#include "stages/gltf/glb_writer.h"
 
 namespace texmesh {
+class GlbWriter;
 
 /// One preview image of a GLB, made once for all scales.
 struct PreviewImage {

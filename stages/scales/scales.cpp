@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "format/base/no_index.h"
 #include "format/split/split_stream.h"
 #include "format/split/split_writer.h"
 #include "stages/base/parallel.h"
+#include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_codecs.h"
 #include "stages/scales/scale_materials.h"
 #include "stages/scales/vertex_split.h"

@@ -8,66 +8,70 @@
 
 namespace texmesh {
 
-/// The Laplace-Beltrami operator of a surface, positive semi-definite: (L f)_i = sum_j rate_ij (f_i - f_j).
+/// The Laplace-Beltrami operator L of a surface: (L f)_i = sum_j rate_ij (f_i - f_j). L is positive
+/// semi-definite. The matrix is sparse and stored by rows.
 struct HeatOperator {
-  std::vector<std::uint32_t> first;   // [vertices + 1] into column and rate
-  std::vector<std::uint32_t> column;  // neighbours, rising within a row
-  std::vector<float> rate;            // w_ij / M_i, one over length squared
-  std::vector<double> mass;           // M_i: the share of the area
-  double mean_edge = 0;               // as it was made with
-  double bound = 0;                   // no eigenvalue is larger: max over edges of both ends' row sums
-  double capped = 0;                  // fraction of edges whose weight the rate cap lowered
+  std::vector<std::uint32_t> first;   // [vertices + 1]: where the row of a vertex begins in column and rate
+  std::vector<std::uint32_t> column;  // neighbours of the vertex, rising within a row
+  std::vector<float> rate;            // rate_ij = w_ij / M_i, in 1 / length^2
+  std::vector<double> mass;           // M_i: the vertex's share of the area
+  double mean_edge = 0;               // mean length of an edge that make_heat_operator() was given
+  double bound = 0;   // bound of the eigenvalues: most, over edges, of both ends' sums of rates
+  double capped = 0;  // fraction of edges whose weight the rate cap has lowered
   std::size_t vertex_count() const { return first.size() - 1; }
 };
 
-/// Neighbours whose weight no triangle gives.
+/// Two vertices that are neighbours without an edge of a triangle between them, and their weight.
 struct HeatChord {
   std::uint32_t lo = 0, hi = 0;  // lo < hi
   double weight = 0;             // > 0
 };
 
-/// What the operator is made from: points, and three vertices per triangle, all different; every vertex has a
-/// triangle or a chord. Works for triangles without area.
+/// The surface of an operator. Every vertex has a triangle or a chord. Triangles may have no area.
 struct HeatSurface {
   std::span<const Vec3d> points;
-  std::span<const std::uint32_t> corners;
-  std::span<const HeatChord> chords;  // sorted by lo, hi; none is an edge of a triangle
+  std::span<const std::uint32_t> corners;  // three different vertices for each triangle
+  std::span<const HeatChord> chords;       // sorted by lo, then hi; no chord is an edge of a triangle
 };
 
-/// Cotangent weights, each cotangent clamped to [0.05, 20]; w_ij <= rate_cap min(M_i, M_j) / mean_edge^2,
-/// which keeps slivers and uneven sampling from blowing up the spectrum. An empty `mass` stands for the
-/// barycentric lumped ones, of at least 0.2 of the neighbours' mean.
+/// Makes the operator from cotangent weights. Each cotangent is clamped to [0.05, 20]. Each weight w_ij is at
+/// most rate_cap min(M_i, M_j) / mean_edge^2, so that slivers and uneven sampling give no huge eigenvalues.
+/// When `mass` is empty, the masses are barycentric: a third of the area of a vertex's triangles, and at
+/// least 0.2 of the mean of its neighbours.
 HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> mass, double mean_edge,
                                 double rate_cap);
 
-/// Slows down the edges of vertices whose rates sum up to more than half of `bound`, so that no eigenvalue is
-/// larger.
+/// Lowers the rates of the edges of every vertex whose rates sum up to more than half of `bound`. Afterwards
+/// no eigenvalue is larger than `bound`.
 void limit_spectrum(HeatOperator& laplacian, double bound);
 
-/// What heat flow makes of points x by one time t. Displacements, not places: beside the size of the whole a
-/// float has too few digits for the response of fine relief.
+/// The points x after heat flow until time t, as displacements. A place as a float would have too few digits
+/// for the response of fine relief on a large surface.
 struct HeatFlow {
   std::vector<Vec3f> moved;     // exp(-(t - start) L) x - x
-  std::vector<Vec3f> response;  // t L exp(-(t - start) L) x: the (negative) scale-normalised LoG
+  std::vector<Vec3f> response;  // t L exp(-(t - start) L) x: the negative of the scale-normalised LoG
 };
 
 enum class HeatPrecision : std::uint8_t {
-  kFloat,   // single precision, series truncated where the rest is below 1e-5
-  kDouble,  // double precision, 1e-9: the yardstick
+  kFloat,   // single precision; the series ends where the rest is below 1e-5
+  kDouble,  // double precision; the series ends where the rest is below 1e-9. Tests compare with it
 };
 
-/// How many Chebyshev terms heat flow over this much time needs at most.
+/// The most Chebyshev terms that heat flow over the time span `time` needs. `bound`: HeatOperator::bound.
 int heat_terms(double time, double bound);
 
-/// Both kernels for all times (strictly rising, beyond `start`) in one Chebyshev recurrence whose matrix
-/// passes take x, y and z together. `points` are x at time `start`; flows follow one another exp(-(a+b)L) =
-/// exp(-bL) exp(-aL), so that long ones can be run in parts. t lambda exp(-t lambda) is expanded directly,
-/// not made from the smoothed points. Deterministic for any thread count.
+/// Runs heat flow from `start` to each of `times` and returns one HeatFlow for each time. `times` rise
+/// strictly and are larger than `start`. `points` are the points x at time `start`. A long flow can be run
+/// in parts: exp(-(a + b) L) = exp(-b L) exp(-a L).
+/// One Chebyshev recurrence serves both members of HeatFlow and all times. Each of its matrix products takes
+/// x, y and z together. The response is not made from the smoothed points: its kernel,
+/// t lambda exp(-t lambda), is expanded directly.
+/// Equal input gives equal results for any number of threads. Throws Cancelled.
 std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec3d> points, double start,
                               std::span<const double> times, const RunContext& context,
                               HeatPrecision precision = HeatPrecision::kFloat);
 
-/// Bytes that one term of the single-precision recurrence has to move at least: operator and vectors once
+/// The fewest bytes that one term of the single-precision recurrence moves: the operator and the vectors once
 /// each.
 double heat_term_bytes(const HeatOperator& laplacian);
 

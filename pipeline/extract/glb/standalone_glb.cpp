@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "format/base/bounded_json.h"
@@ -14,7 +15,7 @@
 namespace texmesh {
 namespace {
 
-using Json = StandaloneGlb::Json;
+using Json = nlohmann::ordered_json;
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
 constexpr const char* kWebp = "EXT_texture_webp";
@@ -78,62 +79,80 @@ void require_valid(std::span<const std::uint8_t> glb, const std::string& entry) 
 
 }  // namespace
 
+struct StandaloneGlb::Document {
+  struct View {
+    Json json;  // without buffer, byteOffset, byteLength, except those of a fallback buffer
+    Bytes bytes;
+    bool meshopt = false;
+  };
+  Json root;
+  std::vector<View> views;
+};
+
+StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
+    : entry_(other.entry_),
+      document_(std::make_unique<Document>(*other.document_)),
+      fallback_bytes_(other.fallback_bytes_),
+      level_node_(other.level_node_) {}
+StandaloneGlb::StandaloneGlb(StandaloneGlb&& other) noexcept = default;
+StandaloneGlb::~StandaloneGlb() = default;
+
 StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry)
-    : entry_(std::move(entry)) {
+    : entry_(std::move(entry)), document_(std::make_unique<Document>()) {
   require_valid(glb, entry_);
   constexpr std::size_t kHeader = 12, kChunk = 8;
   const std::size_t json_bytes = read_u32(glb, kHeader);
-  root_ = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);
+  document_->root = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);
   const std::size_t binary_at = kHeader + kChunk + json_bytes;
   const std::span<const std::uint8_t> binary = glb.size() > binary_at + kChunk
                                                    ? glb.subspan(binary_at + kChunk, read_u32(glb, binary_at))
                                                    : std::span<const std::uint8_t>();
-  if (root_.contains("buffers") && root_["buffers"].size() > 1)
-    fallback_bytes_ = root_["buffers"][1].value("byteLength", std::uint64_t{0});
-  if (!root_.contains("bufferViews")) return;
-  for (const Json& json : root_["bufferViews"]) {
-    View view{json, {}, json.contains("extensions") && json["extensions"].contains(kMeshopt)};
+  if (document_->root.contains("buffers") && document_->root["buffers"].size() > 1)
+    fallback_bytes_ = document_->root["buffers"][1].value("byteLength", std::uint64_t{0});
+  if (!document_->root.contains("bufferViews")) return;
+  for (const Json& json : document_->root["bufferViews"]) {
+    Document::View view{json, {}, json.contains("extensions") && json["extensions"].contains(kMeshopt)};
     const Json& place = view.meshopt ? json["extensions"][kMeshopt] : json;
     const std::size_t offset = number(place, "byteOffset"), bytes = number(place, "byteLength");
     if (offset > binary.size() || bytes > binary.size() - offset)
       throw FormatError(entry_, "/bufferViews", "views within the binary chunk", "one beyond it");
     view.bytes.assign(binary.begin() + static_cast<std::ptrdiff_t>(offset),
                       binary.begin() + static_cast<std::ptrdiff_t>(offset + bytes));
-    views_.push_back(std::move(view));
+    document_->views.push_back(std::move(view));
   }
 }
 
 std::size_t StandaloneGlb::add_view(Bytes bytes) {
-  views_.push_back({Json::object(), std::move(bytes), false});
-  return views_.size() - 1;
+  document_->views.push_back({Json::object(), std::move(bytes), false});
+  return document_->views.size() - 1;
 }
 
 void StandaloneGlb::use_extension(const std::string& name, bool required) {
   for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
     if (list == std::string("extensionsRequired") && !required) continue;
-    Json names = root_.value(list, Json::array());
+    Json names = document_->root.value(list, Json::array());
     if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
-    root_[list] = names;
+    document_->root[list] = names;
   }
 }
 
 void StandaloneGlb::forget_extension(const std::string& name) {
   for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
-    if (!root_.contains(list)) continue;
+    if (!document_->root.contains(list)) continue;
     Json kept = Json::array();
-    for (const Json& n : root_[list])
+    for (const Json& n : document_->root[list])
       if (n != name) kept.push_back(n);
     if (kept.empty())
-      root_.erase(list);
+      document_->root.erase(list);
     else
-      root_[list] = kept;
+      document_->root[list] = kept;
   }
 }
 
 std::vector<std::uint32_t> StandaloneGlb::source_images() const {
   std::vector<std::uint32_t> out;
-  if (!root_.contains("images")) return out;
-  for (const Json& image : root_["images"]) {
+  if (!document_->root.contains("images")) return out;
+  for (const Json& image : document_->root["images"]) {
     std::uint32_t number = 0;
     if (source_image_of(image, number)) out.push_back(number);
   }
@@ -141,10 +160,10 @@ std::vector<std::uint32_t> StandaloneGlb::source_images() const {
 }
 
 void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
-  if (!root_.contains("images")) return;
-  std::vector<bool> webp(root_["images"].size());
+  if (!document_->root.contains("images")) return;
+  std::vector<bool> webp(document_->root["images"].size());
   for (std::size_t k = 0; k < webp.size(); ++k) {
-    Json& image = root_["images"][k];
+    Json& image = document_->root["images"][k];
     std::uint32_t source = 0;
     const auto found = source_image_of(image, source) ? images.find(source) : images.end();
     if (found != images.end()) {
@@ -153,8 +172,8 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
     }
     webp[k] = image.value("mimeType", "") == "image/webp";
   }
-  if (root_.contains("textures"))
-    for (Json& texture : root_["textures"]) {
+  if (document_->root.contains("textures"))
+    for (Json& texture : document_->root["textures"]) {
       std::size_t image = number(texture, "source");
       if (texture.contains("extensions") && texture["extensions"].contains(kWebp))
         image = number(texture["extensions"][kWebp], "source");
@@ -172,25 +191,25 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
 }
 
 bool StandaloneGlb::has_draco() const {
-  return root_.contains("extensionsUsed") &&
-         std::find(root_["extensionsUsed"].begin(), root_["extensionsUsed"].end(), Json(kDraco)) !=
-             root_["extensionsUsed"].end();
+  return document_->root.contains("extensionsUsed") &&
+         std::find(document_->root["extensionsUsed"].begin(), document_->root["extensionsUsed"].end(),
+                   Json(kDraco)) != document_->root["extensionsUsed"].end();
 }
 
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
   std::vector<DracoStream> streams;
-  for_each_primitive(root_, [&](Json& primitive) {
+  for_each_primitive(document_->root, [&](Json& primitive) {
     const Json* draco = draco_of(primitive);
     if (!draco) return;
     DracoStream s;
-    s.bytes = views_.at(number(*draco, "bufferView")).bytes;
+    s.bytes = document_->views.at(number(*draco, "bufferView")).bytes;
     for (const auto& [name, id] : (*draco)["attributes"].items()) s.attributes[name] = id.get<int>();
     streams.push_back(std::move(s));
   });
   if (streams.empty()) return;
   recode_draco(streams, steps, lit_as, entry_, context);
   std::size_t next = 0;
-  for_each_primitive(root_, [&](Json& primitive) {
+  for_each_primitive(document_->root, [&](Json& primitive) {
     Json* draco = draco_of(primitive);
     if (!draco) return;
     DracoStream& s = streams[next++];
@@ -198,87 +217,88 @@ void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as,
     (*draco)["bufferView"] = add_view(std::move(s.bytes));
     for (const auto& [name, id] : s.attributes) (*draco)["attributes"][name] = id;
     for (const auto& [name, accessor] : primitive["attributes"].items()) {
-      Json& a = root_["accessors"].at(accessor.get<std::size_t>());
+      Json& a = document_->root["accessors"].at(accessor.get<std::size_t>());
       a["count"] = s.vertices;
       if (name == "POSITION") a["min"] = vector_json(s.low), a["max"] = vector_json(s.high);
     }
-    Json& indices = root_["accessors"].at(number(primitive, "indices"));
+    Json& indices = document_->root["accessors"].at(number(primitive, "indices"));
     indices["count"] = std::size_t{s.triangles} * 3;
     indices["componentType"] = s.vertices > 65535 ? 5125 : 5123;
   });
 }
 
 void StandaloneGlb::begin_levels(double screen_coverage) {
-  const std::size_t scene = number(root_, "scene");
-  Json& nodes = root_["scenes"].at(scene)["nodes"];
+  const std::size_t scene = number(document_->root, "scene");
+  Json& nodes = document_->root["scenes"].at(scene)["nodes"];
   Json parent{{"name", "level 0"}, {"children", nodes}};
   parent["extensions"][kLod]["ids"] = Json::array();
   parent["extras"]["MSFT_screencoverage"] = Json::array({screen_coverage});
-  level_node_ = root_["nodes"].size();
-  root_["nodes"].push_back(parent);
+  level_node_ = document_->root["nodes"].size();
+  document_->root["nodes"].push_back(parent);
   nodes = Json::array({level_node_});
   use_extension(kLod, false);
 }
 
 void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   for (const char* shared : {"materials", "textures", "samplers"})
-    if (root_.value(shared, Json::array()) != coarser.root_.value(shared, Json::array()))
+    if (document_->root.value(shared, Json::array()) != coarser.document_->root.value(shared, Json::array()))
       throw FormatError(coarser.entry_, std::string("/") + shared, "those of " + entry_, "others");
-  const std::size_t view = views_.size(), accessor = root_["accessors"].size(), mesh = root_["meshes"].size(),
-                    node = root_["nodes"].size();
-  for (View& v : coarser.views_) {
+  const std::size_t view = document_->views.size(), accessor = document_->root["accessors"].size(),
+                    mesh = document_->root["meshes"].size(), node = document_->root["nodes"].size();
+  for (Document::View& v : coarser.document_->views) {
     if (v.meshopt) v.json["byteOffset"] = number(v.json, "byteOffset") + fallback_bytes_;
-    views_.push_back(std::move(v));
+    document_->views.push_back(std::move(v));
   }
   fallback_bytes_ += (coarser.fallback_bytes_ + 3) / 4 * 4;
   const auto moved = [](std::size_t by) {
     return [by](Json& index) { index = index.get<std::size_t>() + by; };
   };
   for (const char* list : {"accessors", "meshes"})
-    for_each_key(coarser.root_[list], "bufferView", moved(view));
-  for (Json& a : coarser.root_["accessors"]) root_["accessors"].push_back(std::move(a));
-  for_each_primitive(coarser.root_, [&](Json& primitive) {
+    for_each_key(coarser.document_->root[list], "bufferView", moved(view));
+  for (Json& a : coarser.document_->root["accessors"]) document_->root["accessors"].push_back(std::move(a));
+  for_each_primitive(coarser.document_->root, [&](Json& primitive) {
     for (Json& a : primitive["attributes"]) a = a.get<std::size_t>() + accessor;
     if (primitive.contains("indices")) primitive["indices"] = number(primitive, "indices") + accessor;
   });
-  for (Json& m : coarser.root_["meshes"]) root_["meshes"].push_back(std::move(m));
-  for (Json& n : coarser.root_["nodes"]) {
+  for (Json& m : coarser.document_->root["meshes"]) document_->root["meshes"].push_back(std::move(m));
+  for (Json& n : coarser.document_->root["nodes"]) {
     if (n.contains("mesh")) n["mesh"] = number(n, "mesh") + mesh;
     if (n.contains("children"))
       for (Json& child : n["children"]) child = child.get<std::size_t>() + node;
-    root_["nodes"].push_back(std::move(n));
+    document_->root["nodes"].push_back(std::move(n));
   }
   Json children = Json::array();
-  for (const Json& child : coarser.root_["scenes"].at(number(coarser.root_, "scene"))["nodes"])
+  for (const Json& child :
+       coarser.document_->root["scenes"].at(number(coarser.document_->root, "scene"))["nodes"])
     children.push_back(child.get<std::size_t>() + node);
-  Json& ids = root_["nodes"][level_node_]["extensions"][kLod]["ids"];
+  Json& ids = document_->root["nodes"][level_node_]["extensions"][kLod]["ids"];
   Json level{{"name", "level " + std::to_string(ids.size() + 1)}, {"children", children}};
-  ids.push_back(root_["nodes"].size());
-  root_["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
-  root_["nodes"].push_back(level);
+  ids.push_back(document_->root["nodes"].size());
+  document_->root["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
+  document_->root["nodes"].push_back(level);
   for (const char* list : {"extensionsUsed", "extensionsRequired"})
-    for (const Json& name : coarser.root_.value(list, Json::array()))
+    for (const Json& name : coarser.document_->root.value(list, Json::array()))
       use_extension(name.get<std::string>(), list == std::string("extensionsRequired"));
 }
 
 Bytes StandaloneGlb::finish() const {
-  Json root = root_;
+  Json root = document_->root;
   root.erase("bufferViews");
   root.erase("buffers");
-  std::vector<std::int64_t> place(views_.size(), -1);
+  std::vector<std::int64_t> place(document_->views.size(), -1);
   for_each_key(root, "bufferView", [&](Json& view) { place.at(view.get<std::size_t>()) = 0; });
   Bytes binary;
   Json views = Json::array();
-  for (std::size_t k = 0; k < views_.size(); ++k) {
+  for (std::size_t k = 0; k < document_->views.size(); ++k) {
     if (place[k] < 0) continue;
     place[k] = static_cast<std::int64_t>(views.size());
     pad_to_four(binary, 0);
-    Json json = views_[k].json;
-    Json& at = views_[k].meshopt ? json["extensions"][kMeshopt] : json;
+    Json json = document_->views[k].json;
+    Json& at = document_->views[k].meshopt ? json["extensions"][kMeshopt] : json;
     at["buffer"] = 0;
     at["byteOffset"] = binary.size();
-    at["byteLength"] = views_[k].bytes.size();
-    binary.insert(binary.end(), views_[k].bytes.begin(), views_[k].bytes.end());
+    at["byteLength"] = document_->views[k].bytes.size();
+    binary.insert(binary.end(), document_->views[k].bytes.begin(), document_->views[k].bytes.end());
     views.push_back(std::move(json));
   }
   for_each_key(root, "bufferView",

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,14 +12,16 @@
 namespace texmesh {
 
 /// A scale's GLB taken apart, changed and written again: other images, a coarser mesh, further levels of
-/// detail. Materials, nodes, names, extras and extensions stay as they are. Brings the JSON library along;
-/// for .cpp files of this folder.
+/// detail. Materials, nodes, names, extras and extensions stay as they are.
 class StandaloneGlb {
  public:
-  using Json = nlohmann::ordered_json;
-
   /// Checks the whole file first (check_glb.h). `entry` is for messages. FormatError.
   StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry);
+  StandaloneGlb(const StandaloneGlb& other);
+  StandaloneGlb(StandaloneGlb&& other) noexcept;
+  StandaloneGlb& operator=(const StandaloneGlb&) = delete;
+  StandaloneGlb& operator=(StandaloneGlb&&) = delete;
+  ~StandaloneGlb();
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
   std::vector<std::uint32_t> source_images() const;
@@ -42,17 +44,12 @@ class StandaloneGlb {
   std::vector<std::uint8_t> finish() const;
 
  private:
-  struct View {
-    Json json;  // without buffer, byteOffset, byteLength, except those of a fallback buffer
-    std::vector<std::uint8_t> bytes;
-    bool meshopt = false;
-  };
+  struct Document;
   std::size_t add_view(std::vector<std::uint8_t> bytes);
   void use_extension(const std::string& name, bool required);
   void forget_extension(const std::string& name);
   std::string entry_;
-  Json root_;
-  std::vector<View> views_;
+  std::unique_ptr<Document> document_;
   std::uint64_t fallback_bytes_ = 0;
   std::size_t level_node_ = 0;
 };

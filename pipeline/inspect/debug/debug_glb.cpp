@@ -1,4 +1,5 @@
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
 #include "format/documents/allocation.h"

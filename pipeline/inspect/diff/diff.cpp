@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/sha256.h"
@@ -40,7 +41,7 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p) {
       libraries(Kind::kLibrary), tool(Kind::kTool), format(Kind::kFormat);
   for (int side = 0; side < 2; ++side) {
     for (const Provenance::Input& i : p[side].inputs) inputs.add(side, i.uri, i.sha256, i.bytes);
-    for (const auto& [stage, section] : p[side].options.items())
+    for (const auto& [stage, section] : p[side].options->items())
       if (section.is_object())
         for (const auto& [name, value] : section.items()) options.add(side, stage + "." + name, value.dump());
     for (const auto& [name, version] : p[side].stages) stages.add(side, name, std::to_string(version));

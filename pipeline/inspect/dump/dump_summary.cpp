@@ -115,7 +115,7 @@ std::string kinds_text(const std::vector<KindBytes>& kinds) {
 }
 
 std::string options_text(const Provenance& provenance) {
-  const std::vector<OptionChange> changes = changed_options(provenance.options);
+  const std::vector<OptionChange> changes = changed_options(*provenance.options);
   if (changes.empty()) return "options: all at their defaults\n";
   TextTable table;
   table.column("option", Align::kLeft);

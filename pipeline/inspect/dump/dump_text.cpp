@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/dump_summary.h"
 #include "pipeline/inspect/dump/dump_textures.h"
@@ -35,7 +37,7 @@ std::string provenance_text(PackageReader& p) {
   TextTable options;
   options.column("option", Align::kLeft);
   options.column("value", Align::kLeft);
-  for (const auto& [stage, section] : provenance.options.items())
+  for (const auto& [stage, section] : provenance.options->items())
     if (section.is_object())
       for (const auto& [name, value] : section.items())
         options.row({printable(stage + "." + name), printable(value.dump())});

@@ -153,8 +153,8 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
                    "/format", std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
                    std::to_string(p.format_major) + "." + std::to_string(p.format_minor));
   const auto option = [&](const char* stage, const char* name) {
-    const auto section = p.options.find(stage);
-    if (section == p.options.end() || !section->contains(name)) return nlohmann::ordered_json();
+    const auto section = p.options->find(stage);
+    if (section == p.options->end() || !section->contains(name)) return nlohmann::ordered_json();
     return (*section)[name];
   };
   const auto title = option("package", "title");

@@ -28,7 +28,7 @@ class CompiledOptions : public ::testing::Test {
     request.options = options_;
     compile_model(request, store_, {}, {});
     PackageReader package(open_store(request.output));
-    return read_provenance(package.entry(package.manifest().provenance)).options[stage][name].dump();
+    return read_provenance(package.entry(package.manifest().provenance)).options->at(stage).at(name).dump();
   }
   testing::TemporaryFolder folder_;
   MemoryStore store_;

@@ -11,89 +11,12 @@
 #include <utility>
 
 #include "pipeline/graph/make_stage.h"
+#include "tests/pipeline/graph/fake_graph.h"
 
 namespace texmesh {
 namespace {
 
-using Text = std::string;
-
-constexpr Artefact<Text> kSource{"source"}, kLeft{"left"}, kRight{"right"}, kMiddle{"middle"}, kJoin{"join"};
-
-/// Options as a stage declares them; the graph knows their texts alone.
-struct ZimFake {
-  int difference = 20;
-  double share = 0.5;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("difference", s.difference, Range{0, 100}, "");
-    v("share", s.share, Range{0, 1}, "");
-  }
-};
-struct FakeOptions {
-  int scales = 20;
-  int unread = 0;
-  ZimFake zim;
-};
-
-std::vector<StageLibrary> fake_libraries() { return {{"draco", "1"}}; }
-
-/// A graph of text stages: left and right read the source, middle is derived, join reads all.
-struct Fake {
-  std::mutex mutex;
-  std::multiset<std::string> ran;
-  std::string left_suffix;  // changes what "left" computes without changing its key: a silent change of code
-  std::string fail;
-
-  Results<Text> text(const std::string& name, Text value) {
-    {
-      const std::lock_guard lock(mutex);
-      ran.insert(name);
-    }
-    if (fail == name) throw StageError(name, "", "success", "failure");
-    Notes notes;
-    if (name == "left") add_warning(notes, "left-note", "", value);
-    return {std::move(value), notes};
-  }
-
-  std::vector<Stage> table(const FakeOptions& o = {}) {
-    const auto left = [this](const Text& source, int, const RunContext&) {
-      return text("left", source.substr(0, 1) + left_suffix);
-    };
-    const auto right = [this](const Text& source, const ZimFake&, const RunContext&) {
-      return text("right", source + "R");
-    };
-    const auto middle = [this](const Text& a, const Text& b, const RunContext&) {
-      return text("middle", a + b);
-    };
-    const auto join = [this](const Text& a, const Text& b, const RunContext&) {
-      return text("join", a + "+" + b);
-    };
-    return {
-        make_stage({"left", 1, ""}, inputs(kSource), outputs(kLeft),
-                   options(OptionValue("ssf.scales", o.scales)), {}, left),
-        make_stage({"right", 1, ""}, inputs(kSource), outputs(kRight), options(OptionValue("zim", o.zim)),
-                   fake_libraries(), right),
-        make_stage({"middle", 1, ""}, inputs(kLeft, kRight), derived(kMiddle), options(), {}, middle),
-        make_stage({"join", 1, ""}, inputs(kMiddle, kLeft), outputs(kJoin), options(), {}, join),
-    };
-  }
-
-  Text run(Store& store, const Text& source, const FakeOptions& o = {}, int threads = 2,
-           Notes* notes = nullptr) {
-    ran.clear();
-    RunContext context;
-    context.threads = threads;
-    const std::vector<Stage> stages = table(o);
-    GraphRun graph(stages, store, context);
-    const Bytes bytes(source.begin(), source.end());
-    graph.give(kSource, source, sha256(bytes), bytes.size());
-    const auto result = graph.run(kJoin);
-    if (notes) *notes = graph.notes();
-    return *result;
-  }
-};
-
-using Ran = std::multiset<std::string>;
+using namespace testing;  // NOLINT: the fake graph
 
 /// A store without claims over another one.
 struct Unclaimed : Store {
@@ -263,69 +186,6 @@ TEST(GraphRun, CancelledBeforeAnyWork) {
   graph.give(kSource, Text("abc"), sha256({}), 0);
   EXPECT_THROW(graph.run(kJoin), Cancelled);
   EXPECT_EQ(fake.ran, Ran{});
-}
-
-TEST(GraphRun, ExplainsWhatHasChangedSinceTheEarlierRun) {
-  Fake fake;
-  MemoryStore store;
-  const auto run = [&](const FakeOptions& options, const StageKeys& earlier, StageKeys* keys) {
-    std::map<std::string, StageExplanation> told;
-    const RunContext context;
-    const std::vector<Stage> stages = fake.table(options);
-    GraphRun graph(stages, store, context);
-    graph.give(kSource, Text("abc"), sha256({}), 3);
-    graph.explain(earlier, [&](const Stage& s, const StageExplanation& e) { told[s.name] = e; });
-    graph.run(kJoin);
-    if (keys) *keys = graph.keys();
-    return told;
-  };
-  using Verdict = StageExplanation::Verdict;
-  StageKeys keys;
-  auto told = run({}, {}, &keys);
-  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
-  EXPECT_FALSE(told.at("left").has_history);
-  EXPECT_EQ(keys.size(), 3u);  // the derived stage has no entry of its own
-  told = run({}, keys, nullptr);
-  EXPECT_EQ(told.at("left").verdict, Verdict::kHit);
-  FakeOptions options;
-  options.scales = 7;
-  told = run(options, keys, nullptr);
-  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
-  EXPECT_TRUE(told.at("left").has_history);
-  ASSERT_EQ(told.at("left").changes.size(), 1u);
-  EXPECT_EQ(told.at("left").changes[0].label, "option ssf.scales");
-  EXPECT_EQ(told.at("left").changes[0].from, "20");
-  EXPECT_EQ(told.at("left").changes[0].to, "7");
-  EXPECT_EQ(told.at("join").verdict, Verdict::kHit);  // left gave the same
-}
-
-TEST(GraphRun, AForecastRunsNothing) {
-  Fake fake;
-  MemoryStore store;
-  const auto forecast = [&](const FakeOptions& options) {
-    const RunContext context;
-    const std::vector<Stage> stages = fake.table(options);
-    GraphRun graph(stages, store, context);
-    graph.give(kSource, Text("abc"), sha256({}), 3);
-    std::map<std::string, StageExplanation> told;
-    for (const auto& [stage, e] : graph.forecast()) told[stage->name] = e;
-    return told;
-  };
-  using Verdict = StageExplanation::Verdict;
-  auto told = forecast({});
-  EXPECT_EQ(told.at("left").verdict, Verdict::kRuns);
-  EXPECT_EQ(told.at("join").verdict, Verdict::kUnknown);
-  EXPECT_FALSE(told.at("join").waits_for.empty());
-  EXPECT_FALSE(told.contains("middle"));
-  EXPECT_EQ(fake.ran, Ran{});
-  {
-    const RunContext context;
-    const std::vector<Stage> stages = fake.table();
-    GraphRun graph(stages, store, context);
-    graph.give(kSource, Text("abc"), sha256({}), 3);
-    graph.run(kJoin);
-  }
-  for (const auto& [name, e] : forecast({})) EXPECT_EQ(e.verdict, Verdict::kHit) << name;
 }
 
 TEST(GraphRun, WaitsForWhoeverComputesTheSameAndTakesTheResult) {

@@ -12,7 +12,7 @@
 #include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
-#include "tests/support/meshes.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/packages.h"
 
 namespace texmesh::testing {
@@ -94,22 +94,17 @@ class BadGeometry : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
-  Mesh m;
-  m.positions = std::move(positions);
-  for (std::uint32_t p = 0; p < m.positions.size(); ++p) m.wedge_position.push_back(p);
+/// The files of this test have UVs.
+Mesh with_uvs(Mesh m) {
   m.uv0.assign(m.positions.size(), {});
-  m.triangles = std::move(triangles);
-  m.triangle_material.assign(m.triangles.size(), 0);
-  m.triangle_part.assign(m.triangles.size(), 0);
-  m.part_names = {"part"};
   return m;
+}
+Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
+  return with_uvs(bare_mesh(std::move(positions), std::move(triangles)));
 }
 
 TEST_F(BadGeometry, SliversOfNextToNoArea) {
-  Mesh m = sheet(24, 0.1f);
-  for (Vec3f& p : m.positions)
-    if (p.y < 0.45f) p.y *= 1e-12f, p.z = 0;
+  const Mesh m = sliver_sheet(24);
   const std::vector<Mesh> finest = compile(m);
   EXPECT_EQ(finest[0].triangles.size(), m.triangles.size());
   EXPECT_GT(scales_, 1u);
@@ -117,9 +112,7 @@ TEST_F(BadGeometry, SliversOfNextToNoArea) {
 
 /// On a coarse grid most faces of the stream show nothing, and the files have none of them.
 TEST_F(BadGeometry, GridsOfFewBits) {
-  Mesh m = sheet(48, 0.1f);
-  for (Vec3f& p : m.positions)
-    if (p.y < 0.45f) p.y *= 1e-12f, p.z = 0;
+  const Mesh m = sliver_sheet(48);
   for (const int bits : {1, 6, 7}) {
     position_bits_ = bits;
     SCOPED_TRACE(position_bits_);
@@ -151,9 +144,7 @@ TEST_F(BadGeometry, FacesTwiceOver) {
 }
 
 TEST_F(BadGeometry, InsideOutBesideRightWayRound) {
-  Mesh inside_out = bumpy_sphere(16, 24);
-  for (Triangle& t : inside_out.triangles) std::swap(t[1], t[2]);
-  const Mesh m = side_by_side({bumpy_sphere(16, 24), inside_out});
+  const Mesh m = side_by_side({bumpy_sphere(16, 24), inside_out(bumpy_sphere(16, 24))});
   for (const Mesh& finest : compile(m)) {
     // Which way a surface faces is what a viewer sees: it stays.
     double inside = 0;
@@ -181,18 +172,7 @@ TEST_F(BadGeometry, OneTriangle) {
 
 TEST_F(BadGeometry, ComponentsOfOneTriangle) {
   const int count = std::getenv("TEXMESH_FULL") ? 1'000'000 : 5'000;
-  Random random{3};
-  std::vector<Vec3f> points;
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const auto place = [&] { return static_cast<float>(random.uniform()); };
-    const Vec3f at{place(), place(), place()};
-    const auto first = static_cast<std::uint32_t>(points.size());
-    for (Vec3f corner : {Vec3f{0, 0, 0}, Vec3f{1, place(), 0}, Vec3f{place(), 1, 1}})
-      points.push_back(at + corner * 0.001f);
-    triangles.push_back({first, first + 1, first + 2});
-  }
-  EXPECT_EQ(compile(bare(points, triangles))[0].triangles.size(), static_cast<std::size_t>(count));
+  EXPECT_EQ(compile(with_uvs(dust(count, 0.001f)))[0].triangles.size(), static_cast<std::size_t>(count));
   EXPECT_GE(scales_, 2u);
 }
 

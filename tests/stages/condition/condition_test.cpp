@@ -8,7 +8,7 @@
 #include <set>
 
 #include "stages/base/run_context.h"
-#include "tests/support/meshes.h"
+#include "tests/support/hostile_meshes.h"
 
 namespace texmesh {
 namespace {
@@ -17,18 +17,6 @@ using testing::Random;
 
 ConditionedMesh run(const Mesh& m, const ConditionOptions& options = {}, bool by_specification = true) {
   return condition_mesh(m, by_specification, options, RunContext{});
-}
-
-/// A mesh without UVs from points and triangles; every corner's wedge is its position.
-Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
-  Mesh m;
-  m.positions = std::move(positions);
-  for (std::uint32_t p = 0; p < m.positions.size(); ++p) m.wedge_position.push_back(p);
-  m.triangles = std::move(triangles);
-  m.triangle_material.assign(m.triangles.size(), 0);
-  m.triangle_part.assign(m.triangles.size(), 0);
-  m.part_names = {"part"};
-  return m;
 }
 
 /// Every corner on its own, as STL stores triangles.
@@ -147,7 +135,7 @@ TEST(Condition, WeldDistanceClosesCracks) {
 
 TEST(Condition, WeldDistanceNeverJoinsWhatIsFartherApart) {
   Random random{11};
-  Mesh m = bare({}, {});
+  Mesh m = testing::bare_mesh({}, {});
   for (std::uint32_t i = 0; i < 3000; ++i) {
     m.positions.push_back({static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
                            static_cast<float>(random.uniform() * 0.02)});
@@ -206,12 +194,12 @@ TEST(Condition, KeepsACopyWithAnotherMaterial) {
 TEST(Condition, SliverStaysWhereItClosesACrack) {
   // A square whose left half has a vertex in the middle of the diagonal that its right half has not.
   const std::vector<Vec3f> points{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 0}};
-  const ConditionedMesh c = run(bare(points, {{0, 1, 2}, {0, 2, 4}, {0, 4, 3}, {4, 2, 3}}));
+  const ConditionedMesh c = run(testing::bare_mesh(points, {{0, 1, 2}, {0, 2, 4}, {0, 4, 3}, {4, 2, 3}}));
   EXPECT_EQ(c.report.slivers_kept, 1u);
   EXPECT_EQ(c.report.boundary_edges, 4u);
   expect_manifold(c);
   // The same sliver at the rim: nothing gapes without it.
-  const ConditionedMesh rim = run(bare(points, {{0, 1, 2}, {0, 2, 4}}));
+  const ConditionedMesh rim = run(testing::bare_mesh(points, {{0, 1, 2}, {0, 2, 4}}));
   EXPECT_EQ(rim.report.degenerate_triangles, 1u);
   EXPECT_EQ(rim.mesh.triangles.size(), 1u);
 }
@@ -231,13 +219,14 @@ TEST(Condition, TwoSidedSheetIsSplitIntoItsSides) {
   EXPECT_EQ(c.component_count, 1u);
   expect_manifold(c);
   expect_same_look(m, c);
-  const ConditionedMesh one = run(bare({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}));
+  const ConditionedMesh one =
+      run(testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}));
   EXPECT_EQ(one.mesh.positions.size(), 6u);
 }
 
 TEST(Condition, SplitsBowTies) {
-  const ConditionedMesh c =
-      run(bare({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}));
+  const ConditionedMesh c = run(
+      testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}));
   EXPECT_EQ(c.report.split_bow_ties, 1u);
   EXPECT_EQ(c.mesh.positions.size(), 6u);
   EXPECT_EQ(c.twin[5], 0u);
@@ -248,13 +237,13 @@ TEST(Condition, SplitsBowTies) {
 
 TEST(Condition, SplitsThreeLeavesAndOpposedFaces) {
   const std::vector<Vec3f> points{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {-1, 0.5f, 0}, {-1, -0.5f, 0}};
-  const ConditionedMesh leaves = run(bare(points, {{0, 1, 2}, {1, 0, 3}, {1, 0, 4}}));
+  const ConditionedMesh leaves = run(testing::bare_mesh(points, {{0, 1, 2}, {1, 0, 3}, {1, 0, 4}}));
   EXPECT_EQ(leaves.report.non_manifold_edges_found, 1u);
   EXPECT_EQ(leaves.report.split_non_manifold_edges, 1u);
   EXPECT_EQ(leaves.mesh.positions.size(), 7u);
   expect_manifold(leaves);
   // Two faces of one edge that disagree on what is front.
-  const ConditionedMesh opposed = run(bare(points, {{0, 1, 2}, {0, 1, 3}}));
+  const ConditionedMesh opposed = run(testing::bare_mesh(points, {{0, 1, 2}, {0, 1, 3}}));
   EXPECT_EQ(opposed.report.non_manifold_edges_found, 0u);
   EXPECT_EQ(opposed.report.split_non_manifold_edges, 1u);
   EXPECT_EQ(opposed.mesh.positions.size(), 6u);
@@ -263,8 +252,9 @@ TEST(Condition, SplitsThreeLeavesAndOpposedFaces) {
 
 TEST(Condition, FourLeavesKeepTheFlatPairs) {
   // Two sheets crossing along an edge: each goes on through the other.
-  const ConditionedMesh c = run(bare({{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}},
-                                     {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {1, 0, 5}}));
+  const ConditionedMesh c =
+      run(testing::bare_mesh({{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}},
+                             {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {1, 0, 5}}));
   EXPECT_EQ(c.mesh.positions.size(), 8u);
   EXPECT_EQ(c.mesh.position_of(0, 0), c.mesh.position_of(1, 1));
   EXPECT_EQ(c.mesh.position_of(2, 0), c.mesh.position_of(3, 1));
@@ -276,21 +266,15 @@ TEST(Condition, AnySoupBecomesManifold) {
   Random random{3};
   for (int round = 0; round < 400; ++round) {
     const std::uint32_t points = 4 + random.next() % 8, triangles = 1 + random.next() % 40;
-    std::vector<Vec3f> p;
-    for (std::uint32_t i = 0; i < points; ++i)
-      p.push_back({static_cast<float>(random.next() % 5), static_cast<float>(random.next() % 5),
-                   static_cast<float>(random.next() % 5)});
-    std::vector<Triangle> t;
-    for (std::uint32_t i = 0; i < triangles; ++i)
-      t.push_back({random.next() % points, random.next() % points, random.next() % points});
-    const Mesh m = bare(p, t);
+    const Mesh m = testing::random_soup(random, points, triangles, 5);
     try {
       const ConditionedMesh c = run(m);
       expect_manifold(c);
       expect_same_look(m, c);
     } catch (const StageError&) {
       for (std::uint32_t i = 0; i < triangles; ++i) {
-        const Vec3f a = p[t[i][0]], b = p[t[i][1]], d = p[t[i][2]];
+        const auto corner = [&](std::size_t k) { return m.positions[m.triangles[i][k]]; };
+        const Vec3f a = corner(0), b = corner(1), d = corner(2);
         EXPECT_EQ(cross(b - a, d - a), Vec3f{});
       }
     }
@@ -314,14 +298,14 @@ TEST(Condition, DropsWhatIsNotFinite) {
 }
 
 TEST(Condition, RefusesWhatShowsNothing) {
-  EXPECT_THROW(run(bare({}, {})), StageError);
-  EXPECT_THROW(run(bare({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}})), StageError);
-  EXPECT_THROW(
-      run(bare({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}})),
-      StageError);
+  EXPECT_THROW(run(testing::bare_mesh({}, {})), StageError);
+  EXPECT_THROW(run(testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}})), StageError);
+  EXPECT_THROW(run(testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}},
+                                      {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}})),
+               StageError);
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(run(bare({{nan, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})), StageError);
-  EXPECT_THROW(run(bare({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 3}})), StageError);
+  EXPECT_THROW(run(testing::bare_mesh({{nan, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})), StageError);
+  EXPECT_THROW(run(testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 3}})), StageError);
   Mesh bad = testing::cube();
   bad.wedge_position[3] = 8;
   EXPECT_THROW(run(bad), StageError);

@@ -13,13 +13,15 @@
 #include "stages/previews/previews.h"
 #include "stages/study/fragment_study.h"
 #include "stages/zim/zim.h"
-#include "tests/bench/bench_texture.h"
 #include "tests/support/allocation_curves.h"
 #include "tests/support/fill_curves.h"
+#include "tests/support/made_texture.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
 namespace {
+
+using testing::made_texture, testing::make_scene, testing::Scene, testing::texture_hash, testing::threads;
 
 constexpr std::uint32_t kSidePx = 1024, kFragmentPx = 128;
 constexpr int kBackground = 80;

@@ -4,85 +4,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <tuple>
 
 #include "format/base/archive.h"
 #include "format/base/sha256.h"
 #include "format/documents/allocation.h"
 #include "format/documents/rate_distortion.h"
-#include "stages/base/run_context.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/ladder/ladder.h"
-#include "stages/lut/size_model.h"
 #include "stages/measure/distortion.h"
 #include "stages/measure/fragment_meter.h"
-#include "stages/previews/previews.h"
-#include "stages/zim/zim.h"
-#include "tests/support/meshes.h"
+#include "tests/stages/lut/lut_scene.h"
 
 namespace texmesh {
 namespace {
 
-using testing::Random;
-
-struct Scene {
-  Fragments fragments;
-  std::vector<Pixels> pixels;
-  Predictors predictors;
-  Ladder ladder;
-  Previews previews;
-};
-
-TexturePlane plane_of(std::uint32_t columns, std::uint32_t rows, std::uint32_t channels) {
-  TexturePlane p;
-  p.channels = channels;
-  p.columns = columns;
-  p.rows = rows;
-  p.fragment_width_px = 32;
-  p.fragment_height_px = 48;
-  p.width_px = columns * 32 - 5;
-  p.height_px = rows * 48 - 7;
-  p.coverage.assign((std::size_t{p.width_px} + 7) / 8 * p.height_px, 0);
-  p.covered_texels.assign(p.fragment_count(), 0);
-  for (std::uint32_t y = 0; y < p.height_px; ++y)
-    for (std::uint32_t x = 0; x < p.width_px; ++x) {
-      if (x / 32 == 1 || (x + y) % 11 == 0) continue;  // a column of empty fragments, and holes elsewhere
-      p.coverage[(std::size_t{p.width_px} + 7) / 8 * y + x / 8] |= static_cast<std::uint8_t>(0x80 >> x % 8);
-      ++p.covered_texels[y / 48 * columns + x / 32];
-    }
-  for (std::size_t f = 0; f < p.fragment_count(); ++f) {
-    p.surface_fraction.push_back(p.covered_texels[f] ? 0.01f * static_cast<float>(f % 3 + 1) : 0);
-    p.features.push_back(static_cast<std::uint32_t>(f * 7 % 5));
-  }
-  p.features.resize(3 * p.fragment_count());
-  const float most = 4;
-  for (std::uint32_t f : p.features) p.eta.push_back(static_cast<float>(f) / most);
-  return p;
-}
-
-Scene make_scene(LadderOptions ladder_options = {}) {
-  Scene s;
-  s.fragments.scales = 2;
-  s.fragments.planes = {plane_of(4, 3, 3), plane_of(2, 1, 1)};
-  Random random{12};
-  for (const TexturePlane& p : s.fragments.planes) {
-    Pixels pixels{p.columns * 32, p.rows * 48, p.channels, {}};
-    for (std::size_t k = 0; k < std::size_t{pixels.width_px} * pixels.height_px * p.channels; ++k)
-      pixels.data.push_back(static_cast<std::uint8_t>(80 + k / 7 % 90 + random.next() % 30));
-    s.pixels.push_back(pixels);
-  }
-  s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder_options, {});
-  s.previews = make_previews(s.fragments, s.pixels, {}, {});
-  return s;
-}
-
-PackageTables build(const Scene& s, const LutOptions& options = {}, int threads = 1) {
-  RunContext context;
-  context.threads = threads;
-  return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, s.previews, options, context);
-}
+using namespace testing;  // NOLINT: fixtures
 
 TEST(Lut, SizesAndDigestsAreThoseOfTheStreams) {
   const Scene s = make_scene();
@@ -278,98 +215,6 @@ TEST(Lut, RateDistortionSpendsNoMoreAndLosesLess) {
     }
 }
 
-TEST(Lut, SizeModelFitsAndIsAbsentForOneRung) {
-  const PlaneTables t = build(make_scene()).planes[0];
-  EXPECT_GT(t.model_correlation, 0.95f);
-  EXPECT_LT(t.model_error, 0.2f);
-  EXPECT_GT(t.model_r, 1.0f);
-  double predictor = 0;
-  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
-  EXPECT_NEAR(t.model_b, std::log(t.model_r) / std::log(100 * predictor), 1e-4);
-  // Nine fragments of 32 x 48 texels in 4:2:0: 36 blocks of two bits each, SOI and EOI.
-  const double constant = 9 * (4 + 36.0 / 4);
-  double error = 0;
-  for (std::size_t r = 2; r < 9; ++r) {  // of quality 10 to 95
-    double size = 0;
-    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
-    error += std::fabs(t.model_a * std::pow(t.model_r, t.rung_quality[r]) + constant - size) / size / 7;
-  }
-  EXPECT_NEAR(t.model_error, error, 1e-3);
-
-  LadderOptions one;
-  one.rungs = {50};
-  const PlaneTables single = build(make_scene(one)).planes[0];
-  EXPECT_EQ(single.model_a, 0);
-  EXPECT_EQ(single.model_error, 0);
-}
-
-TEST(Lut, SizeModelIsNotFittedOnARungWithoutLoss) {
-  LadderOptions options;
-  options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
-  Scene s = make_scene(options);
-  EXPECT_GT(build(s).planes[0].model_error, 0.01f);
-  s.ladder.planes[0].lossless = true;
-  const PlaneTables t = build(s).planes[0];
-  EXPECT_NEAR(t.model_error, 0, 1e-5) << "two points have a curve through both";
-  EXPECT_NEAR(t.model_correlation, 1, 1e-6);
-}
-
-TEST(Lut, ConstantBytesAreTheCodecs) {
-  const Scene s = make_scene();
-  EXPECT_EQ(constant_bytes(s.ladder.planes[0], 32, 48), 4 + 36 / 4.0);  // 4:2:0
-  EXPECT_EQ(constant_bytes(s.ladder.planes[1], 32, 48), 4 + 24 / 4.0);  // grey
-  LadderOptions options;
-  options.subsampling = Subsampling::k444;
-  EXPECT_EQ(constant_bytes(make_scene(options).ladder.planes[0], 32, 48), 4 + 72 / 4.0);
-  PlaneLadder other = s.ladder.planes[0];
-  other.codec = Codec::kWebp;
-  EXPECT_EQ(constant_bytes(other, 32, 48), 30);
-  other.codec = Codec::kJpegProgressive;
-  EXPECT_EQ(constant_bytes(other, 32, 48), 0);
-  other = s.ladder.planes[0];
-  std::vector<std::uint8_t>& tables = other.rungs[0].table_stream;
-  while (!tables.empty()) {  // cut anywhere: some number of blocks, nothing read beyond the end
-    tables.pop_back();
-    EXPECT_GE(constant_bytes(other, 32, 48), 4);
-  }
-  EXPECT_EQ(constant_bytes(other, 32, 48), 4 + 24 / 4.0);
-}
-
-/// Of quality and ln(bytes - c), over the rungs that the model is fitted on.
-double correlation_with(const PlaneTables& t, double constant) {
-  double q = 0, s = 0, qq = 0, qs = 0, ss = 0;
-  constexpr std::size_t kFirst = 2, kLast = 8;
-  const double n = kLast - kFirst + 1;
-  for (std::size_t r = kFirst; r <= kLast; ++r) {
-    double size = -constant;
-    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
-    const double x = t.rung_quality[r], y = std::log(size);
-    q += x / n, s += y / n, qq += x * x / n, qs += x * y / n, ss += y * y / n;
-  }
-  return (qs - q * s) / std::sqrt((qq - q * q) * (ss - s * s));
-}
-
-TEST(Lut, SizeModelHoldsForBlurredTextures) {  // whose blocks' shortest codes are most of the bytes
-  Scene s = make_scene();
-  Random random{5};
-  for (Pixels& pixels : s.pixels)
-    for (std::uint32_t y = 0; y < pixels.height_px; ++y)
-      for (std::uint32_t x = 0; x < pixels.width_px; ++x)
-        for (std::uint32_t c = 0; c < pixels.channels; ++c)
-          pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
-              static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
-  s.previews = make_previews(s.fragments, s.pixels, {}, {});
-  const PackageTables tables = build(s);
-  for (std::size_t p = 0; p < tables.planes.size(); ++p) {
-    const PlaneTables& t = tables.planes[p];
-    const double constant = constant_bytes(s.ladder.planes[p], 32, 48), count = t.order.size();
-    for (const std::uint16_t f : t.order) EXPECT_LT(t.size_bytes[f], 2 * constant) << "the case is this one";
-    EXPECT_NEAR(t.model_correlation, correlation_with(t, constant * count), 1e-5);
-    EXPECT_GT(t.model_correlation, correlation_with(t, 4 * count) + 0.03) << "SOI and EOI alone";
-  }
-}
-
 TEST(Lut, EveryRoleHasItsOwnLeastQuality) {
   Scene s = make_scene();
   const auto least = [&](TextureRole role, const LutOptions& options) {
@@ -441,50 +286,6 @@ TEST(Lut, EmptyAndUnfitInput) {
   EXPECT_TRUE(none.planes[0].order.empty());
   EXPECT_EQ(none.planes[0].total_bytes[0], 0u);
   EXPECT_NO_THROW(write_tables(none));
-}
-
-TEST(Distortion, EqualOppositeAndMasked) {
-  Random random{1};
-  std::vector<std::uint8_t> source(16 * 16), mask(16 * 16, 255), other;
-  for (auto& v : source) v = static_cast<std::uint8_t>(random.next());
-  const DistortionMeter meter(source, mask, 16, 16);
-  EXPECT_EQ(meter.against(source).mse, 0);
-  EXPECT_NEAR(meter.against(source).dssim, 0, 1e-12);
-  other = source;
-  for (auto& v : other) v = static_cast<std::uint8_t>(255 - v);
-  EXPECT_GT(meter.against(other).dssim, 1);  // negative correlation
-  EXPECT_LT(meter.against(other).dssim, 2);
-
-  for (std::size_t k = 0; k < 256; ++k) mask[k] = k % 3 == 0 ? 255 : 0;
-  const DistortionMeter masked(source, mask, 16, 16);
-  EXPECT_EQ(masked.against(source).mse, 0);
-  other = source;
-  for (std::size_t k = 0; k < 256; ++k)
-    other[k] = mask[k] ? source[k] : static_cast<std::uint8_t>(random.next());
-  EXPECT_EQ(masked.against(other).mse, 0);
-  EXPECT_NEAR(masked.against(other).dssim, 0, 1e-12);
-  other[0] = static_cast<std::uint8_t>(source[0] ^ 16);
-  EXPECT_NEAR(masked.against(other).mse, 256.0 / 86, 1e-9);
-}
-
-TEST(Distortion, AgainstTheFormulaInOneWindow) {
-  Random random{2};
-  std::vector<std::uint8_t> a(64), b(64);
-  for (std::size_t k = 0; k < 64; ++k) {
-    a[k] = static_cast<std::uint8_t>(random.next() % 200);
-    b[k] = static_cast<std::uint8_t>(a[k] + random.next() % 40);
-  }
-  double ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
-  for (std::size_t k = 0; k < 64; ++k) ma += a[k] / 64.0, mb += b[k] / 64.0;
-  for (std::size_t k = 0; k < 64; ++k) {
-    va += (a[k] - ma) * (a[k] - ma) / 64;
-    vb += (b[k] - mb) * (b[k] - mb) / 64;
-    cov += (a[k] - ma) * (b[k] - mb) / 64;
-  }
-  const double ssim =
-      (2 * ma * mb + 6.5025) * (2 * cov + 58.5225) / ((ma * ma + mb * mb + 6.5025) * (va + vb + 58.5225));
-  const DistortionMeter meter(a, std::vector<std::uint8_t>(64, 255), 8, 8);
-  EXPECT_NEAR(meter.against(b).dssim, 1 - ssim, 1e-12);
 }
 
 }  // namespace

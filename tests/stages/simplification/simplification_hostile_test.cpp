@@ -9,56 +9,15 @@
 #include "format/base/errors.h"
 #include "stages/simplification/simplification.h"
 #include "tests/stages/simplification/simplification_checks.h"
+#include "tests/support/hostile_meshes.h"
 
 namespace texmesh {
 namespace {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
-Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
-  Mesh m;
-  m.positions = std::move(positions);
-  for (std::uint32_t p = 0; p < m.positions.size(); ++p) m.wedge_position.push_back(p);
-  m.triangles = std::move(triangles);
-  m.triangle_material.assign(m.triangles.size(), 0);
-  m.triangle_part.assign(m.triangles.size(), 0);
-  m.part_names = {"bare"};
-  return m;
-}
-
-void repeat_triangles(Mesh& m, bool turned) {
-  const std::size_t n = m.triangles.size();
-  for (std::size_t t = 0; t < n; ++t) {
-    Triangle copy = m.triangles[t];
-    if (turned) std::swap(copy[1], copy[2]);
-    m.triangles.push_back(copy);
-    m.triangle_material.push_back(m.triangle_material[t]);
-    m.triangle_part.push_back(m.triangle_part[t]);
-  }
-}
-
-/// `count` triangles without a common point, of side `side`, in the unit cube; the first is larger.
-Mesh dust(int count, float side) {
-  Random random{3};
-  std::vector<Vec3f> points;
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    auto place = [&] { return static_cast<float>(random.uniform()); };
-    const Vec3f at{place(), place(), place()};
-    const float s = i == 0 ? 4 * side : side * (0.5f + 0.5f * place());
-    const auto first = static_cast<std::uint32_t>(points.size());
-    for (Vec3f corner : {Vec3f{0, 0, 0}, Vec3f{1, place(), 0}, Vec3f{place(), 1, 1}})
-      points.push_back(at + corner * s);
-    triangles.push_back({first, first + 1, first + 2});
-  }
-  return bare(std::move(points), std::move(triangles));
-}
-
 TEST(SimplificationHostile, SliversOfNextToNoArea) {
-  Mesh m = sheet(24, 0.1f);
-  for (Vec3f& p : m.positions)
-    if (p.y < 0.45f) p.y *= 1e-12f, p.z = 0;
-  const ConditionedMesh mesh = condition(m);
+  const ConditionedMesh mesh = condition(sliver_sheet(24));
   double least = 1;
   for (const Triangle& t : mesh.mesh.triangles) {
     const auto at = [&](std::size_t k) {
@@ -90,13 +49,13 @@ TEST(SimplificationHostile, FarFromTheOriginNothingChanges) {
 TEST(SimplificationHostile, DuplicatedFaces) {
   Mesh m = bumpy_sphere(20, 30);
   const NestedScales clean = run(condition(m));
-  repeat_triangles(m, false);
+  repeat_triangles(m);
   const NestedScales doubled = run(condition(m));
   ASSERT_EQ(clean.scales.size(), doubled.scales.size());
   for (std::size_t i = 0; i < clean.scales.size(); ++i)
     EXPECT_EQ(clean.scales[i].triangles, doubled.scales[i].triangles);
   Mesh decal = bumpy_sphere(20, 30);  // copies of another material stay, and move with what is under them
-  repeat_triangles(decal, false);
+  repeat_triangles(decal);
   for (std::size_t t = decal.triangles.size() / 2; t < decal.triangles.size(); ++t)
     decal.triangle_material[t] = 1;
   const NestedScales both = run(condition(decal));
@@ -105,9 +64,8 @@ TEST(SimplificationHostile, DuplicatedFaces) {
 }
 
 TEST(SimplificationHostile, InsideOutComponents) {
-  Mesh inside_out = bumpy_sphere(16, 24);
-  for (Triangle& t : inside_out.triangles) std::swap(t[1], t[2]);
-  const NestedScales scales = run(condition(side_by_side({bumpy_sphere(16, 24), inside_out})));
+  const Mesh m = bumpy_sphere(16, 24);
+  const NestedScales scales = run(condition(side_by_side({m, inside_out(m)})));
   expect_sound(scales);
   EXPECT_LT(scales.scales.back().triangles.size(), scales.scales[0].triangles.size() / 8);
   Mesh patched = bumpy_sphere(16, 24);  // a patch of one component the wrong way round
@@ -118,28 +76,22 @@ TEST(SimplificationHostile, InsideOutComponents) {
 TEST(SimplificationHostile, SoupOfRandomTriangles) {
   for (int round = 0; round < 20; ++round) {
     Random random{static_cast<std::uint64_t>(round) + 1};
-    std::vector<Vec3f> points;
-    for (int p = 0; p < 30; ++p)
-      points.push_back({static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
-                        static_cast<float>(random.uniform())});
-    std::vector<Triangle> triangles;
-    for (int t = 0; t < 150; ++t)
-      triangles.push_back({random.next() % 30, random.next() % 30, random.next() % 30});
-    expect_sound(run(condition(bare(points, triangles)), {.max_error = 1, .min_triangles = 1}));
+    expect_sound(run(condition(random_soup(random, 30, 150)), {.max_error = 1, .min_triangles = 1}));
   }
 }
 
 TEST(SimplificationHostile, NothingToShowIsAnError) {
   const std::vector<Triangle> faces{{0, 1, 2}, {2, 1, 3}, {0, 2, 3}};
-  EXPECT_THROW(condition(bare({{1, 2, 3}, {1, 2, 3}, {1, 2, 3}, {1, 2, 3}}, faces)), StageError);
-  EXPECT_THROW(condition(bare({{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {4, 4, 4}}, faces)), StageError);
+  EXPECT_THROW(condition(bare_mesh({{1, 2, 3}, {1, 2, 3}, {1, 2, 3}, {1, 2, 3}}, faces)), StageError);
+  EXPECT_THROW(condition(bare_mesh({{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {4, 4, 4}}, faces)), StageError);
   const float inf = std::numeric_limits<float>::infinity();
-  EXPECT_THROW(condition(bare({{inf, 0, 0}, {1, inf, 1}, {2, 2, inf}, {-inf, 4, 4}}, faces)), StageError);
+  EXPECT_THROW(condition(bare_mesh({{inf, 0, 0}, {1, inf, 1}, {2, 2, inf}, {-inf, 4, 4}}, faces)),
+               StageError);
 }
 
 TEST(SimplificationHostile, OneTriangleFarFromAll) {
-  const NestedScales scales =
-      run(condition(bare({{1e30f, 0, 0}, {0, 1e30f, 0}, {0, 0, 1e30f}}, {{0, 1, 2}})), {.min_triangles = 1});
+  const NestedScales scales = run(
+      condition(bare_mesh({{1e30f, 0, 0}, {0, 1e30f, 0}, {0, 0, 1e30f}}, {{0, 1, 2}})), {.min_triangles = 1});
   expect_sound(scales);
   EXPECT_EQ(scales.scales.size(), 1u);
 }
@@ -154,7 +106,7 @@ TEST(SimplificationHostile, HubOfAWideFan) {
     points.push_back(to_float(Vec3d{std::cos(turn), std::sin(turn), 0.01 * std::sin(40 * turn)}));
     triangles.push_back({0, i + 1, (i + 1) % n + 1});
   }
-  const NestedScales scales = run(condition(bare(points, triangles)), {.coarsest = 0.01});
+  const NestedScales scales = run(condition(bare_mesh(points, triangles)), {.coarsest = 0.01});
   EXPECT_LT(scales.scales.back().triangles.size(), n / 20);
   EXPECT_EQ(count_edges(scales, scales.scales.back()).border, scales.scales.back().triangles.size());
 }
