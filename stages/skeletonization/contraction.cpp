@@ -5,89 +5,16 @@
 
 #include <CGAL/memory.h>
 
-#include <cstddef>
-#include <memory>
-#include <utility>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
 
+#include "stages/skeletonization/cgal_failure.h"
+#include "stages/skeletonization/contraction_arena.h"
 #include "stages/skeletonization/geometry_failure.h"
-
-namespace texmesh {
-namespace {
-
-/// Memory whose addresses have the same order in every run. CGAL's contraction keeps edges in a std::set
-/// ordered by address, and with the system's allocator its skeleton varies from run to run (95 to 103 nodes
-/// on one scan).
-class Arena {
- public:
-  explicit Arena(std::size_t capacity)
-      : bytes_(std::make_unique_for_overwrite<std::byte[]>(capacity)), capacity_(capacity) {}
-
-  void* allocate(std::size_t size) {
-    size = (size + kAlignment - 1) / kAlignment * kAlignment;
-    std::vector<void*>& free = free_of(size);
-    if (!free.empty()) {
-      void* p = free.back();
-      free.pop_back();
-      return p;
-    }
-    // Not bad_alloc: the capacity depends on the input alone, a machine's memory does not.
-    if (capacity_ - used_ < size) throw GeometryFailure("contraction needs too much memory");
-    void* p = bytes_.get() + used_;
-    used_ += size;
-    return p;
-  }
-
-  void release(void* p, std::size_t size) {
-    free_of((size + kAlignment - 1) / kAlignment * kAlignment).push_back(p);
-  }
-
- private:
-  static constexpr std::size_t kAlignment = alignof(std::max_align_t);
-
-  /// A polyhedron has three kinds of parts: a list is faster than a map.
-  std::vector<void*>& free_of(std::size_t size) {
-    for (auto& [s, list] : free_)
-      if (s == size) return list;
-    return free_.emplace_back(size, std::vector<void*>()).second;
-  }
-
-  std::unique_ptr<std::byte[]> bytes_;
-  std::size_t capacity_, used_ = 0;
-  std::vector<std::pair<std::size_t, std::vector<void*>>> free_;
-};
-
-/// The arena of the contraction that this thread is in; CGAL default-constructs its allocators, so it cannot
-/// be passed.
-thread_local Arena* current_arena = nullptr;
-
-class ArenaScope {
- public:
-  explicit ArenaScope(Arena& arena) : outer_(std::exchange(current_arena, &arena)) {}
-  ~ArenaScope() { current_arena = outer_; }
-  ArenaScope(const ArenaScope&) = delete;
-  ArenaScope& operator=(const ArenaScope&) = delete;
-
- private:
-  Arena* outer_;
-};
-
-}  // namespace
-
-template <class T>
-struct ContractionAllocator {
-  using value_type = T;
-  ContractionAllocator() = default;
-  template <class U>
-  ContractionAllocator(const ContractionAllocator<U>&) {}
-  T* allocate(std::size_t n) { return static_cast<T*>(current_arena->allocate(n * sizeof(T))); }
-  void deallocate(T* p, std::size_t n) { current_arena->release(p, n * sizeof(T)); }
-  template <class U>
-  bool operator==(const ContractionAllocator<U>&) const {
-    return true;
-  }
-};
-
-}  // namespace texmesh
+#include "stages/skeletonization/inside_test.h"
+#include "stages/skeletonization/normal_equations.h"
+#include "stages/skeletonization/voronoi_poles.h"
 
 // The allocator is a template parameter of Polyhedron_3 with this macro as its default, and the contraction
 // names no other. Only the one forward declaration that holds the default sees our value, so no other CGAL
@@ -99,9 +26,9 @@ struct ContractionAllocator {
 #pragma pop_macro("CGAL_ALLOCATOR")
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Mean_curvature_flow_skeletonization.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/boost/graph/helpers.h>
-#include <CGAL/extract_mean_curvature_flow_skeleton.h>
 
 namespace texmesh {
 namespace {
@@ -109,29 +36,66 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-constexpr int kMaxRays = 1000;
-/// Rays in a row from the same point, in the contraction that this thread is in.
-thread_local int rays_in_a_row = 0;
+using Contraction =
+    CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh, CGAL::Default, CGAL::Default, NormalEquations>;
 
-/// The kernel, but for rays: every one is counted, and too many from one point are an error.
-struct CountingKernel : Kernel {
-  struct Construct_ray_3 {
-    using result_type = Kernel::Ray_3;
-    Kernel::Ray_3 operator()(const Kernel::Point_3& from, const Kernel::Vector_3& along) const {
-      rays_in_a_row = from == last ? rays_in_a_row + 1 : 0;
-      last = from;
-      if (rays_in_a_row > kMaxRays) throw GeometryFailure("contraction cannot tell inside from outside");
-      return Kernel::Ray_3(from, along);
+using MesoSkeleton = Contraction::Meso_skeleton;
+
+static_assert(std::is_same_v<MesoSkeleton::Allocator, ContractionAllocator<int>>);
+
+template <class PointOrVector>
+Vec3d vec(const PointOrVector& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+}  // namespace
+}  // namespace texmesh
+
+/// CGAL's own with the tree and the predicates in a file of their own.
+template <>
+class CGAL::Side_of_triangle_mesh<texmesh::MesoSkeleton, texmesh::Kernel> {
+ public:
+  explicit Side_of_triangle_mesh(const texmesh::MesoSkeleton& mesh) : test_(triangles_of(mesh)) {}
+
+  CGAL::Bounded_side operator()(const texmesh::Kernel::Point_3& p) const {
+    return test_.is_inside(texmesh::vec(p)) ? CGAL::ON_BOUNDED_SIDE : CGAL::ON_UNBOUNDED_SIDE;
+  }
+
+ private:
+  static std::vector<texmesh::InsideTest::Corners> triangles_of(const texmesh::MesoSkeleton& mesh) {
+    CGAL_assertion(CGAL::is_triangle_mesh(mesh));
+    CGAL_assertion(CGAL::is_closed(mesh));
+    std::vector<texmesh::InsideTest::Corners> triangles;
+    for (const auto face : faces(mesh)) {
+      const auto h = face->halfedge();
+      triangles.push_back({texmesh::vec(h->vertex()->point()), texmesh::vec(h->next()->vertex()->point()),
+                           texmesh::vec(h->next()->next()->vertex()->point())});
     }
-    static thread_local Kernel::Point_3 last;
-  };
-  Construct_ray_3 construct_ray_3_object() const { return {}; }
+    return triangles;
+  }
+
+  texmesh::InsideTest test_;
 };
-thread_local Kernel::Point_3 CountingKernel::Construct_ray_3::last{0, 0, 0};
 
-using Contraction = CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh, CountingKernel>;
+/// CGAL's own with the exact triangulation in a file of its own, since either takes long to compile.
+template <>
+void texmesh::Contraction::compute_voronoi_pole() {
+  compute_vertex_normal();
+  std::vector<texmesh::Vec3d> points(num_vertices(m_tmesh)), normals(points.size());
+  for (const auto v : vertices(m_tmesh)) {
+    points[v->id()] = texmesh::vec(v->point());
+    normals[v->id()] = texmesh::vec(m_normals[v->id()]);
+  }
+  const std::vector<texmesh::Vec3d> poles = texmesh::voronoi_poles(points, normals);
+  for (const auto v : vertices(m_tmesh)) {
+    const texmesh::Vec3d& pole = poles[v->id()];
+    v->pole = Point(pole.x, pole.y, pole.z);
+  }
+  m_are_poles_computed = true;
+}
 
-static_assert(std::is_same_v<Contraction::Meso_skeleton::Allocator, ContractionAllocator<int>>);
+namespace texmesh {
+namespace {
 
 SurfaceMesh closed_mesh(const TriangleSoup& closed) {
   SurfaceMesh mesh;
@@ -150,7 +114,7 @@ CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
   // goes.
   Arena arena((std::size_t{16} << 20) + closed.triangles.size() * 4096);
   const ArenaScope scope(arena);
-  rays_in_a_row = 0;
+  InsideTest::forget_rays();
   Contraction::Skeleton graph;
   Contraction contraction(mesh);
   contraction.set_max_iterations(static_cast<std::size_t>(max_contractions));
@@ -170,14 +134,7 @@ CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
 }  // namespace
 
 CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions) {
-  // CGAL derives its failures from std::logic_error: nothing above could tell them from our own mistakes.
-  try {
-    return contract(closed, max_contractions);
-  } catch (const CGAL::Failure_exception& e) {
-    throw GeometryFailure(e.what());
-  } catch (const CGAL::Uncertain_conversion_exception& e) {
-    throw GeometryFailure(e.what());
-  }
+  return with_cgal_checks([&] { return contract(closed, max_contractions); });
 }
 
 }  // namespace texmesh

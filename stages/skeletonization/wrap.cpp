@@ -1,148 +1,43 @@
-// CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
-// not a crash.
-#define CGAL_DEBUG
 #include "stages/skeletonization/wrap.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/connected_components.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_ratio_stop_predicate.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
-#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
-#include <CGAL/alpha_wrap_3.h>
-
-#include <cmath>
 #include <cstdint>
-#include <limits>
-#include <string>
+#include <numeric>
 
 #include "format/base/no_index.h"
-#include "stages/geometry/triangle_tree.h"
-#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/alpha_wrap.h"
+#include "stages/skeletonization/decimation.h"
 
 namespace texmesh {
 namespace {
 
-namespace aw3 = CGAL::Alpha_wraps_3::internal;
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Point = Kernel::Point_3;
-using SurfaceMesh = CGAL::Surface_mesh<Point>;
-using PartMap = SurfaceMesh::Property_map<SurfaceMesh::Face_index, std::size_t>;
-
-/// What a wrap may cost. Steps are CGAL's, and all together may look at 50 triangles for each of the most
-/// steps: where thousands of needles meet, every query meets all of them, and a cone of 5,000 took minutes of
-/// few steps. Scans take 25,000 to 100,000 steps and 1 to 4 million triangles.
-class WorkCap {
- public:
-  WorkCap(std::size_t steps, const RunContext& context)
-      : steps_(steps), triangles_(steps * kTrianglesPerStep), context_(context) {}
-
-  void count_step() {
-    context_.check_cancelled();
-    if (steps_-- == 0 || tried > triangles_) throw GeometryFailure("the wrap takes too many steps");
-  }
-
-  std::uint64_t tried = 0;
-
- private:
-  static constexpr std::size_t kTrianglesPerStep = 50;
-  std::size_t steps_;
-  std::uint64_t triangles_;
-  const RunContext& context_;
-};
-
-/// CGAL calls it before each step.
-class StepCounter : public aw3::Wrapping_default_visitor {
- public:
-  explicit StepCounter(WorkCap& cap) : cap_(cap) {}
-  template <class Wrapper, class Gate>
-  void before_facet_treatment(const Wrapper&, const Gate&) {
-    cap_.count_step();
-  }
-
- private:
-  WorkCap& cap_;
-};
-
-/// What the wrapping asks of its input. CGAL's own oracle answers with exact predicates; in plain double
-/// arithmetic a wrap takes a sixth of the time, and a cell that touches the input by a rounding error does
-/// not matter at an offset of 1/600.
-class SoupOracle {
- public:
-  using Geom_traits = aw3::Alpha_wrap_AABB_traits<Kernel>;
-
-  SoupOracle(const TriangleSoup& soup, WorkCap& cap)
-      : soup_(soup), tree_(soup.points, soup.triangles), cap_(cap) {}
-
-  const Geom_traits& geom_traits() const { return traits_; }
-  CGAL::Bbox_3 bbox() const {
-    const auto& [min, max] = tree_.box();
-    return {min.x, min.y, min.z, max.x, max.y, max.z};
-  }
-
-  template <class K>
-  bool do_intersect(const aw3::Tetrahedron_with_outside_info<K>& cell) const {
-    return tree_.meets(
-        Tetrahedron({vec(cell.m_tet[0]), vec(cell.m_tet[1]), vec(cell.m_tet[2]), vec(cell.m_tet[3])}),
-        cap_.tried);
-  }
-  template <class K>
-  bool do_intersect(const aw3::Ball_3<K>& ball) const {
-    const double radius2 = ball.boundary().squared_radius();
-    return tree_.distance2(vec(ball.boundary().center()), std::nextafter(radius2, 2 * radius2), cap_.tried) <=
-           radius2;
-  }
-
-  double squared_distance(const Point& p) const { return tree_.distance2(vec(p), kInfinity, cap_.tried); }
-  Point closest_point(const Point& p) const {
-    const TriangleTree::Nearest at = tree_.nearest(vec(p), cap_.tried);
-    Vec3d on;
-    for (std::size_t k = 0; k < 3; ++k)
-      on = on + soup_.points[soup_.triangles[at.triangle][k]] * at.weight[k];
-    return {on.x, on.y, on.z};
-  }
-
-  /// The first point of a segment that is `offset` away from the input, within 1 % of it.
-  bool first_intersection(const Point& from, const Point& to, Point& found, double offset) const {
-    const auto distance = [this](const Point& p) { return std::sqrt(squared_distance(p)); };
-    return aw3::Offset_intersection<Geom_traits, decltype(distance)>(distance, offset, 0.01 * offset, 1)
-        .first_intersection(from, to, found);
-  }
-
- private:
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  static Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
-
-  const TriangleSoup& soup_;
-  TriangleTree tree_;
-  WorkCap& cap_;
-  Geom_traits traits_;
-};
-
-void decimate(SurfaceMesh& wrap, std::size_t max_faces) {
-  if (wrap.number_of_faces() <= max_faces) return;
-  // A closed triangle mesh has three edges for two faces.
-  CGAL::Surface_mesh_simplification::Count_stop_predicate<SurfaceMesh> stop(max_faces * 3 / 2);
-  CGAL::Surface_mesh_simplification::edge_collapse(wrap, stop);
-  wrap.collect_garbage();
+std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t p) {
+  while (parent[p] != p) p = parent[p] = parent[parent[p]];
+  return p;
 }
 
-std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
-  const PartMap part = wrap.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part", 0).first;
-  std::vector<TriangleSoup> parts(CGAL::Polygon_mesh_processing::connected_components(wrap, part));
-  std::vector<std::uint32_t> number(wrap.number_of_vertices(), kNoIndex);
-  for (const auto face : wrap.faces()) {
-    TriangleSoup& to = parts[part[face]];
-    Triangle triangle{};
-    std::size_t k = 0;
-    for (const auto v : wrap.vertices_around_face(wrap.halfedge(face))) {
-      if (number[v] == kNoIndex) {
-        number[v] = static_cast<std::uint32_t>(to.points.size());
-        to.points.push_back({wrap.point(v).x(), wrap.point(v).y(), wrap.point(v).z()});
-      }
-      triangle[k++] = number[v];
+/// Parts in the order of their first triangles, triangles in the order of the whole.
+std::vector<TriangleSoup> split_parts(const TriangleSoup& wrap) {
+  std::vector<std::uint32_t> parent(wrap.points.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  for (const Triangle& t : wrap.triangles)
+    for (std::size_t k = 1; k < 3; ++k) parent[root_of(parent, t[k])] = root_of(parent, t[0]);
+  std::vector<TriangleSoup> parts;
+  std::vector<std::uint32_t> part(wrap.points.size(), kNoIndex), number(wrap.points.size(), kNoIndex);
+  for (const Triangle& t : wrap.triangles) {
+    std::uint32_t& n = part[root_of(parent, t[0])];
+    if (n == kNoIndex) {
+      n = static_cast<std::uint32_t>(parts.size());
+      parts.emplace_back();
     }
-    to.triangles.push_back(triangle);
+    TriangleSoup& to = parts[n];
+    Triangle& triangle = to.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (number[t[k]] == kNoIndex) {
+        number[t[k]] = static_cast<std::uint32_t>(to.points.size());
+        to.points.push_back(wrap.points[t[k]]);
+      }
+      triangle[k] = number[t[k]];
+    }
   }
   return parts;
 }
@@ -152,21 +47,7 @@ std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
                                        std::size_t max_faces, std::size_t max_steps,
                                        const RunContext& context) {
-  WorkCap cap(max_steps, context);
-  const SoupOracle oracle(soup, cap);
-  SurfaceMesh wrap;
-  StepCounter counter(cap);
-  // CGAL derives its failures from std::logic_error: nothing above could tell them from our own mistakes.
-  try {
-    aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
-    wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
-    decimate(wrap, max_faces);
-  } catch (const CGAL::Failure_exception& e) {
-    throw GeometryFailure(e.what());
-  } catch (const CGAL::Uncertain_conversion_exception& e) {
-    throw GeometryFailure(e.what());
-  }
-  return split_parts(wrap);
+  return split_parts(decimate(alpha_wrap(soup, alpha, offset, max_steps, context), max_faces));
 }
 
 }  // namespace texmesh
