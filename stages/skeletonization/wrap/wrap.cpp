@@ -1,11 +1,11 @@
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/wrap/wrap.h"
 
 #include <cstdint>
 #include <numeric>
 
 #include "format/base/no_index.h"
-#include "stages/skeletonization/alpha_wrap.h"
-#include "stages/skeletonization/decimation.h"
+#include "stages/skeletonization/wrap/alpha_wrap.h"
+#include "stages/skeletonization/wrap/decimation.h"
 
 namespace texmesh {
 namespace {
