@@ -4,7 +4,7 @@
 
 #include "format/base/vec.h"
 #include "stages/base/run_context.h"
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/wrap/wrap.h"
 
 namespace texmesh {
 

@@ -3,7 +3,7 @@
 
 #include "stages/base/run_context.h"
 #include "stages/geometry/triangle_tree.h"
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/wrap/wrap.h"
 
 namespace texmesh {
 

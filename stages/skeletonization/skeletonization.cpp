@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "stages/base/parallel.h"
-#include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/contraction/contraction.h"
 #include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/local_radius.h"
 #include "stages/skeletonization/segment_tree.h"
-#include "stages/skeletonization/wrap.h"
-#include "stages/skeletonization/wrap_soup.h"
+#include "stages/skeletonization/wrap/wrap.h"
+#include "stages/skeletonization/wrap/wrap_soup.h"
 
 namespace texmesh {
 namespace {

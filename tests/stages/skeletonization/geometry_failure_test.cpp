@@ -6,7 +6,7 @@
 
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
-#include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/contraction/contraction.h"
 
 namespace texmesh {
 namespace {

@@ -12,7 +12,7 @@
 #include "format/base/archive.h"
 #include "format/base/portable_math.h"
 #include "stages/condition/condition.h"
-#include "stages/skeletonization/contraction.h"
+#include "stages/skeletonization/contraction/contraction.h"
 #include "stages/skeletonization/segment_tree.h"
 #include "tests/support/meshes.h"
 

@@ -1,23 +1,19 @@
 // CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
 // not a crash.
 #define CGAL_DEBUG
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/wrap/alpha_wrap.h"
 
+#include <CGAL/Alpha_wrap_3/internal/Alpha_wrap_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/connected_components.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_ratio_stop_predicate.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
-#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
-#include <CGAL/alpha_wrap_3.h>
 
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string>
+#include <unordered_map>
+#include <vector>
 
-#include "format/base/no_index.h"
 #include "stages/geometry/triangle_tree.h"
+#include "stages/skeletonization/cgal_failure.h"
 #include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
@@ -26,8 +22,8 @@ namespace {
 namespace aw3 = CGAL::Alpha_wraps_3::internal;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-using SurfaceMesh = CGAL::Surface_mesh<Point>;
-using PartMap = SurfaceMesh::Property_map<SurfaceMesh::Face_index, std::size_t>;
+
+Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
 
 /// What a wrap may cost. Steps are CGAL's, and all together may look at 50 triangles for each of the most
 /// steps: where thousands of needles meet, every query meets all of them, and a cone of 5,000 took minutes of
@@ -111,7 +107,6 @@ class SoupOracle {
 
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  static Vec3d vec(const Point& p) { return {p.x(), p.y(), p.z()}; }
 
   const TriangleSoup& soup_;
   TriangleTree tree_;
@@ -119,54 +114,55 @@ class SoupOracle {
   Geom_traits traits_;
 };
 
-void decimate(SurfaceMesh& wrap, std::size_t max_faces) {
-  if (wrap.number_of_faces() <= max_faces) return;
-  // A closed triangle mesh has three edges for two faces.
-  CGAL::Surface_mesh_simplification::Count_stop_predicate<SurfaceMesh> stop(max_faces * 3 / 2);
-  CGAL::Surface_mesh_simplification::edge_collapse(wrap, stop);
-  wrap.collect_garbage();
-}
-
-std::vector<TriangleSoup> split_parts(SurfaceMesh& wrap) {
-  const PartMap part = wrap.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part", 0).first;
-  std::vector<TriangleSoup> parts(CGAL::Polygon_mesh_processing::connected_components(wrap, part));
-  std::vector<std::uint32_t> number(wrap.number_of_vertices(), kNoIndex);
-  for (const auto face : wrap.faces()) {
-    TriangleSoup& to = parts[part[face]];
-    Triangle triangle{};
-    std::size_t k = 0;
-    for (const auto v : wrap.vertices_around_face(wrap.halfedge(face))) {
-      if (number[v] == kNoIndex) {
-        number[v] = static_cast<std::uint32_t>(to.points.size());
-        to.points.push_back({wrap.point(v).x(), wrap.point(v).y(), wrap.point(v).z()});
-      }
-      triangle[k++] = number[v];
-    }
-    to.triangles.push_back(triangle);
-  }
-  return parts;
-}
+using Wrapper = aw3::Alpha_wrap_3<SoupOracle>;
 
 }  // namespace
+}  // namespace texmesh
 
-std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
-                                       std::size_t max_faces, std::size_t max_steps,
-                                       const RunContext& context) {
+namespace CGAL::Alpha_wraps_3::internal {
+
+/// The steps of CGAL's own, whose output is a mesh of CGAL with its orientation tested: two thirds of what
+/// this file took to compile. Seen from outside, the corners of a facet of an outside cell run
+/// counter-clockwise.
+template <>
+template <>
+void texmesh::Wrapper::operator()(const double alpha, const double offset, texmesh::TriangleSoup& wrap,
+                                  const texmesh::StepCounter& counter) {
+  texmesh::StepCounter visitor = counter;
+  if (!initialize(alpha, offset, std::vector<Point_3>())) return;
+  alpha_flood_fill(visitor);
+  make_manifold();
+  for (const Vertex_handle v : m_dt.finite_vertex_handles())
+    if (is_non_manifold(v)) throw texmesh::GeometryFailure("the wrap is not a manifold");
+  std::unordered_map<Vertex_handle, std::uint32_t> number;
+  for (auto it = m_dt.finite_facets_begin(); it != m_dt.finite_facets_end(); ++it) {
+    const Facet facet = it->first->info().is_outside ? *it : m_dt.mirror_facet(*it);
+    const auto [cell, across] = facet;
+    if (cell->info().is_outside == cell->neighbor(across)->info().is_outside) continue;
+    texmesh::Triangle& triangle = wrap.triangles.emplace_back();
+    for (int k = 0; k < 3; ++k) {
+      const Vertex_handle v = cell->vertex(Dt::vertex_triple_index(across, k));
+      const auto [at, is_new] = number.emplace(v, static_cast<std::uint32_t>(wrap.points.size()));
+      if (is_new) wrap.points.push_back(texmesh::vec(m_dt.point(v)));
+      triangle[static_cast<std::size_t>(k)] = at->second;
+    }
+  }
+}
+
+}  // namespace CGAL::Alpha_wraps_3::internal
+
+namespace texmesh {
+
+TriangleSoup alpha_wrap(const TriangleSoup& soup, double alpha, double offset, std::size_t max_steps,
+                        const RunContext& context) {
   WorkCap cap(max_steps, context);
   const SoupOracle oracle(soup, cap);
-  SurfaceMesh wrap;
-  StepCounter counter(cap);
-  // CGAL derives its failures from std::logic_error: nothing above could tell them from our own mistakes.
-  try {
-    aw3::Alpha_wrap_3<SoupOracle> wrapper(oracle);
-    wrapper(alpha, offset, wrap, CGAL::parameters::visitor(std::ref(counter)));
-    decimate(wrap, max_faces);
-  } catch (const CGAL::Failure_exception& e) {
-    throw GeometryFailure(e.what());
-  } catch (const CGAL::Uncertain_conversion_exception& e) {
-    throw GeometryFailure(e.what());
-  }
-  return split_parts(wrap);
+  return with_cgal_checks([&] {
+    TriangleSoup wrap;
+    Wrapper wrapper(oracle);
+    wrapper(alpha, offset, wrap, StepCounter(cap));
+    return wrap;
+  });
 }
 
 }  // namespace texmesh

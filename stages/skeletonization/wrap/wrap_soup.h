@@ -1,6 +1,6 @@
 #pragma once
 #include "stages/data/conditioned_mesh.h"
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/triangle_soup.h"
 
 namespace texmesh {
 

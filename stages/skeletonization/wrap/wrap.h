@@ -1,16 +1,11 @@
 #pragma once
+#include <cstddef>
 #include <vector>
 
-#include "format/model/model.h"
 #include "stages/base/run_context.h"
+#include "stages/skeletonization/triangle_soup.h"
 
 namespace texmesh {
-
-/// Points and triangles over them; nothing else is promised.
-struct TriangleSoup {
-  std::vector<Vec3d> points;
-  std::vector<Triangle> triangles;
-};
 
 /// The alpha wrap of a triangle soup (Portaneri et al. 2022, CGAL): closed oriented 2-manifolds around it
 /// that enter no hole narrower than alpha, at a distance of about `offset`, decimated to `max_faces`; one

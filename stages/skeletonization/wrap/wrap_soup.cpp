@@ -1,4 +1,4 @@
-#include "stages/skeletonization/wrap_soup.h"
+#include "stages/skeletonization/wrap/wrap_soup.h"
 
 #include <meshoptimizer.h>
 

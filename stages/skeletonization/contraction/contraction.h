@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/skeletonization/wrap.h"
+#include "stages/skeletonization/triangle_soup.h"
 
 namespace texmesh {
 

@@ -1,0 +1,140 @@
+// CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
+// not a crash.
+#define CGAL_DEBUG
+#include "stages/skeletonization/contraction/contraction.h"
+
+#include <CGAL/memory.h>
+
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "stages/skeletonization/cgal_failure.h"
+#include "stages/skeletonization/contraction/contraction_arena.h"
+#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/contraction/inside_test.h"
+#include "stages/skeletonization/contraction/normal_equations.h"
+#include "stages/skeletonization/contraction/voronoi_poles.h"
+
+// The allocator is a template parameter of Polyhedron_3 with this macro as its default, and the contraction
+// names no other. Only the one forward declaration that holds the default sees our value, so no other CGAL
+// type changes.
+#pragma push_macro("CGAL_ALLOCATOR")
+#undef CGAL_ALLOCATOR
+#define CGAL_ALLOCATOR(T) texmesh::ContractionAllocator<T>
+#include <CGAL/Polyhedron_3_fwd.h>
+#pragma pop_macro("CGAL_ALLOCATOR")
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Mean_curvature_flow_skeletonization.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/boost/graph/helpers.h>
+
+namespace texmesh {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+
+using Contraction =
+    CGAL::Mean_curvature_flow_skeletonization<SurfaceMesh, CGAL::Default, CGAL::Default, NormalEquations>;
+
+using MesoSkeleton = Contraction::Meso_skeleton;
+
+static_assert(std::is_same_v<MesoSkeleton::Allocator, ContractionAllocator<int>>);
+
+template <class PointOrVector>
+Vec3d vec(const PointOrVector& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+}  // namespace
+}  // namespace texmesh
+
+/// CGAL's own with the tree and the predicates in a file of their own.
+template <>
+class CGAL::Side_of_triangle_mesh<texmesh::MesoSkeleton, texmesh::Kernel> {
+ public:
+  explicit Side_of_triangle_mesh(const texmesh::MesoSkeleton& mesh) : test_(triangles_of(mesh)) {}
+
+  CGAL::Bounded_side operator()(const texmesh::Kernel::Point_3& p) const {
+    return test_.is_inside(texmesh::vec(p)) ? CGAL::ON_BOUNDED_SIDE : CGAL::ON_UNBOUNDED_SIDE;
+  }
+
+ private:
+  static std::vector<texmesh::InsideTest::Corners> triangles_of(const texmesh::MesoSkeleton& mesh) {
+    CGAL_assertion(CGAL::is_triangle_mesh(mesh));
+    CGAL_assertion(CGAL::is_closed(mesh));
+    std::vector<texmesh::InsideTest::Corners> triangles;
+    for (const auto face : faces(mesh)) {
+      const auto h = face->halfedge();
+      triangles.push_back({texmesh::vec(h->vertex()->point()), texmesh::vec(h->next()->vertex()->point()),
+                           texmesh::vec(h->next()->next()->vertex()->point())});
+    }
+    return triangles;
+  }
+
+  texmesh::InsideTest test_;
+};
+
+/// CGAL's own with the exact triangulation in a file of its own, since either takes long to compile.
+template <>
+void texmesh::Contraction::compute_voronoi_pole() {
+  compute_vertex_normal();
+  std::vector<texmesh::Vec3d> points(num_vertices(m_tmesh)), normals(points.size());
+  for (const auto v : vertices(m_tmesh)) {
+    points[v->id()] = texmesh::vec(v->point());
+    normals[v->id()] = texmesh::vec(m_normals[v->id()]);
+  }
+  const std::vector<texmesh::Vec3d> poles = texmesh::voronoi_poles(points, normals);
+  for (const auto v : vertices(m_tmesh)) {
+    const texmesh::Vec3d& pole = poles[v->id()];
+    v->pole = Point(pole.x, pole.y, pole.z);
+  }
+  m_are_poles_computed = true;
+}
+
+namespace texmesh {
+namespace {
+
+SurfaceMesh closed_mesh(const TriangleSoup& closed) {
+  SurfaceMesh mesh;
+  for (const Vec3d& p : closed.points) mesh.add_vertex({p.x, p.y, p.z});
+  using Vertex = SurfaceMesh::Vertex_index;
+  for (const Triangle& t : closed.triangles)
+    if (mesh.add_face(Vertex(t[0]), Vertex(t[1]), Vertex(t[2])) == SurfaceMesh::null_face())
+      throw GeometryFailure("wrap is not a manifold");
+  if (!CGAL::is_closed(mesh)) throw GeometryFailure("wrap is not closed");
+  return mesh;
+}
+
+CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
+  const SurfaceMesh mesh = closed_mesh(closed);
+  // A triangle and its share of edges and vertices take about 400 bytes; the contraction splits edges as it
+  // goes.
+  Arena arena((std::size_t{16} << 20) + closed.triangles.size() * 4096);
+  const ArenaScope scope(arena);
+  InsideTest::forget_rays();
+  Contraction::Skeleton graph;
+  Contraction contraction(mesh);
+  contraction.set_max_iterations(static_cast<std::size_t>(max_contractions));
+  contraction.contract_until_convergence();
+  contraction.convert_to_skeleton(graph);
+  CurveSkeleton out;
+  for (const auto v : CGAL::make_range(vertices(graph))) {
+    const auto& p = graph[v].point;
+    out.nodes.push_back({p.x(), p.y(), p.z()});
+  }
+  for (const auto e : CGAL::make_range(edges(graph)))
+    out.segments.push_back(
+        {static_cast<std::uint32_t>(source(e, graph)), static_cast<std::uint32_t>(target(e, graph))});
+  return out;
+}
+
+}  // namespace
+
+CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions) {
+  return with_cgal_checks([&] { return contract(closed, max_contractions); });
+}
+
+}  // namespace texmesh
