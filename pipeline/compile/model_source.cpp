@@ -48,7 +48,7 @@ void ModelSource::open(Store& store, const RunContext& context, bool may_write_n
   look_at_model();
   const Sha256 note_key = list_key();
   if (const auto note = store.find_note(note_key); note && unchanged_since(*note)) return;
-  imported_ = std::make_shared<ImportedModel>(import(context, requests_));
+  imported_ = std::make_shared<ImportedModel>(import(options_, context, requests_));
   if (may_write_notes) store.put_note(note_key, to_json(requests_).dump());
 }
 
@@ -65,10 +65,10 @@ std::vector<std::pair<std::string, std::string>> ModelSource::parts() const {
 }
 
 Source ModelSource::source() {
-  return {[this](const ImportOptions&, const RunContext& context) {
+  return {[this](const ImportOptions& options, const RunContext& context) {
     if (imported_) return std::move(*std::exchange(imported_, nullptr));
     std::vector<FileRequest> again;
-    ImportedModel model = import(context, again);
+    ImportedModel model = import(options, context, again);
     if (to_json(again) != to_json(requests_))
       throw InputError(path_.filename().string(), "", "files that stay as they are while they are compiled",
                        "one that has changed meanwhile");
@@ -142,11 +142,12 @@ bool ModelSource::unchanged_since(const std::string& note) {
   return true;
 }
 
-ImportedModel ModelSource::import(const RunContext& context, std::vector<FileRequest>& requests) {
+ImportedModel ModelSource::import(const ImportOptions& options, const RunContext& context,
+                                  std::vector<FileRequest>& requests) {
   if (!has_bytes_) read_model();
   FileResolver resolver(path_.parent_path());
   try {
-    ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options_, context);
+    ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
     requests = resolver.requests();
     return m;
   } catch (const InputError& e) {

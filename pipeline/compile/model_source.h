@@ -42,10 +42,11 @@ class ModelSource {
   void read_model();
   Sha256 list_key() const;
   bool unchanged_since(const std::string& note);
-  ImportedModel import(const RunContext& context, std::vector<FileRequest>& requests);
+  ImportedModel import(const ImportOptions& options, const RunContext& context,
+                       std::vector<FileRequest>& requests);
 
   std::filesystem::path path_;
-  ImportOptions options_;
+  ImportOptions options_;  // of open()
   std::vector<FileRequest> known_;
   Bytes bytes_;
   bool has_bytes_ = false;

@@ -11,10 +11,10 @@
 
 #include "stages/skeletonization/cgal_failure.h"
 #include "stages/skeletonization/contraction/contraction_arena.h"
-#include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/contraction/inside_test.h"
 #include "stages/skeletonization/contraction/normal_equations.h"
 #include "stages/skeletonization/contraction/voronoi_poles.h"
+#include "stages/skeletonization/geometry_failure.h"
 
 // The allocator is a template parameter of Polyhedron_3 with this macro as its default, and the contraction
 // names no other. Only the one forward declaration that holds the default sees our value, so no other CGAL

@@ -6,7 +6,6 @@
 
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
-#include "stages/skeletonization/contraction/contraction.h"
 
 namespace texmesh {
 namespace {
@@ -32,10 +31,6 @@ TEST(TryGeometry, LetsMistakesAndLimitsOfTheMachinePass) {
   EXPECT_THROW(falls_back_on(StageError("skeletonization", "mesh", "triangles", "none")), StageError);
   EXPECT_THROW(falls_back_on(Cancelled()), Cancelled);
   EXPECT_THROW(falls_back_on(std::bad_alloc()), std::bad_alloc);
-}
-
-TEST(ContractToSkeleton, RefusesAnOpenSurfaceAsGeometry) {
-  EXPECT_THROW(contract_to_skeleton({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}), GeometryFailure);
 }
 
 }  // namespace
