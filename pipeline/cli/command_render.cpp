@@ -62,7 +62,8 @@ RenderedModel model_of(const RenderArguments& args, const RunContext& context) {
     return package_model(package, choice, context);
   }
   for (const auto& [flag, given] : {std::pair{"--scale", args.scale >= 0}, {"--rung", !args.rung.empty()}})
-    if (given) throw UsageError(flag, "", "a package, whose scales and rungs can be chosen", args.input);
+    if (given && std::filesystem::exists(args.input))
+      throw UsageError(flag, "", "a package, whose scales and rungs can be chosen", args.input);
   return load_rendered_model(args.input, {}, context);
 }
 
