@@ -1,0 +1,65 @@
+// `texmesh render` beside three.js: the same files, the same light, the same camera, pixel by pixel.
+import {PNG, check, common, env, fs, lab, labRoots, launch, listen, packages, path, pictures, run, serve} from './browser.mjs';
+import {test} from './harness.mjs';
+import {spheresGlb} from './spheres.mjs';
+
+const kSizePx = 512;
+const kMostApart = 3; // of 255, in the mean over covered pixels
+const kEnvironmentPx = 1024;
+const data = env.data || path.join(env.source, '../shared/data');
+
+/** Scans of the data folder, and the model that is made here. */
+const kScenes = {
+  spheres: null, 'sea turtle': 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb', 'flight helmet': 'flight_helmet/FlightHelmet.gltf',
+};
+
+/** Mean difference over the covered pixels, and a picture of it, eight times as strong. */
+function compare(ours, theirs, coveredPx) {
+  const shown = new PNG({width: ours.width, height: ours.height});
+  let sum = 0;
+  for (let i = 0; i < ours.data.length; i++) {
+    if (i % 4 === 3) { shown.data[i] = 255; continue; }
+    const d = Math.abs(ours.data[i] - theirs.data[i]);
+    sum += d;
+    shown.data[i] = Math.min(255, 8 * d);
+  }
+  return {mean: sum / 3 / coveredPx, shown};
+}
+
+/** A page under the renderer's light. */
+let lit;
+function litPage() {
+  return (lit ??= (async () => {
+    const {browser} = await common();
+    fs.mkdirSync(packages, {recursive: true});
+    const key = JSON.parse(run(env.exportEnvironment, path.join(packages, 'studio.f32'), String(kEnvironmentPx)));
+    const server = await serve({'/data/': data, ...labRoots});
+    const page = await browser.newPage({viewport: {width: kSizePx + 40, height: kSizePx + 40}});
+    listen(page);
+    await page.goto(`${server.url}/lit.html`);
+    await page.waitForFunction('window.ready', null, {timeout: 20000});
+    const made = await lab(page, ([k, s]) => window.lit.light(k, s), [{...key, url: `${server.url}/packages/studio.f32`}, kSizePx]);
+    check(made.samples >= 4 && made.floats, `the browser cannot draw this: ${JSON.stringify(made)}`);
+    return {page, url: server.url};
+  })());
+}
+
+for (const [name, scan] of Object.entries(kScenes))
+  test(`texmesh render shows what three.js shows: ${name}`, async ({skip}) => {
+    if (scan && !fs.existsSync(path.join(data, scan))) skip(`${path.join(data, scan)} is not there`);
+    const {page, url} = await litPage();
+    if (!scan) fs.writeFileSync(path.join(packages, 'spheres.glb'), spheresGlb());
+    const file = (kind) => path.join(pictures, `render-${name.replace(' ', '-')}-${kind}.png`);
+    const told = JSON.parse(run(env.texmesh, 'render', scan ? path.join(data, scan) : path.join(packages, 'spheres.glb'), '-o', file('texmesh'), '--size', String(kSizePx), '--json'));
+    const ours = PNG.sync.read(fs.readFileSync(file('texmesh')));
+    const base64 = await lab(page, ([u, v, b]) => window.lit.picture(u, v, b), [scan ? `${url}/data/${scan}` : `${url}/packages/spheres.glb`, told.views[0], [...ours.data.subarray(0, 3)]]);
+    const theirs = new PNG({width: kSizePx, height: kSizePx});
+    theirs.data = Buffer.from(base64, 'base64');
+    const {mean, shown} = compare(ours, theirs, told.views[0].covered_px);
+    fs.writeFileSync(file('three'), PNG.sync.write(theirs));
+    fs.writeFileSync(file('difference'), PNG.sync.write(shown));
+    console.log(`  ${name}: ${mean.toFixed(2)} of 255 over ${told.views[0].covered_px} pixels`);
+    check(page.said.length === 0, page.said.join('\n'));
+    check(told.views[0].covered_px > 0.1 * kSizePx * kSizePx, `${told.views[0].covered_px} pixels are covered`);
+    check(mean <= kMostApart, `differs by ${mean.toFixed(2)} of 255 in the mean, at most ${kMostApart} are allowed`);
+  });
