@@ -18,8 +18,7 @@ void paste(const Pixels& picture, const SheetView& view, Pixels& sheet) {
 
 /// The whole sheet as if nothing stood on it.
 Pixels empty_sheet(std::uint32_t width_px, std::uint32_t height_px, const RenderEnvironment& environment) {
-  Picture dot{1, {tone_mapped(environment.background)}, {0}};
-  const Pixels colour = encode_srgb(dot);
+  const Pixels colour = encode_srgb({1, {environment.background}, {0}});
   Pixels sheet{width_px, height_px, 3, {}};
   sheet.data.reserve(std::size_t{width_px} * height_px * 3);
   for (std::size_t i = 0; i < std::size_t{width_px} * height_px; ++i)
