@@ -15,7 +15,7 @@ using Level = RenderEnvironment::Level;
 using Harmonics = std::array<double, 9>;
 
 constexpr std::uint32_t kSharpSide = 128, kBlurredSide = 64, kBroadSide = 32;
-constexpr std::size_t kLevels = 8, kLobeSamples = 256;
+constexpr std::size_t kLevels = 8, kLobeSamples = 128;
 
 Vec3f read_level(const Level& level, Vec3f direction) {
   const Vec2f place = render::octahedral(direction);
