@@ -36,9 +36,7 @@ Vec3f studio_radiance(Vec3f direction) {
   return sum;
 }
 
-KeyLight studio_key_light() {
-  return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}};
-}
+KeyLight studio_key_light() { return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}}; }
 
 RenderEnvironment studio_environment(const RunContext& context) {
   return prepare_environment(studio_radiance, studio_key_light(), context);
