@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
@@ -12,10 +13,16 @@ namespace texmesh {
 namespace {
 
 using Level = RenderEnvironment::Level;
-using Harmonics = std::array<double, 9>;
 
-constexpr std::uint32_t kSharpSide = 128, kBlurredSide = 64, kBroadSide = 32;
-constexpr std::size_t kLevels = 8, kLobeSamples = 256;
+constexpr std::size_t kHarmonics = RenderEnvironment::kHarmonics;
+
+// By roughness i / 7. Broad lobes need fewer texels and more samples.
+struct LevelPlan {
+  std::uint32_t side;
+  std::size_t samples;
+};
+constexpr LevelPlan kLevels[] = {{128, 1},  {64, 96},  {64, 96},  {32, 192},
+                                 {32, 192}, {16, 768}, {16, 768}, {16, 768}};
 
 Vec3f read_level(const Level& level, Vec3f direction) {
   const Vec2f place = render::octahedral(direction);
@@ -59,14 +66,14 @@ struct LobeSample {
 
 /// Directions of light that a GGX lobe reflects to a viewer on the normal, by equal shares of half vectors;
 /// each counts by its n.l (Karis 2013).
-std::vector<LobeSample> lobe_samples(double roughness) {
+std::vector<LobeSample> lobe_samples(double roughness, std::size_t count) {
   const double a2 = roughness * roughness * roughness * roughness;
   std::vector<LobeSample> out;
   double sum = 0;
-  for (std::size_t i = 0; i < kLobeSamples; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     double radical = 0, digit = 0.5;
     for (std::size_t n = i; n > 0; n /= 2, digit /= 2) radical += static_cast<double>(n % 2) * digit;
-    const double share = (static_cast<double>(i) + 0.5) / kLobeSamples;
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
     const double cos_h = std::sqrt((1 - share) / (1 + (a2 - 1) * share));
     const double z = 2 * cos_h * cos_h - 1;  // the mirror of +z at the half vector
     if (z <= 0) continue;
@@ -90,21 +97,33 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   return sum;
 }
 
-Harmonics harmonics_of(Vec3d d) {
-  return {0.28209479177387814,
-          0.48860251190291992 * d.y,
-          0.48860251190291992 * d.z,
-          0.48860251190291992 * d.x,
-          1.0925484305920792 * d.x * d.y,
-          1.0925484305920792 * d.y * d.z,
-          0.31539156525252005 * (3 * d.z * d.z - 1),
-          1.0925484305920792 * d.x * d.z,
-          0.54627421529603959 * (d.x * d.x - d.y * d.y)};
+/// Real spherical harmonics of the bands 0, 1, 2 and 4.
+template <class T>
+std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
+  const T x = d.x, y = d.y, z = d.z, x2 = x * x, y2 = y * y, z2 = z * z;
+  return {T(0.28209479177387814),
+          T(0.48860251190291992) * y,
+          T(0.48860251190291992) * z,
+          T(0.48860251190291992) * x,
+          T(1.0925484305920792) * x * y,
+          T(1.0925484305920792) * y * z,
+          T(0.31539156525252005) * (3 * z2 - 1),
+          T(1.0925484305920792) * x * z,
+          T(0.54627421529603959) * (x2 - y2),
+          T(2.5033429417967046) * x * y * (x2 - y2),
+          T(1.7701307697799304) * y * z * (3 * x2 - y2),
+          T(0.94617469575756008) * x * y * (7 * z2 - 1),
+          T(0.66904654355728921) * y * z * (7 * z2 - 3),
+          T(0.10578554691520431) * (35 * z2 * z2 - 30 * z2 + 3),
+          T(0.66904654355728921) * x * z * (7 * z2 - 3),
+          T(0.47308734787878004) * (x2 - y2) * (7 * z2 - 1),
+          T(1.7701307697799304) * x * z * (x2 - 3 * y2),
+          T(0.62583573544917614) * (x2 * x2 - 6 * x2 * y2 + y2 * y2)};
 }
 
-std::array<Vec3f, 9> irradiance_of(const Radiance& radiance) {
+std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
   constexpr int kRings = 64, kPlaces = 128;
-  std::array<Vec3d, 9> sum{};
+  std::array<Vec3d, kHarmonics> sum{};
   for (int i = 0; i < kRings; ++i) {
     // Rings of equal area
     const double up = 1 - 2 * (i + 0.5) / kRings, ring = std::sqrt(1 - up * up);
@@ -112,19 +131,18 @@ std::array<Vec3f, 9> irradiance_of(const Radiance& radiance) {
       const double angle = 2 * portable::kPi * (j + 0.5) / kPlaces;
       const Vec3d d{ring * portable::cos(angle), up, ring * portable::sin(angle)};
       const Vec3f light = radiance(to_float(d));
-      const Harmonics basis = harmonics_of(d);
-      for (std::size_t k = 0; k < 9; ++k)
+      const std::array<double, kHarmonics> basis = harmonics_of(d);
+      for (std::size_t k = 0; k < kHarmonics; ++k)
         for (int c = 0; c < 3; ++c)
           sum[k][c] += basis[k] * static_cast<double>(render::clamped(light[c], 0, 65504));
     }
   }
-  // A cosine lobe over pi weighs the bands by 1, 2/3 and 1/4.
-  std::array<Vec3f, 9> out;
-  for (std::size_t k = 0; k < 9; ++k)
-    out[k] = to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) *
-                                (k == 0  ? 1
-                                 : k < 4 ? 2.0 / 3
-                                         : 0.25)));
+  // A cosine lobe over pi weighs the bands by these; band 3 by 0, and those beyond 4 by less than 1 / 60.
+  std::array<Vec3f, kHarmonics> out;
+  for (std::size_t k = 0; k < kHarmonics; ++k) {
+    const double weight = k == 0 ? 1 : k < 4 ? 2.0 / 3 : k < 9 ? 0.25 : -1.0 / 24;
+    out[k] = to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) * weight));
+  }
   return out;
 }
 
@@ -135,29 +153,21 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
   RenderEnvironment out;
   out.key = key;
   out.irradiance = irradiance_of(radiance);
-  out.levels.push_back(make_level(kSharpSide, context, radiance));
-  for (std::size_t i = 1; i < kLevels; ++i) {
-    const std::vector<LobeSample> lobe = lobe_samples(static_cast<double>(i) / (kLevels - 1));
-    out.levels.push_back(make_level(i < 3 ? kBlurredSide : kBroadSide, context, [&](Vec3f direction) {
+  out.levels.push_back(make_level(kLevels[0].side, context, radiance));
+  for (std::size_t i = 1; i < std::size(kLevels); ++i) {
+    const double roughness = static_cast<double>(i) / (std::size(kLevels) - 1);
+    const std::vector<LobeSample> lobe = lobe_samples(roughness, kLevels[i].samples);
+    out.levels.push_back(make_level(kLevels[i].side, context, [&](Vec3f direction) {
       return filtered(out.levels.front(), lobe, direction);
     }));
   }
   return out;
 }
 
-Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f n) {
-  const std::array<Vec3f, 9>& h = environment.irradiance;
-  const float basis[9] = {0.282094792f,
-                          0.488602512f * n.y,
-                          0.488602512f * n.z,
-                          0.488602512f * n.x,
-                          1.092548431f * n.x * n.y,
-                          1.092548431f * n.y * n.z,
-                          0.315391565f * (3 * n.z * n.z - 1),
-                          1.092548431f * n.x * n.z,
-                          0.546274215f * (n.x * n.x - n.y * n.y)};
+Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
+  const std::array<float, kHarmonics> basis = harmonics_of(normal);
   Vec3f sum;
-  for (std::size_t k = 0; k < 9; ++k) sum = sum + h[k] * basis[k];
+  for (std::size_t k = 0; k < kHarmonics; ++k) sum = sum + environment.irradiance[k] * basis[k];
   return {render::clamped(sum.x, 0, 65504), render::clamped(sum.y, 0, 65504),
           render::clamped(sum.z, 0, 65504)};
 }

@@ -17,7 +17,9 @@ struct KeyLight {
 
 /// Light from all around, prepared for shading. About 0.3 MB.
 struct RenderEnvironment {
-  std::array<Vec3f, 9> irradiance;  // spherical harmonics of irradiance / pi, by band
+  /// Of the bands 0, 1, 2 and 4: of a light in one place, three bands are up to 8 % beside the integral.
+  static constexpr std::size_t kHarmonics = 18;
+  std::array<Vec3f, kHarmonics> irradiance;  // spherical harmonics of irradiance / pi
   /// Prefiltered radiance as octahedral maps with a border of one texel, roughness i / (size - 1).
   struct Level {
     std::uint32_t side = 0;     // texels with the border
@@ -37,7 +39,7 @@ Vec3f studio_radiance(Vec3f direction);
 /// Its key light: from above, to the right of +Z.
 KeyLight studio_key_light();
 
-/// Irradiance is the projection on nine spherical harmonics (Ramamoorthi and Hanrahan 2001). The levels are
+/// Irradiance is the projection on spherical harmonics (Ramamoorthi and Hanrahan 2001). The levels are
 /// filtered by the GGX lobe that is seen from the normal (Karis 2013), sampled without chance. At most about
 /// 0.15 s. Same bits for any thread count.
 RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,

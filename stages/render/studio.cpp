@@ -16,7 +16,7 @@ struct SoftBox {
 constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {5.3f, 5.2f, 5.0f}},
                               {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
                               {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
-constexpr Vec3f kZenith{0.34f, 0.36f, 0.40f}, kHorizon{0.40f, 0.39f, 0.38f}, kGround{0.150f, 0.135f, 0.115f};
+constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
 constexpr float kLog2E = 1.44269504f;
 
 float lobe(Vec3f direction, Vec3f axis, float sharpness) {
@@ -36,9 +36,7 @@ Vec3f studio_radiance(Vec3f direction) {
   return sum;
 }
 
-KeyLight studio_key_light() {
-  return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f} * 1.1f};
-}
+KeyLight studio_key_light() { return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}}; }
 
 RenderEnvironment studio_environment(const RunContext& context) {
   return prepare_environment(studio_radiance, studio_key_light(), context);

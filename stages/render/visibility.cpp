@@ -24,15 +24,18 @@ void require(bool held, const char* what) {
 
 void check_scene(const RenderScene& scene) {
   const Mesh& mesh = *scene.mesh;
-  const std::size_t wedges = mesh.wedge_count();
+  const std::size_t wedges = mesh.wedge_count(), triangles = scene.triangles->size();
+  require(!scene.triangle_source || scene.triangle_source->size() == triangles,
+          "look: a triangle has no source");
   for (const std::uint32_t p : mesh.wedge_position)
     require(p < mesh.positions.size(), "look: a wedge's position is beyond the mesh");
-  for (std::size_t t = 0; t < scene.triangles->size(); ++t) {
+  for (std::size_t t = 0; t < triangles; ++t) {
     for (const std::uint32_t wedge : (*scene.triangles)[t])
       require(wedge < wedges, "look: a triangle's wedge is beyond the mesh");
-    const std::size_t source = scene.triangle_source ? (*scene.triangle_source).at(t) : t;
-    require(mesh.triangle_material.at(source) < scene.materials->size(),
-            "look: a triangle's material is beyond the materials");
+    const std::size_t source = scene.triangle_source ? (*scene.triangle_source)[t] : t;
+    require(
+        source < mesh.triangle_material.size() && mesh.triangle_material[source] < scene.materials->size(),
+        "look: a triangle's material is beyond the materials");
   }
 }
 
