@@ -38,8 +38,8 @@ function litPage() {
     listen(page);
     await page.goto(`${server.url}/lit.html`);
     await page.waitForFunction('window.ready', null, {timeout: 20000});
-    const made = await lab(page, ([k, s]) => window.lit.light(k, s), [{...key, url: `${server.url}/packages/studio.f32`}, kSizePx]);
-    check(made.samples >= 4 && made.floats, `the browser cannot draw this: ${JSON.stringify(made)}`);
+    const works = await lab(page, ([k, s]) => window.lit.light(k, s), [{...key, url: `${server.url}/packages/studio.f32`}, kSizePx]);
+    check(works, 'the browser does not filter textures of floats');
     return {page, url: server.url};
   })());
 }

@@ -11,7 +11,7 @@ let key;
 
 /** The light of all pictures to come; `url` holds RGBA floats. */
 async function light({url, widthPx, heightPx, towards, irradiance}, sizePx) {
-  renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
+  renderer = new WebGLRenderer({preserveDrawingBuffer: true});
   renderer.setPixelRatio(1);
   renderer.setSize(sizePx, sizePx);
   renderer.toneMapping = NeutralToneMapping;
@@ -25,8 +25,34 @@ async function light({url, widthPx, heightPx, towards, irradiance}, sizePx) {
   environment = new PMREMGenerator(renderer).fromEquirectangular(texture).texture;
   key = new DirectionalLight(new Color().setRGB(...irradiance, LinearSRGBColorSpace), 1);
   key.position.set(...towards);
+  return !!renderer.getContext().getExtension('OES_texture_float_linear');
+}
+
+const decode = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+const encode = (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
+
+/**
+ * RGBA, top row first: the mean, as light, of drawings from 4 x 4 places within a pixel. A canvas' own antialiasing takes other places and
+ * mixes encoded colours; one drawing of four times the size would read finer mips.
+ */
+function sampled(scene, camera) {
+  const kSide = 4;
   const gl = renderer.getContext();
-  return {samples: gl.getParameter(gl.SAMPLES), floats: !!gl.getExtension('OES_texture_float_linear')};
+  const {width, height} = renderer.domElement;
+  const light = Float64Array.from({length: 256}, (_, i) => decode(i / 255) / kSide ** 2);
+  const sum = new Float64Array(4 * width * height);
+  const drawn = new Uint8Array(sum.length);
+  for (let k = 0; k < kSide ** 2; k++) {
+    const [dx, dy] = [k % kSide, Math.floor(k / kSide)].map((i) => (i + 0.5) / kSide - 0.5);
+    camera.setViewOffset(width, height, dx, dy, width, height);
+    renderer.render(scene, camera);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, drawn);
+    for (let i = 0; i < drawn.length; i++) sum[i] += light[drawn[i]];
+  }
+  const out = new Uint8ClampedArray(sum.length);
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < 4 * width; x++) out[y * 4 * width + x] = 255 * encode(sum[(height - 1 - y) * 4 * width + x]);
+  return out;
 }
 
 /** The GLB as base64 RGBA, top row first. `view` as `texmesh render --json` tells it; `background`: sRGB bytes. */
@@ -43,13 +69,7 @@ async function picture(glb, view, background) {
   camera.matrixAutoUpdate = false;
   camera.matrix.copy(new Matrix4().makeBasis(right, up, backwards).setPosition(eye));
   camera.matrixWorldNeedsUpdate = true;
-  renderer.render(scene, camera);
-  const {width, height} = renderer.domElement;
-  const canvas = document.createElement('canvas');
-  [canvas.width, canvas.height] = [width, height];
-  const context = canvas.getContext('2d');
-  context.drawImage(renderer.domElement, 0, 0);
-  const bytes = context.getImageData(0, 0, width, height).data;
+  const bytes = sampled(scene, camera);
   let text = '';
   for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
   object.traverse((o) => {
