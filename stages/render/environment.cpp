@@ -16,13 +16,19 @@ using Level = RenderEnvironment::Level;
 
 constexpr std::size_t kHarmonics = RenderEnvironment::kHarmonics;
 
-// By roughness i / 7. Broad lobes need fewer texels and more samples.
+// By roughness i / 7. The variances are those of three.js r170's prefiltered maps, from what the maps leave
+// of the studio's harmonics of bands 1 to 4. With GGX lobes, which are wider, rough metal was 5 of 255 beside
+// three.js; so was plaster with irradiance of a cosine.
 struct LevelPlan {
   std::uint32_t side;
   std::size_t samples;
+  double variance;  // of the angle along each of two axes, radians squared
 };
-constexpr LevelPlan kLevels[] = {{128, 1},  {64, 96},  {64, 96},  {32, 192},
-                                 {32, 192}, {16, 768}, {16, 768}, {16, 768}};
+constexpr LevelPlan kLevels[] = {{128, 1, 0},      {64, 96, 0.0008}, {64, 96, 0.0135}, {32, 192, 0.058},
+                                 {32, 192, 0.129}, {32, 384, 0.21},  {32, 384, 0.27},  {32, 384, 0.32}};
+// What three.js r170's roughest map, from which it reads irradiance, leaves of each band. A cosine lobe over
+// pi leaves 1, 2/3, 1/4, 0 and -1/24.
+constexpr double kIrradianceOfBand[] = {1, 0.740, 0.391, 0.167, 0.057};
 
 Vec3f read_level(const Level& level, Vec3f direction) {
   const Vec2f place = render::octahedral(direction);
@@ -64,26 +70,23 @@ struct LobeSample {
   float weight = 0;
 };
 
-/// Directions of light that a GGX lobe reflects to a viewer on the normal, by equal shares of half vectors;
-/// each counts by its n.l (Karis 2013).
-std::vector<LobeSample> lobe_samples(double roughness, std::size_t count) {
-  const double a2 = roughness * roughness * roughness * roughness;
+/// A Gaussian of the angle by equal shares; each sample counts by the sphere's area beside the plane's.
+std::vector<LobeSample> lobe_samples(const LevelPlan& plan) {
   std::vector<LobeSample> out;
   double sum = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < plan.samples; ++i) {
     double radical = 0, digit = 0.5;
     for (std::size_t n = i; n > 0; n /= 2, digit /= 2) radical += static_cast<double>(n % 2) * digit;
-    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
-    const double cos_h = std::sqrt((1 - share) / (1 + (a2 - 1) * share));
-    const double z = 2 * cos_h * cos_h - 1;  // the mirror of +z at the half vector
-    if (z <= 0) continue;
-    const double ring = std::sqrt(std::max(0.0, 1 - z * z)), angle = 2 * portable::kPi * radical;
-    out.push_back({{static_cast<float>(ring * portable::cos(angle)),
-                    static_cast<float>(ring * portable::sin(angle)), static_cast<float>(z)},
-                   static_cast<float>(z)});
-    sum += z;
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(plan.samples);
+    const double fall = std::sqrt(-2 * plan.variance * portable::log(1 - share));
+    if (fall >= portable::kPi) continue;
+    const double ring = portable::sin(fall), turn = 2 * portable::kPi * radical, weight = ring / fall;
+    out.push_back(
+        {to_float(Vec3d{ring * portable::cos(turn), ring * portable::sin(turn), portable::cos(fall)}),
+         static_cast<float>(weight)});
+    sum += weight;
   }
-  for (LobeSample& s : out) s.weight = static_cast<float>(s.weight / sum);
+  for (LobeSample& s : out) s.weight = static_cast<float>(static_cast<double>(s.weight) / sum);
   return out;
 }
 
@@ -97,7 +100,7 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   return sum;
 }
 
-/// Real spherical harmonics of the bands 0, 1, 2 and 4.
+/// Real spherical harmonics of the bands 0 to 4.
 template <class T>
 std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
   const T x = d.x, y = d.y, z = d.z, x2 = x * x, y2 = y * y, z2 = z * z;
@@ -110,6 +113,13 @@ std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
           T(0.31539156525252005) * (3 * z2 - 1),
           T(1.0925484305920792) * x * z,
           T(0.54627421529603959) * (x2 - y2),
+          T(0.59004358992664352) * y * (3 * x2 - y2),
+          T(2.8906114426405538) * x * y * z,
+          T(0.45704579946446572) * y * (5 * z2 - 1),
+          T(0.37317633259011540) * z * (5 * z2 - 3),
+          T(0.45704579946446572) * x * (5 * z2 - 1),
+          T(1.4453057213202769) * z * (x2 - y2),
+          T(0.59004358992664352) * x * (x2 - 3 * y2),
           T(2.5033429417967046) * x * y * (x2 - y2),
           T(1.7701307697799304) * y * z * (3 * x2 - y2),
           T(0.94617469575756008) * x * y * (7 * z2 - 1),
@@ -137,10 +147,9 @@ std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
           sum[k][c] += basis[k] * static_cast<double>(render::clamped(light[c], 0, 65504));
     }
   }
-  // A cosine lobe over pi weighs the bands by these; band 3 by 0, and those beyond 4 by less than 1 / 60.
   std::array<Vec3f, kHarmonics> out;
   for (std::size_t k = 0; k < kHarmonics; ++k) {
-    const double weight = k == 0 ? 1 : k < 4 ? 2.0 / 3 : k < 9 ? 0.25 : -1.0 / 24;
+    const double weight = kIrradianceOfBand[k == 0 ? 0 : k < 4 ? 1 : k < 9 ? 2 : k < 16 ? 3 : 4];
     out[k] = to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) * weight));
   }
   return out;
@@ -155,8 +164,7 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
   out.irradiance = irradiance_of(radiance);
   out.levels.push_back(make_level(kLevels[0].side, context, radiance));
   for (std::size_t i = 1; i < std::size(kLevels); ++i) {
-    const double roughness = static_cast<double>(i) / (std::size(kLevels) - 1);
-    const std::vector<LobeSample> lobe = lobe_samples(roughness, kLevels[i].samples);
+    const std::vector<LobeSample> lobe = lobe_samples(kLevels[i]);
     out.levels.push_back(make_level(kLevels[i].side, context, [&](Vec3f direction) {
       return filtered(out.levels.front(), lobe, direction);
     }));

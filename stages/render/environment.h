@@ -17,9 +17,8 @@ struct KeyLight {
 
 /// Light from all around, prepared for shading. About 0.3 MB.
 struct RenderEnvironment {
-  /// Of the bands 0, 1, 2 and 4: of a light in one place, three bands are up to 8 % beside the integral.
-  static constexpr std::size_t kHarmonics = 18;
-  std::array<Vec3f, kHarmonics> irradiance;  // spherical harmonics of irradiance / pi
+  static constexpr std::size_t kHarmonics = 25;  // of the bands 0 to 4
+  std::array<Vec3f, kHarmonics> irradiance;      // spherical harmonics of irradiance / pi
   /// Prefiltered radiance as octahedral maps with a border of one texel, roughness i / (size - 1).
   struct Level {
     std::uint32_t side = 0;     // texels with the border
@@ -39,9 +38,10 @@ Vec3f studio_radiance(Vec3f direction);
 /// Its key light: from above, to the right of +Z.
 KeyLight studio_key_light();
 
-/// Irradiance is the projection on spherical harmonics (Ramamoorthi and Hanrahan 2001). The levels are
-/// filtered by the GGX lobe that is seen from the normal (Karis 2013), sampled without chance. At most about
-/// 0.15 s. Same bits for any thread count.
+/// Both are filtered as three.js r170 filters them, since that is what viewers see: by Gaussians of the
+/// angle, whose width follows the roughness; irradiance by that of roughness 1, as spherical harmonics
+/// (Ramamoorthi and Hanrahan 2001). Sampled without chance. At most about 0.15 s. Same bits for any thread
+/// count.
 RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,
                                       const RunContext& context);
 /// studio_radiance with studio_key_light.

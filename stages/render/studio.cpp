@@ -13,7 +13,7 @@ struct SoftBox {
 };
 
 // Their sum is grey. The main box stands where the key light comes from.
-constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {5.3f, 5.2f, 5.0f}},
+constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
                               {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
                               {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
 constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
