@@ -47,8 +47,8 @@ inline EdgePlanes edge_planes(const std::array<Vec3d, 3>& corner) {
   // Of differences: small triangles keep their digits.
   const Vec3d face = cross(corner[1] - corner[0], corner[2] - corner[0]);
   const double volume = dot(corner[0], face);
-  const double inverse = 1 / volume;
-  if (!std::isfinite(volume) || !std::isfinite(inverse)) return out;
+  const double inverse = volume != 0 ? 1 / volume : 0;
+  if (volume == 0 || !std::isfinite(volume) || !std::isfinite(inverse)) return out;
   out.visible = true;
   out.front = volume < 0;  // corners counter-clockwise, y down
   const double sign = volume < 0 ? -1 : 1;

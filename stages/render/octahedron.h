@@ -4,10 +4,12 @@
 
 namespace texmesh::render {
 
-/// -1..1 in both; |x| + |y| > 1 is the lower half, y < 0. The vector need not be unit, but not zero.
+/// -1..1 in both; |x| + |y| > 1 is the lower half, y < 0. The vector need not be unit; of no direction the
+/// place is the middle.
 inline Vec2f octahedral(Vec3f d) {
   auto size = [](float v) { return v < 0 ? -v : v; };
-  const float scale = 1 / (size(d.x) + size(d.y) + size(d.z));
+  const float sum = size(d.x) + size(d.y) + size(d.z);
+  const float scale = sum > 0 ? 1 / sum : 0;
   const float x = d.x * scale, y = d.z * scale;
   if (d.y >= 0) return {x, y};
   return {(1 - size(y)) * (x < 0 ? -1.f : 1.f), (1 - size(x)) * (y < 0 ? -1.f : 1.f)};

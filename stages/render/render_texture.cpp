@@ -40,9 +40,10 @@ float folded(float u, Wrap wrap) {
   return t > 1 ? 2 - t : t;
 }
 
+/// `u` is folded.
 Axis bilinear_axis(float u, std::uint32_t size, Wrap wrap) {
   const auto n = static_cast<std::int32_t>(size);
-  const float at = folded(u, wrap) * static_cast<float>(n) - 0.5f;
+  const float at = u * static_cast<float>(n) - 0.5f;
   Axis axis;
   axis.first = render::floor_of(at);
   axis.second = axis.first + 1;
@@ -57,9 +58,10 @@ Axis bilinear_axis(float u, std::uint32_t size, Wrap wrap) {
   return axis;
 }
 
-std::uint32_t nearest_texel(float u, std::uint32_t size, Wrap wrap) {
-  const std::int32_t at = render::floor_of(folded(u, wrap) * static_cast<float>(size));
-  return static_cast<std::uint32_t>(std::clamp(at, 0, static_cast<std::int32_t>(size) - 1));
+/// `u` is folded.
+std::int32_t nearest_texel(float u, std::uint32_t size) {
+  const auto n = static_cast<std::int32_t>(size);
+  return std::clamp(render::floor_of(u * static_cast<float>(n)), 0, n - 1);
 }
 
 template <std::size_t N>
@@ -104,9 +106,8 @@ Vec4f read_bilinear(const Pixels& level, bool srgb, const TextureSlot& slot, Vec
   }
 }
 
-Vec4f read_nearest(const Pixels& level, bool srgb, const TextureSlot& slot, Vec2f uv) {
-  const auto x = static_cast<std::int32_t>(nearest_texel(uv.x, level.width_px, slot.wrap_s)),
-             y = static_cast<std::int32_t>(nearest_texel(uv.y, level.height_px, slot.wrap_t));
+Vec4f read_nearest(const Pixels& level, bool srgb, Vec2f uv) {
+  const std::int32_t x = nearest_texel(uv.x, level.width_px), y = nearest_texel(uv.y, level.height_px);
   const Curve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
   const Axis ax{x, x, 0}, ay{y, y, 0};
   switch (level.channels) {
@@ -136,17 +137,18 @@ float level_of(const RenderTexture& texture, const TextureFootprint& footprint) 
 Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
   const float level = level_of(texture, footprint);
   const Pixels& finest = texture.levels.front();
+  const Vec2f uv{folded(footprint.uv.x, slot.wrap_s), folded(footprint.uv.y, slot.wrap_t)};
   if (level <= 0 ? slot.mag_filter == MagFilter::kNearest : slot.min_filter == MinFilter::kNearest)
-    return read_nearest(finest, texture.srgb, slot, footprint.uv);
+    return read_nearest(finest, texture.srgb, uv);
   const auto first = static_cast<float>(texture.first_level);
   if (level <= first || slot.min_filter != MinFilter::kTrilinear)
-    return read_bilinear(finest, texture.srgb, slot, footprint.uv);
+    return read_bilinear(finest, texture.srgb, slot, uv);
   const float at = std::min(level - first, static_cast<float>(texture.levels.size() - 1));
   const auto fine = static_cast<std::size_t>(at);
   const float part = at - static_cast<float>(fine);
-  const Vec4f a = read_bilinear(texture.levels[fine], texture.srgb, slot, footprint.uv);
+  const Vec4f a = read_bilinear(texture.levels[fine], texture.srgb, slot, uv);
   if (part == 0) return a;
-  const Vec4f b = read_bilinear(texture.levels[fine + 1], texture.srgb, slot, footprint.uv);
+  const Vec4f b = read_bilinear(texture.levels[fine + 1], texture.srgb, slot, uv);
   return {a.x + (b.x - a.x) * part, a.y + (b.y - a.y) * part, a.z + (b.z - a.z) * part,
           a.w + (b.w - a.w) * part};
 }

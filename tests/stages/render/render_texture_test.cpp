@@ -58,7 +58,7 @@ TEST(RenderTexture, WrapModesFoldTheCoordinates) {
 }
 
 TEST(RenderTexture, CoordinatesThatAreNotFiniteReadACorner) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNan = std::nanf("");
+  const float kInfinity = std::numeric_limits<float>::infinity(), kNan = std::nanf("");
   for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kMirror})
     for (const float u : {kInfinity, -kInfinity, kNan, 3e38f}) {
       const float value = step_at(u, wrap);
