@@ -50,9 +50,11 @@ for (const [name, scan] of Object.entries(kScenes))
     const {page, url} = await litPage();
     if (!scan) fs.writeFileSync(path.join(packages, 'spheres.glb'), spheresGlb());
     const file = (kind) => path.join(pictures, `render-${name.replace(' ', '-')}-${kind}.png`);
-    const told = JSON.parse(run(env.texmesh, 'render', scan ? path.join(data, scan) : path.join(packages, 'spheres.glb'), '-o', file('texmesh'), '--size', String(kSizePx), '--json'));
+    const [model, modelUrl] = scan ? [path.join(data, scan), `${url}/data/${scan}`] : [path.join(packages, 'spheres.glb'), `${url}/packages/spheres.glb`];
+    const told = JSON.parse(run(env.texmesh, 'render', model, '-o', file('texmesh'), '--size', String(kSizePx), '--json'));
     const ours = PNG.sync.read(fs.readFileSync(file('texmesh')));
-    const base64 = await lab(page, ([u, v, b]) => window.lit.picture(u, v, b), [scan ? `${url}/data/${scan}` : `${url}/packages/spheres.glb`, told.views[0], [...ours.data.subarray(0, 3)]]);
+    const background = [...ours.data.subarray(0, 3)];
+    const base64 = await lab(page, ([u, v, b]) => window.lit.picture(u, v, b), [modelUrl, told.views[0], background]);
     const theirs = new PNG({width: kSizePx, height: kSizePx});
     theirs.data = Buffer.from(base64, 'base64');
     const {mean, shown} = compare(ours, theirs, told.views[0].covered_px);
