@@ -1,6 +1,7 @@
 // `texmesh render` beside three.js: the same files, the same light, the same camera, pixel by pixel.
 import {PNG, check, common, env, fs, lab, labRoots, launch, listen, packages, path, pictures, run, serve} from './browser.mjs';
 import {test} from './harness.mjs';
+import {sheetGlb} from './sheet.mjs';
 import {spheresGlb} from './spheres.mjs';
 
 const kSizePx = 512;
@@ -8,9 +9,10 @@ const kMostApart = 3; // of 255, in the mean over covered pixels
 const kEnvironmentPx = 1024;
 const data = env.data || path.join(env.source, '../shared/data');
 
-/** Scans of the data folder, and the model that is made here. */
+/** Models that are made here, and scans of the data folder. */
 const kScenes = {
-  spheres: null, 'sea turtle': 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb', 'flight helmet': 'flight_helmet/FlightHelmet.gltf',
+  spheres: spheresGlb, 'blended sheet': () => sheetGlb({alphaMode: 'BLEND', metal: true}), 'sheet with holes': () => sheetGlb({alphaMode: 'MASK', metal: true}),
+  'sea turtle': 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb', 'flight helmet': 'flight_helmet/FlightHelmet.gltf',
 };
 
 /** Mean difference over the covered pixels, and a picture of it, eight times as strong. */
@@ -44,13 +46,15 @@ function litPage() {
   })());
 }
 
-for (const [name, scan] of Object.entries(kScenes))
+for (const [name, source] of Object.entries(kScenes))
   test(`texmesh render shows what three.js shows: ${name}`, async ({skip}) => {
-    if (scan && !fs.existsSync(path.join(data, scan))) skip(`${path.join(data, scan)} is not there`);
+    const made = typeof source === 'function';
+    const model = path.join(made ? packages : data, made ? `render-${name}.glb` : source);
+    if (!made && !fs.existsSync(model)) skip(`${model} is not there`);
     const {page, url} = await litPage();
-    if (!scan) fs.writeFileSync(path.join(packages, 'spheres.glb'), spheresGlb());
-    const file = (kind) => path.join(pictures, `render-${name.replace(' ', '-')}-${kind}.png`);
-    const [model, modelUrl] = scan ? [path.join(data, scan), `${url}/data/${scan}`] : [path.join(packages, 'spheres.glb'), `${url}/packages/spheres.glb`];
+    if (made) fs.writeFileSync(model, source());
+    const modelUrl = encodeURI(`${url}/${made ? 'packages' : 'data'}/${made ? path.basename(model) : source}`);
+    const file = (kind) => path.join(pictures, `render-${name.replaceAll(' ', '-')}-${kind}.png`);
     const told = JSON.parse(run(env.texmesh, 'render', model, '-o', file('texmesh'), '--size', String(kSizePx), '--json'));
     const ours = PNG.sync.read(fs.readFileSync(file('texmesh')));
     const background = [...ours.data.subarray(0, 3)];
