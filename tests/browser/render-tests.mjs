@@ -3,6 +3,7 @@ import {PNG, check, common, env, fs, lab, labRoots, launch, listen, packages, pa
 import {test} from './harness.mjs';
 import {sheetGlb} from './sheet.mjs';
 import {spheresGlb} from './spheres.mjs';
+import {tilesGlb} from './tiles.mjs';
 
 const kSizePx = 512;
 const kMostApart = 3; // of 255, in the mean over covered pixels
@@ -12,7 +13,7 @@ const data = env.data || path.join(env.source, '../shared/data');
 /** Models that are made here, and scans of the data folder. */
 const kScenes = {
   spheres: spheresGlb, 'blended sheet': () => sheetGlb({alphaMode: 'BLEND', metal: true}), 'sheet with holes': () => sheetGlb({alphaMode: 'MASK', metal: true}),
-  'sea turtle': 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb', 'flight helmet': 'flight_helmet/FlightHelmet.gltf',
+  tiles: tilesGlb, 'sea turtle': 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb', 'flight helmet': 'flight_helmet/FlightHelmet.gltf',
 };
 
 /** Mean difference over the covered pixels, and a picture of it, eight times as strong. */
