@@ -18,6 +18,7 @@ void add_commands(Command& program) {
   add_dump_command(program);
   add_verify_command(program);
   add_diff_command(program);
+  add_render_command(program);
   add_debug_command(program);
   program.group("Export");
   add_extract_command(program);

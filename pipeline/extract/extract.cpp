@@ -27,15 +27,6 @@ int wanted_scale(PackageReader& package, const ExtractRequest& request) {
   return select_scale(package.manifest(), request.display_px > 0 ? request.display_px : kDefaultDisplayPx);
 }
 
-void check_rung(PackageReader& package, const ExtractRequest& request) {
-  if (request.rung == kBestRung || package.tables().planes.empty()) return;
-  std::size_t most = 0;
-  for (const PlaneTables& t : package.tables().planes) most = std::max(most, t.rung_count());
-  if (request.rung >= most)
-    throw InputError(package.store().name(), "rung " + std::to_string(request.rung),
-                     "0 to " + std::to_string(most - 1) + ", or max", "another");
-}
-
 /// The plane that stands for a full-size one: itself, or where a displayed height is given and no rung, the
 /// smallest mip that has a texel for every pixel.
 std::map<std::uint32_t, std::uint32_t> shown_planes(PackageReader& package, const ExtractRequest& request) {
@@ -101,7 +92,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   const Manifest& m = package.manifest();
   Extracted out;
   out.scale = wanted_scale(package, request);
-  check_rung(package, request);
+  require_rung(package, request.rung);
   out.triangles = scale_entry(package, out.scale).triangles;
   out.levels = request.lods ? levels_of(m, out.scale) : std::vector<int>{out.scale};
   StandaloneGlb file(package.scale_glb(out.scale), mesh_path(out.scale));

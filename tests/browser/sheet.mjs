@@ -23,6 +23,23 @@ function stripes(sidePx) {
   return PNG.sync.write(png, {colorType: 2});
 }
 
+/** A GLB whose buffer view k is blob k. */
+export function glbOf(json, blobs) {
+  const bufferViews = [];
+  const parts = [];
+  let length = 0;
+  for (const blob of blobs) {
+    bufferViews.push({buffer: 0, byteOffset: length, byteLength: blob.length});
+    parts.push(blob, Buffer.alloc(-blob.length & 3));
+    length += blob.length + (-blob.length & 3);
+  }
+  let text = JSON.stringify({...json, bufferViews, buffers: [{byteLength: length}]});
+  text += ' '.repeat(-text.length & 3);
+  const chunk = (type, bytes) => [Buffer.from(Uint32Array.of(bytes.length, type).buffer), bytes];
+  const body = Buffer.concat([...chunk(0x4e4f534a, Buffer.from(text)), ...chunk(0x004e4942, Buffer.concat(parts))]);
+  return Buffer.concat([Buffer.from(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), body]);
+}
+
 /** The sheet as a GLB, in the plane of x and y, a metre wide and high. `alphaMode` as glTF has it; of metal it has no sheen. */
 export function sheetGlb({alphaMode, metal = false, sidePx = 512}) {
   const n = kCells + 1;
@@ -36,16 +53,8 @@ export function sheetGlb({alphaMode, metal = false, sidePx = 512}) {
     }
   const blobs = [positions, uvs, new Uint32Array(indices), picture(sidePx, alphaMode === 'MASK'), stripes(sidePx)]
     .map((a) => Buffer.from(a.buffer, a.byteOffset, a.byteLength));
-  const bufferViews = [];
-  const parts = [];
-  let length = 0;
-  for (const blob of blobs) {
-    bufferViews.push({buffer: 0, byteOffset: length, byteLength: blob.length});
-    parts.push(blob, Buffer.alloc(-blob.length & 3));
-    length += blob.length + (-blob.length & 3);
-  }
   const clamp = {wrapS: 33071, wrapT: 33071};
-  const json = {
+  return glbOf({
     asset: {version: '2.0'}, scene: 0, scenes: [{nodes: [0]}], nodes: [{mesh: 0}], ...(!metal && {extensionsUsed: ['KHR_materials_sheen']}),
     meshes: [{primitives: [{attributes: {POSITION: 0, TEXCOORD_0: 1}, indices: 2, material: 0}]}],
     materials: [{
@@ -53,15 +62,10 @@ export function sheetGlb({alphaMode, metal = false, sidePx = 512}) {
       ...(!metal && {extensions: {KHR_materials_sheen: {sheenColorFactor: [1, 1, 1], sheenRoughnessFactor: 0.6, sheenColorTexture: {index: 1}}}}),
     }],
     textures: [{source: 0, sampler: 0}, {source: 1, sampler: 0}], samplers: [clamp],
-    images: [3, 4].map((bufferView) => ({bufferView, mimeType: 'image/png'})), bufferViews, buffers: [{byteLength: length}],
+    images: [3, 4].map((bufferView) => ({bufferView, mimeType: 'image/png'})),
     accessors: [
       {bufferView: 0, componentType: 5126, count: n * n, type: 'VEC3', min: [-0.5, -0.5, -0.08], max: [0.5, 0.5, 0.08]},
       {bufferView: 1, componentType: 5126, count: n * n, type: 'VEC2'}, {bufferView: 2, componentType: 5125, count: indices.length, type: 'SCALAR'},
     ],
-  };
-  let text = JSON.stringify(json);
-  text += ' '.repeat(-text.length & 3);
-  const chunk = (type, bytes) => [Buffer.from(Uint32Array.of(bytes.length, type).buffer), bytes];
-  const body = Buffer.concat([...chunk(0x4e4f534a, Buffer.from(text)), ...chunk(0x004e4942, Buffer.concat(parts))]);
-  return Buffer.concat([Buffer.from(Uint32Array.of(0x46546c67, 2, 12 + body.length).buffer), body]);
+  }, blobs);
 }

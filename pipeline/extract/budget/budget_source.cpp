@@ -7,7 +7,6 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/standalone_glb.h"
-#include "pipeline/import/import.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -19,10 +18,6 @@ constexpr double kReferenceTexels = 8e6;  // of all colours together: finer ones
 constexpr double kTexelsPerByte = 40;     // more texels than that are never worth a byte
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;
-
-class NoFiles : public Resolver {
-  std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
-};
 
 double longest_side(const Mesh& mesh) {
   const double side = to_double(bounding_box(mesh.positions)).longest_side();
@@ -59,24 +54,11 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
   meter = std::make_unique<PictureMeter>(pictures, context);
 }
 
-Model read_model(StandaloneGlb file, const std::string& entry, const RunContext& context) {
-  std::map<std::uint32_t, FileImageData> images;
-  for (const std::uint32_t i : file.source_images()) {
-    const auto byte = [i](int shift) { return static_cast<std::uint8_t>(i >> shift); };
-    images[i] = {FileImage::kPng, encode_image({1, 1, 3, {byte(0), byte(8), byte(16)}}, {FileImage::kPng})};
-  }
-  file.set_images(images);
-  NoFiles none;
-  return import_gltf(entry, file.finish(), none, {}, context).model;
-}
-
 ShownModel shown(const Model& model) {
   ShownModel out{&model.mesh, &model.materials, {}};
   for (const Image& i : model.images) out.image_names.push_back(i.name);
   return out;
 }
-
-std::string image_name(std::uint32_t image) { return std::to_string(image); }
 
 std::uint32_t side_of(std::uint32_t full, double share) {
   double side = std::floor(static_cast<double>(full) * share + 0.5);

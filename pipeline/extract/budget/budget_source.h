@@ -8,11 +8,10 @@
 #include "pipeline/extract/budget/picture_meter.h"
 #include "pipeline/extract/glb/draco_recode.h"
 #include "pipeline/extract/glb/extracted.h"
+#include "pipeline/extract/glb/scale_model.h"
 #include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
-
-class StandaloneGlb;
 
 using ImageTextures = std::map<std::string, MipTexture>;  // by image_name()
 
@@ -43,14 +42,7 @@ struct BudgetSource {
   std::unique_ptr<PictureMeter> meter;
 };
 
-/// The mesh and materials of a file. Its images become single texels, all different (import makes equal ones
-/// one), named by image_name() of their source image.
-Model read_model(StandaloneGlb file, const std::string& entry, const RunContext& context);
-
 ShownModel shown(const Model& model);
-
-/// As import names "texture/<image>": without the folder.
-std::string image_name(std::uint32_t image);
 
 /// A side of a texture made smaller. Of 128 px and more a multiple of 16, so that viewers can halve it
 /// several times: smaller copies of odd sizes lie beside their place.

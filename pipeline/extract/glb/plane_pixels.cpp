@@ -86,4 +86,13 @@ Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t run
   return out;
 }
 
+void require_rung(PackageReader& package, std::uint32_t rung) {
+  if (rung == kBestRung || package.tables().planes.empty()) return;
+  std::size_t most = 0;
+  for (const PlaneTables& t : package.tables().planes) most = std::max(most, t.rung_count());
+  if (rung >= most)
+    throw InputError(package.store().name(), "rung " + std::to_string(rung),
+                     "0 to " + std::to_string(most - 1) + ", or max", "another");
+}
+
 }  // namespace texmesh

@@ -16,4 +16,7 @@ inline constexpr std::uint32_t kBestRung = 0xffffffffu;
 /// damaged or the plane has more than 4e8 texels. Same result for any thread count.
 Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context);
 
+/// InputError where no plane of the package has that rung. kBestRung is always there.
+void require_rung(PackageReader& package, std::uint32_t rung);
+
 }  // namespace texmesh

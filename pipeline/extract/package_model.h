@@ -1,0 +1,29 @@
+#pragma once
+#include <cstdint>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/rendered_model.h"
+
+namespace texmesh {
+
+/// Which textures of a package.
+enum class PackageTextures : std::uint8_t {
+  kRung,     // put together from their fragments at one rung
+  kPreview,  // the small JPEGs of the first picture
+  kSource    // the source images where the package keeps them, else the best rung
+};
+
+/// What of a package is shown.
+struct PackageChoice {
+  int scale = 0;
+  PackageTextures textures = PackageTextures::kRung;
+  std::uint32_t rung = kBestRung;  // with kRung; planes with fewer rungs show their best
+};
+
+/// A scale of a package with whole textures, for the renderer. `bounds` are those of S_0 for every scale, so
+/// that a camera sees all scales alike. InputError for a scale or rung that is not there; FormatError when
+/// the package is damaged. Same result for any thread count.
+RenderedModel package_model(PackageReader& package, const PackageChoice& choice, const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,78 @@
+#include "stages/render/brdf.h"
+
+#include <cmath>
+
+namespace texmesh::render {
+namespace {
+
+Vec3f mixed(Vec3f a, Vec3f b, float part) { return a + (b - a) * part; }
+Vec3f f0_of(const Surface& s) { return mixed({0.04f, 0.04f, 0.04f}, s.base_colour, s.metallic); }
+
+/// Lagarde and de Rousiers 2014: occlusion of what comes from the direction of the mirror.
+float specular_occlusion(float n_dot_v, float occlusion, float roughness) {
+  const float base = n_dot_v + occlusion;
+  if (!(base > 0)) return 0;
+  const float power = exp2_of(exp2_of(-16 * roughness - 1) * log2_of(base < 1e-30f ? 1e-30f : base));
+  return saturated(power - 1 + occlusion);
+}
+
+/// Light from all around, with what a second and later reflection between microfacets adds (Fdez-Aguera
+/// 2019).
+Vec3f reflected_surroundings(const Surface& s, Vec3f to_viewer, const RenderEnvironment& environment) {
+  const float cosine = dot(s.normal, to_viewer), n_dot_v = saturated(cosine);
+  const Vec3f f0 = f0_of(s);
+  const Vec2f ab = split_sum(s.roughness, n_dot_v);
+  Vec3f single, multiple;
+  const float lost = 1 - (ab.x + ab.y);
+  for (int k = 0; k < 3; ++k) {
+    single[k] = f0[k] * ab.x + ab.y;
+    const float average = f0[k] + (1 - f0[k]) * (1.f / 21);
+    multiple[k] = single[k] * average / (1 - lost * average) * lost;
+  }
+  const Vec3f light = diffuse_light(environment, s.normal);
+  // A rough lobe's mean direction leans towards the normal.
+  const Vec3f mirror = s.normal * (2 * cosine) - to_viewer;
+  const Vec3f direction = normalized(mixed(mirror, s.normal, s.roughness * s.roughness));
+  const Vec3f glossy = specular_light(environment, direction, s.roughness);
+  const float left = 1 - largest(single + multiple);
+  const Vec3f diffuse = product(s.base_colour, light) * ((1 - s.metallic) * left * s.occlusion);
+  const Vec3f specular = (product(glossy, single) + product(light, multiple)) *
+                         (s.occlusion < 1 ? specular_occlusion(n_dot_v, s.occlusion, s.roughness) : 1.f);
+  return diffuse + specular;
+}
+
+}  // namespace
+
+Vec2f split_sum(float roughness, float n_dot_v) {
+  const float x = 1 - roughness, y = 0.0425f - 0.0275f * roughness, z = 1.04f - 0.572f * roughness,
+              w = 0.022f * roughness - 0.04f;
+  const float squared = x * x, falling = exp2_of(-9.28f * n_dot_v);
+  const float a004 = (squared < falling ? squared : falling) * x + y;
+  return {z - 1.04f * a004, w + 1.04f * a004};
+}
+
+Vec3f reflected_by_brdf(const Surface& s, Vec3f to_light, Vec3f to_viewer) {
+  const float n_dot_l = saturated(dot(s.normal, to_light));
+  if (n_dot_l == 0) return {};
+  const Vec3f half = normalized(to_light + to_viewer);
+  const float n_dot_v = saturated(dot(s.normal, to_viewer)), n_dot_h = saturated(dot(s.normal, half)),
+              v_dot_h = saturated(dot(to_viewer, half));
+  const float alpha = s.roughness * s.roughness;
+  const float specular = smith_visibility(alpha, n_dot_l, n_dot_v) * ggx_distribution(alpha, n_dot_h);
+  const float weight = schlick_weight(v_dot_h), lambert = (1 - s.metallic) / kPi;
+  const Vec3f f0 = f0_of(s);
+  Vec3f out;
+  for (int k = 0; k < 3; ++k) {
+    const float fresnel = f0[k] + (1 - f0[k]) * weight;
+    out[k] = (s.base_colour[k] * lambert * (1 - fresnel) + fresnel * specular) * n_dot_l;
+  }
+  return out;
+}
+
+Vec3f radiance_towards(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
+  const Vec3f key = reflected_by_brdf(surface, environment.key.towards, to_viewer);
+  return product(key, environment.key.irradiance) + reflected_surroundings(surface, to_viewer, environment) +
+         surface.emission;
+}
+
+}  // namespace texmesh::render

@@ -1,0 +1,191 @@
+#include "stages/render/environment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "format/base/portable_math.h"
+#include "stages/base/parallel.h"
+#include "stages/render/octahedron.h"
+#include "stages/render/render_math.h"
+
+namespace texmesh {
+namespace {
+
+using Level = RenderEnvironment::Level;
+
+constexpr std::size_t kHarmonics = RenderEnvironment::kHarmonics;
+
+// By roughness i / 7. The variances are those of three.js r170's prefiltered maps, from what the maps leave
+// of the studio's harmonics of bands 1 to 4. With GGX lobes, which are wider, rough metal was 5 of 255 beside
+// three.js; so was plaster with irradiance of a cosine.
+struct LevelPlan {
+  std::uint32_t side;
+  std::size_t samples;
+  double variance;  // of the angle along each of two axes, radians squared
+};
+constexpr LevelPlan kLevels[] = {{128, 1, 0},      {64, 96, 0.0008}, {64, 96, 0.0135}, {32, 192, 0.058},
+                                 {32, 192, 0.129}, {32, 384, 0.21},  {32, 384, 0.27},  {32, 384, 0.32}};
+// What three.js r170's roughest map, from which it reads irradiance, leaves of each band. A cosine lobe over
+// pi leaves 1, 2/3, 1/4, 0 and -1/24.
+constexpr double kIrradianceOfBand[] = {1, 0.740, 0.391, 0.167, 0.057};
+
+Vec3f read_level(const Level& level, Vec3f direction) {
+  const Vec2f place = render::octahedral(direction);
+  const float scale = static_cast<float>(level.side - 2) * 0.5f;
+  // Texel i of a level has its middle at (i - 0.5) / (side - 2) of the square.
+  const auto end = static_cast<float>(level.side - 1);
+  const float x = render::clamped((place.x + 1) * scale + 0.5f, 0, end),
+              y = render::clamped((place.y + 1) * scale + 0.5f, 0, end);
+  const auto most = static_cast<std::int32_t>(level.side) - 2;
+  const std::int32_t column = std::min(render::floor_of(x), most), row = std::min(render::floor_of(y), most);
+  const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
+  const Vec3f* texel =
+      level.texels.data() + static_cast<std::size_t>(row) * level.side + static_cast<std::size_t>(column);
+  const Vec3f top = texel[0] + (texel[1] - texel[0]) * fx;
+  const Vec3f bottom = texel[level.side] + (texel[level.side + 1] - texel[level.side]) * fx;
+  return top + (bottom - top) * fy;
+}
+
+template <class F>
+Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of) {
+  Level level;
+  level.side = inner_side + 2;
+  level.texels.resize(static_cast<std::size_t>(level.side) * level.side);
+  parallel_for(context, level.texels.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      auto place = [&](std::size_t at) {
+        return (static_cast<float>(at) - 0.5f) * 2 / static_cast<float>(inner_side) - 1;
+      };
+      const Vec3f value =
+          value_of(render::octahedral_direction({place(i % level.side), place(i / level.side)}));
+      for (int k = 0; k < 3; ++k) level.texels[i][k] = render::clamped(value[k], 0, 65504);
+    }
+  });
+  return level;
+}
+
+struct LobeSample {
+  Vec3f direction;  // around +z
+  float weight = 0;
+};
+
+/// A Gaussian of the angle by equal shares; each sample counts by the sphere's area beside the plane's.
+std::vector<LobeSample> lobe_samples(const LevelPlan& plan) {
+  std::vector<LobeSample> out;
+  double sum = 0;
+  for (std::size_t i = 0; i < plan.samples; ++i) {
+    double radical = 0, digit = 0.5;
+    for (std::size_t n = i; n > 0; n /= 2, digit /= 2) radical += static_cast<double>(n % 2) * digit;
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(plan.samples);
+    const double fall = std::sqrt(-2 * plan.variance * portable::log(1 - share));
+    if (fall >= portable::kPi) continue;
+    const double ring = portable::sin(fall), turn = 2 * portable::kPi * radical, weight = ring / fall;
+    out.push_back(
+        {to_float(Vec3d{ring * portable::cos(turn), ring * portable::sin(turn), portable::cos(fall)}),
+         static_cast<float>(weight)});
+    sum += weight;
+  }
+  for (LobeSample& s : out) s.weight = static_cast<float>(static_cast<double>(s.weight) / sum);
+  return out;
+}
+
+Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f z) {
+  // Any pair of axes serves; this one has no seam near the poles.
+  const Vec3f x = normalized(cross(z.y < 0.9f && z.y > -0.9f ? Vec3f{0, 1, 0} : Vec3f{1, 0, 0}, z));
+  const Vec3f y = cross(z, x);
+  Vec3f sum;
+  for (const LobeSample& s : lobe)
+    sum = sum + read_level(radiance, x * s.direction.x + y * s.direction.y + z * s.direction.z) * s.weight;
+  return sum;
+}
+
+/// Real spherical harmonics of the bands 0 to 4.
+template <class T>
+std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
+  const T x = d.x, y = d.y, z = d.z, x2 = x * x, y2 = y * y, z2 = z * z;
+  return {T(0.28209479177387814),
+          T(0.48860251190291992) * y,
+          T(0.48860251190291992) * z,
+          T(0.48860251190291992) * x,
+          T(1.0925484305920792) * x * y,
+          T(1.0925484305920792) * y * z,
+          T(0.31539156525252005) * (3 * z2 - 1),
+          T(1.0925484305920792) * x * z,
+          T(0.54627421529603959) * (x2 - y2),
+          T(0.59004358992664352) * y * (3 * x2 - y2),
+          T(2.8906114426405538) * x * y * z,
+          T(0.45704579946446572) * y * (5 * z2 - 1),
+          T(0.37317633259011540) * z * (5 * z2 - 3),
+          T(0.45704579946446572) * x * (5 * z2 - 1),
+          T(1.4453057213202769) * z * (x2 - y2),
+          T(0.59004358992664352) * x * (x2 - 3 * y2),
+          T(2.5033429417967046) * x * y * (x2 - y2),
+          T(1.7701307697799304) * y * z * (3 * x2 - y2),
+          T(0.94617469575756008) * x * y * (7 * z2 - 1),
+          T(0.66904654355728921) * y * z * (7 * z2 - 3),
+          T(0.10578554691520431) * (35 * z2 * z2 - 30 * z2 + 3),
+          T(0.66904654355728921) * x * z * (7 * z2 - 3),
+          T(0.47308734787878004) * (x2 - y2) * (7 * z2 - 1),
+          T(1.7701307697799304) * x * z * (x2 - 3 * y2),
+          T(0.62583573544917614) * (x2 * x2 - 6 * x2 * y2 + y2 * y2)};
+}
+
+std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
+  constexpr int kRings = 64, kPlaces = 128;
+  std::array<Vec3d, kHarmonics> sum{};
+  for (int i = 0; i < kRings; ++i) {
+    // Rings of equal area
+    const double up = 1 - 2 * (i + 0.5) / kRings, ring = std::sqrt(1 - up * up);
+    for (int j = 0; j < kPlaces; ++j) {
+      const double angle = 2 * portable::kPi * (j + 0.5) / kPlaces;
+      const Vec3d d{ring * portable::cos(angle), up, ring * portable::sin(angle)};
+      const Vec3f light = radiance(to_float(d));
+      const std::array<double, kHarmonics> basis = harmonics_of(d);
+      for (std::size_t k = 0; k < kHarmonics; ++k)
+        for (int c = 0; c < 3; ++c)
+          sum[k][c] += basis[k] * static_cast<double>(render::clamped(light[c], 0, 65504));
+    }
+  }
+  std::array<Vec3f, kHarmonics> out;
+  for (std::size_t k = 0; k < kHarmonics; ++k) {
+    const double weight = kIrradianceOfBand[k == 0 ? 0 : k < 4 ? 1 : k < 9 ? 2 : k < 16 ? 3 : 4];
+    out[k] = to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) * weight));
+  }
+  return out;
+}
+
+}  // namespace
+
+RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,
+                                      const RunContext& context) {
+  RenderEnvironment out;
+  out.key = key;
+  out.irradiance = irradiance_of(radiance);
+  out.levels.push_back(make_level(kLevels[0].side, context, radiance));
+  for (std::size_t i = 1; i < std::size(kLevels); ++i) {
+    const std::vector<LobeSample> lobe = lobe_samples(kLevels[i]);
+    out.levels.push_back(make_level(kLevels[i].side, context, [&](Vec3f direction) {
+      return filtered(out.levels.front(), lobe, direction);
+    }));
+  }
+  return out;
+}
+
+Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
+  const std::array<float, kHarmonics> basis = harmonics_of(normal);
+  Vec3f sum;
+  for (std::size_t k = 0; k < kHarmonics; ++k) sum = sum + environment.irradiance[k] * basis[k];
+  return {render::clamped(sum.x, 0, 65504), render::clamped(sum.y, 0, 65504),
+          render::clamped(sum.z, 0, 65504)};
+}
+
+Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
+  const float at = render::saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
+  const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
+  const Vec3f a = read_level(environment.levels[sharp], direction),
+              b = read_level(environment.levels[sharp + 1], direction);
+  return a + (b - a) * (at - static_cast<float>(sharp));
+}
+
+}  // namespace texmesh

@@ -1,0 +1,49 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/data/pixels.h"
+#include "stages/render/render_material.h"
+
+namespace texmesh {
+
+/// A texture with its mips, as a graphics processor holds it: 8 bits a channel. Level l has the sides
+/// max(1, side / 2^l), rounded down. Channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA.
+struct RenderTexture {
+  std::uint32_t width_px = 0, height_px = 0;  // of level 0, which may not be kept
+  bool srgb = false;                          // colours are sRGB encoded; alpha never is
+  std::uint32_t first_level = 0;
+  std::vector<Pixels> levels;  // first_level, first_level + 1, ... 1 x 1
+};
+
+/// Completes the chain from its first level, which must be there with the sides of its number. Each level is
+/// the one before it, read bilinearly at the middles of the new texels: with even sides that is the mean of
+/// 2 x 2. sRGB colours are averaged in linear light. Every level is rounded to 8 bits. Same bits on every
+/// machine and for any thread count.
+void complete_mips(RenderTexture& texture, const RunContext& context);
+
+/// The texture of a whole image, which is level 0. Levels finer than `first_level` are not kept.
+/// std::invalid_argument when the image is empty or has other than 1..4 channels.
+RenderTexture render_texture(Pixels image, bool srgb, std::uint32_t first_level, const RunContext& context);
+
+/// Where and how large a texture is read: coordinates after the slot's transform, and their derivatives by
+/// the picture's pixels.
+struct TextureFootprint {
+  Vec2f uv, uv_dx, uv_dy;
+};
+
+/// RGBA as a shader reads it: linear light for sRGB colours, else 0..1; grey in all three channels; alpha 1
+/// where there is none. The level is log2 of the longer of the two derivatives in texels (OpenGL 4.6, 8.14,
+/// anisotropy 1), at least the first level kept. Not finite coordinates read the texture's corner.
+Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint);
+
+/// KHR_texture_transform as 2 x 3 numbers: uv' = (a u + b v + c, d u + e v + f).
+struct UvMatrix {
+  float a = 1, b = 0, c = 0, d = 0, e = 1, f = 0;
+  Vec2f place(Vec2f uv) const { return {a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f}; }
+  Vec2f direction(Vec2f uv) const { return {a * uv.x + b * uv.y, d * uv.x + e * uv.y}; }
+};
+UvMatrix uv_matrix(const UvTransform& transform);
+
+}  // namespace texmesh

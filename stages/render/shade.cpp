@@ -1,0 +1,147 @@
+#include "stages/render/shade.h"
+
+#include <array>
+#include <bit>
+#include <span>
+
+#include "format/base/srgb.h"
+#include "stages/base/parallel.h"
+#include "stages/measure/sampled_curve.h"
+#include "stages/render/fragment_shader.h"
+#include "stages/render/srgb_encoder.h"
+
+namespace texmesh {
+namespace {
+
+using render::FragmentColour;
+
+constexpr std::size_t kSamples = std::size_t{kSamplesPerSide} * kSamplesPerSide;
+using Curve = SampledCurve<8192>;
+
+template <double (*kFunction)(double)>
+Vec3f curved(Vec3f c) {
+  static const Curve curve(kFunction);
+  return {curve(c.x), curve(c.y), curve(c.z)};
+}
+Vec3f encoded(Vec3f light) { return curved<srgb_of_light>(light); }
+Vec3f decoded(Vec3f code) { return curved<light_of_srgb>(code); }
+
+float share_of(const RenderFragment& fragment) {
+  return static_cast<float>(std::popcount(fragment.mask)) / static_cast<float>(kSamples);
+}
+
+/// The samples of one pixel, filled from the nearest fragment to the farthest.
+class Samples {
+ public:
+  /// `mixes`: something lets light through, so colours are mixed as they are encoded.
+  explicit Samples(bool mixes) : mixes_(mixes) { left_.fill(1); }
+
+  void put_behind(unsigned mask, Vec3f linear, float alpha) {
+    const Vec3f colour = mixes_ ? encoded(linear) : linear;
+    for (std::size_t s = 0; s < kSamples; ++s) {
+      if ((mask >> s & 1) == 0) continue;
+      colour_[s] = colour_[s] + colour * (alpha * left_[s]);
+      left_[s] *= 1 - alpha;
+    }
+  }
+  Vec3f mean() const {
+    Vec3f sum;
+    for (const Vec3f c : colour_) sum = sum + (mixes_ ? decoded(c) : c);
+    return sum * (1 / static_cast<float>(kSamples));
+  }
+
+ private:
+  bool mixes_;
+  std::array<Vec3f, kSamples> colour_{};
+  std::array<float, kSamples> left_{};  // of the light from behind
+};
+
+struct Pixel {
+  Vec3f linear;
+  bool covered = false;
+};
+
+/// Nothing can be seen through what the pixel shows.
+Pixel opaque_pixel(const render::FragmentShader& shader, std::uint32_t at,
+                   std::span<const RenderFragment> fragments, Vec3f background) {
+  Vec3f sum;
+  float left = 1;
+  for (const RenderFragment& fragment : fragments) {
+    const float share = share_of(fragment);
+    sum = sum + shader.colour_of(at, fragment).linear * share;
+    left -= share;
+  }
+  return {sum + background * left, true};
+}
+
+Pixel layered_pixel(const render::FragmentShader& shader, std::uint32_t at,
+                    std::span<const RenderFragment> fragments, Vec3f background) {
+  std::array<FragmentColour, kMaxLayers + kSamples> colours;
+  bool mixes = false;
+  Pixel out;
+  for (std::size_t i = 0; i < fragments.size(); ++i) {
+    colours[i] = shader.colour_of(at, fragments[i]);
+    mixes = mixes || (colours[i].alpha > 0 && colours[i].alpha < 1);
+    out.covered = out.covered || colours[i].alpha > 0;
+  }
+  Samples samples(mixes);
+  for (std::size_t i = 0; i < fragments.size(); ++i)
+    if (colours[i].alpha > 0) samples.put_behind(fragments[i].mask, colours[i].linear, colours[i].alpha);
+  samples.put_behind((1u << kSamples) - 1, background, 1);
+  out.linear = samples.mean();
+  return out;
+}
+
+}  // namespace
+
+Picture shade(const RenderScene& scene, const Visibility& visibility,
+              const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
+              const RunContext& context) {
+  const render::FragmentShader shader(scene, visibility, textures, environment);
+  const std::size_t pixels = static_cast<std::size_t>(visibility.side_px) * visibility.side_px;
+  Picture out;
+  out.side_px = visibility.side_px;
+  out.linear.assign(pixels, environment.background);
+  out.covered.assign(pixels, 0);
+  parallel_for(context, pixels, 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::span<const RenderFragment> fragments(visibility.fragments.data() + visibility.first[i],
+                                                      visibility.first[i + 1] - visibility.first[i]);
+      if (fragments.empty()) continue;
+      const bool layers = fragments.front().layer != 0;
+      const Pixel pixel = (layers ? layered_pixel : opaque_pixel)(shader, static_cast<std::uint32_t>(i),
+                                                                  fragments, environment.background);
+      out.linear[i] = pixel.linear;
+      out.covered[i] = pixel.covered;
+    }
+  });
+  return out;
+}
+
+Vec3f tone_mapped(Vec3f linear) {
+  constexpr float kStart = 0.8f - 0.04f, kDesaturation = 0.15f, kRoom = 1 - kStart;
+  Vec3f c;
+  for (int k = 0; k < 3; ++k) c[k] = render::clamped(linear[k], 0, 65504);
+  const float xy = c.x < c.y ? c.x : c.y, least = xy < c.z ? xy : c.z;
+  const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
+  c = c - Vec3f{offset, offset, offset};
+  const float peak = render::largest(c);
+  if (peak >= kStart) {
+    const float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kStart);
+    const float grey = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
+    c = c * (new_peak / peak);
+    c = c + (Vec3f{new_peak, new_peak, new_peak} - c) * grey;
+  }
+  return {render::saturated(c.x), render::saturated(c.y), render::saturated(c.z)};
+}
+
+Pixels encode_srgb(const Picture& picture) {
+  Pixels out{picture.side_px, picture.side_px, 3, {}};
+  out.data.reserve(picture.linear.size() * 3);
+  const render::SrgbEncoder& encode = render::srgb_encoder();
+  for (const Vec3f c : picture.linear)
+    for (int k = 0; k < 3; ++k) out.data.push_back(encode(c[k]));
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,31 @@
+#pragma once
+#include <vector>
+
+#include "stages/data/pixels.h"
+#include "stages/measure/image_compare.h"
+#include "stages/render/environment.h"
+#include "stages/render/render_texture.h"
+#include "stages/render/visibility.h"
+
+namespace texmesh {
+
+/// The picture of what is seen, with these textures; `textures` are the scene's texture_count, and one
+/// without levels counts as white (a normal map as flat).
+/// Materials: glTF 2.0, appendix B (GGX, height-correlated Smith, Schlick, Lambert), with what three.js r170
+/// adds: a floor of roughness, roughness of the geometry, multiple scattering (Fdez-Aguera 2019), specular
+/// occlusion (Lagarde 2014). Each triangle is shaded once a pixel, at the mean of its samples. Colours are
+/// tone-mapped (Khronos PBR Neutral) and cut to 0..1 there; a pixel is the mean of its samples in linear
+/// light. Blending mixes sRGB-encoded values, as browsers' canvases do. A pixel is covered where something
+/// with an alpha above 0 is seen. Uncovered samples show the environment's background. NaN never comes out.
+/// Same bits on every machine and for any thread count.
+Picture shade(const RenderScene& scene, const Visibility& visibility,
+              const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
+              const RunContext& context);
+
+/// Khronos PBR Neutral of linear RGB >= 0, cut to 0..1.
+Vec3f tone_mapped(Vec3f linear);
+
+/// RGB of 8 bits, sRGB encoded, rounded to nearest.
+Pixels encode_srgb(const Picture& picture);
+
+}  // namespace texmesh

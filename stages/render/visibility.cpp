@@ -1,0 +1,155 @@
+#include "stages/render/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "stages/base/parallel.h"
+#include "stages/render/visibility_tile.h"
+
+namespace texmesh {
+namespace {
+
+using render::kTilePx;
+using render::kTileSamples;
+using render::SampleBox;
+using render::TileFragments;
+using render::TileInput;
+
+constexpr std::uint32_t kMostSide = 8192;
+
+void require(bool held, const char* what) {
+  if (!held) throw std::invalid_argument(what);
+}
+
+void check_scene(const RenderScene& scene) {
+  const Mesh& mesh = *scene.mesh;
+  const std::size_t wedges = mesh.wedge_count(), triangles = scene.triangles->size();
+  require(!scene.triangle_source || scene.triangle_source->size() == triangles,
+          "look: a triangle has no source");
+  for (const std::uint32_t p : mesh.wedge_position)
+    require(p < mesh.positions.size(), "look: a wedge's position is beyond the mesh");
+  for (std::size_t t = 0; t < triangles; ++t) {
+    for (const std::uint32_t wedge : (*scene.triangles)[t])
+      require(wedge < wedges, "look: a triangle's wedge is beyond the mesh");
+    const std::size_t source = scene.triangle_source ? (*scene.triangle_source)[t] : t;
+    require(
+        source < mesh.triangle_material.size() && mesh.triangle_material[source] < scene.materials->size(),
+        "look: a triangle's material is beyond the materials");
+  }
+}
+
+void check_camera(const RenderCamera& camera) {
+  double sum = camera.tan_half_fov + camera.near;
+  for (const Vec3d& v : {camera.eye, camera.x, camera.y, camera.z}) sum += v.x + v.y + v.z;
+  require(std::isfinite(sum) && camera.tan_half_fov > 0 && camera.near > 0, "look: no camera");
+}
+
+/// The triangles of every tile by rising index: those of tile i stand from first[i] on.
+struct Bins {
+  std::vector<std::size_t> first;
+  std::vector<std::uint32_t> triangles;
+};
+
+template <class F>
+void for_each_tile(const SampleBox& box, std::uint32_t tiles, F f) {
+  if (box.empty()) return;
+  constexpr auto kSide = static_cast<std::int32_t>(kTileSamples);
+  for (std::int32_t y = box.y_first / kSide; y <= box.y_last / kSide; ++y)
+    for (std::int32_t x = box.x_first / kSide; x <= box.x_last / kSide; ++x)
+      f(static_cast<std::size_t>(y) * tiles + static_cast<std::size_t>(x));
+}
+
+Bins sorted_into_tiles(const std::vector<SampleBox>& boxes, std::uint32_t tiles) {
+  Bins bins;
+  bins.first.assign(static_cast<std::size_t>(tiles) * tiles + 1, 0);
+  for (const SampleBox& box : boxes) for_each_tile(box, tiles, [&](std::size_t i) { ++bins.first[i + 1]; });
+  for (std::size_t i = 1; i < bins.first.size(); ++i) bins.first[i] += bins.first[i - 1];
+  bins.triangles.resize(bins.first.back());
+  std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
+  for (std::uint32_t t = 0; t < boxes.size(); ++t)
+    for_each_tile(boxes[t], tiles, [&](std::size_t i) { bins.triangles[next[i]++] = t; });
+  return bins;
+}
+
+TileInput tile_input(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
+                     const RunContext& context) {
+  TileInput input{&scene, render::SampleFrame(camera, side_px), camera.near, side_px, {}, {}};
+  input.seen.resize(scene.mesh->positions.size());
+  parallel_for(context, input.seen.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      input.seen[i] = render::seen_from(camera, input.frame, scene.mesh->positions[i]);
+  });
+  input.boxes.resize(scene.triangles->size());
+  parallel_for(context, input.boxes.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto triangle = static_cast<std::uint32_t>(t);
+      const std::array<Vec3d, 3> corners = input.corners_of(triangle);
+      const render::EdgePlanes planes = render::edge_planes(corners);
+      if (planes.visible && (planes.front || scene.material_of(triangle).double_sided))
+        input.boxes[t] = render::sample_box(corners, input.frame, camera.near);
+    }
+  });
+  return input;
+}
+
+/// Puts the pixels of all tiles into raster order.
+void join_tiles(const std::vector<TileFragments>& parts, std::uint32_t tiles, const RunContext& context,
+                Visibility& out) {
+  const std::size_t side = out.side_px;
+  auto part_of = [&](std::size_t x, std::size_t y) -> const TileFragments& {
+    return parts[y / kTilePx * tiles + x / kTilePx];
+  };
+  out.first.assign(side * side + 1, 0);
+  for (std::size_t y = 0; y < side; ++y)
+    for (std::size_t x = 0; x < side; ++x)
+      out.first[y * side + x + 1] =
+          out.first[y * side + x] + part_of(x, y).count[y % kTilePx * kTilePx + x % kTilePx];
+  out.fragments.resize(out.first.back());
+  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      auto from = parts[i].fragments.begin();
+      for (std::size_t p = 0; p < parts[i].count.size(); ++p) {
+        const std::size_t x = i % tiles * kTilePx + p % kTilePx, y = i / tiles * kTilePx + p / kTilePx;
+        if (x >= side || y >= side) continue;
+        const auto count = static_cast<std::ptrdiff_t>(parts[i].count[p]);
+        std::copy(from, from + count,
+                  out.fragments.begin() + static_cast<std::ptrdiff_t>(out.first[y * side + x]));
+        from += count;
+      }
+    }
+  });
+}
+
+}  // namespace
+
+RenderScene render_scene(const Mesh& mesh, const std::vector<RenderMaterial>& materials,
+                         std::size_t texture_count) {
+  return {&mesh, &mesh.triangles, nullptr, &materials, texture_count};
+}
+
+Visibility look(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
+                const RunContext& context) {
+  require(side_px > 0 && side_px <= kMostSide, "look: a picture has 1 to 8192 pixels a side");
+  check_camera(camera);
+  check_scene(scene);
+  const TileInput input = tile_input(scene, camera, side_px, context);
+  const std::uint32_t tiles = (side_px + kTilePx - 1) / kTilePx;
+  const Bins bins = sorted_into_tiles(input.boxes, tiles);
+  std::vector<TileFragments> parts(bins.first.size() - 1);
+  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto tile = static_cast<std::uint32_t>(i);
+      parts[i] =
+          render::look_into_tile(input, tile % tiles, tile / tiles,
+                                 {bins.triangles.data() + bins.first[i], bins.first[i + 1] - bins.first[i]});
+    }
+  });
+  Visibility out;
+  out.side_px = side_px;
+  out.camera = camera;
+  join_tiles(parts, tiles, context, out);
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,138 @@
+#include "stages/render/environment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "stages/render/octahedron.h"
+#include "stages/render/render_math.h"
+#include "tests/stages/render/render_fixtures.h"
+
+namespace texmesh {
+namespace {
+
+// Directions spread over the sphere.
+std::vector<Vec3f> directions(int count) {
+  std::vector<Vec3f> out;
+  for (int i = 0; i < count; ++i) {
+    const double up = 1 - 2 * (i + 0.5) / count, ring = std::sqrt(1 - up * up), turn = 2.399963 * i;
+    out.push_back(to_float(Vec3d{ring * std::cos(turn), up, ring * std::sin(turn)}));
+  }
+  return out;
+}
+// The mean under a Gaussian of the angle, by brute force.
+Vec3d blurred_by_sum(const Radiance& radiance, Vec3f middle, double variance) {
+  Vec3d sum;
+  double weights = 0;
+  for (const Vec3f d : directions(60000)) {
+    const double angle = std::acos(std::clamp(static_cast<double>(dot(d, middle)), -1.0, 1.0));
+    const double weight = std::exp(-angle * angle / (2 * variance));
+    sum = sum + to_double(radiance(d)) * weight;
+    weights += weight;
+  }
+  return sum * (1 / weights);
+}
+
+TEST(Environment, PlacesOfTheOctahedronAreTheirDirections) {
+  for (const Vec3f d : directions(1000)) {
+    const Vec2f place = render::octahedral(d);
+    EXPECT_LE(std::fabs(place.x), 1.0001f);
+    EXPECT_LE(std::fabs(place.y), 1.0001f);
+    EXPECT_NEAR(length(render::octahedral_direction(place) - d), 0, 1e-5);
+  }
+  // A place a little beyond a border is near the one inside of it.
+  for (const float t : {-0.8f, -0.1f, 0.3f, 0.9f})
+    for (const float side : {-1.f, 1.f}) {
+      const Vec3f in = render::octahedral_direction({side * 0.99f, t}),
+                  out = render::octahedral_direction({side * 1.01f, t});
+      EXPECT_GT(dot(in, out), 0.998f);
+      EXPECT_GT(dot(render::octahedral_direction({t, side * 0.99f}),
+                    render::octahedral_direction({t, side * 1.01f})),
+                0.998f);
+    }
+}
+
+TEST(Environment, EvenLightIsEvenEverywhere) {
+  const RenderEnvironment even = testing::even_light({0.2f, 0.7f, 3});
+  for (const Vec3f d : directions(50)) {
+    EXPECT_NEAR(diffuse_light(even, d).y, 0.7, 1e-3);
+    for (const float roughness : {0.f, 0.1f, 0.5f, 0.99f, 1.f}) {
+      EXPECT_NEAR(specular_light(even, d, roughness).x, 0.2, 1e-5);
+      EXPECT_NEAR(specular_light(even, d, roughness).z, 3, 1e-4);
+    }
+  }
+}
+
+TEST(Environment, DiffuseLightIsTheStudioUnderTheBroadestBlur) {
+  const RenderEnvironment studio = studio_environment({});
+  for (const Vec3f n : directions(24)) {
+    const Vec3d expected = blurred_by_sum(studio_radiance, n, 0.32);
+    const Vec3f found = diffuse_light(studio, n);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(found[k] / expected[k], 1, 0.02);
+  }
+}
+
+TEST(Environment, TheRoughestLevelIsDiffuseAndTheSharpestTheRadianceItself) {
+  const RenderEnvironment studio = studio_environment({});
+  for (const Vec3f d : directions(100)) {
+    EXPECT_NEAR(specular_light(studio, d, 1).y / diffuse_light(studio, d).y, 1, 0.04);
+    EXPECT_NEAR(specular_light(studio, d, 0).y / studio_radiance(d).y, 1, 0.02);
+  }
+}
+
+TEST(Environment, ALobeIsAGaussianWhoseWidthFollowsTheRoughness) {
+  // A bright half space above: the share that a lobe across the border sees, by brute force.
+  const Radiance radiance = [](Vec3f d) { return d.y > 0 ? Vec3f{1, 1, 1} : Vec3f{}; };
+  const RenderEnvironment light = prepare_environment(radiance, {}, {});
+  const Vec3f n = normalized(Vec3f{1, 0.3f, 0.2f});
+  for (const auto& [level, variance] : {std::pair{3, 0.058}, {5, 0.21}, {7, 0.32}})
+    EXPECT_NEAR(specular_light(light, n, static_cast<float>(level) / 7).x,
+                blurred_by_sum(radiance, n, variance).x, 0.03)
+        << level;
+}
+
+TEST(Environment, TheStudioIsNeutralAndLightsAWhiteBodyWithoutBurningIt) {
+  const RenderEnvironment studio = studio_environment({});
+  const Vec3f mean = studio.irradiance[0] * 0.2820948f;
+  EXPECT_NEAR(mean.x / mean.y, 1, 0.03);
+  EXPECT_NEAR(mean.z / mean.y, 1, 0.03);
+  float most = 0;
+  for (const Vec3f d : directions(20000)) {
+    for (int k = 0; k < 3; ++k) EXPECT_GT(studio_radiance(d)[k], 0);
+    most = std::max(most, studio_radiance(d).y);
+  }
+  EXPECT_GT(most, 4);
+  EXPECT_LT(most, 6.5);
+  for (const Vec3f n : directions(50)) {
+    const float facing = std::max(dot(n, studio.key.towards), 0.f) / 3.14159265f;
+    const float plaster = 0.85f * (diffuse_light(studio, n).y + facing * studio.key.irradiance.y);
+    EXPECT_GT(plaster, 0.12f);
+    EXPECT_LT(plaster, 1.0f);
+  }
+}
+
+TEST(Environment, HostileRadianceIsCutOff) {
+  const RenderEnvironment light = prepare_environment(
+      [](Vec3f d) {
+        return Vec3f{std::nanf(""), d.x > 0 ? -1.f : 1e30f, std::numeric_limits<float>::infinity()};
+      },
+      {}, {});
+  for (const Vec3f d : directions(50)) {
+    EXPECT_TRUE(render::is_finite(diffuse_light(light, d)));
+    for (const float roughness : {0.f, 0.3f, 1.f, std::nanf("")}) {
+      const Vec3f s = specular_light(light, d, roughness);
+      EXPECT_TRUE(render::is_finite(s));
+      EXPECT_GE(s.y, 0);
+    }
+  }
+  EXPECT_TRUE(render::is_finite(specular_light(light, {}, 0.5f)));
+}
+
+TEST(Environment, SameForAnyNumberOfThreads) {
+  const RenderEnvironment one = studio_environment({}), many = studio_environment({8, {}, nullptr});
+  EXPECT_EQ(one.irradiance, many.irradiance);
+  for (std::size_t l = 0; l < one.levels.size(); ++l) EXPECT_EQ(one.levels[l].texels, many.levels[l].texels);
+}
+
+}  // namespace
+}  // namespace texmesh
