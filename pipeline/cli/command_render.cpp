@@ -202,10 +202,8 @@ void add_render_command(Command& app) {
       "  texmesh render bust.texmesh --unlit --rung preview -o colours.png");
   c.notes(
       "The reference renderer shows glTF's metallic-roughness materials with normal maps, occlusion, "
-      "emission, "
-      "alpha and vertex colours, in perspective, tone-mapped (Khronos PBR Neutral), 16 samples a pixel. "
-      "Other "
-      "extensions of materials are not rendered; a warning names them.\n"
+      "emission, alpha and vertex colours, in perspective, tone-mapped (Khronos PBR Neutral), 16 samples a "
+      "pixel. Other extensions of materials are not rendered; a warning names them.\n"
       "The same input gives the same bytes on every machine.\n"
       "Exit code: 0, 1 when the input cannot be shown or the picture not be written, 2 usage, 3 internal "
       "error.");
