@@ -11,6 +11,7 @@
 
 #include "format/base/archive.h"
 #include "format/base/portable_math.h"
+#include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
 #include "stages/skeletonization/contraction/contraction.h"
 #include "stages/skeletonization/segment_tree.h"
