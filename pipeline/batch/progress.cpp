@@ -199,7 +199,7 @@ void Progress::finished(std::size_t model, const WorkerReport& r, const std::str
   if (mode_ == OutputMode::kJson) {
     out_ << Json{{"event", "model-finished"},
                  {"model", name},
-                 {"result", result_name(r.result)},
+                 {"result", enum_name(r.result)},
                  {"ran", r.ran},
                  {"output", output},
                  {"bytes", r.package_bytes},

@@ -50,7 +50,7 @@ std::string utf8(const std::string& text) {
 Json model_json(const PlannedModel& m, const WorkerReport& r) {
   Json j{{"model", m.name},
          {"output", m.output},
-         {"result", result_name(r.result)},
+         {"result", enum_name(r.result)},
          {"ran", r.ran},
          {"bytes", r.package_bytes},
          {"seconds", r.seconds},
@@ -141,8 +141,8 @@ std::string write_junit(const std::vector<PlannedModel>& models, const std::vect
         "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
         "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
         "</properties>\n",
-        result_name(r.result), xml(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes,
-        r.stages_ran, r.stages_hit);
+        enum_name(r.result), xml(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes, r.stages_ran,
+        r.stages_hit);
     if (r.result == ModelResult::kCancelled)
       out += "<skipped message=\"not reached\"/>\n";
     else if (!r.ok())

@@ -1,10 +1,13 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "format/base/fields.h"
 #include "pipeline/graph/key.h"
 #include "pipeline/io/file_request.h"
 
@@ -39,7 +42,11 @@ struct WorkerJob {
 };
 
 enum class ModelResult : std::uint8_t { kOk, kUnchanged, kFailed, kInternal, kCancelled };
-const char* result_name(ModelResult result);  // "ok", "unchanged", "failed", "internal-error", "cancelled"
+template <>
+struct EnumNames<ModelResult> {
+  static constexpr std::array<std::string_view, 5> names{"ok", "unchanged", "failed", "internal-error",
+                                                         "cancelled"};
+};
 
 /// One stage in the course of a model, in seconds since the pool began.
 struct StageSpan {

@@ -135,19 +135,4 @@ std::vector<FileRequest> files_from_json(const std::string& json) {
   return files;
 }
 
-const char* result_name(ModelResult r) {
-  switch (r) {
-    case ModelResult::kOk:
-      return "ok";
-    case ModelResult::kUnchanged:
-      return "unchanged";
-    case ModelResult::kFailed:
-      return "failed";
-    case ModelResult::kInternal:
-      return "internal-error";
-    default:
-      return "cancelled";
-  }
-}
-
 }  // namespace texmesh

@@ -13,12 +13,10 @@
 namespace texmesh {
 namespace {
 
-using Kind = Difference::Kind;
-
 /// Compares two lists of named things and notes what is not the same, in A's order, then B's own.
 class NamedDifferences {
  public:
-  explicit NamedDifferences(Kind kind) : kind_(kind) {}
+  explicit NamedDifferences(DifferenceKind kind) : kind_(kind) {}
   void add(int side, const std::string& name, std::string value, std::uint64_t bytes = 0) {
     const auto [it, fresh] = place_.emplace(name, all_.size());
     if (fresh) all_.push_back({kind_, name, {}, {}});
@@ -31,14 +29,15 @@ class NamedDifferences {
   }
 
  private:
-  Kind kind_;
+  DifferenceKind kind_;
   std::map<std::string, std::size_t> place_;
   std::vector<Difference> all_;
 };
 
 std::vector<Difference> differences_of(const std::array<Provenance, 2>& p) {
-  NamedDifferences inputs(Kind::kInput), options(Kind::kOption), stages(Kind::kStageVersion),
-      libraries(Kind::kLibrary), tool(Kind::kTool), format(Kind::kFormat);
+  NamedDifferences inputs(DifferenceKind::kInput), options(DifferenceKind::kOption),
+      stages(DifferenceKind::kStageVersion), libraries(DifferenceKind::kLibrary), tool(DifferenceKind::kTool),
+      format(DifferenceKind::kFormat);
   for (int side = 0; side < 2; ++side) {
     for (const Provenance::Input& i : p[side].inputs) inputs.add(side, i.uri, i.sha256, i.bytes);
     for (const auto& [stage, section] : p[side].options->items())
@@ -140,19 +139,19 @@ class Causes {
 
   static bool touches(const Difference& d, const Stage& s, const std::string& artefact) {
     switch (d.kind) {
-      case Kind::kInput:
+      case DifferenceKind::kInput:
         return s.name == "import" && (artefact == "import.images" || d.name.empty() || !is_image(d.name));
-      case Kind::kOption:
+      case DifferenceKind::kOption:
         return std::any_of(s.options.begin(), s.options.end(), [&](const StageOption& o) {
           return d.name == o.name || d.name.starts_with(o.name + ".");
         });
-      case Kind::kStageVersion:
+      case DifferenceKind::kStageVersion:
         return d.name == s.name;
-      case Kind::kLibrary:
+      case DifferenceKind::kLibrary:
         return std::any_of(s.libraries.begin(), s.libraries.end(),
                            [&](const StageLibrary& l) { return l.name == d.name; });
-      case Kind::kTool:
-      case Kind::kFormat:
+      case DifferenceKind::kTool:
+      case DifferenceKind::kFormat:
         return s.name == "package";
     }
     return false;

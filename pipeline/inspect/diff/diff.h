@@ -3,17 +3,26 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/fields.h"
 
 namespace texmesh {
+
+/// What packages can differ in.
+enum class DifferenceKind : std::uint8_t { kInput, kOption, kStageVersion, kLibrary, kTool, kFormat };
+template <>
+struct EnumNames<DifferenceKind> {
+  static constexpr std::array<std::string_view, 6> names{"input",   "option", "stage",
+                                                         "library", "tool",   "format"};
+};
 
 /// One thing that two packages do not share. Texts and sizes are those of A and B, empty or 0 where that
 /// package has no such thing.
 struct Difference {
-  enum class Kind : std::uint8_t { kInput, kOption, kStageVersion, kLibrary, kTool, kFormat };
-  Kind kind;
+  DifferenceKind kind;
   std::string name;                      // uri ("" = the model itself), "ladder.rungs", stage, library
   std::array<std::string, 2> values;     // digest, JSON text, version
   std::array<std::uint64_t, 2> bytes{};  // inputs only

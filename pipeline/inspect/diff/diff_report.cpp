@@ -8,39 +8,20 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Kind = Difference::Kind;
 
 /// Entries are many where a rung list changes; a person needs the first few of each stage.
 constexpr std::size_t kEntriesShown = 8;
 
-const char* kind_name(Kind kind) {
-  switch (kind) {
-    case Kind::kInput:
-      return "input";
-    case Kind::kOption:
-      return "option";
-    case Kind::kStageVersion:
-      return "stage";
-    case Kind::kLibrary:
-      return "library";
-    case Kind::kTool:
-      return "tool";
-    case Kind::kFormat:
-      return "format";
-  }
-  return "";
-}
-
 std::string name_of(const Difference& d) {
-  if (d.kind == Kind::kInput) return d.name.empty() ? "the model itself" : printable(d.name);
+  if (d.kind == DifferenceKind::kInput) return d.name.empty() ? "the model itself" : printable(d.name);
   return printable(d.name);
 }
 
 std::string value_of(const Difference& d, int side) {
   const std::string& v = d.values[side];
   if (v.empty()) return "-";
-  if (d.kind == Kind::kInput) return grouped(d.bytes[side]) + " bytes, " + v.substr(0, 12);
-  if (d.kind == Kind::kStageVersion) return "version " + v;
+  if (d.kind == DifferenceKind::kInput) return grouped(d.bytes[side]) + " bytes, " + v.substr(0, 12);
+  if (d.kind == DifferenceKind::kStageVersion) return "version " + v;
   return printable(v);
 }
 
@@ -61,7 +42,7 @@ std::string recorded_text(const PackageDiff& diff) {
   TextTable table;
   for (const char* header : {"recorded", "what", "A", "B"}) table.column(header, Align::kLeft);
   for (const Difference& d : diff.differences)
-    table.row({kind_name(d.kind), name_of(d), value_of(d, 0), value_of(d, 1)});
+    table.row({std::string(enum_name(d.kind)), name_of(d), value_of(d, 0), value_of(d, 1)});
   return "what the packages were made from and with\n" + table.text();
 }
 
@@ -69,7 +50,7 @@ std::string because(const PackageDiff& diff, const StageDifference& s) {
   std::string text;
   for (const std::size_t i : s.causes) {
     const Difference& d = diff.differences[i];
-    text += (text.empty() ? "" : ", ") + std::string(kind_name(d.kind)) + " " + name_of(d);
+    text += (text.empty() ? "" : ", ") + std::string(enum_name(d.kind)) + " " + name_of(d);
   }
   return text.empty()
              ? "nothing recorded: one of the packages was not made by this tool as it says, run verify"
@@ -118,8 +99,9 @@ Json sizes(const std::array<std::uint64_t, 2>& bytes, bool a = true, bool b = tr
 }
 
 Json recorded_json(const Difference& d) {
-  Json j{{"kind", kind_name(d.kind)}, {"name", d.name}, {"values", pair(d.values)}};
-  if (d.kind == Kind::kInput) j["bytes"] = sizes(d.bytes, !d.values[0].empty(), !d.values[1].empty());
+  Json j{{"kind", enum_name(d.kind)}, {"name", d.name}, {"values", pair(d.values)}};
+  if (d.kind == DifferenceKind::kInput)
+    j["bytes"] = sizes(d.bytes, !d.values[0].empty(), !d.values[1].empty());
   return j;
 }
 
