@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
 #include "pipeline/compile/compile_model.h"
@@ -14,6 +16,7 @@
 namespace texmesh {
 namespace {
 
+using Json = nlohmann::json;
 using testing::GltfBuilder;
 
 constexpr int kSide = 8;
@@ -135,6 +138,26 @@ TEST_F(SourceToExtract, AModelNearZeroNeedsNoFurtherNode) {
   const Bytes placed = extract(package, request);
   request.recentre = true;
   EXPECT_EQ(placed, extract(package, request));
+}
+
+Json samplers_of(const Bytes& glb) {
+  std::uint32_t length = 0;
+  std::memcpy(&length, glb.data() + 12, 4);
+  return Json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(length))["samplers"];
+}
+
+TEST_F(SourceToExtract, SamplersAreTheSources) {
+  GltfBuilder b = sheet({});
+  b.json["textures"][0]["sampler"] = 0;
+  for (const int min_filter : {9728, 9729, 9984, 9985, 9986, 9987}) {
+    const int mag_filter = min_filter % 2 == 0 ? 9729 : 9728;
+    b.json["samplers"] = Json::array(
+        {{{"minFilter", min_filter}, {"magFilter", mag_filter}, {"wrapS", 33071}, {"wrapT", 33648}}});
+    const std::string package = compile(b, MeshCodec::kNone);
+    EXPECT_EQ(samplers_of(PackageReader(open_store(package)).scale_glb(0)), b.json["samplers"]);
+    for (const auto& [what, request] : every_kind_of_request())
+      EXPECT_EQ(samplers_of(extract(package, request)), b.json["samplers"]) << what;
+  }
 }
 
 }  // namespace
