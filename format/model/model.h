@@ -44,6 +44,17 @@ struct Mesh {
 };
 
 enum class Wrap : std::uint8_t { kRepeat = 0, kClamp = 1, kMirror = 2 };
+/// How a texture is read where it is shown smaller than it is, as glTF's minFilter. The first part is the
+/// filter within a level, the second part the filter between levels; without a second part level 0 alone is
+/// read.
+enum class Minification : std::uint8_t {
+  kLinearMipmapLinear = 0,
+  kNearest = 1,
+  kLinear = 2,
+  kNearestMipmapNearest = 3,
+  kLinearMipmapNearest = 4,
+  kNearestMipmapLinear = 5
+};
 enum class AlphaMode : std::uint8_t { kOpaque = 0, kMask = 1, kBlend = 2 };
 
 /// Affine map of a UV before sampling: uv' = offset + rotate(rotation) * (scale *
@@ -65,12 +76,13 @@ struct TextureRef {
   std::uint8_t texcoord = 0;  // 0 -> uv0, 1 -> uv1
   Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
   bool nearest = false;  // magnification without interpolation
+  Minification minification = Minification::kLinearMipmapLinear;
   UvTransform transform;
   bool used() const { return image >= 0; }
   friend bool operator==(const TextureRef&, const TextureRef&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.image, s.texcoord, s.wrap_s, s.wrap_t, s.nearest, s.transform);
+    a(s.image, s.texcoord, s.wrap_s, s.wrap_t, s.nearest, s.minification, s.transform);
   }
 };
 

@@ -17,7 +17,7 @@ struct ExtractArguments {
   std::string package, output, bytes, rung = "max", images = "auto";
   int scale = -1, jobs = 0;
   double display_px = 0;
-  bool lods = false, json = false;
+  bool recentre = false, lods = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text) {
@@ -36,6 +36,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.scale >= 0) r.scale = a.scale;
   r.rung = rung_of(a.rung);
   r.display_px = a.display_px;
+  r.recentre = a.recentre;
   r.lods = a.lods;
   if (a.images == "jpeg") r.images = ExtractImages::kJpeg;
   if (a.images == "webp") r.images = ExtractImages::kWebp;
@@ -85,6 +86,8 @@ void add_options(Command& c, ExtractArguments& args) {
   c.flag("--lods", args.lods,
          "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
          "textures");
+  c.flag("--recentre", args.recentre,
+         "Leave the model near 0, in the frame of the package's meshes; default: where the source has it");
   add_jobs_option(c, args.jobs);
   c.flag("--json", args.json, "Print what was chosen as one JSON object (schemas/extract.v1.schema.json)");
 }

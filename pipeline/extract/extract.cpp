@@ -100,6 +100,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   for (std::size_t l = 1; l < out.levels.size(); ++l)
     file.add_level(StandaloneGlb(package.scale_glb(out.levels[l]), mesh_path(out.levels[l])),
                    screen_coverage_of(m, out.levels[l]));
+  if (!request.recentre) file.move_to(m.origin);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
   std::map<std::uint32_t, FileImageData> images;

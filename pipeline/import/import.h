@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 4;
+inline constexpr int kImportVersion = 5;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

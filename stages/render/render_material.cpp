@@ -19,6 +19,17 @@ float emission_strength(const Material& material) {
   return 1;
 }
 
+MinFilter min_filter_of(Minification minification) {
+  switch (minification) {
+    case Minification::kNearest:
+      return MinFilter::kNearest;
+    case Minification::kLinear:
+      return MinFilter::kLinear;
+    default:  // the renderer has one filter with mip levels
+      return MinFilter::kTrilinear;
+  }
+}
+
 UvTransform finite_transform(const UvTransform& t) {
   const bool finite = std::isfinite(t.offset.x) && std::isfinite(t.offset.y) && std::isfinite(t.scale.x) &&
                       std::isfinite(t.scale.y) && std::fabs(t.rotation) <= 1e6f;
@@ -55,6 +66,7 @@ RenderMaterial render_material(const Material& material,
     slot.wrap_s = ref.wrap_s;
     slot.wrap_t = ref.wrap_t;
     slot.mag_filter = ref.nearest ? MagFilter::kNearest : MagFilter::kLinear;
+    slot.min_filter = min_filter_of(ref.minification);
     slot.transform = finite_transform(ref.transform);
   }
   return out;

@@ -52,7 +52,8 @@ struct RenderMaterial {
 
 /// The material without its extensions, but for the strength of emission. `texture_of` gives the index of the
 /// texture that stands for a used reference, -1 = none. One image may stand for two textures, one sRGB and
-/// one plain. Values that are not finite become the defaults of glTF, others are clipped to its ranges.
+/// one plain. All four of glTF's minification filters with mip levels become kTrilinear. Values that are not
+/// finite become the defaults of glTF, others are clipped to its ranges.
 RenderMaterial render_material(
     const Material& material,
     const std::function<std::int32_t(const TextureRef& reference, TextureUse use)>& texture_of);

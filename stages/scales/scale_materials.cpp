@@ -74,13 +74,16 @@ class TextureTable {
 
  private:
   std::size_t sampler(const TextureRef& ref) {
-    const auto [it, fresh] = samplers_.try_emplace(
-        {static_cast<int>(ref.wrap_s), static_cast<int>(ref.wrap_t), ref.nearest}, samplers_.size());
+    const auto [it, fresh] =
+        samplers_.try_emplace({static_cast<int>(ref.wrap_s), static_cast<int>(ref.wrap_t), ref.nearest,
+                               static_cast<int>(ref.minification)},
+                              samplers_.size());
     if (fresh) {
       constexpr int kWrap[] = {10497, 33071, 33648};
+      constexpr int kMinFilter[] = {9987, 9728, 9729, 9984, 9985, 9986};  // by Minification
       writer_.array("samplers")
           .push_back({{"magFilter", ref.nearest ? 9728 : 9729},
-                      {"minFilter", ref.nearest ? 9984 : 9987},
+                      {"minFilter", kMinFilter[static_cast<int>(ref.minification)]},
                       {"wrapS", kWrap[static_cast<int>(ref.wrap_s)]},
                       {"wrapT", kWrap[static_cast<int>(ref.wrap_t)]}});
     }
@@ -94,7 +97,7 @@ class TextureTable {
   GlbWriter& writer_;
   std::array<bool, 2> has_uv_;
   std::map<std::uint32_t, std::size_t> image_of_;
-  std::map<std::array<int, 3>, std::size_t> samplers_;
+  std::map<std::array<int, 4>, std::size_t> samplers_;
   std::map<std::array<std::size_t, 2>, std::size_t> textures_;
 };
 

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 4;
+inline constexpr int kScalesVersion = 5;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>

@@ -74,7 +74,8 @@ class Scorer {
   }
   double score(const Bytes& glb, const std::string& name) const {
     NoFiles none;
-    const Model model = import_model(name, glb, none, {}, context_).model;
+    Model model = import_model(name, glb, none, {}, context_).model;
+    for (Vec3f& p : model.mesh.positions) p = to_float(to_double(p) + model.mesh.origin - origin_);
     return meter_->difference(pictures(model, views_, context_), context_);
   }
 

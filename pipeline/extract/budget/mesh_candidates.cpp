@@ -58,6 +58,7 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+  if (!source_.request.recentre) file->move_to(m.origin);
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
   c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);

@@ -20,7 +20,8 @@ struct ExtractRequest {
   std::uint32_t rung = kBestRung;  // of full-size planes, where `bytes` is 0
   double display_px = 0;           // displayed height, device px; 0 = not said (with `bytes`: 512)
   ExtractImages images = ExtractImages::kAuto;
-  bool lods = false;  // all major scales and the one chosen, as MSFT_lod
+  bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
+  bool lods = false;      // all major scales and the one chosen, as MSFT_lod
 };
 
 struct ExtractedImage {

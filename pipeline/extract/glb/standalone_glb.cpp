@@ -281,6 +281,16 @@ void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
       use_extension(name.get<std::string>(), list == std::string("extensionsRequired"));
 }
 
+void StandaloneGlb::move_to(Vec3d translation) {
+  if (translation == Vec3d{}) return;
+  const std::size_t scene = number(document_->root, "scene");
+  Json& nodes = document_->root["scenes"].at(scene)["nodes"];
+  Json parent{{"name", "origin"}, {"translation", {translation.x, translation.y, translation.z}}};
+  parent["children"] = nodes;
+  nodes = Json::array({document_->root["nodes"].size()});
+  document_->root["nodes"].push_back(parent);
+}
+
 Bytes StandaloneGlb::finish() const {
   Json root = document_->root;
   root.erase("bufferViews");

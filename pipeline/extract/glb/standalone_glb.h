@@ -40,6 +40,10 @@ class StandaloneGlb {
   /// level is shown (extras.MSFT_screencoverage).
   void add_level(StandaloneGlb coarser, double screen_coverage);
 
+  /// Makes the nodes of the scene the children of one node that moves them by `translation`, object units.
+  /// Positions stay as they are. Nothing happens for {0, 0, 0}. After all levels of detail.
+  void move_to(Vec3d translation);
+
   /// The file; views in their first order, those that nothing uses left out. Same input, same bytes.
   std::vector<std::uint8_t> finish() const;
 

@@ -246,6 +246,7 @@ void check_texture(const Item& texture) {
 
 void check_sampler(const Item& sampler) {
   sampler.one_of("magFilter", {9728, 9729});
+  sampler.one_of("minFilter", {9728, 9729, 9984, 9985, 9986, 9987});
   for (const char* wrap : {"wrapS", "wrapT"}) sampler.one_of(wrap, {33071, 33648, 10497});
 }
 

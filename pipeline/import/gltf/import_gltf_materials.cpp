@@ -33,6 +33,24 @@ Wrap wrap_of(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror : Wrap::kRepeat;
 }
 
+/// Absent is the viewer's choice: glTF's viewers take mip levels and blend them.
+Minification minification_of(int filter) {
+  switch (filter) {
+    case TINYGLTF_TEXTURE_FILTER_NEAREST:
+      return Minification::kNearest;
+    case TINYGLTF_TEXTURE_FILTER_LINEAR:
+      return Minification::kLinear;
+    case TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_NEAREST:
+      return Minification::kNearestMipmapNearest;
+    case TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_NEAREST:
+      return Minification::kLinearMipmapNearest;
+    case TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_LINEAR:
+      return Minification::kNearestMipmapLinear;
+    default:
+      return Minification::kLinearMipmapLinear;
+  }
+}
+
 class MaterialReader {
  public:
   MaterialReader(const Source& source, const Json& document, const tinygltf::Model& structure,
@@ -139,6 +157,7 @@ TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
     ref.wrap_s = wrap_of(sampler.wrapS);
     ref.wrap_t = wrap_of(sampler.wrapT);
     ref.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+    ref.minification = minification_of(sampler.minFilter);
   }
   ref.image = image_of_texture(index);
   if (ref.image < 0) return {};

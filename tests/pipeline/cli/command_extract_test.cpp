@@ -31,6 +31,7 @@ TEST(CliExtract, EveryWayToAskGivesAFile) {
   const std::vector<std::vector<std::string>> ways{{"--bytes", "20kB", "--display", "100"},
                                                    {"--scale", "0", "--rung", "max"},
                                                    {"--display", "300"},
+                                                   {"--display", "300", "--recentre"},
                                                    {"--lods"},
                                                    {"--lods", "--image-format", "webp", "--rung", "0"},
                                                    {"--image-format", "png"}};

@@ -106,7 +106,10 @@ TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
   EXPECT_EQ(root["images"].size(), 1u);
   EXPECT_EQ(root["meshes"].size(), 2u);
   ASSERT_EQ(root["scenes"][0]["nodes"].size(), 1u);
-  const nlohmann::json& top = root["nodes"][root["scenes"][0]["nodes"][0].get<std::size_t>()];
+  const nlohmann::json& placed = root["nodes"][root["scenes"][0]["nodes"][0].get<std::size_t>()];
+  EXPECT_EQ(placed["translation"], nlohmann::json::parse("[10.0, 20.0, 30.0]"));
+  ASSERT_EQ(placed["children"].size(), 1u);
+  const nlohmann::json& top = root["nodes"][placed["children"][0].get<std::size_t>()];
   ASSERT_EQ(top["extensions"]["MSFT_lod"]["ids"].size(), 1u);
   const auto coverage = top["extras"]["MSFT_screencoverage"].get<std::vector<double>>();
   ASSERT_EQ(coverage.size(), 2u);

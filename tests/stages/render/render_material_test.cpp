@@ -35,7 +35,8 @@ TEST(RenderMaterial, EveryUseHasItsSlotAndAnImageMayServeTwice) {
   Material from;
   from.base_colour_texture.image = from.emissive_texture.image = 3;
   from.metallic_roughness_texture.image = from.occlusion_texture.image = 3;
-  from.normal_texture = {4, 1, Wrap::kClamp, Wrap::kMirror, true, {{0.1f, 0.2f}, {2, 2}, 1}};
+  from.normal_texture = {
+      4, 1, Wrap::kClamp, Wrap::kMirror, true, Minification::kLinearMipmapLinear, {{0.1f, 0.2f}, {2, 2}, 1}};
   const RenderMaterial m = render_material(
       from, [](const TextureRef& ref, TextureUse use) { return ref.image * 2 + (is_srgb(use) ? 1 : 0); });
   EXPECT_EQ(m.slot(TextureUse::kBaseColour).texture, 7);
@@ -50,6 +51,22 @@ TEST(RenderMaterial, EveryUseHasItsSlotAndAnImageMayServeTwice) {
   EXPECT_EQ(normal.mag_filter, MagFilter::kNearest);
   EXPECT_EQ(normal.min_filter, MinFilter::kTrilinear);
   EXPECT_EQ(normal.transform, from.normal_texture.transform);
+}
+
+TEST(RenderMaterial, FiltersWithMipLevelsAreOneAndTheOthersAreKept) {
+  for (const auto& [from, to] : {std::pair{Minification::kNearest, MinFilter::kNearest},
+                                 {Minification::kLinear, MinFilter::kLinear},
+                                 {Minification::kNearestMipmapNearest, MinFilter::kTrilinear},
+                                 {Minification::kLinearMipmapNearest, MinFilter::kTrilinear},
+                                 {Minification::kNearestMipmapLinear, MinFilter::kTrilinear},
+                                 {Minification::kLinearMipmapLinear, MinFilter::kTrilinear}}) {
+    Material material;
+    material.emissive_texture.image = 0;
+    material.emissive_texture.minification = from;
+    const RenderMaterial m = render_material(material, no_texture);
+    EXPECT_EQ(m.slot(TextureUse::kEmissive).min_filter, to);
+    EXPECT_EQ(m.slot(TextureUse::kEmissive).mag_filter, MagFilter::kLinear);
+  }
 }
 
 TEST(RenderMaterial, OfTheExtensionsTheStrengthOfEmissionCounts) {

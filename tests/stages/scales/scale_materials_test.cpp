@@ -20,7 +20,13 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   m.emissive = {1, 0.5f, 0};
   m.alpha_mode = AlphaMode::kMask, m.alpha_cutoff = 0.3f;
   m.double_sided = m.unlit = true;
-  m.base_colour_texture = {0, 0, Wrap::kClamp, Wrap::kMirror, true, {{0.5f, 0}, {2, 3}, 0.25f}};
+  m.base_colour_texture = {0,
+                           0,
+                           Wrap::kClamp,
+                           Wrap::kMirror,
+                           true,
+                           Minification::kNearestMipmapNearest,
+                           {{0.5f, 0}, {2, 3}, 0.25f}};
   m.normal_texture.image = 1, m.normal_scale = 0.5f;
   c.materials[1].alpha_mode = AlphaMode::kBlend;
   c.materials[1].base_colour_texture.image = 0;
@@ -60,6 +66,30 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
       EXPECT_EQ(both.at(x, y)[1], colour.at(x, y)[1]);
       EXPECT_EQ(both.at(x, y)[3], *alpha.at(2 * x, 2 * y));
     }
+}
+
+TEST(Scales, SamplersFilterAsTheSourceSays) {
+  const std::vector<std::pair<Minification, int>> codes{{Minification::kLinearMipmapLinear, 9987},
+                                                        {Minification::kNearest, 9728},
+                                                        {Minification::kLinear, 9729},
+                                                        {Minification::kNearestMipmapNearest, 9984},
+                                                        {Minification::kLinearMipmapNearest, 9985},
+                                                        {Minification::kNearestMipmapLinear, 9986}};
+  Case c(testing::cube(), 2 * codes.size());
+  c.add_image(TextureRole::kBaseColour);
+  for (std::size_t k = 0; k < c.materials.size(); ++k) {
+    TextureRef& t = c.materials[k].base_colour_texture;
+    t.image = 0, t.minification = codes[k / 2].first, t.nearest = k % 2 == 1;
+  }
+  const Glb glb = open(c.write(MeshCodec::kNone).files[0].glb);
+  EXPECT_EQ(glb.json["samplers"].size(), c.materials.size());
+  for (std::size_t k = 0; k < c.materials.size(); ++k) {
+    const Json& info = glb.json["materials"][k]["pbrMetallicRoughness"]["baseColorTexture"];
+    const Json& texture = glb.json["textures"][info["index"].get<std::size_t>()];
+    const Json& sampler = glb.json["samplers"][texture["sampler"].get<std::size_t>()];
+    EXPECT_EQ(sampler["minFilter"], codes[k / 2].second);
+    EXPECT_EQ(sampler["magFilter"], k % 2 == 1 ? 9728 : 9729);
+  }
 }
 
 TEST(Scales, MaterialExtensionsComeBackAsTheyWere) {

@@ -29,7 +29,8 @@ TEST(Scales, SeveralPartsMaterialsTextureSetsAndColours) {
   c.add_image(TextureRole::kBaseColour);
   c.add_image(TextureRole::kOcclusionRoughnessMetallic);
   c.materials[0].base_colour_texture.image = 0;
-  c.materials[1].occlusion_texture = {1, 1, Wrap::kClamp, Wrap::kMirror, true, {{0.25f, 0}, {2, 2}, 0.5f}};
+  c.materials[1].occlusion_texture = {
+      1, 1, Wrap::kClamp, Wrap::kMirror, true, Minification::kNearest, {{0.25f, 0}, {2, 2}, 0.5f}};
   for (MeshCodec codec : kCodecs) {
     expect_round_trip(c, codec);
     const Glb glb = open(c.write(codec).files[0].glb);

@@ -11,7 +11,7 @@ const linearFilter = 1006;
 export class PlaneStorage {
   private readonly gl_: WebGL2RenderingContext;
   private readonly views_ = new Map<Texture, FramebufferTexture>(); // by the texture that each view is like
-  private readonly storages_ = new Set<WebGLTexture>();
+  private readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
   private stale_ = false; // the smallest levels
 
   constructor(
@@ -35,23 +35,24 @@ export class PlaneStorage {
     Object.assign(texture, { source, colorSpace: colourSpace === 'srgb' ? 'srgb' : '', flipY: false, generateMipmaps: false });
     const storage = this.storageOf_(texture);
     this.views_.set(old, texture);
-    const [first] = this.storages_;
-    if (first && filled && !this.storages_.has(storage)) this.fill_(first, widthPx, heightPx, storage);
-    this.storages_.add(storage);
+    if (this.storages_.has(storage)) return texture;
+    const [first] = this.storages_.keys();
+    this.storages_.set(storage, texture.minFilter > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1);
+    if (first && filled) this.fill_(first, widthPx, heightPx, storage);
     return texture;
   }
   /** Fills the whole with another texture, scaled bilinearly. */
   fillAll(from: Texture): void {
     const { width, height } = from.image as ImageBitmap;
-    for (const to of this.storages_) this.fill_(this.storageOf_(from), width, height, to);
+    for (const to of this.storages_.keys()) this.fill_(this.storageOf_(from), width, height, to);
   }
   /** See PlaneComposer.upload. */
   upload(levels: readonly ImageBitmap[], x: number, y: number): void {
     const { gl_: gl, info_: { widthPx, heightPx } } = this;
-    for (const storage of this.storages_) {
+    for (const [storage, levelCount] of this.storages_) {
       this.renderer_.state.bindTexture(gl.TEXTURE_2D, storage);
       for (const name of [gl.UNPACK_FLIP_Y_WEBGL, gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, gl.UNPACK_COLORSPACE_CONVERSION_WEBGL]) gl.pixelStorei(name, 0);
-      levels.slice(0, this.levelCount_()).forEach((bitmap, level) => {
+      levels.slice(0, levelCount).forEach((bitmap, level) => {
         const [left, top] = [x >> level, y >> level];
         const width = Math.min(bitmap.width, (widthPx >> level) - left);
         const height = Math.min(bitmap.height, (heightPx >> level) - top);
@@ -62,7 +63,7 @@ export class PlaneStorage {
   }
   /** The smallest levels follow the uploads. */
   updateMips(): void {
-    if (this.stale_) this.withBuffers_(() => this.storages_.forEach((storage) => this.halve_(storage, ownLevels - 1)));
+    if (this.stale_) this.withBuffers_(() => [...this.storages_.keys()].forEach((storage) => this.halve_(storage, ownLevels - 1)));
     this.stale_ = false;
   }
   /** RGBA bytes, row 0 at the top. */
@@ -70,7 +71,7 @@ export class PlaneStorage {
     const { gl_: gl, info_: { widthPx, heightPx } } = this;
     const pixels = new Uint8Array(4 * widthPx * heightPx);
     this.withBuffers_(() => {
-      this.attach_(gl.READ_FRAMEBUFFER, [...this.storages_][0], 0);
+      this.attach_(gl.READ_FRAMEBUFFER, [...this.storages_.keys()][0], 0);
       gl.readPixels(0, 0, widthPx, heightPx, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     });
     return pixels;
@@ -89,11 +90,6 @@ export class PlaneStorage {
   }
   private side_(px: number, level: number): number {
     return Math.max(1, px >> level);
-  }
-  /** Number of levels: one, where no view asks for more. */
-  private levelCount_(): number {
-    const { widthPx, heightPx } = this.info_;
-    return this.textures.some((v) => v.minFilter > linearFilter) ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1;
   }
   /** Runs `use` with framebuffers of its own, and leaves the renderer's state as it was. */
   private withBuffers_(use: () => void): void {
@@ -123,7 +119,7 @@ export class PlaneStorage {
   /** Makes the levels behind level `from`, each of the level before. */
   private halve_(storage: WebGLTexture, from: number): void {
     const { widthPx, heightPx } = this.info_;
-    for (let level = from + 1; level < this.levelCount_(); ++level)
+    for (let level = from + 1; level < this.storages_.get(storage)!; ++level)
       this.copy_(storage, level - 1, this.side_(widthPx, level - 1), this.side_(heightPx, level - 1), storage, level);
   }
   private fill_(from: WebGLTexture, width: number, height: number, to: WebGLTexture): void {

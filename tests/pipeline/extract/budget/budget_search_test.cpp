@@ -67,6 +67,24 @@ double farthest(const Mesh& mesh, const Mesh& from) {
   return out;
 }
 
+TEST(MoveTo, ANodeHoldsTheWholeSceneAtADouble) {
+  const Bytes glb = stored_scale();
+  const Mesh stored = read_model({glb, "s00.glb"}, "s00.glb", {}).mesh;
+  const Vec3d to{4.5e6 + 1.0 / 3, -0.1, 16.9};
+  StandaloneGlb file(glb, "s00.glb");
+  file.move_to(to);
+  const Mesh moved = read_model(file, "s00.glb", {}).mesh;
+  ASSERT_EQ(moved.positions.size(), stored.positions.size());
+  EXPECT_EQ(moved.part_names, stored.part_names);
+  for (std::size_t i = 0; i < stored.positions.size(); ++i)
+    EXPECT_LT(length(to_double(moved.positions[i]) + moved.origin - to_double(stored.positions[i]) - to),
+              1e-6);
+  StandaloneGlb unmoved(glb, "s00.glb");
+  const Bytes before = unmoved.finish();
+  unmoved.move_to({});
+  EXPECT_EQ(unmoved.finish(), before);
+}
+
 TEST(Recode, LeanerStepsAreSmallerAndKeepTheirBound) {
   const Bytes glb = stored_scale();
   const Mesh stored = read_model({glb, "s00.glb"}, "s00.glb", {}).mesh;

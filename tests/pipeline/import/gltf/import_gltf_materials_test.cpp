@@ -81,12 +81,32 @@ TEST(ImportGltfMaterials, ReadsEveryProperty) {
     EXPECT_EQ(t.wrap_s, Wrap::kClamp);
     EXPECT_EQ(t.wrap_t, Wrap::kMirror);
     EXPECT_TRUE(t.nearest);
+    EXPECT_EQ(t.minification, Minification::kLinearMipmapLinear);
   }
   EXPECT_EQ(r.base_colour_texture.texcoord, 0);
   EXPECT_EQ(r.metallic_roughness_texture.texcoord, 1);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].bytes, png());
   EXPECT_TRUE(m.notes.empty());
+}
+
+TEST(ImportGltfMaterials, KeepsEveryMinificationFilter) {
+  for (const auto& [code, kind] : {std::pair{9728, Minification::kNearest},
+                                   {9729, Minification::kLinear},
+                                   {9984, Minification::kNearestMipmapNearest},
+                                   {9985, Minification::kLinearMipmapNearest},
+                                   {9986, Minification::kNearestMipmapLinear},
+                                   {9987, Minification::kLinearMipmapLinear}}) {
+    GltfBuilder b = textured(base_colour());
+    b.json["textures"][0]["sampler"] = 0;
+    b.json["samplers"] = {{{"minFilter", code}}};
+    const TextureRef t = import(b).materials.at(0).base_colour_texture;
+    EXPECT_EQ(t.minification, kind) << code;
+    EXPECT_FALSE(t.nearest);
+  }
+  GltfBuilder wrong = textured(base_colour());
+  wrong.json["samplers"] = {{{"minFilter", 9730}}};
+  EXPECT_THROW(import(wrong), InputError);
 }
 
 TEST(ImportGltfMaterials, KeepsTextureTransforms) {
