@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "delivery/cpp/client/delivery_plan.h"
 #include "delivery/cpp/package/package_reader.h"
 #include "format/container/container.h"
 #include "pipeline/compile/compile_model.h"
@@ -212,10 +213,10 @@ CompileOptions cheap_options() {
 
 class Materials : public ::testing::TestWithParam<Kind> {};
 
-TEST_P(Materials, CompileIntoSoundPackages) {
+/// The path of the package.
+std::string compiled(const Kind& kind, const testing::TemporaryFolder& folder) {
   GltfBuilder b = sheet();
-  GetParam().change(b);
-  const testing::TemporaryFolder folder;
+  kind.change(b);
   const Bytes glb = b.glb();
   testing::write_text(folder / "m.glb", {glb.begin(), glb.end()});
   CompileRequest request;
@@ -224,9 +225,14 @@ TEST_P(Materials, CompileIntoSoundPackages) {
   request.options = cheap_options();
   NullStore store;
   compile_model(request, store, {}, {});
+  return request.output;
+}
 
-  PackageReader package(open_store(request.output));
-  const auto opened = open_store(request.output);
+TEST_P(Materials, CompileIntoSoundPackages) {
+  const testing::TemporaryFolder folder;
+  const std::string path = compiled(GetParam(), folder);
+  PackageReader package(open_store(path));
+  const auto opened = open_store(path);
   std::string findings;
   for (const Finding& f : verify_package(*opened, {}).findings) findings += to_string(f) + "\n";
   EXPECT_EQ(findings, "");
@@ -240,6 +246,15 @@ TEST_P(Materials, CompileIntoSoundPackages) {
   // At the best rung S_0 is nearly what the source is, whatever shows of it.
   EXPECT_GT(q.ssim[q.rungs.size() - 1], 0.9f);
   EXPECT_LT(q.difference[q.rungs.size() - 1], 0.1f);
+}
+
+TEST(Prediction, WithoutColoursFollowsTheOtherMaps) {
+  for (const Kind& kind : kinds()) {
+    if (kind.name != "normal only" && kind.name != "emissive only") continue;
+    const testing::TemporaryFolder folder;
+    PackageReader package(open_store(compiled(kind, folder)));
+    EXPECT_LT(predicted_ssim(package, 1000, 0, 0.3), predicted_ssim(package, 1000, 0, 0)) << kind.name;
+  }
 }
 
 std::string test_name(const ::testing::TestParamInfo<Kind>& kind) {
