@@ -241,7 +241,9 @@ TEST_P(Materials, CompileIntoSoundPackages) {
   std::set<int> rungs;
   for (const PlaneTables& t : package.tables().planes)
     rungs.insert(t.rung_quality.begin(), t.rung_quality.end());
-  if (rungs.empty()) EXPECT_EQ(q.rungs, std::vector<int>{100});
+  if (rungs.empty()) {
+    EXPECT_EQ(q.rungs, std::vector<int>{100});
+  }
   for (const int rung : q.rungs) EXPECT_TRUE(rungs.empty() || rungs.contains(rung)) << rung;
   // At the best rung S_0 is nearly what the source is, whatever shows of it.
   EXPECT_GT(q.ssim[q.rungs.size() - 1], 0.9f);
