@@ -9,9 +9,9 @@ namespace texmesh {
 /// Measured quality of scale x rung samples: quality.json.
 struct QualityTable {
   std::vector<int> scales;        // scale numbers, rising (0 = S_0)
-  std::vector<int> rungs;         // IJG qualities, rising; {100} for untextured models
+  std::vector<int> rungs;         // IJG qualities, rising; {100} for models without planes
   std::vector<float> ssim;        // [scale index * rungs + rung index], 0..1, 1 = equal
-  std::vector<float> difference;  // FLIP-like mean colour difference, 0..1, 0 = equal
+  std::vector<float> difference;  // mean FLIP, 0..1, 0 = equal
   std::uint32_t views = 0, size_px = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {

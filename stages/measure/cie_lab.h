@@ -1,6 +1,7 @@
 #pragma once
-// Colours as the eye tells them apart: what FLIP (Andersson et al. 2020) and the quality stage's difference
-// have in common. Linear colours are those of sRGB's primaries, 0 .. 1; XYZ is relative to a white of Y = 1.
+// Colours as the eye tells them apart: what FLIP (Andersson et al. 2020) and the difference of
+// image_compare.h have in common. Linear colours are those of sRGB's primaries, 0 .. 1; XYZ is relative to a
+// white of Y = 1.
 #include <algorithm>
 #include <cmath>
 

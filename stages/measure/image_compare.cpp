@@ -91,8 +91,8 @@ std::vector<Vec3f> eye_lab(const Picture& picture) {
 
 }  // namespace
 
-ComparedPicture prepare_comparison(const Picture& picture) {
-  ComparedPicture out;
+LumaPicture prepare_luma(const Picture& picture) {
+  LumaPicture out;
   out.side_px = picture.side_px;
   out.covered = picture.covered;
   out.luma.resize(picture.linear.size());
@@ -105,11 +105,14 @@ ComparedPicture prepare_comparison(const Picture& picture) {
   out.luma_square_mean.resize(out.luma.size());
   for (std::size_t i = 0; i < out.luma.size(); ++i) out.luma_square_mean[i] = out.luma[i] * out.luma[i];
   ssim_window().blur(out.luma_square_mean, out.side_px);
-  out.lab = eye_lab(picture);
   return out;
 }
 
-PictureDifference compare_pictures(const ComparedPicture& reference, const ComparedPicture& test) {
+ComparedPicture prepare_comparison(const Picture& picture) {
+  return {prepare_luma(picture), eye_lab(picture)};
+}
+
+PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test) {
   constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
   std::vector<float> product(reference.luma.size());
   for (std::size_t i = 0; i < product.size(); ++i) product[i] = reference.luma[i] * test.luma[i];
@@ -121,9 +124,16 @@ PictureDifference compare_pictures(const ComparedPicture& reference, const Compa
     const double va = reference.luma_square_mean[i] - a * a, vb = test.luma_square_mean[i] - b * b;
     const double covariance = product[i] - a * b;
     sum.ssim += (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (va + vb + kC2));
-    sum.difference += colour_difference(reference.lab[i], test.lab[i]);
     ++sum.pixels;
   }
+  return sum;
+}
+
+PictureDifference compare_pictures(const ComparedPicture& reference, const ComparedPicture& test) {
+  PictureDifference sum = compare_luma(reference, test);
+  for (std::size_t i = 0; i < reference.lab.size(); ++i)
+    if (reference.covered[i] || test.covered[i])
+      sum.difference += colour_difference(reference.lab[i], test.lab[i]);
   return sum;
 }
 

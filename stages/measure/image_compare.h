@@ -13,13 +13,18 @@ struct Picture {
   std::vector<std::uint8_t> covered;  // 0 or 1
 };
 
-/// What of a reference is computed once for many comparisons.
-struct ComparedPicture {
+/// What SSIM compares, computed once for many comparisons.
+struct LumaPicture {
   std::uint32_t side_px = 0;
   std::vector<float> luma;                         // sRGB-encoded, 0..1
   std::vector<float> luma_mean, luma_square_mean;  // under a Gaussian of deviation 1.5 px
-  std::vector<Vec3f> lab;                          // after the eye's blur, Hunt-adjusted
   std::vector<std::uint8_t> covered;
+};
+LumaPicture prepare_luma(const Picture& picture);
+
+/// The same with what the colour difference compares.
+struct ComparedPicture : LumaPicture {
+  std::vector<Vec3f> lab;  // after the eye's blur, Hunt-adjusted
 };
 ComparedPicture prepare_comparison(const Picture& picture);
 
@@ -35,5 +40,7 @@ struct PictureDifference {
 /// distance, its exponent 0.7 and its remapping to 0..1. FLIP's edge and point detectors are left out: SSIM
 /// stands beside it for structure.
 PictureDifference compare_pictures(const ComparedPicture& reference, const ComparedPicture& test);
+/// SSIM and the pixels alone; the difference stays 0.
+PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test);
 
 }  // namespace texmesh

@@ -58,6 +58,12 @@ Pixels next_level(const Pixels& fine, bool srgb, const RunContext& context) {
 
 }  // namespace
 
+Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context) {
+  for (; levels > 0 && (image.width_px > 1 || image.height_px > 1); --levels)
+    image = next_level(image, srgb, context);
+  return image;
+}
+
 void complete_mips(RenderTexture& texture, const RunContext& context) {
   while (texture.levels.back().width_px > 1 || texture.levels.back().height_px > 1)
     texture.levels.push_back(next_level(texture.levels.back(), texture.srgb, context));

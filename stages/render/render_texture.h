@@ -17,6 +17,11 @@ struct RenderTexture {
   std::vector<Pixels> levels;  // first_level, first_level + 1, ... 1 x 1
 };
 
+/// A mip of an image that is not empty, so many levels coarser, at most down to 1 x 1; made as
+/// complete_mips() makes the levels of a texture. Of a part whose place and sides are multiples of 2^levels
+/// it is that part of the whole image's mip, where the image's sides are such multiples, too.
+Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context);
+
 /// Completes the chain from its first level, which must be there with the sides of its number. Each level is
 /// the one before it, read bilinearly at the middles of the new texels: with even sides that is the mean of
 /// 2 x 2. sRGB colours are averaged in linear light. Every level is rounded to 8 bits. Same bits on every

@@ -179,6 +179,9 @@ double predicted_ssim(const QualityTable& table, int scale, double quality) {
 
 double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
                           double texture_dssim) {
+  double heaviest = 0;
+  for (const PlaneChoice& p : planes)
+    heaviest = std::max(heaviest, role_weight(package.textures()[p.plane].role));
   // Mean loss of uniform rungs, by quality, over the planes that are shown.
   std::vector<std::pair<double, double>> curve;  // quality, loss
   double weight = 0;
@@ -186,7 +189,7 @@ double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>
   std::vector<int> quality;
   for (const PlaneChoice& p : planes) {
     const PlaneTables& t = package.tables().planes[p.plane];
-    if (role_weight(package.textures()[p.plane].role) < 1) continue;
+    if (role_weight(package.textures()[p.plane].role) < heaviest) continue;
     if (quality.empty()) {
       quality.assign(t.rung_quality.begin(), t.rung_quality.end());
       loss.assign(quality.size(), 0);

@@ -66,7 +66,7 @@ double predicted_ssim(PackageReader& package, double displayed_px, int scale, do
 /// measurement.
 int wanted_scale(PackageReader& package, const DeliveryRequest& request);
 /// The quality at which the textures lose `texture_dssim` when all fragments have it: interpolated between
-/// the losses of the rungs.
+/// the losses of the rungs of those planes whose role weighs most, base colours where there are some.
 double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
                           double texture_dssim);
 

@@ -142,6 +142,47 @@ TEST(Quality, VertexColoursEmissionAndNormalsShow) {
   EXPECT_GT(measure(s).ssim[2], coloured.ssim[2]) << "a glare hides the difference";
 }
 
+TEST(Quality, ModelsWithoutColoursHaveTheRungsOfTheirOwnMaps) {
+  Sample s = sample_sheet(true);
+  std::swap(s.materials[0].base_colour_texture, s.materials[0].normal_texture);
+  s.fragments.planes[0].role = TextureRole::kNormal;
+  const QualityTable normals = measure(s);
+  EXPECT_EQ(normals.rungs, measure(sample_sheet(true)).rungs);
+  EXPECT_LT(normals.ssim[0], normals.ssim[3] - 0.02) << "bad normals must show";
+  EXPECT_GT(normals.difference[0], normals.difference[3] + 0.01f);
+
+  s.materials[0].unlit = true;
+  const QualityTable unseen = measure(s);
+  EXPECT_EQ(unseen.rungs, normals.rungs);
+  EXPECT_EQ(unseen.ssim[0], 1.f);
+  EXPECT_EQ(unseen.difference[0], 0.f);
+  for (std::size_t r = 1; r < 4; ++r) EXPECT_EQ(unseen.ssim[8 + r], unseen.ssim[8]);
+}
+
+TEST(Quality, ColoursAreSampledBeforeOtherMaps) {
+  Sample s = sample_sheet(true);
+  s.fragments.planes.insert(s.fragments.planes.begin(), s.fragments.planes[0]);
+  s.pixels.push_back(s.pixels[0]);
+  s.ladder.planes.push_back(s.ladder.planes[0]);
+  s.fragments.planes[0].role = TextureRole::kNormal;
+  s.fragments.planes[1].image = 1;
+  s.ladder.planes[0].rungs.resize(2);
+  s.materials[0].normal_texture.image = 0;
+  s.materials[0].base_colour_texture.image = 1;
+  EXPECT_EQ(measure(s).rungs, measure(sample_sheet(true)).rungs);
+}
+
+TEST(Quality, WhatIsTransparentIsNotMeasured) {
+  Sample s = sample_sheet(true);
+  s.materials[0].alpha_mode = AlphaMode::kBlend;
+  s.materials[0].base_colour = {1, 1, 1, 0};
+  const QualityTable t = measure(s);
+  for (float x : t.ssim) EXPECT_EQ(x, 1.f);
+  const Notes notes = notes_of(s);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].code, "quality-not-measured");
+}
+
 TEST(Quality, SameForAnyNumberOfThreads) {
   const Sample s = sample_sheet(true);
   QualityOptions options;

@@ -198,5 +198,23 @@ TEST(RenderTexture, WhatIsNoImageIsRefused) {
   EXPECT_THROW(render_texture({2, 2, 1, {1, 2, 3}}, true, 0, {}), std::invalid_argument);
 }
 
+TEST(RenderTexture, APartOfAMipIsTheMipOfThePart) {
+  Pixels whole{32, 16, 3, {}};
+  for (std::uint32_t i = 0; i < 32 * 16 * 3; ++i)
+    whole.data.push_back(static_cast<std::uint8_t>(i * i % 253));
+  Pixels right{16, 16, 3, {}};
+  for (std::uint32_t y = 0; y < 16; ++y)
+    right.data.insert(right.data.end(), whole.at(16, y), whole.at(16, y) + 48);
+  for (const bool srgb : {false, true}) {
+    const Pixels mip = coarser_level(whole, srgb, 2, {}), part = coarser_level(right, srgb, 2, {});
+    ASSERT_EQ(mip.width_px, 8u);
+    ASSERT_EQ(part.width_px, 4u);
+    for (std::uint32_t y = 0; y < 4; ++y)
+      EXPECT_TRUE(std::equal(part.at(0, y), part.at(0, y) + 12, mip.at(4, y)));
+    EXPECT_EQ(mip.data, render_texture(whole, srgb, 2, {}).levels[0].data);
+  }
+  EXPECT_EQ(coarser_level(right, false, 9, {}).width_px, 1u);
+}
+
 }  // namespace
 }  // namespace texmesh

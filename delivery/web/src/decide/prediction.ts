@@ -29,14 +29,19 @@ export function predictedSsim({ scales, rungs, ssim }: QualityTable, scale: numb
   return Math.max(0, interpolated(scales, scale, 0, ofScale));
 }
 
-/** The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs' losses. */
+/**
+ * The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs' losses, of those planes whose role
+ * weighs most, base colours where there are some.
+ */
 export function equivalentQuality(data: PackageData, planes: readonly PlaneChoice[], textureDssim: number): number {
+  const weightOf = ({ plane }: PlaneChoice): number => roleWeight(data.textures[plane].role);
+  const heaviest = Math.max(...planes.map(weightOf));
   let weight = 0;
   let rungs: number[] = [];
   let losses: number[] = [];
-  for (const { plane } of planes) {
-    const t = data.tables[plane];
-    if (!t || roleWeight(data.textures[plane].role) < 1) continue;
+  for (const choice of planes) {
+    const t = data.tables[choice.plane];
+    if (!t || weightOf(choice) < heaviest) continue;
     if (rungs.length === 0) {
       rungs = [...t.rungQuality];
       losses = rungs.map(() => 0);

@@ -11,7 +11,7 @@ export interface QualityTable {
   rungs: number[];
   /** [scale index * rungs + rung index] SSIM of pictures, 1 = equal. */
   ssim: Float32Array;
-  /** Difference of pictures in the same shape, 0 = equal. */
+  /** Mean FLIP of pictures in the same shape, 0 = equal. */
   difference: Float32Array;
 }
 

@@ -1,0 +1,49 @@
+#pragma once
+// Inside the room only: which textures show, and what of them pictures of one size need.
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stages/data/fragments.h"
+#include "stages/render/visibility.h"
+
+namespace texmesh::quality {
+
+inline constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples of 16
+
+/// A texture that materials read: a full-size plane, with the plane of its alpha where there is one.
+struct ShownTexture {
+  std::uint32_t plane = 0;  // index into Fragments::planes
+  std::optional<std::uint32_t> alpha;
+  bool srgb = false;
+};
+
+struct ShownTextures {
+  std::vector<ShownTexture> textures;
+  std::vector<RenderMaterial> materials;  // their slots count `textures`
+  /// The plane whose rungs are sampled: the first that shows, colours before normals before other numbers.
+  /// Where none shows, the first of all in the same order. Nothing for a model without planes.
+  std::optional<std::uint32_t> sampled_plane;
+};
+
+/// What the reference renderer reads. References to coordinates that the mesh does not have, all but the base
+/// colour of unlit materials, and the emission of materials that emit nothing do not show. All textures are
+/// read with mips, whatever the sampler says.
+ShownTextures find_shown(const std::vector<Material>& materials, const Fragments& fragments,
+                         const Mesh& mesh);
+
+/// Per shown texture, the finest mip that more than 2 % of its fragments in pictures ask for.
+class LevelCount {
+ public:
+  explicit LevelCount(std::size_t textures) : wanted_(textures) {}
+  /// A view of S_0. `sizes`: width and height of each texture in px.
+  void add(const RenderScene& scene, const Visibility& view, const std::vector<Vec2<std::uint32_t>>& sizes);
+  /// At most kMaxFirstLevel each.
+  std::vector<std::uint32_t> first_levels() const;
+
+ private:
+  std::vector<std::array<std::uint64_t, kMaxFirstLevel + 1>> wanted_;
+};
+
+}  // namespace texmesh::quality
