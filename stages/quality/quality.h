@@ -45,8 +45,7 @@ struct MeasuredQuality {
 ///   other numbers. Where none shows it is the first of all, and the columns are equal. A model without
 ///   planes gets one column (rung quality 100).
 /// - What shows in no picture at all (a thread thinner than a sample, specks, an alpha of 0 everywhere) has
-/// no
-///   measured difference: values of 1 and 0, and a warning.
+///   no measured difference: values of 1 and 0, and a warning.
 /// StageError when S_0 has no extent. Same bytes for any thread count and machine.
 ///
 /// The pictures are rasterised, not ray-cast by Embree: Embree's kernels take reciprocals by rcpps, whose
