@@ -20,8 +20,9 @@ struct ShownModel {
 };
 
 /// The views of a model with everything worked out that does not depend on texels: orthographic, directions
-/// spread over the sphere, base colour x vertex colour x texture under a head-light plus emission, as the
-/// quality stage renders. Textures are filtered trilinearly.
+/// spread over the sphere, base colour x vertex colour x texture under a head-light plus emission.
+/// Textures are filtered trilinearly. Normal and data maps do not show, unlike in the pictures of the
+/// quality stage.
 class ModelViews {
  public:
   /// `cameras` and `side_px` of all models that are to be compared must be the same.

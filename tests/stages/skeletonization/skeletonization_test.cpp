@@ -15,11 +15,13 @@
 #include "stages/condition/condition.h"
 #include "stages/skeletonization/contraction/contraction.h"
 #include "stages/skeletonization/segment_tree.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
 namespace {
 
+using testing::bare_mesh;
 using testing::Random;
 
 /// Coarser than the defaults: the shapes here are plain, and a wrap's time grows with the square.
@@ -35,17 +37,6 @@ std::vector<std::uint8_t> bytes(const Skeleton& s) {
   ArchiveWriter writer;
   writer(s);
   return writer.finish();
-}
-
-Mesh bare(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
-  Mesh m;
-  m.positions = std::move(positions);
-  for (std::uint32_t p = 0; p < m.positions.size(); ++p) m.wedge_position.push_back(p);
-  m.triangles = std::move(triangles);
-  m.triangle_material.assign(m.triangles.size(), 0);
-  m.triangle_part.assign(m.triangles.size(), 0);
-  m.part_names = {"part"};
-  return m;
 }
 
 /// A closed cylinder around the x axis.
@@ -71,7 +62,7 @@ Mesh cylinder(float radius, float length, std::uint32_t rings, std::uint32_t seg
     triangles.push_back({left, k, j});
     triangles.push_back({right, top + j, top + k});
   }
-  return bare(std::move(points), std::move(triangles));
+  return bare_mesh(std::move(points), std::move(triangles));
 }
 
 void expect_sound(const Skeleton& s, std::size_t positions) {
@@ -143,7 +134,7 @@ TEST(Skeletonization, RadiusHasAFloor) {
 }
 
 TEST(Skeletonization, NeverFails) {
-  const Mesh one = bare({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+  const Mesh one = bare_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
   expect_sound(run(one), 3);
   expect_sound(run(testing::sheet(12)), 13 * 13);
   expect_sound(run(testing::sheet(12, 0)), 13 * 13);
@@ -153,7 +144,7 @@ TEST(Skeletonization, NeverFails) {
       testing::side_by_side({testing::cube(), testing::sheet(4), tiny, testing::sphere(8, 12)}, 3);
   expect_sound(run(several), several.positions.size());
   Random random{17};
-  Mesh soup = bare({}, {});
+  Mesh soup = bare_mesh({}, {});
   for (std::uint32_t i = 0; i < 300; ++i) {
     soup.positions.push_back({static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
                               static_cast<float>(random.uniform())});
@@ -232,7 +223,7 @@ Mesh fan(std::uint32_t sides) {
     points.push_back(to_float(Vec3d{portable::cos(a), 0, portable::sin(a)}));
     triangles.push_back({0, 1 + i, 1 + (i + 1) % sides});
   }
-  return bare(std::move(points), std::move(triangles));
+  return bare_mesh(std::move(points), std::move(triangles));
 }
 
 TEST(Skeletonization, NeedlesAroundAHubTakeACoarserWrap) {
