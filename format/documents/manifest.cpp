@@ -62,8 +62,9 @@ Json stream_json(const StreamRef& ref) {
 /// One array per property: as objects, forty scales would spend half of the 16 KiB on names.
 Json scales_json(const std::vector<ManifestScale>& scales) {
   Json j;
-  for (const char* name : {"scale", "triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
-                           "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge"})
+  for (const char* name :
+       {"scale", "triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95",
+        "p99", "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip"})
     j[name] = Json::array();
   for (const ManifestScale& s : scales) {
     j["scale"].push_back(s.scale);
@@ -80,6 +81,7 @@ Json scales_json(const std::vector<ManifestScale>& scales) {
     j["displayPxJnd"].push_back(six_digits(s.display_px_jnd));
     j["displayPxError"].push_back(six_digits(s.display_px_error));
     j["displayPxEdge"].push_back(six_digits(s.display_px_edge));
+    j["displayPxFlip"].push_back(six_digits(s.display_px_flip));
   }
   if (std::ranges::any_of(scales, [](const ManifestScale& s) { return !s.floor.empty(); }))
     for (const ManifestScale& s : scales) j["floor"].push_back(s.floor);
@@ -204,6 +206,7 @@ void read_scales(const JsonAt& at, bool floors, Manifest& m) {
     s.display_px_jnd = at["displayPxJnd"][i].number(0, kAnyDisplayPx);
     s.display_px_error = at["displayPxError"][i].number(0, kAnyDisplayPx);
     s.display_px_edge = at["displayPxEdge"][i].number(0, kAnyDisplayPx);
+    s.display_px_flip = at["displayPxFlip"][i].number(0, kAnyDisplayPx);
     if (floors) s.floor = at["floor"][i].text(kMaxFloorBytes);
     m.scales.push_back(std::move(s));
   }

@@ -32,6 +32,9 @@ struct ManifestScale {
   double p95 = 0, p99 = 0;              // relative distance to S_0 (perceptual value), 0 for S_0
   // Displayed object height in px up to which the scale is enough; kAnyDisplayPx for S_0:
   double display_px_jnd = 0, display_px_error = 0, display_px_edge = 0;
+  // The same by lit pictures: from the table's least height up to this one no view of the scale can be told
+  // from S_0's (stages/quality); 0 = at no height.
+  double display_px_flip = 0;
   // Why it has more vertices than its scale asks for, or why no scale is coarser; else "" (since 1.1).
   std::string floor;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
@@ -59,7 +62,7 @@ struct Manifest {
   double surface_area = 0;  // of S_0, object units squared, six digits; 0 = not said (since 1.1)
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
-  std::vector<ManifestStep> steps;    // default rule: finer of JND and <= 1 px error
+  std::vector<ManifestStep> steps;    // by the default rule, see viewing.h
   std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
   // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between
   // them; its SHA-256.

@@ -46,10 +46,10 @@ double limit_of(std::span<const ManifestScale> scales, std::size_t k, StepRule r
       return scales[k].display_px_error;
     case StepRule::kEdge:
       return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
-    case StepRule::kDefault:
+    case StepRule::kFlip:
       break;
   }
-  return std::min(scales[k].display_px_jnd, scales[k].display_px_error);
+  return scales[k].display_px_flip;
 }
 
 /// By how much a relative distance grows when R can be no more than half the part's shorter side.
@@ -63,13 +63,10 @@ double growth_of_value(const ManifestScale& s, double displayed_px, const Visibl
 bool accepts(std::span<const ManifestScale> scales, std::size_t k, double displayed_px,
              const VisiblePart& part, StepRule rule) {
   const ManifestScale& s = scales[k];
-  const bool jnd =
-      std::max(part.width_px, part.height_px) * growth_of_value(s, displayed_px, part) <= s.display_px_jnd;
-  const bool error = displayed_px <= s.display_px_error;
-  if (rule == StepRule::kJnd) return jnd;
-  if (rule == StepRule::kError) return error;
-  if (rule == StepRule::kEdge) return displayed_px <= limit_of(scales, k, rule);
-  return jnd && error;
+  if (rule == StepRule::kJnd)
+    return std::max(part.width_px, part.height_px) * growth_of_value(s, displayed_px, part) <=
+           s.display_px_jnd;
+  return displayed_px <= limit_of(scales, k, rule);
 }
 
 }  // namespace

@@ -21,10 +21,10 @@ double displayed_height_px(double object_height, double distance, const Camera& 
 /// The distance at which the object is displayed that high; infinite for 0 px, 0 for kAnyDisplayPx and more.
 double viewing_distance(double object_height, double height_px, const Camera& camera);
 
-/// What decides about the scale: kJnd = the just-noticeable difference; kError = an error of one pixel (95th
-/// percentile); kEdge = the O_V / E_S that matches the displayed height best (thesis 7.6); kDefault = the
-/// finer of kJnd and kError, which is what Manifest::steps holds.
-enum class StepRule { kDefault, kJnd, kError, kEdge };
+/// What decides about the scale: kFlip = lit pictures that cannot be told from S_0's, the default, which is
+/// what Manifest::steps holds; kJnd = the just-noticeable difference; kError = an error of one pixel (95th
+/// percentile); kEdge = the O_V / E_S that matches the displayed height best (thesis 7.6).
+enum class StepRule { kFlip, kJnd, kError, kEdge };
 /// The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's, up to
 /// kAnyDisplayPx. A scale that accepts no more than a coarser one gives no step. `scales` as in a
 /// manifest, S_0 first.
@@ -67,9 +67,9 @@ double fovea_radius_px(double eye_distance_px, double degrees = kFoveaDegrees);
 /// The scale for an object displayed `displayed_px` high (the whole of it, seen or not) of which only a part
 /// is visible. The part is a shape of its own: no point of it is farther from its skeleton than half its
 /// shorter side, so a distance between surfaces weighs more, relative to that, than on the whole object; and
-/// the height that the JND goes by is the part's. The rule of one pixel and O_V / E_S know nothing of shapes
-/// and stay as they are. Nothing visible: the coarsest scale. Not clipped: scale_at(step_function(...)).
+/// the height that the JND goes by is the part's. The other rules know nothing of shapes and stay as they
+/// are. Nothing visible: the coarsest scale. Not clipped: scale_at(step_function(...)).
 int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part,
-                 StepRule rule = StepRule::kDefault);
+                 StepRule rule = StepRule::kFlip);
 
 }  // namespace texmesh

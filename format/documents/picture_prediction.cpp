@@ -1,0 +1,113 @@
+#include "format/documents/picture_prediction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/portable_math.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kLeastFlip = 1e-6;                    // what logarithms take for 0
+constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on before the first sample
+constexpr double kLeastDssim = 1e-9, kMostFlip = 1.0;  // 0 of texels is 0 of the picture
+
+/// Two neighbours on an axis and the way between them.
+struct Between {
+  std::size_t first = 0, second = 0;
+  double part = 0;
+};
+template <class Axis, class Value>
+Between between(std::size_t count, double at, Axis&& axis, Value&& value) {
+  Between b;
+  while (b.first + 2 < count && axis(b.first + 1) < at) ++b.first;
+  b.second = std::min(b.first + 1, count - 1);
+  if (b.second > b.first) {
+    const double from = value(axis(b.first)), to = value(axis(b.second));
+    b.part = std::clamp((value(at) - from) / (to - from), 0.0, 1.0);
+  }
+  return b;
+}
+
+Between size_at(const QualityTable& table, double displayed_px) {
+  return between(
+      table.sizes_px.size(), std::max(displayed_px, 1.0),
+      [&](std::size_t i) { return static_cast<double>(table.sizes_px[i]); },
+      [](double px) { return portable::log(px); });
+}
+
+double mixed(double a, double b, double part) { return (1 - part) * a + part * b; }
+
+}  // namespace
+
+GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px) {
+  const auto found = std::ranges::find(table.groups, group, &GroupLosses::group);
+  if (found == table.groups.end() || table.sizes_px.empty()) return;
+  const Between size = size_at(table, displayed_px);
+  part_ = size.part;
+  for (const std::size_t i : {size.first, size.second}) {
+    const TextureLosses& losses = found->sizes[i];
+    Curve curve;
+    double least = kLeastFlip;
+    for (std::size_t k = 0; k < losses.texel_dssim.size(); ++k) {
+      least = std::max(least, static_cast<double>(losses.coded.flip[k]));
+      curve.log_dssim.push_back(portable::log(static_cast<double>(losses.texel_dssim[k])));
+      curve.log_flip.push_back(portable::log(least));
+    }
+    curve.coarser = losses.coarser.flip;
+    curves_.push_back(std::move(curve));
+  }
+}
+
+double GroupCurve::Curve::at(double texel_dssim) const {
+  const double x = portable::log(texel_dssim);
+  const std::size_t n = log_dssim.size();
+  if (n == 1) return portable::exp(log_flip[0] + kSteepest * (x - log_dssim[0]));
+  std::size_t i = 0;
+  while (i + 2 < n && log_dssim[i + 1] < x) ++i;
+  double slope = (log_flip[i + 1] - log_flip[i]) / (log_dssim[i + 1] - log_dssim[i]);
+  if (x < log_dssim[0]) slope = std::clamp(slope, kFlattest, kSteepest);
+  return portable::exp(log_flip[i] + slope * (x - log_dssim[i]));
+}
+
+double GroupCurve::Curve::at_level(double levels) const {
+  const auto value = [&](std::size_t i) {
+    return i == 0 || coarser.empty() ? 0.0 : static_cast<double>(coarser[std::min(i, coarser.size()) - 1]);
+  };
+  const double whole = std::floor(std::clamp(levels, 0.0, static_cast<double>(kMaxCoarserLevels)));
+  const auto i = static_cast<std::size_t>(whole);
+  return mixed(value(i), value(i + 1), std::clamp(levels - whole, 0.0, 1.0));
+}
+
+double GroupCurve::coded(double texel_dssim) const {
+  if (!(texel_dssim > kLeastDssim)) return 0;
+  if (curves_.empty()) return std::min(texel_dssim, kMostFlip);
+  return std::min(kMostFlip, mixed(curves_[0].at(texel_dssim), curves_[1].at(texel_dssim), part_));
+}
+
+double GroupCurve::coarser(double levels) const {
+  if (curves_.empty() || !(levels > 0)) return 0;
+  return mixed(curves_[0].at_level(levels), curves_[1].at_level(levels), part_);
+}
+
+double geometry_flip(const QualityTable& table, double displayed_px, double scale) {
+  if (table.sizes_px.empty() || table.scales.empty()) return 0;
+  const Between size = size_at(table, displayed_px);
+  const Between s = between(
+      table.scales.size(), scale, [&](std::size_t i) { return static_cast<double>(table.scales[i]); },
+      [](double v) { return v; });
+  const auto at = [&](std::size_t i) {
+    const std::vector<float>& flip = table.geometry[i].flip;
+    return mixed(static_cast<double>(flip[s.first]), static_cast<double>(flip[s.second]), s.part);
+  };
+  return mixed(at(size.first), at(size.second), size.part);
+}
+
+double combined_flip(const QualityTable& table, std::span<const double> losses) {
+  double sum = 0;
+  for (const double loss : losses)
+    if (loss > 0) sum += portable::pow(loss, static_cast<double>(table.exponent));
+  return sum > 0 ? std::min(kMostFlip, portable::pow(sum, 1 / static_cast<double>(table.exponent))) : 0;
+}
+
+}  // namespace texmesh

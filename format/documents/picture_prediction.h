@@ -1,0 +1,43 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "format/documents/quality_table.h"
+
+namespace texmesh {
+
+// FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a
+// quality table. Values at displayed heights between two of the table's are linear in the height's logarithm;
+// outside of them the nearest height counts. Same bits on every machine.
+
+/// What textures of one group lose at one displayed height. A group that the table does not have loses its
+/// texels' 1 - SSIM, and nothing by coarser mips.
+class GroupCurve {
+ public:
+  GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px);
+  /// FLIP where the texels lose `texel_dssim` >= 0: 0 for 0, along straight lines through the samples'
+  /// logarithms, which go on before the first and behind the last sample. 0..1, not falling.
+  double coded(double texel_dssim) const;
+  /// FLIP with mips that are `levels` >= 0 coarser than those for this display, between whole levels linear.
+  /// Behind the last sampled level its value.
+  double coarser(double levels) const;
+
+ private:
+  struct Curve {
+    std::vector<double> log_dssim, log_flip;
+    std::vector<float> coarser;
+    double at(double texel_dssim) const;
+    double at_level(double levels) const;
+  };
+  std::vector<Curve> curves_;  // none, one, or those of the two heights around
+  double part_ = 0;            // of the second one
+};
+
+/// FLIP of a scale with the source's texels. Scales between two of the table's are linear in the number; 0
+/// for a table without scales.
+double geometry_flip(const QualityTable& table, double displayed_px, double scale);
+
+/// Losses of scale and groups together, by QualityTable::exponent; at most 1.
+double combined_flip(const QualityTable& table, std::span<const double> losses);
+
+}  // namespace texmesh
