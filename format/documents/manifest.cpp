@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kFile = kManifestPath;
+const std::string kManifestFile = kManifestPath;
 constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
 constexpr std::uint64_t kMaxPlanes = 10000;
@@ -253,18 +253,18 @@ void read_first_picture(const JsonAt& at, Manifest& m) {
 }  // namespace
 
 std::string write_manifest(const Manifest& manifest) {
-  const std::string json = dump_json(manifest_json(manifest), kFile);
+  const std::string json = dump_json(manifest_json(manifest), kManifestFile);
   const std::uint64_t room = kBootstrapBytes - ContainerWriter::data_offset(0, kManifestPath, json.size());
   if (json.size() > room)
-    throw FormatError(kFile, "", "at most " + std::to_string(room) + " bytes",
+    throw FormatError(kManifestFile, "", "at most " + std::to_string(room) + " bytes",
                       std::to_string(json.size()) + " bytes");
   read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
 
 Manifest read_manifest(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kFile, kBootstrapBytes);
-  const JsonAt at(document, kFile);
+  const nlohmann::json document = parse_json(json, kManifestFile, kBootstrapBytes);
+  const JsonAt at(document, kManifestFile);
   Manifest m;
   read_version(at, m);
   read_shape(at, m);

@@ -10,8 +10,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kFile = kQualityPath;
-constexpr std::uint64_t kMaxFileBytes = 4u << 20;
+const std::string kQualityFile = kQualityPath;
+constexpr std::uint64_t kMaxQualityBytes = 4u << 20;
 
 Json floats_json(const std::vector<float>& values) {
   Json j = Json::array();
@@ -46,14 +46,14 @@ std::string write_quality(const QualityTable& table) {
   j["rungs"] = table.rungs;
   j["ssim"] = floats_json(table.ssim);
   j["difference"] = floats_json(table.difference);
-  std::string json = dump_json(j, kFile);
+  std::string json = dump_json(j, kQualityFile);
   read_quality(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
 
 QualityTable read_quality(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kFile, kMaxFileBytes);
-  const JsonAt at(document, kFile);
+  const nlohmann::json document = parse_json(json, kQualityFile, kMaxQualityBytes);
+  const JsonAt at(document, kQualityFile);
   QualityTable table;
   table.views = static_cast<std::uint32_t>(at["views"].integer(1, 10000));
   table.size_px = static_cast<std::uint32_t>(at["sizePx"].integer(1, 65536));

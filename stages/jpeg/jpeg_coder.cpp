@@ -96,7 +96,7 @@ unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
   return (1024 + q / 2) / q;
 }
 
-unsigned bits_of(unsigned value) {
+unsigned bit_length(unsigned value) {
   unsigned bits = 0;
   for (; value > 0; value >>= 1) ++bits;
   return bits;
@@ -266,10 +266,10 @@ std::vector<std::vector<std::uint8_t>> JpegCoder::possible_symbols() const {
     for (int c = 0; c < info.num_components; ++c) {
       if (info.comp_info[c].dc_tbl_no != pair) continue;
       const JQUANT_TBL& quantisers = *info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no];
-      dc = std::max(dc, bits_of(2 * largest_coefficient(quantisers, 0)));
+      dc = std::max(dc, bit_length(2 * largest_coefficient(quantisers, 0)));
       unsigned later = 0;
       for (std::size_t k = kBlockCoefficients - 1; k > 0; --k) {
-        later = std::max(later, bits_of(largest_coefficient(quantisers, k)));
+        later = std::max(later, bit_length(largest_coefficient(quantisers, k)));
         ac[k] = std::max(ac[k], later);
       }
     }

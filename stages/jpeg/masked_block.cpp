@@ -77,7 +77,7 @@ Quad with_sign_of(Quad size, Quad x) {
   return (Quad)((Bits)size | ((Bits)x & std::numeric_limits<std::int32_t>::min()));
 }
 
-int bits_of(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
+int magnitude_bits(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
 
 int nearest(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
 
@@ -130,12 +130,12 @@ class BitCount {
  private:
   int end_bits() const { return coding_.ac.bits[0]; }
   int dc_bits(int step) const {
-    const int size = bits_of(step);
+    const int size = magnitude_bits(step);
     const int bits = coding_.dc.bits[static_cast<std::size_t>(size)];
     return bits > 0 ? bits + size : kNoCode;
   }
   int ac_bits(int zeros, int value) const {
-    const int size = bits_of(value);
+    const int size = magnitude_bits(value);
     const int bits = coding_.ac.bits[static_cast<std::size_t>((zeros & 15) << 4 | size)];
     return bits > 0 ? (zeros >> 4) * coding_.ac.bits[0xf0] + bits + size : kNoCode;
   }
