@@ -21,7 +21,6 @@ using Json = nlohmann::ordered_json;
 const std::string kManifestFile = kManifestPath;
 constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
-constexpr std::uint64_t kMaxPlanes = 10000;
 
 /// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
 constexpr std::array<std::string_view, 3> kKnownFeatures{
@@ -226,7 +225,7 @@ void read_steps(const JsonAt& at, Manifest& m) {
 }
 
 void read_first_picture(const JsonAt& at, Manifest& m) {
-  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPlanes));
+  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   const JsonAt first = at["firstPicture"];
   const EntryRef& coarsest = m.scales.back().glb;
   m.first_picture_offset = read_offset(first["offset"]);

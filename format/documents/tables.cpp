@@ -14,7 +14,7 @@ namespace {
 const std::string kTablesFile = kTablesPath;
 constexpr std::string_view kTablesMagic = "TXMT";
 constexpr std::size_t kDirectoryHead = 16, kDirectoryRecord = 36, kSectionFixed = 56;
-constexpr std::uint32_t kMaxFragments = 65535, kMaxRungs = 100, kMaxScaleCount = 100, kGammaSteps = 21;
+constexpr std::uint32_t kMaxFragments = 65535, kMaxScaleCount = 100;
 constexpr std::uint32_t kFeatureLimit = 1u << 24;
 constexpr float kLargestMse = 65025, kLargestDssim = 2;
 // How far rounding may carry a fraction out of 0..1 before the writer calls it an error.
@@ -64,8 +64,8 @@ void check_shape(const PlaneTables& t, const std::string& place) {
       place + "/columns,rows", "1 to 65535 fragments",
       std::to_string(t.columns) + " x " + std::to_string(t.rows));
   require_tables(t.scales < kMaxScaleCount, place + "/scales", "at most 99", std::to_string(t.scales));
-  require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxRungs, place + "/rung_quality",
-                 "1 to 100 rungs", std::to_string(t.rung_quality.size()));
+  require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxPackageRungs,
+                 place + "/rung_quality", "1 to 100 rungs", std::to_string(t.rung_quality.size()));
   for (std::size_t r = 0; r < t.rung_count(); ++r)
     require_tables(t.rung_quality[r] >= 1 && t.rung_quality[r] <= 100 &&
                        (r == 0 || t.rung_quality[r] > t.rung_quality[r - 1]),
@@ -280,7 +280,7 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   const std::uint64_t order = in.u32();
   if (t.columns == 0 || t.rows == 0 || t.columns > kMaxFragments || t.rows > kMaxFragments / t.columns)
     in.fail("1 to 65535 fragments", std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  if (t.scales >= kMaxScaleCount || rungs == 0 || rungs > kMaxRungs || order > t.fragment_count())
+  if (t.scales >= kMaxScaleCount || rungs == 0 || rungs > kMaxPackageRungs || order > t.fragment_count())
     in.fail("at most 99 scales, 100 rungs and every fragment once", "more");
   if (size_width < 1 || size_width > 4 || feature_width < 1 || feature_width > 3)
     in.fail("widths of 1 to 4 and 1 to 3 bytes",

@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 
 const std::string kTexturesFile = kTexturesPath;
 constexpr std::uint64_t kMaxTexturesBytes = 32u << 20;
-constexpr std::size_t kMaxPlanes = 10000, kMaxRungs = 100, kMaxTextBytes = 1000;
+constexpr std::size_t kMaxTextBytes = 1000;
 constexpr std::uint64_t kMaxSide = 1u << 20, kMaxMip = 20;
 
 Json texture_json(const TextureInfo& t) {
@@ -76,7 +76,7 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
 
 void read_mip(const JsonAt& at, TextureInfo& t) {
   if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
-  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPlanes);
+  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPackagePlanes);
 }
 
 void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
@@ -129,7 +129,7 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
   t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);
   const JsonAt qualities = at["rungQuality"];
-  for (std::size_t i = 0, n = qualities.array(1, kMaxRungs); i < n; ++i) {
+  for (std::size_t i = 0, n = qualities.array(1, kMaxPackageRungs); i < n; ++i) {
     const int quality = static_cast<int>(qualities[i].integer(1, 100));
     if (i > 0 && quality <= t.rung_quality.back())
       qualities[i].fail("a rising number", std::to_string(quality));
@@ -163,7 +163,7 @@ std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kTexturesFile, kMaxTexturesBytes);
   const JsonAt list = JsonAt(document, kTexturesFile)["textures"];
   std::vector<TextureInfo> textures;
-  for (std::size_t i = 0, n = list.array(0, kMaxPlanes); i < n; ++i)
+  for (std::size_t i = 0, n = list.array(0, kMaxPackagePlanes); i < n; ++i)
     textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
   check_mips(list, textures);
   return textures;

@@ -22,8 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kMaxImageBytes = 1ull << 30;
 
-std::string kilobytes(std::uint64_t bytes) { return fixed(static_cast<double>(bytes) / 1e3, 1); }
-
 /// "+12.3" percent that `part` is more than `whole`.
 std::string more_than(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:+.1f}", 100 * (static_cast<double>(part) / static_cast<double>(whole) - 1));

@@ -36,15 +36,13 @@ struct Blocks {
   std::vector<int> dc;  // in eighths
 };
 
-int nearest(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
-
 void add_block(const BlockValues& samples, Blocks& out) {
   const BlockValues coefficients = block_dct(samples);
   Magnitudes& magnitudes = out.ac.emplace_back();
   for (std::size_t k = 1; k < 64; ++k)
     magnitudes[place_of(k)] =
-        static_cast<std::uint16_t>(std::abs(nearest(kParts * coefficients[kNaturalOfZigzag[k]])));
-  out.dc.push_back(nearest(kParts * coefficients[0]));
+        static_cast<std::uint16_t>(std::abs(nearest_integer(kParts * coefficients[kNaturalOfZigzag[k]])));
+  out.dc.push_back(nearest_integer(kParts * coefficients[0]));
 }
 
 /// Means of 2 x 2 samples, rounded as libjpeg does: down and up in turn.

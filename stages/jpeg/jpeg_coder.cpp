@@ -88,8 +88,6 @@ constexpr std::array<std::uint8_t, 16> kAdobeMarker{0xff, 0xee, 0,   14, 'A', 'd
                                                     'e',  0,    100, 0,  0,   0,   0,   0};
 constexpr std::size_t kMarkerBytes = 2;
 
-constexpr std::size_t kBlockCoefficients = 64;
-
 /// No coefficient of 8-bit samples is larger than 1024 (DC; AC stay under 930) before it is quantised.
 unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
   const unsigned q = quantisers.quantval[kNaturalOfZigzag[zigzag]];

@@ -10,7 +10,6 @@ namespace {
 using Span = std::span<const std::uint8_t>;
 
 constexpr std::uint8_t kSos = 0xda, kEoi = 0xd9;
-constexpr std::size_t kBlockCoefficients = 64;
 constexpr std::uint8_t kEndOfBlock = 0x00, kSixteenZeros = 0xf0;
 
 [[noreturn]] void fail_scan(const char* expected, std::string found) {

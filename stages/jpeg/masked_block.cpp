@@ -79,8 +79,6 @@ Quad with_sign_of(Quad size, Quad x) {
 
 int magnitude_bits(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
 
-int nearest(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
-
 /// What changing one of the coefficients costs in bits.
 class BitCount {
  public:
@@ -160,7 +158,7 @@ class Look {
       : coding_(coding), bits_(bits), k_(k), quantiser_(quantiser), rest_(rest), energy_(energy) {}
 
   Change best() {
-    const int now = bits_.value(k_), move = nearest(rest_ / energy_);
+    const int now = bits_.value(k_), move = nearest_integer(rest_ / energy_);
     if (move != 0) consider(now, move);
     if (move > 1 || move < -1) consider(now, move > 0 ? move - 1 : move + 1);
     const int smaller = now > 0 ? -1 : 1;
