@@ -11,7 +11,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxHeaderBytes = 1 << 20;
+constexpr std::size_t kMaxPlyHeaderBytes = 1 << 20;
 constexpr std::size_t kMaxElements = 256, kMaxProperties = 1024;
 
 std::optional<PlyType> type_of(std::string_view word) {
@@ -60,7 +60,7 @@ class PlyHeaderReader {
         fail("format, element, property, comment or end_header", quote(word));
     }
     fail("end_header",
-         text_.size() >= kMaxHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
+         text_.size() >= kMaxPlyHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
   }
 
  private:
@@ -162,7 +162,7 @@ int PlyElement::find_property(std::initializer_list<std::string_view> names) con
 }
 
 PlyHeader read_ply_header(const std::string& file, std::span<const std::uint8_t> bytes) {
-  return PlyHeaderReader(file, text_of(bytes).substr(0, kMaxHeaderBytes)).read();
+  return PlyHeaderReader(file, text_of(bytes).substr(0, kMaxPlyHeaderBytes)).read();
 }
 
 PlyRows::PlyRows(const std::string& file, std::span<const std::uint8_t> bytes, const PlyHeader& header)
