@@ -16,6 +16,9 @@ inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
 inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
 
+/// Most texture planes of a package, mips included, and most rungs of a plane.
+inline constexpr std::uint32_t kMaxPackagePlanes = 10000, kMaxPackageRungs = 100;
+
 std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
 std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack

@@ -12,9 +12,9 @@
 namespace texmesh {
 namespace {
 
-const std::string kFile = kIndexPath;
-constexpr std::string_view kMagic = "TXMX";
-constexpr std::size_t kHeadFixed = 16, kPageFixed = 44, kRecordFixed = 49;
+const std::string kIndexFile = kIndexPath;
+constexpr std::string_view kIndexMagic = "TXMX";
+constexpr std::size_t kPageListHead = 16, kPageFixed = 44, kRecordFixed = 49;
 
 std::uint32_t plane_of(const EntryRef& entry) {
   const EntryName name = parse_entry_path(entry.path);
@@ -25,22 +25,24 @@ std::uint32_t plane_of(const EntryRef& entry) {
 
 /// What holds for any list of entries, whoever made it.
 void check_entry(const EntryRef& e) {
-  if (!is_valid_entry_path(e.path)) throw FormatError(kFile, "entry " + e.path, "a valid path", "another");
+  if (!is_valid_entry_path(e.path))
+    throw FormatError(kIndexFile, "entry " + e.path, "a valid path", "another");
   if (e.path == kManifestPath || e.path == kIndexPath)
-    throw FormatError(kFile, "entry " + e.path, "an entry other than manifest and index", e.path);
+    throw FormatError(kIndexFile, "entry " + e.path, "an entry other than manifest and index", e.path);
   if (e.offset % 64 != 0 || e.offset == 0)
-    throw FormatError(kFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
+    throw FormatError(kIndexFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
   if (e.offset > std::uint64_t{1} << 53 || e.bytes > std::uint64_t{1} << 53)
-    throw FormatError(kFile, "entry " + e.path, "offset and size up to 2^53", "more");
+    throw FormatError(kIndexFile, "entry " + e.path, "offset and size up to 2^53", "more");
 }
 
-void check_order(const std::vector<EntryRef>& entries) {
+void check_entry_order(const std::vector<EntryRef>& entries) {
   std::set<std::string> paths;
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const EntryRef& e = entries[i];
-    if (!paths.insert(e.path).second) throw FormatError(kFile, "entry " + e.path, "each path once", "twice");
+    if (!paths.insert(e.path).second)
+      throw FormatError(kIndexFile, "entry " + e.path, "each path once", "twice");
     if (i > 0 && e.offset <= entries[i - 1].offset + entries[i - 1].bytes)
-      throw FormatError(kFile, "offset of " + e.path, "more than where " + entries[i - 1].path + " ends",
+      throw FormatError(kIndexFile, "offset of " + e.path, "more than where " + entries[i - 1].path + " ends",
                         std::to_string(e.offset));
   }
 }
@@ -61,14 +63,14 @@ Bytes write_page(const std::vector<EntryRef>& entries) {
 
 std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
   for (const EntryRef& e : entries) check_entry(e);
-  check_order(entries);
+  check_entry_order(entries);
   // Page 0 is always there; planes follow by number.
   std::vector<EntryRef> general;
   std::map<std::uint32_t, std::vector<EntryRef>> planes;
   for (const EntryRef& e : entries) (plane_of(e) == kNoPlane ? general : planes[plane_of(e)]).push_back(e);
 
   BytesOut head, pages;
-  head.text(kMagic);
+  head.text(kIndexMagic);
   head.u16(kFormatMajor);
   head.u16(kFormatMinor);
   head.u32(planes.size() + 1);
@@ -88,8 +90,8 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
 }
 
 IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
-  BytesIn in(bytes, kFile);
-  in.expect("the magic TXMX", kMagic);
+  BytesIn in(bytes, kIndexFile);
+  in.expect("the magic TXMX", kIndexMagic);
   if (const auto major = in.u16(); major != kFormatMajor)
     in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
   IndexHead head;
@@ -97,7 +99,7 @@ IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
   const std::uint64_t page_count = in.u32(), entry_count = in.u32();
   if (page_count == 0 || page_count > in.left() / kPageFixed)
     in.fail("a page count that fits the file", std::to_string(page_count));
-  head.bytes = kHeadFixed + page_count * kPageFixed;
+  head.bytes = kPageListHead + page_count * kPageFixed;
   std::uint64_t offset = head.bytes, entries = 0;
   for (std::uint64_t i = 0; i < page_count; ++i) {
     IndexPage page;
@@ -126,10 +128,10 @@ std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
   const IndexPage& p = head.pages.at(page);
   const std::string place = "page " + std::to_string(page);
   if (bytes.size() != p.bytes)
-    throw FormatError(kFile, place, std::to_string(p.bytes) + " bytes", std::to_string(bytes.size()));
+    throw FormatError(kIndexFile, place, std::to_string(p.bytes) + " bytes", std::to_string(bytes.size()));
   if (sha256(bytes) != p.digest)
-    throw FormatError(kFile, place, "SHA-256 " + to_hex(p.digest), to_hex(sha256(bytes)));
-  BytesIn in(bytes, kFile + ": " + place);
+    throw FormatError(kIndexFile, place, "SHA-256 " + to_hex(p.digest), to_hex(sha256(bytes)));
+  BytesIn in(bytes, kIndexFile + ": " + place);
   std::vector<EntryRef> entries;
   for (std::uint32_t i = 0; i < p.entries; ++i) {
     EntryRef e;
@@ -143,7 +145,7 @@ std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
     entries.push_back(std::move(e));
   }
   if (head.minor <= kFormatMinor) in.finish();  // later minor versions may add to a page's end
-  check_order(entries);
+  check_entry_order(entries);
   return entries;
 }
 
@@ -151,7 +153,7 @@ std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes) {
   const IndexHead head = read_index_head(bytes);
   const IndexPage& last = head.pages.back();
   if (last.offset + last.bytes != bytes.size())
-    throw FormatError(kFile, "", std::to_string(last.offset + last.bytes) + " bytes",
+    throw FormatError(kIndexFile, "", std::to_string(last.offset + last.bytes) + " bytes",
                       std::to_string(bytes.size()));
   std::vector<EntryRef> entries;
   for (std::size_t i = 0; i < head.pages.size(); ++i) {
@@ -160,7 +162,7 @@ std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes) {
       entries.push_back(std::move(e));
   }
   std::ranges::sort(entries, {}, &EntryRef::offset);
-  check_order(entries);
+  check_entry_order(entries);
   return entries;
 }
 

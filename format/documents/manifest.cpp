@@ -18,10 +18,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kFile = kManifestPath;
+const std::string kManifestFile = kManifestPath;
 constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
-constexpr std::uint64_t kMaxPlanes = 10000;
 
 /// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
 constexpr std::array<std::string_view, 3> kKnownFeatures{
@@ -229,7 +228,7 @@ void read_steps(const JsonAt& at, Manifest& m) {
 }
 
 void read_first_picture(const JsonAt& at, Manifest& m) {
-  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPlanes));
+  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   const JsonAt first = at["firstPicture"];
   const EntryRef& coarsest = m.scales.back().glb;
   m.first_picture_offset = read_offset(first["offset"]);
@@ -256,18 +255,18 @@ void read_first_picture(const JsonAt& at, Manifest& m) {
 }  // namespace
 
 std::string write_manifest(const Manifest& manifest) {
-  const std::string json = dump_json(manifest_json(manifest), kFile);
+  const std::string json = dump_json(manifest_json(manifest), kManifestFile);
   const std::uint64_t room = kBootstrapBytes - ContainerWriter::data_offset(0, kManifestPath, json.size());
   if (json.size() > room)
-    throw FormatError(kFile, "", "at most " + std::to_string(room) + " bytes",
+    throw FormatError(kManifestFile, "", "at most " + std::to_string(room) + " bytes",
                       std::to_string(json.size()) + " bytes");
   read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
 
 Manifest read_manifest(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kFile, kBootstrapBytes);
-  const JsonAt at(document, kFile);
+  const nlohmann::json document = parse_json(json, kManifestFile, kBootstrapBytes);
+  const JsonAt at(document, kManifestFile);
   Manifest m;
   read_version(at, m);
   read_shape(at, m);

@@ -15,7 +15,8 @@
 namespace texmesh {
 namespace {
 
-[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
+[[noreturn]] void fail_package(const std::string& place, const std::string& expected,
+                               const std::string& found) {
   throw FormatError("package", place, expected, found);
 }
 
@@ -115,8 +116,8 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
   for (const PackageEntry& e : entries) {
     const EntryKind kind = parse_entry_path(e.path).kind;
     if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures)
-      fail("entry " + e.path, "an entry that write_package does not make itself", e.path);
-    if (!paths.insert(e.path).second) fail("entry " + e.path, "one entry of that path", "two");
+      fail_package("entry " + e.path, "an entry that write_package does not make itself", e.path);
+    if (!paths.insert(e.path).second) fail_package("entry " + e.path, "one entry of that path", "two");
   }
   std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
   for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
@@ -127,9 +128,9 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
     for (std::uint32_t r = 0; r < textures[p].rung_quality.size(); ++r) needed.push_back(rung_path(p, r));
   }
   for (const std::string& path : needed)
-    if (!paths.contains(path)) fail("entry " + path, "an entry", "none");
+    if (!paths.contains(path)) fail_package("entry " + path, "an entry", "none");
   if (manifest.scales.empty() || manifest.plane_count != textures.size())
-    fail("manifest", "scales, and as many planes as textures", std::to_string(manifest.plane_count));
+    fail_package("manifest", "scales, and as many planes as textures", std::to_string(manifest.plane_count));
 }
 
 }  // namespace

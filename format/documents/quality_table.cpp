@@ -11,8 +11,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kFile = kQualityPath;
-constexpr std::uint64_t kMaxFileBytes = 4u << 20;
+const std::string kQualityFile = kQualityPath;
+constexpr std::uint64_t kMaxQualityBytes = 4u << 20;
 
 Json floats_json(const std::vector<float>& values) {
   Json j = Json::array();
@@ -102,14 +102,14 @@ std::string write_quality(const QualityTable& table) {
   for (const PictureLosses& losses : table.geometry) j["geometry"].push_back(losses_json(losses));
   j["groups"] = Json::array();
   for (const GroupLosses& group : table.groups) j["groups"].push_back(group_json(group));
-  std::string json = dump_json(j, kFile);
+  std::string json = dump_json(j, kQualityFile);
   read_quality(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
 
 QualityTable read_quality(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kFile, kMaxFileBytes);
-  const JsonAt at(document, kFile);
+  const nlohmann::json document = parse_json(json, kQualityFile, kMaxQualityBytes);
+  const JsonAt at(document, kQualityFile);
   QualityTable table;
   table.views = static_cast<std::uint32_t>(at["views"].integer(1, 10000));
   table.sizes_px = read_rising<std::uint32_t>(at["sizesPx"], kMaxQualitySizes, 1, 65536);

@@ -11,33 +11,35 @@
 namespace texmesh {
 namespace {
 
-const std::string kFile = kTablesPath;
-constexpr std::string_view kMagic = "TXMT";
-constexpr std::size_t kHeadFixed = 16, kDirectoryRecord = 36, kSectionFixed = 56;
-constexpr std::uint32_t kMaxFragments = 65535, kMaxRungs = 100, kMaxScaleCount = 100, kGammaSteps = 21;
+const std::string kTablesFile = kTablesPath;
+constexpr std::string_view kTablesMagic = "TXMT";
+constexpr std::size_t kDirectoryHead = 16, kDirectoryRecord = 36, kSectionFixed = 56;
+constexpr std::uint32_t kMaxFragments = 65535, kMaxScaleCount = 100;
 constexpr std::uint32_t kFeatureLimit = 1u << 24;
 constexpr float kLargestMse = 65025, kLargestDssim = 2;
 // How far rounding may carry a fraction out of 0..1 before the writer calls it an error.
 constexpr float kRounding = 1e-4f;
 
-[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
-  throw FormatError(kFile, place, expected, found);
+[[noreturn]] void fail_tables(const std::string& place, const std::string& expected,
+                              const std::string& found) {
+  throw FormatError(kTablesFile, place, expected, found);
 }
 
-void require(bool good, const std::string& place, const char* expected, const std::string& found) {
-  if (!good) fail(place, expected, found);
+void require_tables(bool good, const std::string& place, const char* expected, const std::string& found) {
+  if (!good) fail_tables(place, expected, found);
 }
 
 template <class T>
 void require_count(const std::vector<T>& values, std::size_t count, const std::string& place) {
-  if (values.size() != count) fail(place, std::to_string(count) + " values", std::to_string(values.size()));
+  if (values.size() != count)
+    fail_tables(place, std::to_string(count) + " values", std::to_string(values.size()));
 }
 
 void require_range(const std::vector<float>& values, float lo, float hi, const std::string& place) {
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!(values[i] >= lo && values[i] <= hi))
-      fail(place + "[" + std::to_string(i) + "]", std::to_string(lo) + " to " + std::to_string(hi),
-           std::to_string(values[i]));
+      fail_tables(place + "[" + std::to_string(i) + "]", std::to_string(lo) + " to " + std::to_string(hi),
+                  std::to_string(values[i]));
 }
 
 void check_counts(const PlaneTables& t, const std::string& place) {
@@ -57,20 +59,21 @@ void check_counts(const PlaneTables& t, const std::string& place) {
 }
 
 void check_shape(const PlaneTables& t, const std::string& place) {
-  require(t.columns >= 1 && t.rows >= 1 && t.columns <= kMaxFragments && t.rows <= kMaxFragments / t.columns,
-          place + "/columns,rows", "1 to 65535 fragments",
-          std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  require(t.scales < kMaxScaleCount, place + "/scales", "at most 99", std::to_string(t.scales));
-  require(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxRungs, place + "/rung_quality",
-          "1 to 100 rungs", std::to_string(t.rung_quality.size()));
+  require_tables(
+      t.columns >= 1 && t.rows >= 1 && t.columns <= kMaxFragments && t.rows <= kMaxFragments / t.columns,
+      place + "/columns,rows", "1 to 65535 fragments",
+      std::to_string(t.columns) + " x " + std::to_string(t.rows));
+  require_tables(t.scales < kMaxScaleCount, place + "/scales", "at most 99", std::to_string(t.scales));
+  require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxPackageRungs,
+                 place + "/rung_quality", "1 to 100 rungs", std::to_string(t.rung_quality.size()));
   for (std::size_t r = 0; r < t.rung_count(); ++r)
-    require(t.rung_quality[r] >= 1 && t.rung_quality[r] <= 100 &&
-                (r == 0 || t.rung_quality[r] > t.rung_quality[r - 1]),
-            place + "/rung_quality", "1 to 100, strictly rising", std::to_string(t.rung_quality[r]));
+    require_tables(t.rung_quality[r] >= 1 && t.rung_quality[r] <= 100 &&
+                       (r == 0 || t.rung_quality[r] > t.rung_quality[r - 1]),
+                   place + "/rung_quality", "1 to 100, strictly rising", std::to_string(t.rung_quality[r]));
 }
 
 void check_parameters(const PlaneTables& t, const std::string& place) {
-  require(t.allocation <= 2, place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
+  require_tables(t.allocation <= 2, place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
   require_range({t.quality_width}, 0, 100, place + "/quality_width");
   require_range({t.log_width}, 0, 4, place + "/log_width");
   require_range({t.quality_max}, 1, 100, place + "/quality_max");
@@ -80,22 +83,23 @@ void check_parameters(const PlaneTables& t, const std::string& place) {
 }
 
 /// Each stored fragment stands in the order once, and only stored fragments have sizes and digests.
-void check_order(const PlaneTables& t, const std::string& place) {
+void check_fragment_order(const PlaneTables& t, const std::string& place) {
   const std::size_t fragments = t.fragment_count();
   std::vector<bool> listed(fragments, false);
   for (const std::uint16_t f : t.order) {
-    require(f < fragments && !listed[f], place + "/order", "every stored fragment once", std::to_string(f));
+    require_tables(f < fragments && !listed[f], place + "/order", "every stored fragment once",
+                   std::to_string(f));
     listed[f] = true;
   }
   std::vector<bool> stored(fragments, false);
   for (std::size_t k = 0; k < t.size_bytes.size(); ++k) {
     if (t.size_bytes[k] > 0) stored[k % fragments] = true;
-    require(t.size_bytes[k] > 0 || t.digest[k] == 0, place + "/digest", "0 where nothing is stored",
-            "a digest");
+    require_tables(t.size_bytes[k] > 0 || t.digest[k] == 0, place + "/digest", "0 where nothing is stored",
+                   "a digest");
   }
   for (std::size_t f = 0; f < fragments; ++f)
-    require(stored[f] == listed[f], place + "/order", "exactly the fragments that have a size",
-            "fragment " + std::to_string(f));
+    require_tables(stored[f] == listed[f], place + "/order", "exactly the fragments that have a size",
+                   "fragment " + std::to_string(f));
 }
 
 /// Each knot lies between two rungs, further on than the one before.
@@ -108,10 +112,11 @@ void check_knots(const PlaneTables& t, const std::string& place) {
     const bool rises = k == 0 || q > t.knot_quality[k - 1];
     const std::size_t before = above;
     while (above < t.rung_count() && t.rung_quality[above] < q) ++above;
-    require(rises && above > 0 && above < t.rung_count() && t.rung_quality[above] != q,
-            place + "/knot_quality", "strictly rising, between rungs", std::to_string(q));
-    require(k == 0 || above != before || t.knot_position[k] >= t.knot_position[k - 1],
-            place + "/knot_position", "not falling between two rungs", std::to_string(t.knot_position[k]));
+    require_tables(rises && above > 0 && above < t.rung_count() && t.rung_quality[above] != q,
+                   place + "/knot_quality", "strictly rising, between rungs", std::to_string(q));
+    require_tables(k == 0 || above != before || t.knot_position[k] >= t.knot_position[k - 1],
+                   place + "/knot_position", "not falling between two rungs",
+                   std::to_string(t.knot_position[k]));
   }
 }
 
@@ -130,8 +135,8 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
     require_range(*v, -rounding, 1 + rounding, place + "/predictors");
   require_range(t.quality, 0, 100, place + "/quality");
   for (const std::uint32_t f : t.features)
-    require(f < kFeatureLimit, place + "/features", "less than 2^24", std::to_string(f));
-  check_order(t, place);
+    require_tables(f < kFeatureLimit, place + "/features", "less than 2^24", std::to_string(f));
+  check_fragment_order(t, place);
 }
 
 /// The least number of bytes that holds every value, 1 to 4.
@@ -260,7 +265,7 @@ void read_extension(BytesIn& in, PlaneTables& t, int minor) {
 }
 
 PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const std::string& place) {
-  BytesIn in(bytes, kFile + ": " + place);
+  BytesIn in(bytes, kTablesFile + ": " + place);
   PlaneTables t;
   t.columns = in.u32();
   t.rows = in.u32();
@@ -275,7 +280,7 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   const std::uint64_t order = in.u32();
   if (t.columns == 0 || t.rows == 0 || t.columns > kMaxFragments || t.rows > kMaxFragments / t.columns)
     in.fail("1 to 65535 fragments", std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  if (t.scales >= kMaxScaleCount || rungs == 0 || rungs > kMaxRungs || order > t.fragment_count())
+  if (t.scales >= kMaxScaleCount || rungs == 0 || rungs > kMaxPackageRungs || order > t.fragment_count())
     in.fail("at most 99 scales, 100 rungs and every fragment once", "more");
   if (size_width < 1 || size_width > 4 || feature_width < 1 || feature_width > 3)
     in.fail("widths of 1 to 4 and 1 to 3 bytes",
@@ -301,7 +306,7 @@ std::string plane_place(std::size_t plane) { return "plane " + std::to_string(pl
 
 std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
   BytesOut head, sections;
-  head.text(kMagic);
+  head.text(kTablesMagic);
   head.u16(kFormatMajor);
   head.u16(kFormatMinor);
   head.u32(tables.planes.size());
@@ -318,8 +323,8 @@ std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
 }
 
 TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
-  BytesIn in(bytes, kFile);
-  in.expect("the magic TXMT", kMagic);
+  BytesIn in(bytes, kTablesFile);
+  in.expect("the magic TXMT", kTablesMagic);
   if (const auto major = in.u16(); major != kFormatMajor)
     in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
   TablesHead head;
@@ -328,7 +333,7 @@ TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
   if (in.u32() != 0 && head.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
   if (planes > in.left() / kDirectoryRecord)
     in.fail("a plane count that fits the file", std::to_string(planes));
-  head.bytes = kHeadFixed + planes * kDirectoryRecord;
+  head.bytes = kDirectoryHead + planes * kDirectoryRecord;
   std::uint64_t offset = head.bytes;
   for (std::uint64_t p = 0; p < planes; ++p) {
     TablesSection section{offset, in.u32(), {}};
@@ -344,9 +349,9 @@ PlaneTables read_tables_section(const TablesHead& head, std::size_t plane,
                                 std::span<const std::uint8_t> section) {
   const TablesSection& s = head.planes.at(plane);
   if (section.size() != s.bytes)
-    fail(plane_place(plane), std::to_string(s.bytes) + " bytes", std::to_string(section.size()));
+    fail_tables(plane_place(plane), std::to_string(s.bytes) + " bytes", std::to_string(section.size()));
   if (sha256(section) != s.digest)
-    fail(plane_place(plane), "SHA-256 " + to_hex(s.digest), to_hex(sha256(section)));
+    fail_tables(plane_place(plane), "SHA-256 " + to_hex(s.digest), to_hex(sha256(section)));
   return read_section(section, head.minor, plane_place(plane));
 }
 
@@ -354,7 +359,7 @@ PackageTables read_tables(std::span<const std::uint8_t> bytes) {
   const TablesHead head = read_tables_head(bytes);
   const std::uint64_t end =
       head.planes.empty() ? head.bytes : head.planes.back().offset + head.planes.back().bytes;
-  if (end != bytes.size()) fail("", std::to_string(end) + " bytes", std::to_string(bytes.size()));
+  if (end != bytes.size()) fail_tables("", std::to_string(end) + " bytes", std::to_string(bytes.size()));
   PackageTables tables;
   for (std::size_t p = 0; p < head.planes.size(); ++p)
     tables.planes.push_back(

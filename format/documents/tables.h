@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -6,6 +7,9 @@
 #include "format/base/sha256.h"
 
 namespace texmesh {
+
+/// Values of Gamma that tables hold sizes for: 0, 0.05 .. 1.
+inline constexpr std::size_t kGammaSteps = 21;
 
 /// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising
 /// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N = scales + 1 feature scales.

@@ -13,9 +13,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kFile = kTexturesPath;
-constexpr std::uint64_t kMaxFileBytes = 32u << 20;
-constexpr std::size_t kMaxPlanes = 10000, kMaxRungs = 100, kMaxTextBytes = 1000;
+const std::string kTexturesFile = kTexturesPath;
+constexpr std::uint64_t kMaxTexturesBytes = 32u << 20;
+constexpr std::size_t kMaxTextBytes = 1000;
 constexpr std::uint64_t kMaxSide = 1u << 20, kMaxMip = 20;
 
 Json texture_json(const TextureInfo& t) {
@@ -76,7 +76,7 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
 
 void read_mip(const JsonAt& at, TextureInfo& t) {
   if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
-  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPlanes);
+  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPackagePlanes);
 }
 
 void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
@@ -129,7 +129,7 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
   t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);
   const JsonAt qualities = at["rungQuality"];
-  for (std::size_t i = 0, n = qualities.array(1, kMaxRungs); i < n; ++i) {
+  for (std::size_t i = 0, n = qualities.array(1, kMaxPackageRungs); i < n; ++i) {
     const int quality = static_cast<int>(qualities[i].integer(1, 100));
     if (i > 0 && quality <= t.rung_quality.back())
       qualities[i].fail("a rising number", std::to_string(quality));
@@ -154,16 +154,16 @@ std::string write_textures(const std::vector<TextureInfo>& textures) {
   Json j;
   j["textures"] = Json::array();
   for (const TextureInfo& t : textures) j["textures"].push_back(texture_json(t));
-  std::string json = dump_json(j, kFile);
+  std::string json = dump_json(j, kTexturesFile);
   read_textures(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
 
 std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kFile, kMaxFileBytes);
-  const JsonAt list = JsonAt(document, kFile)["textures"];
+  const nlohmann::json document = parse_json(json, kTexturesFile, kMaxTexturesBytes);
+  const JsonAt list = JsonAt(document, kTexturesFile)["textures"];
   std::vector<TextureInfo> textures;
-  for (std::size_t i = 0, n = list.array(0, kMaxPlanes); i < n; ++i)
+  for (std::size_t i = 0, n = list.array(0, kMaxPackagePlanes); i < n; ++i)
     textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
   check_mips(list, textures);
   return textures;
@@ -175,7 +175,7 @@ void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<Entr
   const auto resolve = [&](EntryRef& ref) {
     const auto it = by_path.find(ref.path);
     if (it == by_path.end())
-      throw FormatError(kIndexPath, ref.path, "an entry, for " + kFile + " speaks of it", "none");
+      throw FormatError(kIndexPath, ref.path, "an entry, for " + kTexturesFile + " speaks of it", "none");
     ref = *it->second;
   };
   for (TextureInfo& t : textures) {

@@ -20,7 +20,7 @@ double half_tangent(double degrees) {
   return portable::sin(half) / portable::cos(half);
 }
 
-void require(bool good, const char* place, const char* expected, double found) {
+void require_viewing(bool good, const char* place, const char* expected, double found) {
   if (!good) throw FormatError("viewing", place, expected, std::to_string(found));
 }
 
@@ -72,15 +72,15 @@ bool accepts(std::span<const ManifestScale> scales, std::size_t k, double displa
 }  // namespace
 
 double displayed_height_px(double object_height, double distance, const Camera& camera) {
-  require(distance > 0, "distance", "> 0", distance);
-  require(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
-          camera.fov_degrees);
+  require_viewing(distance > 0, "distance", "> 0", distance);
+  require_viewing(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
+                  camera.fov_degrees);
   return object_height / (2 * distance * half_tangent(camera.fov_degrees)) * camera.viewport_px;
 }
 
 double viewing_distance(double object_height, double height_px, const Camera& camera) {
-  require(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
-          camera.fov_degrees);
+  require_viewing(camera.fov_degrees > 0 && camera.fov_degrees < 180, "field of view", "0 .. 180 degrees",
+                  camera.fov_degrees);
   if (height_px >= kAnyDisplayPx) return 0;
   if (!(height_px > 0)) return std::numeric_limits<double>::infinity();
   return object_height / (2 * height_px * half_tangent(camera.fov_degrees)) * camera.viewport_px;
@@ -125,7 +125,7 @@ VisiblePart clip_to(const ScreenRect& object, const ScreenCircle& fovea) {
 }
 
 double fovea_radius_px(double eye_distance_px, double degrees) {
-  require(degrees > 0 && degrees < 180, "angle of the fovea", "0 .. 180 degrees", degrees);
+  require_viewing(degrees > 0 && degrees < 180, "angle of the fovea", "0 .. 180 degrees", degrees);
   return eye_distance_px * half_tangent(degrees);
 }
 

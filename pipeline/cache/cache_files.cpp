@@ -13,6 +13,7 @@
 
 #include "format/base/errors.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/descriptor.h"
 
 namespace texmesh {
 namespace {
@@ -22,13 +23,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kRecordVersion = 2;
 constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
-
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
 
 std::span<const std::uint8_t> as_bytes(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
@@ -51,7 +45,7 @@ bool is_there(const std::string& path, std::size_t bytes) {
 
 bool sync_folder(const std::string& folder) {
   const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  return d.fd >= 0 && (::fsync(d.fd) == 0 || errno == EINVAL || errno == ENOTSUP);
+  return d.get() >= 0 && (::fsync(d.get()) == 0 || errno == EINVAL || errno == ENOTSUP);
 }
 
 /// For file systems without O_TMPFILE (NFS): a named sibling. Pruning removes what a killed process leaves.
@@ -104,12 +98,12 @@ std::string object_path(const char* kind, const Sha256& digest) {
 std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat s {};
-  if (d.fd < 0 || ::fstat(d.fd, &s) != 0 || !S_ISREG(s.st_mode) ||
+  if (d.get() < 0 || ::fstat(d.get(), &s) != 0 || !S_ISREG(s.st_mode) ||
       static_cast<std::uint64_t>(s.st_size) > max_bytes)
     return std::nullopt;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(s.st_size));
   for (std::size_t at = 0; at < bytes.size();) {
-    const ssize_t n = ::read(d.fd, bytes.data() + at, bytes.size() - at);
+    const ssize_t n = ::read(d.get(), bytes.data() + at, bytes.size() - at);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return std::nullopt;  // EIO, or somebody shortens the file
     at += static_cast<std::size_t>(n);
@@ -123,12 +117,12 @@ bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes
   fs::create_directories(folder, ec);
   if (ec) return false;
   const Descriptor d{::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666)};
-  if (d.fd < 0) {
+  if (d.get() < 0) {
     if (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL && errno != ENOENT) return false;
     return is_there(path, bytes.size()) || publish_by_rename(path, bytes);
   }
-  if (!write_all(d.fd, bytes) || ::fdatasync(d.fd) != 0) return false;
-  const std::string self = "/proc/self/fd/" + std::to_string(d.fd);
+  if (!write_all(d.get(), bytes) || ::fdatasync(d.get()) != 0) return false;
+  const std::string self = "/proc/self/fd/" + std::to_string(d.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) != 0) {
     if (errno == EEXIST) return is_there(path, bytes.size());
     return errno == ENOENT && publish_by_rename(path, bytes);  // no /proc in this sandbox

@@ -271,7 +271,7 @@ constexpr const char* kNotes =
     "changed. A model that fails leaves the package that was there before.\n"
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error.";
 
-void add_options(Command& c, CompileArguments& args) {
+void add_compile_options(Command& c, CompileArguments& args) {
   c.option("INPUT", args.inputs,
            "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
       .required();
@@ -293,7 +293,7 @@ void add_options(Command& c, CompileArguments& args) {
   add_stage_options(c, args);
 }
 
-int run(const CompileArguments& args) {
+int run_compile(const CompileArguments& args) {
   RunSettings settings;
   BatchPlan plan;
   try {
@@ -316,10 +316,10 @@ int run(const CompileArguments& args) {
 void add_compile_command(Command& app) {
   auto args = std::make_shared<CompileArguments>();
   Command c = app.add("compile", "Compile textured scans into packages");
-  add_options(c, *args);
+  add_compile_options(c, *args);
   c.examples(kExamples);
   c.notes(kNotes);
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_compile(*args); });
 }
 
 }  // namespace texmesh

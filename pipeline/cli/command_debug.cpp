@@ -23,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct DebugArguments {
   std::string input, what, output, profile;
   std::vector<std::string> settings;
   int jobs = 0, size_px = 640;
@@ -34,7 +34,7 @@ struct Arguments {
 bool is_png(const std::string& path) { return path.ends_with(".png") || path.ends_with(".PNG"); }
 
 /// Profile first, then --set over it.
-CompileOptions gather_options(const Arguments& args) {
+CompileOptions gather_options(const DebugArguments& args) {
   CompileOptions options;
   if (!args.profile.empty()) {
     const auto bytes = read_input_file(args.profile, 1 << 20);
@@ -54,7 +54,7 @@ CompileOptions gather_options(const Arguments& args) {
   return options;
 }
 
-void check_output(const Arguments& args) {
+void check_output(const DebugArguments& args) {
   if (!is_png(args.output) && !args.output.ends_with(".glb") && !args.output.ends_with(".GLB"))
     throw InputError("--output", "", "a name that ends in .glb (to turn it in any viewer) or .png",
                      args.output);
@@ -62,7 +62,7 @@ void check_output(const Arguments& args) {
 
 std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
 
-void print_json(const Arguments& args, const DebugLegend& legend, const Notes& notes) {
+void print_debug_json(const DebugArguments& args, const DebugLegend& legend, const Notes& notes) {
   Json stops = Json::array(), list = Json::array();
   for (const auto& [value, colour] : legend.stops)
     stops.push_back({{"value", value}, {"colour", hex(colour)}});
@@ -83,7 +83,7 @@ void print_json(const Arguments& args, const DebugLegend& legend, const Notes& n
   std::cout << out.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
 }
 
-void print_text(const Arguments& args, const DebugLegend& legend, const Notes& notes) {
+void print_debug_text(const DebugArguments& args, const DebugLegend& legend, const Notes& notes) {
   static const char* const kColourNames[]{"dark violet", "blue", "teal", "green", "yellow"};
   std::cout << args.output << "\n" << legend.quantity;
   if (!legend.unit.empty()) std::cout << ", " << legend.unit;
@@ -98,7 +98,7 @@ void print_text(const Arguments& args, const DebugLegend& legend, const Notes& n
       std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
 }
 
-DebugView make_view(const Arguments& args, const CompileOptions& options, Notes& notes) {
+DebugView make_view(const DebugArguments& args, const CompileOptions& options, Notes& notes) {
   const auto what = static_cast<DebugQuantity>(std::find(kDebugNames.begin(), kDebugNames.end(), args.what) -
                                                kDebugNames.begin());
   const RunContext context = context_of(args.jobs);
@@ -112,19 +112,19 @@ DebugView make_view(const Arguments& args, const CompileOptions& options, Notes&
   return view_input(request, what, *store, context, {}, notes);
 }
 
-void run(const Arguments& args, const CompileOptions& options) {
+void run_debug(const DebugArguments& args, const CompileOptions& options) {
   Notes notes;
   const DebugView view = make_view(args, options, notes);
   write_output_file(args.output, is_png(args.output)
                                      ? write_debug_png(view, static_cast<std::uint32_t>(args.size_px))
                                      : write_debug_glb(view));
   if (args.json)
-    print_json(args, view.legend, notes);
+    print_debug_json(args, view.legend, notes);
   else
-    print_text(args, view.legend, notes);
+    print_debug_text(args, view.legend, notes);
 }
 
-void add_options(Command& c, Arguments& args) {
+void add_debug_options(Command& c, DebugArguments& args) {
   c.option("INPUT", args.input, "A model (runs the stages that are needed, through the cache) or a package")
       .required();
   c.option(
@@ -148,7 +148,7 @@ void add_options(Command& c, Arguments& args) {
   c.flag("--json", args.json, "Print the legend as one JSON object");
 }
 
-int check_and_run(const Arguments& args) {
+int check_and_run_debug(const DebugArguments& args) {
   CompileOptions options;
   try {
     check_output(args);
@@ -157,16 +157,16 @@ int check_and_run(const Arguments& args) {
     std::cerr << "texmesh debug: " << e.what() << '\n';
     return kExitUsage;
   }
-  run(args, options);
+  run_debug(args, options);
   return kExitOk;
 }
 
 }  // namespace
 
 void add_debug_command(Command& app) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<DebugArguments>();
   Command c = app.add("debug", "Picture what a stage computed, with a legend of its colours");
-  add_options(c, *args);
+  add_debug_options(c, *args);
   c.examples(
       "  texmesh debug turtle.glb --what persistence -o turtle.png\n"
       "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=120\n"
@@ -176,7 +176,7 @@ void add_debug_command(Command& app) {
       "their values. A GLB holds the colours as vertex colours (fragments: as textures) and the skeleton as "
       "lines.\n"
       "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
-  c.on_run([args] { return check_and_run(*args); });
+  c.on_run([args] { return check_and_run_debug(*args); });
 }
 
 }  // namespace texmesh

@@ -11,7 +11,7 @@
 namespace texmesh {
 namespace {
 
-struct Arguments {
+struct DiffArguments {
   std::array<std::string, 2> packages;
   bool json = false;
 };
@@ -19,7 +19,7 @@ struct Arguments {
 }  // namespace
 
 void add_diff_command(Command& app) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<DiffArguments>();
   Command c = app.add("diff", "Say what differs between two packages, and why");
   c.option("A", args->packages[0], "A .texmesh file, or a folder that unpack made").required();
   c.option("B", args->packages[1], "The other package").required();

@@ -12,7 +12,7 @@
 namespace texmesh {
 namespace {
 
-struct Arguments {
+struct DumpArguments {
   std::string package;
   std::string part = "summary";
   std::optional<double> gamma;
@@ -24,7 +24,7 @@ DumpPart part_of(const std::string& name) {
   return static_cast<DumpPart>(it - kDumpParts.begin());
 }
 
-int run(const Arguments& args) {
+int run_dump(const DumpArguments& args) {
   const DumpPart part = part_of(args.part);
   if (args.gamma && part != DumpPart::kTables && part != DumpPart::kAll) {
     std::cerr << "texmesh dump: --gamma: expected with tables or all, found with " << args.part << '\n';
@@ -41,7 +41,7 @@ int run(const Arguments& args) {
 }  // namespace
 
 void add_dump_command(Command& app) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<DumpArguments>();
   Command c = app.add("dump", "Show what a package holds and why it is as large as it is");
   add_package_argument(c, args->package, false);
   c.option(
@@ -65,7 +65,7 @@ void add_dump_command(Command& app) {
       "  texmesh dump bust.texmesh tables --gamma 0.3   what each fragment gets then\n"
       "  texmesh dump bust.texmesh entries | sort -n -k2   which entries are large");
   c.notes("Exit code: 0, 1 when the package cannot be read, 2 usage.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_dump(*args); });
 }
 
 }  // namespace texmesh

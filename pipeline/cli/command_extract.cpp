@@ -44,7 +44,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   return r;
 }
 
-int run(const ExtractArguments& args) {
+int run_extract(const ExtractArguments& args) {
   const ExtractRequest request = request_of(args);
   check_output_file(args.output);  // not after the search
   PackageReader package(open_store(args.package));
@@ -56,7 +56,7 @@ int run(const ExtractArguments& args) {
   return extracted.within ? kExitOk : kExitDifferent;
 }
 
-void add_options(Command& c, ExtractArguments& args) {
+void add_extract_options(Command& c, ExtractArguments& args) {
   add_package_argument(c, args.package, true);
   c.option("-o,--output", args.output, "The GLB to write").required().value_name("GLB");
   const Option bytes =
@@ -97,7 +97,7 @@ void add_options(Command& c, ExtractArguments& args) {
 void add_extract_command(Command& app) {
   auto args = std::make_shared<ExtractArguments>();
   Command c = app.add("extract", "Write one GLB that any viewer opens: a scale with whole textures");
-  add_options(c, *args);
+  add_extract_options(c, *args);
   c.examples(
       "  texmesh extract bust.texmesh --bytes 500kB -o bust.glb\n"
       "  texmesh extract bust.texmesh --scale 0 --rung max --image-format png -o master.glb\n"
@@ -111,7 +111,7 @@ void add_extract_command(Command& app) {
       "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
       "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then).");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_extract(*args); });
 }
 
 }  // namespace texmesh

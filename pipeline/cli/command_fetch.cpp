@@ -259,7 +259,7 @@ Json fetch_json(const Fetched& f, double limit_s) {
   return j;
 }
 
-void print(const Fetched& f, double limit_s) {
+void print_fetched(const Fetched& f, double limit_s) {
   std::cout << fmt::format(
       "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
       "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
@@ -281,7 +281,7 @@ void print(const Fetched& f, double limit_s) {
       1 - f.texture_dssim, f.ssim, f.load.cancelled ? "; cancelled" : "");
 }
 
-int run(FetchArguments& args) {
+int run_fetch(FetchArguments& args) {
   std::signal(SIGINT, [](int) {
     interrupted = 1;
     std::signal(SIGINT, SIG_DFL);  // a second one ends the process
@@ -299,11 +299,11 @@ int run(FetchArguments& args) {
   if (args.json)
     std::cout << fetch_json(f, limit_s).dump() << '\n';
   else
-    print(f, limit_s);
+    print_fetched(f, limit_s);
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 
-void add_options(Command& c, FetchArguments& args) {
+void add_fetch_options(Command& c, FetchArguments& args) {
   DeliveryArguments& d = args.delivery;
   c.option("URL", d.package, "http(s) URL of a .texmesh file, or of its tree (which ends in a slash)")
       .required();
@@ -336,7 +336,7 @@ void add_options(Command& c, FetchArguments& args) {
 void add_fetch_command(Command& app) {
   auto args = std::make_shared<FetchArguments>();
   Command c = app.add("fetch", "Fetch from web servers what a viewer would get within a time");
-  add_options(c, *args);
+  add_fetch_options(c, *args);
   c.examples(
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
@@ -346,7 +346,7 @@ void add_fetch_command(Command& app) {
       "ranges is asked for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_fetch(*args); });
 }
 
 }  // namespace texmesh

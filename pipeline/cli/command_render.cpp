@@ -94,7 +94,7 @@ Json notes_json(const Notes& notes) {
   return list;
 }
 
-void print_json(const RenderArguments& args, const RenderedModel& model, const PictureSheet& sheet) {
+void print_render_json(const RenderArguments& args, const RenderedModel& model, const PictureSheet& sheet) {
   Json textures = Json::array();
   for (std::size_t t = 0; t < model.textures.size(); ++t)
     textures.push_back({{"width_px", model.textures[t].width_px},
@@ -114,7 +114,7 @@ void print_json(const RenderArguments& args, const RenderedModel& model, const P
   std::cout << out.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
 }
 
-void print_text(const RenderArguments& args, const RenderedModel& model, const PictureSheet& sheet) {
+void print_render_text(const RenderArguments& args, const RenderedModel& model, const PictureSheet& sheet) {
   double covered = 0;
   for (const SheetView& v : sheet.views) covered += v.covered_px;
   const double pixels = static_cast<double>(sheet.views.size()) * args.size_px * args.size_px;
@@ -130,7 +130,7 @@ void print_text(const RenderArguments& args, const RenderedModel& model, const P
       std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
 }
 
-int run(const RenderArguments& args) {
+int run_render(const RenderArguments& args) {
   check_usage(args);
   check_output_file(args.output);  // not after the work
   const RunContext context = context_of(args.jobs);
@@ -142,13 +142,13 @@ int run(const RenderArguments& args) {
       render_sheet(model, environment, args.views, static_cast<std::uint32_t>(args.size_px), context);
   write_output_file(args.output, write_png(sheet.pixels));
   if (args.json)
-    print_json(args, model, sheet);
+    print_render_json(args, model, sheet);
   else
-    print_text(args, model, sheet);
+    print_render_text(args, model, sheet);
   return kExitOk;
 }
 
-void add_options(Command& c, RenderArguments& args) {
+void add_render_options(Command& c, RenderArguments& args) {
   c.option("INPUT", args.input,
            "A model that compile takes (glTF, GLB, OBJ, PLY, STL, range scan), or a package: a .texmesh file "
            "or a "
@@ -194,7 +194,7 @@ void add_options(Command& c, RenderArguments& args) {
 void add_render_command(Command& app) {
   auto args = std::make_shared<RenderArguments>();
   Command c = app.add("render", "Picture a model or a package as viewers show it, lit");
-  add_options(c, *args);
+  add_render_options(c, *args);
   c.examples(
       "  texmesh render bust.glb -o bust.png\n"
       "  texmesh render bust.texmesh --scale 14 --rung 2 --size 256 -o coarse.png\n"
@@ -207,7 +207,7 @@ void add_render_command(Command& app) {
       "The same input gives the same bytes on every machine.\n"
       "Exit code: 0, 1 when the input cannot be shown or the picture not be written, 2 usage, 3 internal "
       "error.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_render(*args); });
 }
 
 }  // namespace texmesh

@@ -263,7 +263,7 @@ void simulate_package(const SimulateArguments& a) {
   for (const std::string& w : plan.warnings) std::cout << "warning: " << w << '\n';
 }
 
-int run(const SimulateArguments& args) {
+int run_simulate(const SimulateArguments& args) {
   const bool experiment = !args.table.empty() || args.theorem;
   if (!experiment && args.package.empty())
     throw UsageError("PACKAGE", "", "a package, --table or --theorem", "none of them");
@@ -305,7 +305,7 @@ void add_simulate_command(Command& app) {
       "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem "
       "play the method itself and take --order, --seeds and the form of the output only.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_simulate(*args); });
 }
 
 }  // namespace texmesh

@@ -34,7 +34,7 @@ void print_table() {
                              joined(names_of(s.inputs)));
 }
 
-void print_json() {
+void print_stages_json() {
   Json list = Json::array();
   for (const Stage& s : default_stage_table())
     list.push_back({{"stage", s.name},
@@ -72,7 +72,7 @@ void add_stages_command(Command& app) {
     if (args->schema)
       std::cout << profile_schema();
     else if (args->json)
-      print_json();
+      print_stages_json();
     else if (args->dot)
       print_dot();
     else

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct VerifyArguments {
   std::vector<std::string> packages;
   int jobs = 0;
   std::uint64_t memory_mib = 8192;
@@ -61,7 +61,7 @@ Json to_json(const std::string& path, const VerifyReport& r) {
           {"fragments", r.fragments}, {"findings", findings}};
 }
 
-void print(const std::string& path, const VerifyReport& r, bool quiet) {
+void print_verified(const std::string& path, const VerifyReport& r, bool quiet) {
   for (const Finding& f : r.findings) std::cout << path << ": " << printable(to_string(f)) << '\n';
   if (quiet && r.findings.empty()) return;
   std::cout << path << ": "
@@ -72,7 +72,7 @@ void print(const std::string& path, const VerifyReport& r, bool quiet) {
             << r.previews << " previews, " << r.fragments << " fragments)\n";
 }
 
-int run_verify(const Arguments& args) {
+int run_verify(const VerifyArguments& args) {
   limit_memory(args.memory_mib);
   const RunContext context = context_of(args.jobs);
   bool clean = true;
@@ -83,7 +83,7 @@ int run_verify(const Arguments& args) {
     if (args.json)
       all.push_back(to_json(path, report));
     else
-      print(path, report, args.quiet);
+      print_verified(path, report, args.quiet);
   }
   if (args.json)
     std::cout << Json{{"packages", all}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
@@ -93,7 +93,7 @@ int run_verify(const Arguments& args) {
 }  // namespace
 
 void add_verify_command(Command& app) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<VerifyArguments>();
   Command c = app.add("verify", "Check every byte of packages: digests, documents, meshes, images");
   c.option("PACKAGES", args->packages, ".texmesh files or unpacked folders").required();
   add_jobs_option(c, args->jobs);

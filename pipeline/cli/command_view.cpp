@@ -15,7 +15,7 @@
 namespace texmesh {
 namespace {
 
-struct Arguments {
+struct ViewArguments {
   std::string package, viewer, host = "127.0.0.1";
   int port = 0;
   bool open = false, json = false;
@@ -25,7 +25,7 @@ std::string url_host(const std::string& host) {
   return host.find(':') == std::string::npos ? host : "[" + host + "]";
 }
 
-void announce(const Arguments& args, const Site& site, const std::string& base) {
+void announce(const ViewArguments& args, const Site& site, const std::string& base) {
   const std::vector<std::string> packages = site.packages();
   // The package's path is encoded twice: the page decodes the query before it takes the value for a URL.
   const std::string page = packages.size() == 1 ? base + "?pkg=" + percent_encoded(packages[0]) : base;
@@ -45,7 +45,7 @@ void announce(const Arguments& args, const Site& site, const std::string& base) 
   }
 }
 
-void view(const Arguments& args) {
+void view(const ViewArguments& args) {
   const Site site(args.package, viewer_folder(args.viewer));
   ViewServer server(site);
   const int port = server.bind(args.host, args.port);
@@ -66,7 +66,7 @@ void view(const Arguments& args) {
 }  // namespace
 
 void add_view_command(Command& app) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<ViewArguments>();
   Command c = app.add("view", "Look at packages in a browser: serves the packages and the viewer");
   c.option("PACKAGE", args->package,
            "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")

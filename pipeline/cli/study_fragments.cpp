@@ -22,8 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kMaxImageBytes = 1ull << 30;
 
-std::string kilobytes(std::uint64_t bytes) { return fixed(static_cast<double>(bytes) / 1e3, 1); }
-
 /// "+12.3" percent that `part` is more than `whole`.
 std::string more_than(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:+.1f}", 100 * (static_cast<double>(part) / static_cast<double>(whole) - 1));
@@ -146,7 +144,7 @@ void run_fragments(const FragmentArguments& args) {
   }
 }
 
-int check_and_run(const FragmentArguments& args) {
+int study_fragments_of(const FragmentArguments& args) {
   for (std::size_t k = 1; k < args.qualities.size(); ++k)
     if (args.qualities[k] <= args.qualities[k - 1] || args.qualities.size() > 16)
       throw UsageError("study fragments: --qualities", "", "at most 16, strictly rising",
@@ -155,7 +153,7 @@ int check_and_run(const FragmentArguments& args) {
   return kExitOk;
 }
 
-void add_options(Command& c, FragmentArguments& args) {
+void add_fragment_options(Command& c, FragmentArguments& args) {
   c.option("IMAGES", args.images, "JPEG, PNG, TIFF, WebP or EXR images").required();
   c.option("--grids", args.grids, "Fragments in a row and a column: 16 cuts into 16 x 16")
       .separated_by(',')
@@ -181,7 +179,7 @@ void add_fragments_study(Command& study) {
   Command c = study.add("fragments",
                         "Does cutting a texture cost bytes? The sum of its fragments against one file (Table "
                         "3.1, Figs. 3.5-3.8)");
-  add_options(c, *args);
+  add_fragment_options(c, *args);
   c.examples(
       "  texmesh study fragments atlas.jpg\n"
       "  texmesh study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv");
@@ -193,7 +191,7 @@ void add_fragments_study(Command& study) {
       "Sides of fragments are multiples of 16: the image's edges are repeated to fill the last fragments, "
       "and small images are cut into fewer than n x n.\n"
       "Exit code: 0, 1 when an image cannot be read, 2 usage, 3 internal error.");
-  c.on_run([args] { return check_and_run(*args); });
+  c.on_run([args] { return study_fragments_of(*args); });
 }
 
 }  // namespace texmesh

@@ -23,8 +23,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string kilobytes(std::uint64_t bytes) { return fixed(static_cast<double>(bytes) / 1e3, 1); }
-
 struct QualityArguments {
   std::string model, output;
   CacheChoice cache;
@@ -106,7 +104,7 @@ Json quality_json(const Choices& choices) {
   return {{"quality", list}};
 }
 
-int check_and_run(const QualityArguments& args) {
+int study_quality_of(const QualityArguments& args) {
   if (!args.output.empty() && !args.output.ends_with(".png"))
     throw UsageError("study quality: --output", "", "x.png", args.output);
   if (args.options.picture_view >= args.options.views)
@@ -119,7 +117,7 @@ int check_and_run(const QualityArguments& args) {
   return kExitOk;
 }
 
-void add_options(Command& c, QualityArguments& args) {
+void add_quality_options(Command& c, QualityArguments& args) {
   AllocationStudyOptions& options = args.options;
   c.option("MODEL", args.model, "A textured model; runs the stages that are needed, through the cache")
       .required();
@@ -152,7 +150,7 @@ void add_quality_study(Command& study) {
       study.add("quality",
                 "Is variable texture quality better than one for all, within the same bytes? Rendered "
                 "and scored (Fig. 3.9)");
-  add_options(c, *args);
+  add_quality_options(c, *args);
   c.examples(
       "  texmesh study quality turtle.glb -o turtle.png\n"
       "  texmesh study quality bust.obj --quality 30 --views 12 --json");
@@ -164,7 +162,7 @@ void add_quality_study(Command& study) {
       "Surface SSIM is that of the tables. Rendered SSIM and difference (FLIP-like) compare S_0 with these "
       "textures with S_0 and the source's.\n"
       "Exit code: 0, 1 when the model cannot be compiled, 2 usage, 3 internal error.");
-  c.on_run([args] { return check_and_run(*args); });
+  c.on_run([args] { return study_quality_of(*args); });
 }
 
 }  // namespace texmesh

@@ -13,7 +13,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kDefaultDisplayPx = 1000;
+constexpr double kExtractDisplayPx = 1000;
 constexpr double kDisplayQuality = 90;  // of images that were made smaller
 constexpr double kTopQuality = 97;      // of images coded anew from planes that say no quality
 
@@ -24,7 +24,7 @@ const ManifestScale& scale_entry(PackageReader& package, int scale) {
 int wanted_scale(PackageReader& package, const ExtractRequest& request) {
   if (request.scale) return scale_entry(package, *request.scale).scale;
   if (request.lods && request.display_px <= 0) return 0;
-  return select_scale(package.manifest(), request.display_px > 0 ? request.display_px : kDefaultDisplayPx);
+  return select_scale(package.manifest(), request.display_px > 0 ? request.display_px : kExtractDisplayPx);
 }
 
 /// The plane that stands for a full-size one: itself, or where a displayed height is given and no rung, the
@@ -51,8 +51,8 @@ double quality_of_rung(PackageReader& package, std::uint32_t plane, std::uint32_
 }
 
 /// A plane at full size, or from it the size of a mip: the full-size plane has better rungs than any mip.
-Pixels plane_texels(PackageReader& package, std::uint32_t base, std::uint32_t plane, std::uint32_t rung,
-                    Averaging kind, const RunContext& context) {
+Pixels fragment_texels(PackageReader& package, std::uint32_t base, std::uint32_t plane, std::uint32_t rung,
+                       Averaging kind, const RunContext& context) {
   Pixels pixels = read_plane(package, base, rung, context);
   if (plane == base) return pixels;
   const TextureInfo& mip = package.textures()[plane];
@@ -67,7 +67,7 @@ FileImageData image_file(PackageReader& package, const ExtractRequest& request, 
                          const std::map<std::uint32_t, std::uint32_t>& planes, const RunContext& context,
                          ExtractedImage& row) {
   const std::uint32_t plane = planes.at(image.plane);
-  Pixels pixels = plane_texels(package, image.plane, plane, request.rung, image.averaging(), context);
+  Pixels pixels = fragment_texels(package, image.plane, plane, request.rung, image.averaging(), context);
   if (image.alpha_plane) {
     const Pixels alpha = read_plane(package, *image.alpha_plane, request.rung, context);
     if (alpha.width_px < pixels.width_px || alpha.height_px < pixels.height_px)

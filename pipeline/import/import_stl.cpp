@@ -17,7 +17,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 84, kTriangleBytes = 50;
+constexpr std::size_t kStlHeaderBytes = 84, kTriangleBytes = 50;
 
 std::uint32_t binary_count(std::span<const std::uint8_t> bytes) {
   std::uint32_t n;
@@ -27,8 +27,8 @@ std::uint32_t binary_count(std::span<const std::uint8_t> bytes) {
 
 // Many binary files begin with "solid", so the size decides first; text decides where the size is wrong.
 bool is_binary(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() >= kHeaderBytes &&
-      bytes.size() == kHeaderBytes + std::uint64_t{kTriangleBytes} * binary_count(bytes))
+  if (bytes.size() >= kStlHeaderBytes &&
+      bytes.size() == kStlHeaderBytes + std::uint64_t{kTriangleBytes} * binary_count(bytes))
     return true;
   const std::string_view text = trim(text_of(bytes).substr(0, 1024));
   if (!same_word(text.substr(0, 5), "solid")) return true;
@@ -37,12 +37,12 @@ bool is_binary(std::span<const std::uint8_t> bytes) {
 
 std::vector<Vec3f> read_binary(const std::string& file, std::span<const std::uint8_t> bytes,
                                const ImportOptions& options) {
-  if (bytes.size() < kHeaderBytes)
+  if (bytes.size() < kStlHeaderBytes)
     throw InputError(file, "header",
-                     std::to_string(kHeaderBytes) + " bytes, or text that begins with \"solid\"",
+                     std::to_string(kStlHeaderBytes) + " bytes, or text that begins with \"solid\"",
                      std::to_string(bytes.size()) + " bytes");
   const std::uint32_t count = binary_count(bytes);
-  const std::uint64_t needed = kHeaderBytes + std::uint64_t{kTriangleBytes} * count;
+  const std::uint64_t needed = kStlHeaderBytes + std::uint64_t{kTriangleBytes} * count;
   if (bytes.size() < needed)
     throw InputError(file, "byte 80 (triangle count)",
                      std::to_string(needed) + " bytes for " + std::to_string(count) + " triangles",
@@ -52,7 +52,7 @@ std::vector<Vec3f> read_binary(const std::string& file, std::span<const std::uin
                      std::to_string(count));
   std::vector<Vec3f> points(std::size_t{3} * count);
   for (std::size_t t = 0; t < count; ++t)
-    std::memcpy(&points[3 * t], bytes.data() + kHeaderBytes + t * kTriangleBytes + 12, 36);
+    std::memcpy(&points[3 * t], bytes.data() + kStlHeaderBytes + t * kTriangleBytes + 12, 36);
   return points;
 }
 

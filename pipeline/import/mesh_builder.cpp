@@ -27,7 +27,7 @@ bool equal_bits(Vec4f a, Vec4f b) {
   return equal_bits(a.x, b.x) && equal_bits(a.y, b.y) && equal_bits(a.z, b.z) && equal_bits(a.w, b.w);
 }
 
-bool finite(const Vec3d& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+bool finite_normal(const Vec3d& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 // Twice the area vector (Newell), about the first corner so that far-away polygons keep their digits.
 Vec3d area_vector(std::span<const Vec3d> points) {
@@ -150,7 +150,8 @@ void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<s
   }
   if (n == 4) return triangulate_quad(points, triangles);
   const Vec3d normal = area_vector(points);
-  if (finite(normal) && dot(normal, normal) > 0) return cut_ears(project(points, normal), triangles, work);
+  if (finite_normal(normal) && dot(normal, normal) > 0)
+    return cut_ears(project(points, normal), triangles, work);
   for (std::uint32_t i = 1; i + 1 < n; ++i) triangles.push_back({0, i, i + 1});
 }
 

@@ -17,19 +17,20 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr const char* kNoFile = "0000000000000000";
 
-[[noreturn]] void fail(const std::string& place, const std::string& expected, const std::string& found) {
+[[noreturn]] void fail_fragment_index(const std::string& place, const std::string& expected,
+                                      const std::string& found) {
   throw FormatError(kFragmentIndexPath, place, expected, found);
 }
 
 const Json& list_member(const Json& object, const char* key, const std::string& place) {
   if (!object.is_object() || !object.contains(key) || !object[key].is_array())
-    fail(place + "/" + key, "a list", "something else");
+    fail_fragment_index(place + "/" + key, "a list", "something else");
   return object[key];
 }
 
 std::uint64_t integer(const Json& value, const std::string& place, std::uint64_t largest) {
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > largest)
-    fail(place, "an integer in 0 .. " + std::to_string(largest), value.dump().substr(0, 60));
+    fail_fragment_index(place, "an integer in 0 .. " + std::to_string(largest), value.dump().substr(0, 60));
   return value.get<std::uint64_t>();
 }
 
@@ -45,13 +46,14 @@ FragmentIndex::Rung read_rung(const Json& json, std::size_t fragments, const std
   const Json& bytes = list_member(json, "bytes", place);
   const Json& digests = list_member(json, "sha256", place);
   if (bytes.size() != fragments || digests.size() != fragments)
-    fail(place, std::to_string(fragments) + " fragments, as in order",
-         std::to_string(bytes.size()) + " sizes, " + std::to_string(digests.size()) + " digests");
+    fail_fragment_index(
+        place, std::to_string(fragments) + " fragments, as in order",
+        std::to_string(bytes.size()) + " sizes, " + std::to_string(digests.size()) + " digests");
   for (std::size_t i = 0; i < fragments; ++i) {
     rung.bytes.push_back(integer(bytes[i], place + "/bytes/" + std::to_string(i), 1ull << 32));
     if (!is_short_digest(digests[i]))
-      fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits",
-           digests[i].dump().substr(0, 60));
+      fail_fragment_index(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits",
+                          digests[i].dump().substr(0, 60));
     rung.digests.push_back(digests[i].get<std::string>());
   }
   return rung;
@@ -114,7 +116,7 @@ std::string write_fragment_index(const FragmentIndex& index) {
 FragmentIndex read_fragment_index(std::span<const std::uint8_t> json) {
   const Json root = parse_bounded_json(json, kFragmentIndexPath, 16);
   if (!root.is_object() || !root.contains("version") || root["version"] != 1)
-    fail("/version", "1", "something else");
+    fail_fragment_index("/version", "1", "something else");
   FragmentIndex index;
   const Json& planes = list_member(root, "planes", "");
   for (std::size_t k = 0; k < planes.size(); ++k)

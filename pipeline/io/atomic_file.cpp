@@ -14,17 +14,11 @@
 #include <vector>
 
 #include "format/base/errors.h"
+#include "pipeline/io/descriptor.h"
 #include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
-
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
 
 [[noreturn]] void fail(const std::string& path, const char* step) {
   throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
@@ -42,7 +36,7 @@ void write_all(int fd, std::span<const std::uint8_t> bytes, const std::string& p
 void sync_folder(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   Descriptor d{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (d.fd < 0 || ::fsync(d.fd) != 0) {
+  if (d.get() < 0 || ::fsync(d.get()) != 0) {
     // Some file systems cannot sync folders; the rename itself stands.
     if (errno != EINVAL && errno != ENOTSUP) fail(path, "fsync of the folder");
   }
@@ -120,14 +114,14 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
                            const std::string& temporary) {
   std::string temp = temporary.empty() ? own_temporary(path) : temporary;
   Descriptor d{open_temporary(temp)};
-  for (int i = 0; d.fd < 0 && errno == EEXIST && i < 100; ++i) {
+  for (int i = 0; d.get() < 0 && errno == EEXIST && i < 100; ++i) {
     temp = own_temporary(path);
-    d.fd = open_temporary(temp);
+    d.reset(open_temporary(temp));
   }
-  if (d.fd < 0) fail(path, "open");
+  if (d.get() < 0) fail(path, "open");
   try {
-    write_all(d.fd, bytes, path);
-    if (::fdatasync(d.fd) != 0) fail(path, "fdatasync");
+    write_all(d.get(), bytes, path);
+    if (::fdatasync(d.get()) != 0) fail(path, "fdatasync");
     // Under the lock: a cleaner must not take the finished file for one that was left.
     if (::rename(temp.c_str(), path.c_str()) != 0) fail(path, "rename");
   } catch (...) {
@@ -162,8 +156,8 @@ void write_output_file(const std::string& path, std::span<const std::uint8_t> by
                        const std::string& temporary) {
   if (is_special_file(path)) {
     const Descriptor d{::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
-    if (d.fd < 0) fail(path, "open");
-    return write_all(d.fd, bytes, path);
+    if (d.get() < 0) fail(path, "open");
+    return write_all(d.get(), bytes, path);
   }
   const std::string target = behind_links(path);
   write_file_atomically(target, bytes, target == path ? temporary : "");
@@ -172,7 +166,7 @@ void write_output_file(const std::string& path, std::span<const std::uint8_t> by
 bool remove_stale_temporary(const std::string& path) {
   if (without_temporary_ending(std::filesystem::path(path).filename().string()).empty()) return false;
   const Descriptor d{::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)};
-  return d.fd >= 0 && ::flock(d.fd, LOCK_EX | LOCK_NB) == 0 && stands_at(d.fd, path) &&
+  return d.get() >= 0 && ::flock(d.get(), LOCK_EX | LOCK_NB) == 0 && stands_at(d.get(), path) &&
          ::unlink(path.c_str()) == 0;
 }
 
@@ -191,12 +185,12 @@ std::size_t remove_stale_temporaries(const std::string& folder, const std::strin
 bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes) {
   Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat st {};
-  if (d.fd < 0 || ::fstat(d.fd, &st) != 0 || !S_ISREG(st.st_mode) ||
+  if (d.get() < 0 || ::fstat(d.get(), &st) != 0 || !S_ISREG(st.st_mode) ||
       static_cast<std::uint64_t>(st.st_size) != bytes.size())
     return false;
   std::vector<std::uint8_t> buffer(1 << 20);
   while (!bytes.empty()) {
-    const ssize_t n = ::read(d.fd, buffer.data(), std::min(buffer.size(), bytes.size()));
+    const ssize_t n = ::read(d.get(), buffer.data(), std::min(buffer.size(), bytes.size()));
     if (n <= 0 || std::memcmp(buffer.data(), bytes.data(), static_cast<std::size_t>(n)) != 0) return false;
     bytes = bytes.subspan(static_cast<std::size_t>(n));
   }

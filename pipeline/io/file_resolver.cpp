@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <system_error>
-#include <utility>
 
+#include "pipeline/io/descriptor.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/uri.h"
 
@@ -20,23 +20,6 @@ namespace {
 // O_NONBLOCK: opening a FIFO or a device returns at once, fstat then refuses it.
 constexpr int kReadFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
 constexpr const char* kRegularFile = "a regular file, no symbolic link, beneath the model's folder";
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() { reset(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-  void reset(int fd = -1) {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = fd;
-  }
-
- private:
-  int fd_;
-};
 
 std::string message(int error) { return std::generic_category().message(error); }
 

@@ -35,6 +35,8 @@ std::string grouped(std::uint64_t value);
 std::string shortest(double value, int digits = 4);
 /// `digits` digits after the point.
 std::string fixed(double value, int digits);
+/// Thousands of bytes, one digit after the point.
+std::string kilobytes(std::uint64_t bytes);
 /// Text of a package for a terminal: control characters and invalid UTF-8 become '?'.
 std::string printable(const std::string& text);
 

@@ -46,7 +46,9 @@ std::string escaped(std::string_view bytes) {
   return out;
 }
 
-int hex_digit(char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1; }
+int lower_hex_digit(char c) {
+  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
 
 }  // namespace
 
@@ -68,8 +70,8 @@ std::string from_wire(std::string_view text) {
   if (text.empty() || text[0] != kMark) return std::string(text);
   std::string out;
   for (std::size_t i = 1; i < text.size(); ++i) {
-    const int high = i + 3 < text.size() ? hex_digit(text[i + 2]) : -1,
-              low = i + 3 < text.size() ? hex_digit(text[i + 3]) : -1;
+    const int high = i + 3 < text.size() ? lower_hex_digit(text[i + 2]) : -1,
+              low = i + 3 < text.size() ? lower_hex_digit(text[i + 3]) : -1;
     if (text[i] == '\\' && text[i + 1] == 'x' && high >= 0 && low >= 0) {
       out += static_cast<char>(16 * high + low);
       i += 3;

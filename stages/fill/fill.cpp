@@ -178,8 +178,6 @@ Pixels channels_of(const Pixels& image, const TexturePlane& plane) {
   return out;
 }
 
-constexpr std::uint32_t kMcu = 16;  // what JPEG codes together with 4:2:0
-
 /// Sets the 16 x 16 block at (x, y) to the mean of the 16 texels that start at (u, v) and go right or down.
 void flatten_block(Pixels& pixels, std::uint32_t x, std::uint32_t y, std::uint32_t u, std::uint32_t v,
                    bool down) {

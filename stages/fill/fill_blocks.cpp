@@ -11,7 +11,6 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kMcu = 16;
 constexpr int kIterations = 16;
 constexpr float kLastThreshold = 8;  // of orthonormal DCT coefficients: about what quality 75 rounds to 0
 constexpr int kSameLevel = 6;        // flat neighbours that differ by no more get one value

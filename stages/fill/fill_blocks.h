@@ -9,6 +9,9 @@
 
 namespace texmesh {
 
+/// The side in pixels of what a JPEG codes together with 4:2:0.
+inline constexpr std::uint32_t kMcu = 16;
+
 /// Makes texels that nobody sees cheap for a JPEG whose blocks start at the image's corner. `pixels` (1 or 3
 /// channels) have been filled smoothly; texels whose coverage bit is 1 stay as they are. Only 16 x 16 blocks
 /// that lie wholly inside the image are touched:

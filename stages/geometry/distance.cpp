@@ -47,7 +47,7 @@ std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
   return order;
 }
 
-double box_distance2(Vec3d p, const Box3f& box) {
+double float_box_distance2(Vec3d p, const Box3f& box) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     const double below = static_cast<double>(box.min[k]) - p[k];
@@ -153,7 +153,7 @@ double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_
   Open stack[128];  // 63 bits of the curve, and halves of what shares a cell
   int depth = 0;
   const double enough2 = enough * enough;
-  stack[depth++] = {0, box_distance2(p, nodes_[0].box)};
+  stack[depth++] = {0, float_box_distance2(p, nodes_[0].box)};
   while (depth > 0) {
     const Open open = stack[--depth];
     if (open.distance2 >= best) continue;
@@ -168,8 +168,8 @@ double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_
       if (best <= enough2) break;
       continue;
     }
-    Open near{node.first, box_distance2(p, nodes_[node.first].box)};
-    Open far{node.first + 1, box_distance2(p, nodes_[node.first + 1].box)};
+    Open near{node.first, float_box_distance2(p, nodes_[node.first].box)};
+    Open far{node.first + 1, float_box_distance2(p, nodes_[node.first + 1].box)};
     if (far.distance2 < near.distance2) std::swap(near, far);
     if (far.distance2 < best) stack[depth++] = far;
     if (near.distance2 < best) stack[depth++] = near;

@@ -3,7 +3,6 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 
 void put_u32(Bytes& out, std::size_t x) {
@@ -21,15 +20,15 @@ Bytes glb_container(std::string_view json, ByteSpan binary) {
       kHeaderBytes + 2 * kChunkHeaderBytes + padded(json.size()) + padded(binary.size());
   Bytes out;
   out.reserve(bytes);
-  put_u32(out, kMagic);
+  put_u32(out, kGlbMagic);
   put_u32(out, 2);
   put_u32(out, bytes);
   put_u32(out, padded(json.size()));
-  put_u32(out, kJsonChunk);
+  put_u32(out, kGlbJsonChunk);
   out.insert(out.end(), json.begin(), json.end());
   pad_to_four(out, ' ');
   put_u32(out, padded(binary.size()));
-  put_u32(out, kBinaryChunk);
+  put_u32(out, kGlbBinaryChunk);
   out.insert(out.end(), binary.begin(), binary.end());
   pad_to_four(out, 0);
   return out;

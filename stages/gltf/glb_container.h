@@ -1,9 +1,14 @@
 #pragma once
+#include <cstdint>
 #include <string_view>
 
 #include "format/base/bytes.h"
 
 namespace texmesh {
+
+/// "glTF", "JSON" and "BIN" as numbers, as a GLB file has them (glTF 2.0, section 4.4).
+inline constexpr std::uint32_t kGlbMagic = 0x46546c67, kGlbJsonChunk = 0x4e4f534a,
+                               kGlbBinaryChunk = 0x004e4942;
 
 /// Appends bytes of the value `with` until the length is a multiple of 4, as chunks and accessors of a GLB
 /// need it.

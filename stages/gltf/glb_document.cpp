@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
+#include "stages/gltf/glb_container.h"
 
 namespace texmesh {
 namespace {
 
 using Json = GlbDocument::Json;
 
-constexpr std::uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr std::uint64_t kMaxDecodedBytes = 4ull << 30;
 
 constexpr std::array<std::string_view, 5> kReadExtensions{"KHR_draco_mesh_compression",
@@ -138,7 +138,7 @@ bool GlbDocument::load_chunks() {
     return findings_.require(holds, "glb-container", entry_, field, expected, found);
   };
   if (!require(bytes_.size() >= 20, "", "at least 20 bytes", std::to_string(bytes_.size()))) return false;
-  if (!require(read_u32(bytes_, 0) == kMagic, "byte 0", "\"glTF\"", "other bytes")) return false;
+  if (!require(read_u32(bytes_, 0) == kGlbMagic, "byte 0", "\"glTF\"", "other bytes")) return false;
   if (!require(read_u32(bytes_, 4) == 2, "byte 4", "version 2", std::to_string(read_u32(bytes_, 4))))
     return false;
   if (!require(read_u32(bytes_, 8) == bytes_.size(), "byte 8", std::to_string(bytes_.size()) + " bytes",
@@ -154,7 +154,7 @@ bool GlbDocument::load_chunks() {
     if (!require(length % 4 == 0 && length <= bytes_.size() - at - 8, field,
                  "a chunk of a multiple of 4 bytes that fits the file", std::to_string(length) + " bytes"))
       return false;
-    const bool expected_type = chunk == 0 ? type == kJsonChunk : chunk == 1 && type == kBinaryChunk;
+    const bool expected_type = chunk == 0 ? type == kGlbJsonChunk : chunk == 1 && type == kGlbBinaryChunk;
     if (!require(expected_type, field, chunk == 0 ? "the JSON chunk" : "the BIN chunk, then the end",
                  "another chunk"))
       return false;

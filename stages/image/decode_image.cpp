@@ -75,7 +75,7 @@ void check_png_unchanged(const Image& image) {
 
 // Every sample of a PNG, 16-bit ones as words.
 template <class T>
-std::vector<T> read_png(const Image& image) {
+std::vector<T> png_pixels(const Image& image) {
   const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
   std::vector<T> samples;
   samples.reserve(row * image.height_px);  // filled row by row, so that a header that lies costs nothing
@@ -119,9 +119,9 @@ Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourPro
   if (image.format == ImageFormat::kPng) {
     check_png_unchanged(image);
     if (image.bits_per_channel == 16)
-      store_words(read_png<std::uint16_t>(image), profile, pixels);
+      store_words(png_pixels<std::uint16_t>(image), profile, pixels);
     else
-      pixels.data = read_png<std::uint8_t>(image);
+      pixels.data = png_pixels<std::uint8_t>(image);
     return pixels;
   }
   StoredSamples samples = decode_tiff_exr(image);
@@ -209,7 +209,7 @@ FloatPixels decode_float(const Image& image) {
   auto widen = [&pixels](const auto& samples) { pixels.data.assign(samples.begin(), samples.end()); };
   if (image.format == ImageFormat::kPng && image.bits_per_channel == 16) {
     check_png_unchanged(image);
-    widen(read_png<std::uint16_t>(image));
+    widen(png_pixels<std::uint16_t>(image));
     return pixels;
   }
   if (image.format != ImageFormat::kTiff && image.format != ImageFormat::kExr) {

@@ -19,20 +19,20 @@ namespace {
 // A progressive file of endless scans is an attack on time; encoders write about 10.
 constexpr int kMaxScans = 500;
 
-struct Decoder {
+struct JpegDecoder {
   jpeg_decompress_struct info{};
   jpeg_error_mgr errors{};
   std::jmp_buf escape;
   char message[JMSG_LENGTH_MAX] = "";
 
-  Decoder() = default;
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
-  ~Decoder() { jpeg_destroy_decompress(&info); }
+  JpegDecoder() = default;
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+  ~JpegDecoder() { jpeg_destroy_decompress(&info); }
 };
 
 [[noreturn]] void escape_with_message(j_common_ptr info) {
-  auto* decoder = static_cast<Decoder*>(info->client_data);
+  auto* decoder = static_cast<JpegDecoder*>(info->client_data);
   info->err->format_message(info, decoder->message);
   std::longjmp(decoder->escape, 1);
 }
@@ -52,13 +52,13 @@ void on_message(j_common_ptr info, int level) {
 }
 
 void on_progress(j_common_ptr info) {
-  auto* decoder = static_cast<Decoder*>(info->client_data);
+  auto* decoder = static_cast<JpegDecoder*>(info->client_data);
   if (decoder->info.input_scan_number <= kMaxScans) return;
   std::snprintf(decoder->message, sizeof decoder->message, "more than %d scans", kMaxScans);
   std::longjmp(decoder->escape, 1);
 }
 
-void open(Decoder& decoder, jpeg_progress_mgr& progress, std::span<const std::uint8_t> bytes) {
+void open_jpeg(JpegDecoder& decoder, jpeg_progress_mgr& progress, std::span<const std::uint8_t> bytes) {
   decoder.info.err = jpeg_std_error(&decoder.errors);
   decoder.errors.error_exit = escape_with_message;
   decoder.errors.emit_message = on_message;
@@ -84,19 +84,19 @@ void choose_output(jpeg_decompress_struct& info) {
                                                                 : JCS_RGB;
 }
 
-bool start(Decoder& decoder) {
+bool start_jpeg(JpegDecoder& decoder) {
   if (setjmp(decoder.escape)) return false;
   choose_output(decoder.info);
   return jpeg_start_decompress(&decoder.info) != FALSE;
 }
 
-bool next_row(Decoder& decoder, std::uint8_t* row) {
+bool next_jpeg_row(JpegDecoder& decoder, std::uint8_t* row) {
   if (setjmp(decoder.escape)) return false;
   JSAMPROW rows[1] = {row};
   return jpeg_read_scanlines(&decoder.info, rows, 1) == 1;
 }
 
-bool finish(Decoder& decoder) {
+bool finish_jpeg(JpegDecoder& decoder) {
   if (setjmp(decoder.escape)) return false;
   return jpeg_finish_decompress(&decoder.info) != FALSE;
 }
@@ -115,24 +115,24 @@ void cmyk_to_rgb(std::uint8_t* row, std::uint32_t width_px, bool inverted) {
   }
 }
 
-jvirt_barray_ptr* read_coefficients(Decoder& decoder) {
+jvirt_barray_ptr* read_coefficients(JpegDecoder& decoder) {
   if (setjmp(decoder.escape)) return nullptr;
   return jpeg_read_coefficients(&decoder.info);
 }
 
 /// Where a row of blocks is in memory; all of them are there at once.
-JBLOCKROW block_row(Decoder& decoder, jvirt_barray_ptr blocks, JDIMENSION row) {
+JBLOCKROW block_row(JpegDecoder& decoder, jvirt_barray_ptr blocks, JDIMENSION row) {
   if (setjmp(decoder.escape)) return nullptr;
   auto* info = reinterpret_cast<j_common_ptr>(&decoder.info);
   return *decoder.info.mem->access_virt_barray(info, blocks, row, 1, FALSE);
 }
 
-[[noreturn]] void fail(const std::string& name, const std::string& place, const Decoder& decoder) {
+[[noreturn]] void fail_jpeg(const std::string& name, const std::string& place, const JpegDecoder& decoder) {
   throw InputError(name, place, "a JPEG that decodes", decoder.message[0] ? decoder.message : "no more data");
 }
 
 /// Where a file that holds its pixels in several scans went wrong before the first row could be given.
-std::string scan_place(const Decoder& decoder) {
+std::string scan_place(const JpegDecoder& decoder) {
   const jpeg_decompress_struct& info = decoder.info;
   if (info.input_scan_number == 0 || !info.comps_in_scan) return "JPEG header";
   const JDIMENSION row = std::min<JDIMENSION>(
@@ -144,10 +144,10 @@ std::string scan_place(const Decoder& decoder) {
 }  // namespace
 
 JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_t> bytes) {
-  Decoder decoder;
+  JpegDecoder decoder;
   jpeg_progress_mgr progress{};
-  open(decoder, progress, bytes);
-  if (decoder.message[0]) fail(name, "JPEG header", decoder);
+  open_jpeg(decoder, progress, bytes);
+  if (decoder.message[0]) fail_jpeg(name, "JPEG header", decoder);
   const int components = decoder.info.num_components;
   if (components != 1 && components != 3 && components != 4)
     throw InputError(name, "JPEG header", "1, 3 or 4 components", std::to_string(components));
@@ -156,37 +156,37 @@ JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_
 
 void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
                  const std::function<void(const std::uint8_t* pixels)>& row) {
-  Decoder decoder;
+  JpegDecoder decoder;
   jpeg_progress_mgr progress{};
-  open(decoder, progress, bytes);
-  if (decoder.message[0]) fail(name, "JPEG header", decoder);
-  if (!start(decoder)) fail(name, scan_place(decoder), decoder);
+  open_jpeg(decoder, progress, bytes);
+  if (decoder.message[0]) fail_jpeg(name, "JPEG header", decoder);
+  if (!start_jpeg(decoder)) fail_jpeg(name, scan_place(decoder), decoder);
   const std::uint32_t width = decoder.info.output_width, height = decoder.info.output_height;
   const bool cmyk = decoder.info.out_color_space == JCS_CMYK;
   std::vector<std::uint8_t> buffer(static_cast<std::size_t>(width) *
                                    static_cast<std::size_t>(decoder.info.output_components));
   for (std::uint32_t y = 0; y < height; ++y) {
-    if (!next_row(decoder, buffer.data()))
-      fail(name, "row " + std::to_string(y) + " of " + std::to_string(height), decoder);
+    if (!next_jpeg_row(decoder, buffer.data()))
+      fail_jpeg(name, "row " + std::to_string(y) + " of " + std::to_string(height), decoder);
     if (cmyk) cmyk_to_rgb(buffer.data(), width, decoder.info.saw_Adobe_marker != 0);
     row(buffer.data());
   }
-  if (!finish(decoder)) fail(name, "end of the JPEG", decoder);
+  if (!finish_jpeg(decoder)) fail_jpeg(name, "end of the JPEG", decoder);
 }
 
 struct JpegCoefficients::State {
-  Decoder decoder;
+  JpegDecoder decoder;
   jpeg_progress_mgr progress{};
   std::vector<std::vector<JBLOCKROW>> rows;  // [component]
 };
 
 JpegCoefficients::JpegCoefficients(const std::string& name, std::span<const std::uint8_t> bytes)
     : state_(std::make_unique<State>()) {
-  Decoder& decoder = state_->decoder;
-  open(decoder, state_->progress, bytes);
-  if (decoder.message[0]) fail(name, "JPEG header", decoder);
+  JpegDecoder& decoder = state_->decoder;
+  open_jpeg(decoder, state_->progress, bytes);
+  if (decoder.message[0]) fail_jpeg(name, "JPEG header", decoder);
   jvirt_barray_ptr* const blocks = read_coefficients(decoder);
-  if (!blocks) fail(name, scan_place(decoder), decoder);
+  if (!blocks) fail_jpeg(name, scan_place(decoder), decoder);
   for (int c = 0; c < decoder.info.num_components; ++c) {
     const jpeg_component_info& from = decoder.info.comp_info[c];
     Component to;
@@ -194,12 +194,12 @@ JpegCoefficients::JpegCoefficients(const std::string& name, std::span<const std:
     to.down = static_cast<std::uint32_t>(from.v_samp_factor);
     to.blocks_across = from.width_in_blocks;
     to.blocks_down = from.height_in_blocks;
-    if (!from.quant_table) fail(name, "quantisers", decoder);
+    if (!from.quant_table) fail_jpeg(name, "quantisers", decoder);
     for (std::size_t k = 0; k < 64; ++k) to.quantisers[k] = from.quant_table->quantval[k];
     components_.push_back(to);
     std::vector<JBLOCKROW>& rows = state_->rows.emplace_back();
     for (JDIMENSION row = 0; row < from.height_in_blocks; ++row)
-      if (!rows.emplace_back(block_row(decoder, blocks[c], row))) fail(name, "coefficients", decoder);
+      if (!rows.emplace_back(block_row(decoder, blocks[c], row))) fail_jpeg(name, "coefficients", decoder);
   }
 }
 

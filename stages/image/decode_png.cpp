@@ -13,7 +13,7 @@ namespace texmesh {
 namespace {
 
 // libpng leaves by longjmp: functions that call it own nothing with a destructor, everything lives here.
-struct Decoder {
+struct PngDecoder {
   std::span<const std::uint8_t> bytes;
   std::size_t at = 0;
   png_structp png = nullptr;
@@ -21,14 +21,14 @@ struct Decoder {
   std::jmp_buf escape;
   char message[200] = "";
 
-  explicit Decoder(std::span<const std::uint8_t> b) : bytes(b) {}
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
-  ~Decoder() { png_destroy_read_struct(&png, &info, nullptr); }
+  explicit PngDecoder(std::span<const std::uint8_t> b) : bytes(b) {}
+  PngDecoder(const PngDecoder&) = delete;
+  PngDecoder& operator=(const PngDecoder&) = delete;
+  ~PngDecoder() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
 [[noreturn]] void on_error(png_structp png, png_const_charp text) {
-  auto* decoder = static_cast<Decoder*>(png_get_error_ptr(png));
+  auto* decoder = static_cast<PngDecoder*>(png_get_error_ptr(png));
   std::strncpy(decoder->message, text, sizeof decoder->message - 1);
   std::longjmp(decoder->escape, 1);
 }
@@ -36,13 +36,13 @@ struct Decoder {
 void on_warning(png_structp, png_const_charp) {}  // odd ancillary chunks: every viewer shows such files
 
 void read_bytes(png_structp png, png_bytep to, std::size_t count) {
-  auto* decoder = static_cast<Decoder*>(png_get_io_ptr(png));
+  auto* decoder = static_cast<PngDecoder*>(png_get_io_ptr(png));
   if (count > decoder->bytes.size() - decoder->at) png_error(png, "the file ends here");
   std::memcpy(to, decoder->bytes.data() + decoder->at, count);
   decoder->at += count;
 }
 
-bool open(Decoder& d) {
+bool open_png(PngDecoder& d) {
   d.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &d, on_error, on_warning);
   if (d.png) d.info = png_create_info_struct(d.png);
   if (!d.info) {
@@ -60,26 +60,26 @@ bool open(Decoder& d) {
   return true;
 }
 
-bool start(Decoder& d) {
+bool start_png(PngDecoder& d) {
   if (setjmp(d.escape)) return false;
   png_set_interlace_handling(d.png);
   png_read_update_info(d.png, d.info);
   return true;
 }
 
-bool next_row(Decoder& d, std::uint8_t* row) {
+bool next_png_row(PngDecoder& d, std::uint8_t* row) {
   if (setjmp(d.escape)) return false;
   png_read_row(d.png, row, nullptr);
   return true;
 }
 
-bool finish(Decoder& d) {
+bool finish_png(PngDecoder& d) {
   if (setjmp(d.escape)) return false;
   png_read_end(d.png, nullptr);
   return true;
 }
 
-PngHeader header_of(const Decoder& d) {
+PngHeader png_header_of(const PngDecoder& d) {
   PngHeader h;
   h.width_px = png_get_image_width(d.png, d.info);
   h.height_px = png_get_image_height(d.png, d.info);
@@ -91,7 +91,7 @@ PngHeader header_of(const Decoder& d) {
   return h;
 }
 
-[[noreturn]] void fail(const std::string& name, const std::string& place, const Decoder& d) {
+[[noreturn]] void fail_png(const std::string& name, const std::string& place, const PngDecoder& d) {
   throw InputError(name, place, "a PNG that decodes", d.message);
 }
 
@@ -101,7 +101,7 @@ std::string row_place(std::uint32_t row, std::uint32_t height) {
 
 /// Deflate shrinks at most 1032-fold. A header that claims more lies about the size, and is refused before
 /// memory is taken.
-void check_plausible(const std::string& name, const Decoder& d, const PngHeader& h) {
+void check_plausible_png(const std::string& name, const PngDecoder& d, const PngHeader& h) {
   const std::uint64_t row_bits =
       std::uint64_t{h.width_px} * png_get_channels(d.png, d.info) * png_get_bit_depth(d.png, d.info);
   if ((row_bits + 7) / 8 * h.height_px / 1032 <= d.bytes.size()) return;
@@ -110,50 +110,50 @@ void check_plausible(const std::string& name, const Decoder& d, const PngHeader&
                    std::to_string(h.width_px) + " x " + std::to_string(h.height_px));
 }
 
-void decode_rows(const std::string& name, Decoder& d, const PngHeader& h, std::size_t row_bytes,
-                 const std::function<void(const std::uint8_t*)>& row) {
+void decode_png_rows(const std::string& name, PngDecoder& d, const PngHeader& h, std::size_t row_bytes,
+                     const std::function<void(const std::uint8_t*)>& row) {
   std::vector<std::uint8_t> buffer(row_bytes);
   for (std::uint32_t y = 0; y < h.height_px; ++y) {
-    if (!next_row(d, buffer.data())) fail(name, row_place(y, h.height_px), d);
+    if (!next_png_row(d, buffer.data())) fail_png(name, row_place(y, h.height_px), d);
     row(buffer.data());
   }
 }
 
 /// Seven passes, each over a part of the texels: only the last leaves whole rows.
-void decode_interlaced(const std::string& name, Decoder& d, const PngHeader& h, std::size_t row_bytes,
+void decode_interlaced(const std::string& name, PngDecoder& d, const PngHeader& h, std::size_t row_bytes,
                        const std::function<void(const std::uint8_t*)>& row) {
   constexpr int kPasses = 7;
   std::vector<std::uint8_t> buffer(row_bytes * h.height_px);
   for (int pass = 0; pass < kPasses; ++pass)
     for (std::uint32_t y = 0; y < h.height_px; ++y)
-      if (!next_row(d, buffer.data() + row_bytes * y))
-        fail(name, "pass " + std::to_string(pass + 1) + ", " + row_place(y, h.height_px), d);
+      if (!next_png_row(d, buffer.data() + row_bytes * y))
+        fail_png(name, "pass " + std::to_string(pass + 1) + ", " + row_place(y, h.height_px), d);
   for (std::uint32_t y = 0; y < h.height_px; ++y) row(buffer.data() + row_bytes * y);
 }
 
 }  // namespace
 
 PngHeader read_png_header(const std::string& name, std::span<const std::uint8_t> bytes) {
-  Decoder d(bytes);
-  if (!open(d)) fail(name, "PNG header", d);
-  return header_of(d);
+  PngDecoder d(bytes);
+  if (!open_png(d)) fail_png(name, "PNG header", d);
+  return png_header_of(d);
 }
 
 void decode_png(const std::string& name, std::span<const std::uint8_t> bytes,
                 const std::function<void(const std::uint8_t* samples)>& row) {
-  Decoder d(bytes);
-  if (!open(d)) fail(name, "PNG header", d);
-  const PngHeader h = header_of(d);
-  check_plausible(name, d, h);
-  if (!start(d)) fail(name, "PNG header", d);
+  PngDecoder d(bytes);
+  if (!open_png(d)) fail_png(name, "PNG header", d);
+  const PngHeader h = png_header_of(d);
+  check_plausible_png(name, d, h);
+  if (!start_png(d)) fail_png(name, "PNG header", d);
   const std::size_t row_bytes = png_get_rowbytes(d.png, d.info);
   if (row_bytes != std::size_t{h.width_px} * h.channels * (h.bits / 8))
     throw InputError(name, "PNG header", "rows of its size", std::to_string(row_bytes) + " bytes");
   if (h.interlaced)
     decode_interlaced(name, d, h, row_bytes, row);
   else
-    decode_rows(name, d, h, row_bytes, row);
-  if (!finish(d)) fail(name, "end of the PNG", d);
+    decode_png_rows(name, d, h, row_bytes, row);
+  if (!finish_png(d)) fail_png(name, "end of the PNG", d);
 }
 
 }  // namespace texmesh

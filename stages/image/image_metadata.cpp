@@ -216,7 +216,7 @@ bool srgb_primaries(ByteSpan chrm) {
   return true;
 }
 
-void read_png(ByteSpan bytes, ImageMetadata& out) {
+void read_png_metadata(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::uint32_t kSrgbGamma = 45455, kNear = 1000;
   bool srgb = false;
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
@@ -295,7 +295,7 @@ ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8
       read_jpeg(bytes, out);
       break;
     case ImageFormat::kPng:
-      read_png(bytes, out);
+      read_png_metadata(bytes, out);
       break;
     case ImageFormat::kTiff:
       read_tiff(bytes, out);

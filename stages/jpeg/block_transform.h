@@ -9,6 +9,9 @@ namespace texmesh {
 /// Samples, or coefficients by frequency: [8 * down + across].
 using BlockValues = std::array<float, 64>;
 
+/// The integer nearest to a coefficient; halves go away from 0.
+inline int nearest_integer(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
+
 /// Orthonormal DCT, which is JPEG's.
 BlockValues block_dct(const BlockValues& samples);
 BlockValues block_inverse_dct(const BlockValues& coefficients);

@@ -23,7 +23,7 @@ constexpr std::size_t kWindowsPerTask = 32;  // whose blocks stay in the cache w
 // What MaskedJpeg saves, in bits, when it leaves out a coefficient of 1: one that others follow, and the last
 // one with the zeros before it; and when it makes a larger one smaller. Fitted on four atlases of scans,
 // whose bytes between rungs they give within .8 %; 3, 3 and 1: within 1.0, 4, 4 and 1: within 2.1.
-constexpr float kInnerBits = 2.5f, kLastBits = 3, kZeroBits = 1, kSmallerBits = 2;
+constexpr float kInnerBits = 2.5f, kLastBits = 3, kZeroBits = 1, kSmallerGuessBits = 2;
 
 /// Magnitudes of a block's coefficients in eighths, the first one 0. The k-th of the file's order stands at
 /// [k % 8 * 8 + k / 8], so that one comparison of eight values gives a bit of eight bytes of a mask.
@@ -36,15 +36,13 @@ struct Blocks {
   std::vector<int> dc;  // in eighths
 };
 
-int nearest(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
-
 void add_block(const BlockValues& samples, Blocks& out) {
   const BlockValues coefficients = block_dct(samples);
   Magnitudes& magnitudes = out.ac.emplace_back();
   for (std::size_t k = 1; k < 64; ++k)
     magnitudes[place_of(k)] =
-        static_cast<std::uint16_t>(std::abs(nearest(kParts * coefficients[kNaturalOfZigzag[k]])));
-  out.dc.push_back(nearest(kParts * coefficients[0]));
+        static_cast<std::uint16_t>(std::abs(nearest_integer(kParts * coefficients[kNaturalOfZigzag[k]])));
+  out.dc.push_back(nearest_integer(kParts * coefficients[0]));
 }
 
 /// Means of 2 x 2 samples, rounded as libjpeg does: down and up in turn.
@@ -102,7 +100,7 @@ class Quantiser {
       const auto up = [&](float bits) {
         return leaves_out_ && k > 0 ? static_cast<std::uint32_t>(bits * per_bit) + 1 : 0u;
       };
-      add_[k] = step / 2 - std::min(up(kSmallerBits), step / 2);
+      add_[k] = step / 2 - std::min(up(kSmallerGuessBits), step / 2);
       share_[k] = ((1u << kShift) + step - 1) / step;
       least_[place_of(k)] = static_cast<std::int16_t>(std::min(step - step / 2 + up(kInnerBits), 32767u));
       last_[k] = static_cast<float>(step - step / 2) + kLastBits * per_bit;
@@ -175,7 +173,7 @@ Quantisers quantisers_at(JpegKind kind, int quality) {
 using Counts = std::array<std::uint32_t, 256>;
 using TableCounts = std::array<Counts, 4>;
 
-void count_block(const Magnitudes& block, const Quantiser& quantiser, Counts& ac) {
+void count_magnitudes(const Magnitudes& block, const Quantiser& quantiser, Counts& ac) {
   unsigned next = 1;
   for (std::uint64_t left = quantiser.coded(block); left != 0; left &= left - 1) {
     const auto k = static_cast<unsigned>(std::countr_zero(left));
@@ -199,7 +197,7 @@ void count_blocks(const Blocks& blocks, const Quantiser& quantiser, Counts& dc, 
     const int now = level(b);
     ++dc[static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(std::abs(now - before))))];
     before = now;
-    count_block(blocks.ac[b], quantiser, ac);
+    count_magnitudes(blocks.ac[b], quantiser, ac);
   }
 }
 
@@ -216,7 +214,7 @@ void count_window(const PixelWindow& window, const JpegKind& kind, std::span<con
 }
 
 /// Of the codes, with the best table for them, and of what follows them.
-double bits_of(const Counts& counts) {
+double entropy_bits(const Counts& counts) {
   std::vector<std::uint8_t> symbols;
   std::vector<std::uint64_t> weights;
   for (std::size_t s = 0; s < counts.size(); ++s)
@@ -253,7 +251,7 @@ std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow>
   std::vector<double> out;
   for (const TableCounts& tables : counts) {
     double bits = 0;
-    for (const Counts& table : tables) bits += bits_of(table);
+    for (const Counts& table : tables) bits += entropy_bits(table);
     out.push_back(bits);
   }
   return out;

@@ -88,15 +88,13 @@ constexpr std::array<std::uint8_t, 16> kAdobeMarker{0xff, 0xee, 0,   14, 'A', 'd
                                                     'e',  0,    100, 0,  0,   0,   0,   0};
 constexpr std::size_t kMarkerBytes = 2;
 
-constexpr std::size_t kBlockCoefficients = 64;
-
 /// No coefficient of 8-bit samples is larger than 1024 (DC; AC stay under 930) before it is quantised.
 unsigned largest_coefficient(const JQUANT_TBL& quantisers, std::size_t zigzag) {
   const unsigned q = quantisers.quantval[kNaturalOfZigzag[zigzag]];
   return (1024 + q / 2) / q;
 }
 
-unsigned bits_of(unsigned value) {
+unsigned bit_length(unsigned value) {
   unsigned bits = 0;
   for (; value > 0; value >>= 1) ++bits;
   return bits;
@@ -266,10 +264,10 @@ std::vector<std::vector<std::uint8_t>> JpegCoder::possible_symbols() const {
     for (int c = 0; c < info.num_components; ++c) {
       if (info.comp_info[c].dc_tbl_no != pair) continue;
       const JQUANT_TBL& quantisers = *info.quant_tbl_ptrs[info.comp_info[c].quant_tbl_no];
-      dc = std::max(dc, bits_of(2 * largest_coefficient(quantisers, 0)));
+      dc = std::max(dc, bit_length(2 * largest_coefficient(quantisers, 0)));
       unsigned later = 0;
       for (std::size_t k = kBlockCoefficients - 1; k > 0; --k) {
-        later = std::max(later, bits_of(largest_coefficient(quantisers, k)));
+        later = std::max(later, bit_length(largest_coefficient(quantisers, k)));
         ac[k] = std::max(ac[k], later);
       }
     }

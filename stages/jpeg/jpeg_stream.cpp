@@ -10,10 +10,9 @@ namespace {
 using Span = std::span<const std::uint8_t>;
 
 constexpr std::uint8_t kSos = 0xda, kEoi = 0xd9;
-constexpr std::size_t kBlockCoefficients = 64;
 constexpr std::uint8_t kEndOfBlock = 0x00, kSixteenZeros = 0xf0;
 
-[[noreturn]] void fail(const char* expected, std::string found) {
+[[noreturn]] void fail_scan(const char* expected, std::string found) {
   throw FormatError("JPEG", "entropy-coded data", expected, std::move(found));
 }
 
@@ -36,10 +35,10 @@ class BitReader {
 
  private:
   void next_byte() {
-    if (at_ == data_.size()) fail("more blocks", "the end");
+    if (at_ == data_.size()) fail_scan("more blocks", "the end");
     byte_ = data_[at_++];
     count_ = 8;
-    if (byte_ == 0xff && (at_ == data_.size() || data_[at_++] != 0)) fail("coded bits", "a marker");
+    if (byte_ == 0xff && (at_ == data_.size() || data_[at_++] != 0)) fail_scan("coded bits", "a marker");
   }
   Span data_;
   std::size_t at_ = 0;
@@ -47,8 +46,8 @@ class BitReader {
 };
 
 /// A table in the form of ISO 10918-1 F.2.2.3: codes of one length are consecutive numbers.
-struct Decoder {
-  explicit Decoder(const HuffmanTable& table) : symbols(table.symbols) {
+struct HuffmanDecoder {
+  explicit HuffmanDecoder(const HuffmanTable& table) : symbols(table.symbols) {
     int code = 0, index = 0;
     for (std::size_t l = 1; l <= 16; ++l) {
       first_index[l] = index - code;
@@ -64,13 +63,13 @@ struct Decoder {
       code = code << 1 | static_cast<int>(in.bit());
       if (code < end_code[l]) return symbols[static_cast<std::size_t>(first_index[l] + code)];
     }
-    fail("a code of the table", "another");
+    fail_scan("a code of the table", "another");
   }
   const std::vector<std::uint8_t>& symbols;
   std::array<int, 17> first_index{}, end_code{};
 };
 
-void count_block(BitReader& in, const Decoder& dc, const Decoder& ac,
+void count_block(BitReader& in, const HuffmanDecoder& dc, const HuffmanDecoder& ac,
                  std::array<std::uint64_t, 256>& dc_count, std::array<std::uint64_t, 256>& ac_count) {
   const std::uint8_t category = dc.next(in);
   ++dc_count[category];
@@ -88,7 +87,7 @@ void count_block(BitReader& in, const Decoder& dc, const Decoder& ac,
 
 void count_symbols(Span data, Span mcu, std::size_t blocks, const HuffmanTables& tables,
                    SymbolCounts& counts) {
-  const std::vector<Decoder> decoders(tables.begin(), tables.end());
+  const std::vector<HuffmanDecoder> decoders(tables.begin(), tables.end());
   counts.resize(tables.size());
   BitReader in(data);
   for (std::size_t b = 0; b < blocks; ++b) {

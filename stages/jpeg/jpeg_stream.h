@@ -9,6 +9,9 @@
 
 namespace texmesh {
 
+/// Of a block of 8 x 8 samples.
+inline constexpr std::size_t kBlockCoefficients = 64;
+
 /// The place in an 8 x 8 block, row by row, of the k-th coefficient of a JPEG's order.
 inline constexpr std::array<std::uint8_t, 64> kNaturalOfZigzag{
     0,  1,  8,  16, 9,  2,  3,  10, 17, 24, 32, 25, 18, 11, 4,  5,  12, 19, 26, 33, 40, 48,

@@ -77,9 +77,7 @@ Quad with_sign_of(Quad size, Quad x) {
   return (Quad)((Bits)size | ((Bits)x & std::numeric_limits<std::int32_t>::min()));
 }
 
-int bits_of(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
-
-int nearest(float x) { return static_cast<int>(x < 0 ? x - 0.5f : x + 0.5f); }
+int magnitude_bits(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
 
 /// What changing one of the coefficients costs in bits.
 class BitCount {
@@ -130,12 +128,12 @@ class BitCount {
  private:
   int end_bits() const { return coding_.ac.bits[0]; }
   int dc_bits(int step) const {
-    const int size = bits_of(step);
+    const int size = magnitude_bits(step);
     const int bits = coding_.dc.bits[static_cast<std::size_t>(size)];
     return bits > 0 ? bits + size : kNoCode;
   }
   int ac_bits(int zeros, int value) const {
-    const int size = bits_of(value);
+    const int size = magnitude_bits(value);
     const int bits = coding_.ac.bits[static_cast<std::size_t>((zeros & 15) << 4 | size)];
     return bits > 0 ? (zeros >> 4) * coding_.ac.bits[0xf0] + bits + size : kNoCode;
   }
@@ -160,7 +158,7 @@ class Look {
       : coding_(coding), bits_(bits), k_(k), quantiser_(quantiser), rest_(rest), energy_(energy) {}
 
   Change best() {
-    const int now = bits_.value(k_), move = nearest(rest_ / energy_);
+    const int now = bits_.value(k_), move = nearest_integer(rest_ / energy_);
     if (move != 0) consider(now, move);
     if (move > 1 || move < -1) consider(now, move > 0 ? move - 1 : move + 1);
     const int smaller = now > 0 ? -1 : 1;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
 
-using Curve = SampledCurve<16384>;
+using FlipCurve = SampledCurve<16384>;
 
 /// One row of a separable filter, of any parity.
 using Kernel = std::vector<float>;  // [2 * radius + 1]
@@ -91,21 +91,21 @@ std::vector<float> eye_filtered(const std::vector<float>& channel, const PixelRe
   return out;
 }
 
-const Curve& lab_curve() {
-  static const Curve curve(lab_root);
+const FlipCurve& flip_lab_curve() {
+  static const FlipCurve curve(lab_root);
   return curve;
 }
 
 /// x^0.7 of 0 .. 256, which holds every HyAB distance of colours.
-float compressed(float distance) {
-  static const Curve power([](double x) { return x > 0 ? portable::pow(x * 256, kHyabExponent) : 0; });
+float flip_compressed(float distance) {
+  static const FlipCurve power([](double x) { return x > 0 ? portable::pow(x * 256, kHyabExponent) : 0; });
   if (distance >= 0.5f) return power(distance / 256);
   return distance > 0 ? static_cast<float>(portable::pow(static_cast<double>(distance), kHyabExponent)) : 0;
 }
 
-float colour_difference(Vec3f a, Vec3f b) {
-  static const float largest = compressed(largest_hyab<float>(lab_curve()));
-  return remapped_difference(compressed(hyab<float>(a, b)), largest);
+float flip_colour_difference(Vec3f a, Vec3f b) {
+  static const float largest = flip_compressed(largest_hyab<float>(flip_lab_curve()));
+  return remapped_difference(flip_compressed(hyab<float>(a, b)), largest);
 }
 
 /// Derivatives of a Gaussian as wide as features that the eye looks for: first (edges), second (points); the
@@ -202,7 +202,7 @@ FlipPicture prepare_flip(const Picture& picture) {
   std::vector<Vec3f> lab(box.count());
   for (std::size_t i = 0; i < lab.size(); ++i) {
     const Vec3d xyz = xyz_of_opponent(to_double(Vec3f{opponent[0][i], opponent[1][i], opponent[2][i]}));
-    lab[i] = hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), lab_curve());
+    lab[i] = hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), flip_lab_curve());
   }
   out.lab = in_whole_picture(lab, box, picture.side_px);
   out.detail[0] = in_whole_picture(feature_strength(luma, box, feature_kernels().edge), box, picture.side_px);
@@ -217,7 +217,7 @@ double flip_of(const FlipPicture& reference, const FlipPicture& test) {
   for (std::size_t i = 0; i < reference.lab.size(); ++i) {
     if (!reference.covered[i] && !test.covered[i]) continue;
     ++pixels;
-    const double colour = static_cast<double>(colour_difference(reference.lab[i], test.lab[i]));
+    const double colour = static_cast<double>(flip_colour_difference(reference.lab[i], test.lab[i]));
     if (!(colour > 0)) continue;
     const float edges = std::fabs(reference.detail[0][i] - test.detail[0][i]),
                 points = std::fabs(reference.detail[1][i] - test.detail[1][i]);

@@ -148,7 +148,7 @@ ViewSample sample_of(const TriangleShade& s, const double weight[3], Vec3d towar
 }
 
 // The level whose texels are nearest in size to the footprint (a factor 2 of area either way), then bilinear.
-Vec3f filtered(const MipTexture& texture, Vec2f uv, float area, bool repeat_s, bool repeat_t) {
+Vec3f filtered_texel(const MipTexture& texture, Vec2f uv, float area, bool repeat_s, bool repeat_t) {
   std::size_t level = 0;
   for (float limit = 2; area > limit && level + 1 < texture.first_level + texture.levels.size(); limit *= 4)
     ++level;
@@ -266,11 +266,11 @@ Picture draw(const ViewBuffer& view, const std::vector<MipTexture>& textures) {
   for (const ViewSample& s : view.samples) {
     Vec3f c = s.factor, e = s.emission;
     if (s.base_plane >= 0)
-      c = product(c, filtered(textures[static_cast<std::size_t>(s.base_plane)], s.base_uv, s.base_area,
-                              s.base_repeat_s, s.base_repeat_t));
+      c = product(c, filtered_texel(textures[static_cast<std::size_t>(s.base_plane)], s.base_uv, s.base_area,
+                                    s.base_repeat_s, s.base_repeat_t));
     if (s.emissive_plane >= 0)
-      e = product(e, filtered(textures[static_cast<std::size_t>(s.emissive_plane)], s.emissive_uv,
-                              s.emissive_area, s.emissive_repeat_s, s.emissive_repeat_t));
+      e = product(e, filtered_texel(textures[static_cast<std::size_t>(s.emissive_plane)], s.emissive_uv,
+                                    s.emissive_area, s.emissive_repeat_s, s.emissive_repeat_t));
     out.linear[s.pixel] = out.linear[s.pixel] + (c + e) * (1.f / kSamples);
   }
   return out;

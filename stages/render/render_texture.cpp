@@ -13,11 +13,11 @@
 namespace texmesh {
 namespace {
 
-using Curve = std::array<float, 256>;
+using ByteCurve = std::array<float, 256>;
 
-const Curve& numbers_of_bytes() {
-  static const Curve table = [] {
-    Curve t{};
+const ByteCurve& numbers_of_bytes() {
+  static const ByteCurve table = [] {
+    ByteCurve t{};
     for (std::size_t i = 0; i < t.size(); ++i) t[i] = static_cast<float>(i) / 255;
     return t;
   }();
@@ -73,8 +73,8 @@ Vec4f rgba(const float* v) {
 }
 
 template <std::size_t N>
-Vec4f bilinear(const Pixels& level, const Curve& colour, const Axis& x, const Axis& y) {
-  const Curve& number = numbers_of_bytes();
+Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Axis& x, const Axis& y) {
+  const ByteCurve& number = numbers_of_bytes();
   auto texel = [&](std::int32_t column, std::int32_t row) {
     return level.data.data() +
            (static_cast<std::size_t>(row) * level.width_px + static_cast<std::size_t>(column)) * N;
@@ -84,7 +84,7 @@ Vec4f bilinear(const Pixels& level, const Curve& colour, const Axis& x, const Ax
   const float wd = x.part * y.part, wb = x.part - wd, wc = y.part - wd, wa = 1 - x.part - wc;
   float value[N];
   for (std::size_t k = 0; k < N; ++k) {
-    const Curve& curve = (N == 2 || N == 4) && k + 1 == N ? number : colour;
+    const ByteCurve& curve = (N == 2 || N == 4) && k + 1 == N ? number : colour;
     value[k] = (curve[a[k]] * wa + curve[b[k]] * wb) + (curve[c[k]] * wc + curve[d[k]] * wd);
   }
   return rgba<N>(value);
@@ -93,7 +93,7 @@ Vec4f bilinear(const Pixels& level, const Curve& colour, const Axis& x, const Ax
 Vec4f read_bilinear(const Pixels& level, bool srgb, const TextureSlot& slot, Vec2f uv) {
   const Axis x = bilinear_axis(uv.x, level.width_px, slot.wrap_s),
              y = bilinear_axis(uv.y, level.height_px, slot.wrap_t);
-  const Curve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
+  const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
   switch (level.channels) {
     case 1:
       return bilinear<1>(level, colour, x, y);
@@ -108,7 +108,7 @@ Vec4f read_bilinear(const Pixels& level, bool srgb, const TextureSlot& slot, Vec
 
 Vec4f read_nearest(const Pixels& level, bool srgb, Vec2f uv) {
   const std::int32_t x = nearest_texel(uv.x, level.width_px), y = nearest_texel(uv.y, level.height_px);
-  const Curve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
+  const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
   const Axis ax{x, x, 0}, ay{y, y, 0};
   switch (level.channels) {
     case 1:

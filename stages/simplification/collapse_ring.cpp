@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kLeastNormalCosine = 0.2;  // between a triangle's normal before and after
 
-Vec3d face_normal(Vec3d a, Vec3d b, Vec3d c) { return cross(b - a, c - a); }
+Vec3d normal_of_corners(Vec3d a, Vec3d b, Vec3d c) { return cross(b - a, c - a); }
 
 }  // namespace
 
@@ -187,7 +187,7 @@ bool CollapseRing::keeps_orientation(const WedgeMap& map) const {
   for (const Corner& c : corners_) {
     if (c.a == slot || c.b == slot) continue;
     const Vec3d a = mesh_.point(neighbours_[c.a].point), b = mesh_.point(neighbours_[c.b].point);
-    const Vec3d before = face_normal(from, a, b), after = face_normal(to, a, b);
+    const Vec3d before = normal_of_corners(from, a, b), after = normal_of_corners(to, a, b);
     const double square = dot(before, before) * dot(after, after), along = dot(before, after);
     if (dot(before, before) > 0 &&
         (along <= 0 || along * along <= kLeastNormalCosine * kLeastNormalCosine * square))

@@ -15,7 +15,7 @@ namespace {
 
 /// Response differences below this many roundings of the largest radius are the sensor's number format, not
 /// shape.
-constexpr double kNoise = 4 * 0x1p-24;
+constexpr double kRoundingNoise = 4 * 0x1p-24;
 
 /// Samples of r(alpha, y) or of something computed from it; `valid` where there is one.
 struct Grid {
@@ -229,7 +229,7 @@ class RangeFilter {
   }
 
   void mark_crossings(int scale, const Grid& curvature) {
-    const std::vector<std::uint8_t> found = find_crossings(curvature, kNoise * largest_);
+    const std::vector<std::uint8_t> found = find_crossings(curvature, kRoundingNoise * largest_);
     std::uint32_t count = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (!found[i]) continue;

@@ -17,7 +17,7 @@ constexpr double kTruncationLog = 14.5;
 /// Terms that one pass over the accumulators takes in. The accumulators are the bulk of the memory traffic.
 constexpr int kBlock = 8;
 /// Rows of a parallel piece, and of the part of it whose terms stay in the first-level cache.
-constexpr std::size_t kGrain = 2048, kRows = 64;
+constexpr std::size_t kHeatGrain = 2048, kRows = 64;
 
 // Four lanes, the last unused: x, y and z of a vertex travel together through every pass over the matrix.
 using FloatQuad = float __attribute__((vector_size(16)));
@@ -191,7 +191,7 @@ class Chebyshev {
     source_ = std::make_unique<Quad[]>(n_);
     for (auto& t : ring_) t = std::make_unique<Quad[]>(n_);  // zeroed: D_0
     const double factor = 4 / l.bound;
-    parallel_for(context_, n_, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context_, n_, kHeatGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Vec3d sum;
         for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
@@ -222,7 +222,7 @@ class Chebyshev {
     const float* rate = l_.rate.data();
     const auto factor = static_cast<Real>(4 / l_.bound);
     Quad* to = term(k);
-    parallel_for(context_, n_, kGrain, [=](std::size_t begin, std::size_t end) {
+    parallel_for(context_, n_, kHeatGrain, [=](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         if (!before) {
           to[i] = source[i] * static_cast<Real>(-0.5);
@@ -253,7 +253,7 @@ class Chebyshev {
           f[0] = static_cast<Real>(coefficients_[s].smooth[u]);
           f[1] = static_cast<Real>(coefficients_[s].response[u]);
         }
-    parallel_for(context_, n_, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context_, n_, kHeatGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t row = begin; row < end; row += kRows)
         for (std::size_t s = active; s < scales; ++s)
           add(terms, &factor[s * kBlock * 2], row, std::min(end, row + kRows), flows_[s]);

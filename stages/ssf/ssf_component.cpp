@@ -16,7 +16,7 @@ namespace {
 /// The response of a surface without relief is what discretisation makes of its curvature, some percent of
 /// it. Contrast is measured against at least this share of the curvature's rms, and this many roundings of a
 /// coordinate.
-constexpr double kBaseShare = 0.15, kNoise = 4;
+constexpr double kBaseShare = 0.15, kNoiseFactor = 4;
 
 /// Where more edges than this have a capped rate, scales are 20 % off on an unevenly sampled head.
 constexpr double kManyCapped = 0.1;
@@ -27,7 +27,7 @@ constexpr double kCluster = 0.5;
 /// terms.
 constexpr std::size_t kTimesAtOnce = 8;
 
-constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kCrossingGrain = 4096;
 constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
 
 Vec3d moved(Vec3d point, Vec3f by) { return point + to_double(by); }
@@ -57,7 +57,7 @@ class FeatureFinder {
   /// none of a kind closer than `apart` to another along the surface.
   std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
-    parallel_for(context, found.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, found.size(), kCrossingGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin; v < end; ++v) found[v] = feature_kind(static_cast<std::uint32_t>(v));
     });
     for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
@@ -313,7 +313,7 @@ class ComponentFilter {
     const auto ratio = static_cast<float>(ladder_.time[scale] / ladder_.time[scale + ladder_.band]);
     std::vector<float> g(fine.size());
     for (std::size_t v = 0; v < g.size(); ++v) g[v] = fine[v] - ratio * coarse[v];
-    const double least = std::max(kNoise * component_.noise, kBaseShare * rms(fine));
+    const double least = std::max(kNoiseFactor * component_.noise, kBaseShare * rms(fine));
     const std::vector<std::uint8_t> found =
         FeatureFinder(state.level, std::move(g), ladder_.sigma[scale], least, options_.contrast)
             .find(seed_radius(ladder_.sigma[scale], options_.error_ratio), context_);

@@ -50,7 +50,7 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
 
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kNotInTime = std::numeric_limits<double>::infinity();
 constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at least
 
 /// A model of a network as a transport.
@@ -120,7 +120,7 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
   how.rtt_s = network.rtt_s;
   how.initial_bytes_s = options.throughput.initial_bytes_s;
   const TransferEnd end = transfer(source, transport, how);
-  SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNever : end.last_s);
+  SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNotInTime : end.last_s);
   result.never = end.given_up > 0;
   return result;
 }
@@ -132,7 +132,7 @@ NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
 }
 
 double fetched_s(const NetworkOptions& all, double from_s, std::uint64_t bytes) {
-  if (!std::isfinite(from_s)) return kNever;
+  if (!std::isfinite(from_s)) return kNotInTime;
   const NetworkOptions network = without_dead_mirrors(all, from_s);
   ModelTransport transport(network);
   transport.move_to(from_s);
@@ -144,7 +144,7 @@ double fetched_s(const NetworkOptions& all, double from_s, std::uint64_t bytes) 
   for (const MirrorModel& m : network.mirrors) best = std::max(best, m.rate.at(from_s));
   how.initial_bytes_s = std::max(1.0, std::min(best, network.link.at(from_s)));
   const TransferEnd end = transfer(source, transport, how);
-  return end.given_up > 0 ? kNever : end.last_s;
+  return end.given_up > 0 ? kNotInTime : end.last_s;
 }
 
 SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,

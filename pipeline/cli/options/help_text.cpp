@@ -58,7 +58,7 @@ std::string paragraphs(const std::string& text) {
 }
 
 /// "-o,--output"; of an everyday stage option the names without its stage.
-std::string names_of(const CLI::Option& o, bool short_only) {
+std::string option_names(const CLI::Option& o, bool short_only) {
   if (o.get_positional()) return o.get_name(true, false);
   std::string names;
   const auto add = [&](const std::string& name) { names += (names.empty() ? "" : ",") + name; };
@@ -72,12 +72,12 @@ std::string description_of(const CLI::Option& o, const HelpNotes& notes) {
   std::string text = o.get_description();
   if (const auto it = notes.choices.find(&o); it != notes.choices.end()) text += " " + it->second;
   if (notes.with_default.contains(&o)) text += " (default " + o.get_default_str() + ")";
-  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + names_of(*other, false) + ")";
+  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + option_names(*other, false) + ")";
   return text;
 }
 
 std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes) {
-  std::string left = names_of(o, everyday != nullptr);
+  std::string left = option_names(o, everyday != nullptr);
   if (!o.get_positional() && o.get_type_size() != 0 && !o.get_type_name().empty())
     left += " " + o.get_type_name();
   const bool own_text = everyday == nullptr || everyday->text.empty();

@@ -13,7 +13,7 @@ namespace texmesh {
 namespace {
 
 constexpr int kViews = 5;
-constexpr double kDefaultDisplayPx = 512;
+constexpr double kBudgetDisplayPx = 512;
 constexpr double kReferenceTexels = 8e6;  // of all colours together: finer ones cost memory and show nothing
 constexpr double kTexelsPerByte = 40;     // more texels than that are never worth a byte
 constexpr std::uint32_t kLeastSide = 4;
@@ -30,7 +30,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
     : package(from),
       request(wishes),
       context(run),
-      display_px(wishes.display_px > 0 ? wishes.display_px : kDefaultDisplayPx),
+      display_px(wishes.display_px > 0 ? wishes.display_px : kBudgetDisplayPx),
       side_px(static_cast<std::uint32_t>(std::clamp(display_px, 64.0, 768.0))),
       textures(from, std::max(kTexelsPerByte * static_cast<double>(wishes.bytes), 65536.0), run) {
   context.progress = nullptr;

@@ -13,12 +13,12 @@ namespace texmesh {
 namespace {
 
 constexpr double kTypicalTexelsPerByte = 6;  // where the search begins
-constexpr int kSteps = 30;
-constexpr double kNear = 0.96;  // of the bytes, while candidates are compared
+constexpr int kSizeSteps = 30;
+constexpr double kNearEnough = 0.96;  // of the bytes, while candidates are compared
 constexpr int kTries = 6;
-constexpr double kNothing = 1e9;
-constexpr double kLeastBytes = 150;     // of any image file
-constexpr double kWorthClimbing = 1.1;  // times the best of another coding
+constexpr double kNoTexture = 1e9;
+constexpr double kLeastImageBytes = 150;  // of any image file
+constexpr double kWorthClimbing = 1.1;    // times the best of another coding
 
 std::vector<std::uint8_t> coverage_by(const Model& model, std::uint32_t image, std::uint32_t width,
                                       std::uint32_t height) {
@@ -75,7 +75,7 @@ float ColourTextures::sharpening(double share) const {
 }
 
 TexturePoint ColourTextures::best_size(const MeshCandidate& mesh, double bytes, const TexturePoint* near) {
-  return climb_sizes(mesh, bytes, near ? near->step : likely_step(bytes), codings_.front(), kNothing);
+  return climb_sizes(mesh, bytes, near ? near->step : likely_step(bytes), codings_.front(), kNoTexture);
 }
 
 TexturePoint ColourTextures::best_of_other_codings(const MeshCandidate& mesh, double bytes,
@@ -97,10 +97,10 @@ TexturePoint ColourTextures::climb_sizes(const MeshCandidate& mesh, double bytes
     if (fresh) it->second = measure(mesh, bytes, s, coding);
     return it->second;
   };
-  if (limit < kNothing && at(step).difference > limit) return at(step);
-  while (step + 1 < kSteps && bytes > kLeastBytes && at(step).difference >= kNothing) ++step;
+  if (limit < kNoTexture && at(step).difference > limit) return at(step);
+  while (step + 1 < kSizeSteps && bytes > kLeastImageBytes && at(step).difference >= kNoTexture) ++step;
   while (step > 0 && at(step - 1).difference < at(step).difference) --step;
-  while (step + 1 < kSteps && at(step + 1).difference < at(step).difference) ++step;
+  while (step + 1 < kSizeSteps && at(step + 1).difference < at(step).difference) ++step;
   return at(step);
 }
 
@@ -114,7 +114,7 @@ int ColourTextures::likely_step(double bytes) const {
     texels += static_cast<double>(source_.image(i).width_px) * source_.image(i).height_px;
   const double wanted = std::max(bytes, 1.0) * kTypicalTexelsPerByte;
   int step = 0;
-  while (step + 1 < kSteps && texels * size_step(step) * size_step(step) > wanted) ++step;
+  while (step + 1 < kSizeSteps && texels * size_step(step) * size_step(step) > wanted) ++step;
   return step;
 }
 
@@ -160,8 +160,8 @@ TexturePoint ColourTextures::measure(const MeshCandidate& mesh, double bytes, in
   const std::vector<Pixels>& pixels = colours_at(step);
   std::map<double, std::vector<FileImageData>> files;
   double& start = last_quality_[static_cast<int>(coding.format) * 2 + coding.full_chroma];
-  TexturePoint point{step, coding, 0, kNothing};
-  point.quality = quality_for(bytes, start > 0 ? start : 50, kNear, kTries, [&](double q) {
+  TexturePoint point{step, coding, 0, kNoTexture};
+  point.quality = quality_for(bytes, start > 0 ? start : 50, kNearEnough, kTries, [&](double q) {
     files[q] = encoded(pixels, coding, q, true);
     return total(files[q]);
   });

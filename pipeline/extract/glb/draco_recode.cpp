@@ -99,8 +99,8 @@ Extent extent_of(const std::vector<Work>& all, const std::string& prefix) {
   return out;
 }
 
-void set_up(draco::ExpertEncoder& encoder, const Work& work, const Extent& positions, const Extent& uvs,
-            const DracoSteps& steps) {
+void set_up_draco(draco::ExpertEncoder& encoder, const Work& work, const Extent& positions, const Extent& uvs,
+                  const DracoSteps& steps) {
   encoder.SetSpeedOptions(0, 0);
   for (const auto& [name, id] : work.ids) {
     if (work.mesh->attribute(id)->data_type() != draco::DT_FLOAT32) continue;
@@ -176,7 +176,7 @@ DracoStream coded(Work& work, const Extent& positions, const Extent& uvs, const 
     throw StageError("extract", entry, "attributes without repeats", "a failure");
   work.mesh->DeduplicatePointIds();
   draco::ExpertEncoder encoder(*work.mesh);
-  set_up(encoder, work, positions, uvs, steps);
+  set_up_draco(encoder, work, positions, uvs, steps);
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeToBuffer(&buffer);
   if (!status.ok()) throw StageError("extract", entry, "a Draco stream", status.error_msg_string());

@@ -67,7 +67,7 @@ void set_quality(jpeg_compress_struct& info, const ImageCoding& coding) {
     }
 }
 
-void set_up(jpeg_compress_struct& info, const Pixels& pixels, const ImageCoding& coding) {
+void set_up_jpeg(jpeg_compress_struct& info, const Pixels& pixels, const ImageCoding& coding) {
   info.image_width = pixels.width_px;
   info.image_height = pixels.height_px;
   info.input_components = static_cast<int>(pixels.channels);
@@ -89,7 +89,7 @@ std::vector<std::uint8_t> encode_jpeg_file(const Pixels& pixels, const ImageCodi
   jpeg_compress_struct& info = writer.info;
   const bool ok = jpeg_guarded(writer.errors, [&] {
     jpeg_mem_dest(&info, &writer.data, &writer.size);
-    set_up(info, pixels, coding);
+    set_up_jpeg(info, pixels, coding);
     jpeg_start_compress(&info, TRUE);
     while (info.next_scanline < info.image_height) {
       auto* row = const_cast<JSAMPLE*>(pixels.data.data() + stride * info.next_scanline);  // read only

@@ -13,8 +13,8 @@ namespace texmesh {
 namespace gltf {
 namespace {
 
-constexpr std::size_t kMaxParts = 65535;      // Mesh::triangle_part is 16 bits wide
-constexpr std::size_t kMaxMaterials = 65535;  // and so is triangle_material
+constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
+constexpr std::size_t kMaxGltfMaterials = 65535;  // and so is triangle_material
 
 /// Reads each primitive once; keeps it only while further nodes show the same mesh.
 class PrimitiveCache {
@@ -72,8 +72,8 @@ std::map<int, std::uint16_t> GltfReader::read_used_materials(const std::vector<I
   for (const Instance& i : instances) {
     for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives) index[p.material] = 0;
   }
-  if (index.size() > kMaxMaterials) {
-    source_.fail("/materials", "at most " + std::to_string(kMaxMaterials), std::to_string(index.size()));
+  if (index.size() > kMaxGltfMaterials) {
+    source_.fail("/materials", "at most " + std::to_string(kMaxGltfMaterials), std::to_string(index.size()));
   }
   std::vector<int> used;
   for (const auto& [material, unset] : index) used.push_back(material);

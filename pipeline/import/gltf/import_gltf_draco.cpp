@@ -16,9 +16,9 @@ constexpr std::uint64_t kMaxFacesPerByte = 1000;
 constexpr int kMaxMetadataDepth = 16;
 
 /// Reads the header of a Draco stream; past its end everything is 0 and ok() is false.
-class HeaderReader {
+class DracoHeaderReader {
  public:
-  explicit HeaderReader(ByteSpan bytes) : bytes_(bytes) {}
+  explicit DracoHeaderReader(ByteSpan bytes) : bytes_(bytes) {}
   bool ok() const { return ok_; }
   std::uint8_t u8() {
     if (at_ >= bytes_.size()) ok_ = false;
@@ -49,7 +49,7 @@ class HeaderReader {
   bool ok_ = true;
 };
 
-void skip_metadata_element(HeaderReader& in, int depth) {
+void skip_metadata_element(DracoHeaderReader& in, int depth) {
   if (depth > kMaxMetadataDepth) in.skip(std::numeric_limits<std::uint64_t>::max());
   const std::uint64_t entries = in.varint();
   for (std::uint64_t i = 0; i < entries && in.ok(); ++i) {
@@ -63,7 +63,7 @@ void skip_metadata_element(HeaderReader& in, int depth) {
   }
 }
 
-void skip_metadata(HeaderReader& in) {
+void skip_metadata(DracoHeaderReader& in) {
   const std::uint64_t attributes = in.varint();
   for (std::uint64_t i = 0; i < attributes && in.ok(); ++i) {
     in.varint();
@@ -73,7 +73,7 @@ void skip_metadata(HeaderReader& in) {
 }
 
 void check_header(const Source& source, const std::string& place, ByteSpan data) {
-  HeaderReader in(data);
+  DracoHeaderReader in(data);
   for (const char c : std::string_view("DRACO")) {
     if (in.u8() != static_cast<std::uint8_t>(c)) source.fail(place, "a Draco stream", "other bytes");
   }

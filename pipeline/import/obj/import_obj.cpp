@@ -16,7 +16,7 @@ bool has_colour(const ObjData& data, std::uint32_t position) {
   return position < data.colours.size() && std::isfinite(data.colours[position].x);
 }
 
-double colour_scale(const ObjData& data) {
+double scale_of_largest(const ObjData& data) {
   float largest = 0;
   for (const Vec3f& c : data.colours)
     for (int i = 0; i < 3; ++i) largest = c[i] > largest ? c[i] : largest;
@@ -57,7 +57,7 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
     any_normal = any_normal || r.normal != kNoIndex;
   }
   const bool any_colour = choose_colours(data, model, options);
-  const double scale = colour_scale(data);
+  const double scale = scale_of_largest(data);
   MeshBuilder builder(data.positions, {any_uv, any_normal, any_colour});
   std::vector<Corner> corners;
   std::uint64_t without_uv = 0;

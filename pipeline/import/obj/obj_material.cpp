@@ -13,7 +13,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxMaterials = 65000;
+constexpr std::size_t kMaxObjMaterials = 65000;
 
 // Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a
 // file may be named "1".
@@ -85,9 +85,9 @@ class MtlReader {
       if (!word.empty() && word.front() == '#') {
         if (lower(line.substr(0, 200)).find("meshlab") != std::string::npos) file_.by_meshlab = true;
       } else if (same_word(word, "newmtl")) {
-        if (file_.materials.size() >= kMaxMaterials)
-          throw InputError(name_, lines_.place(), "at most " + std::to_string(kMaxMaterials) + " materials",
-                           "more");
+        if (file_.materials.size() >= kMaxObjMaterials)
+          throw InputError(name_, lines_.place(),
+                           "at most " + std::to_string(kMaxObjMaterials) + " materials", "more");
         file_.materials.emplace_back().name = trim(rest);
       } else if (!file_.materials.empty()) {
         statement(lower(word), rest, file_.materials.back());

@@ -11,7 +11,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxHeaderBytes = 1 << 20;
+constexpr std::size_t kMaxPlyHeaderBytes = 1 << 20;
 constexpr std::size_t kMaxElements = 256, kMaxProperties = 1024;
 
 std::optional<PlyType> type_of(std::string_view word) {
@@ -28,9 +28,9 @@ std::optional<PlyType> type_of(std::string_view word) {
 }
 
 // The header's lines, read as the statements of one document.
-class HeaderReader {
+class PlyHeaderReader {
  public:
-  HeaderReader(const std::string& file, std::string_view text) : file_(file), text_(text), lines_(text) {}
+  PlyHeaderReader(const std::string& file, std::string_view text) : file_(file), text_(text), lines_(text) {}
 
   PlyHeader read() {
     std::string_view line;
@@ -60,7 +60,7 @@ class HeaderReader {
         fail("format, element, property, comment or end_header", quote(word));
     }
     fail("end_header",
-         text_.size() >= kMaxHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
+         text_.size() >= kMaxPlyHeaderBytes ? "a header of more than 1 MiB" : "the end of the file");
   }
 
  private:
@@ -126,7 +126,7 @@ class HeaderReader {
 };
 
 template <class T>
-double load(const std::uint8_t* p, bool swap) {
+double load_number(const std::uint8_t* p, bool swap) {
   std::uint8_t raw[sizeof(T)];
   for (std::size_t i = 0; i < sizeof(T); ++i) raw[i] = p[swap ? sizeof(T) - 1 - i : i];
   T value;
@@ -162,7 +162,7 @@ int PlyElement::find_property(std::initializer_list<std::string_view> names) con
 }
 
 PlyHeader read_ply_header(const std::string& file, std::span<const std::uint8_t> bytes) {
-  return HeaderReader(file, text_of(bytes).substr(0, kMaxHeaderBytes)).read();
+  return PlyHeaderReader(file, text_of(bytes).substr(0, kMaxPlyHeaderBytes)).read();
 }
 
 PlyRows::PlyRows(const std::string& file, std::span<const std::uint8_t> bytes, const PlyHeader& header)
@@ -254,23 +254,23 @@ double PlyRows::binary_number(PlyType type) {
   const bool swap = (encoding_ == PlyEncoding::kBigEndian) == (std::endian::native == std::endian::little);
   switch (type) {
     case PlyType::kInt8:
-      return load<std::int8_t>(p, swap);
+      return load_number<std::int8_t>(p, swap);
     case PlyType::kUint8:
-      return load<std::uint8_t>(p, swap);
+      return load_number<std::uint8_t>(p, swap);
     case PlyType::kInt16:
-      return load<std::int16_t>(p, swap);
+      return load_number<std::int16_t>(p, swap);
     case PlyType::kUint16:
-      return load<std::uint16_t>(p, swap);
+      return load_number<std::uint16_t>(p, swap);
     case PlyType::kInt32:
-      return load<std::int32_t>(p, swap);
+      return load_number<std::int32_t>(p, swap);
     case PlyType::kUint32:
-      return load<std::uint32_t>(p, swap);
+      return load_number<std::uint32_t>(p, swap);
     case PlyType::kFloat:
-      return load<float>(p, swap);
+      return load_number<float>(p, swap);
     case PlyType::kDouble:
       break;
   }
-  return load<double>(p, swap);
+  return load_number<double>(p, swap);
 }
 
 void PlyRows::next_binary(PlyRow& row) {

@@ -10,7 +10,7 @@
 namespace texmesh {
 namespace {
 
-double colour_scale(PlyType type) {
+double scale_of_type(PlyType type) {
   switch (type) {
     case PlyType::kFloat:
     case PlyType::kDouble:
@@ -38,7 +38,7 @@ struct ColourColumns {
       if (column[i] < 0) continue;
       const PlyProperty& p = element.properties[static_cast<std::size_t>(column[i])];
       if (p.is_list) column[i] = -1;
-      scale[i] = colour_scale(p.type);
+      scale[i] = scale_of_type(p.type);
     }
     for (std::size_t i = 0; i < 256; ++i) table[i] = linear_from_srgb(static_cast<double>(i) / 255.0);
   }

@@ -11,7 +11,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxJsonBytes = 1 << 20, kMaxHeaderBytes = 1 << 16;
+constexpr std::size_t kMaxJsonBytes = 1 << 20, kMaxGridHeaderBytes = 1 << 16;
 
 /// Reads the fields of an object one by one. Fields that were not read are unknown ones:
 /// finish() refuses them.
@@ -84,7 +84,7 @@ struct CyberwareHeader {
 
 CyberwareHeader read_cyberware_header(const std::string& file, std::span<const std::uint8_t> bytes) {
   CyberwareHeader header;
-  const std::string_view text = text_of(bytes).substr(0, kMaxHeaderBytes);
+  const std::string_view text = text_of(bytes).substr(0, kMaxGridHeaderBytes);
   std::size_t at = 0, line = 0;
   for (;;) {
     const std::size_t end = text.find('\n', at);

@@ -10,7 +10,7 @@
 namespace texmesh {
 namespace {
 
-using Json = GlbWriter::Json;
+using Json = nlohmann::ordered_json;
 constexpr int kFloat = 5126, kUint = 5125, kLines = 1, kArrayBuffer = 34962, kElementBuffer = 34963;
 
 template <class T>

@@ -6,8 +6,6 @@
 
 namespace texmesh {
 
-std::string kilobytes(std::uint64_t bytes) { return fixed(static_cast<double>(bytes) / 1e3, 1); }
-
 std::string percent(double fraction, int digits) { return fixed(100 * fraction, digits); }
 
 std::string plane_title(const TextureInfo& t, std::size_t plane) {

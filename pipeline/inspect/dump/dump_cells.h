@@ -8,7 +8,6 @@ namespace texmesh {
 
 // How the text of a dump shows numbers and names.
 
-std::string kilobytes(std::uint64_t bytes);
 std::string percent(double fraction, int digits = 1);
 /// The title line of a texture plane.
 std::string plane_title(const TextureInfo& texture, std::size_t plane);

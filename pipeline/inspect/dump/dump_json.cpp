@@ -1,5 +1,6 @@
 #include "format/container/layout.h"
 #include "format/documents/allocation.h"
+#include "format/documents/tables.h"
 #include "format/documents/viewing.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/package_figures.h"
@@ -9,8 +10,6 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr std::size_t kGammas = 21;
 
 Json vector_json(const Vec3d& v) { return Json{v.x, v.y, v.z}; }
 
@@ -187,7 +186,7 @@ Json allocation_json(const PlaneTables& t, std::uint32_t scale, std::optional<do
     rungs.push_back(stored ? Json(f.fragment_rung[i]) : Json());
     bytes.push_back(stored ? Json(f.fragment_bytes[i]) : Json());
   }
-  for (std::size_t g = 0; g < kGammas; ++g) total.push_back(t.total_bytes[scale * kGammas + g]);
+  for (std::size_t g = 0; g < kGammaSteps; ++g) total.push_back(t.total_bytes[scale * kGammaSteps + g]);
   return {{"scale", scale},         {"quality", t.quality[scale]},
           {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
           {"total_bytes", total},   {"fragment_quality", q},

@@ -5,14 +5,13 @@
 #include <algorithm>
 
 #include "format/documents/allocation.h"
+#include "format/documents/tables.h"
 #include "pipeline/inspect/dump/dump_cells.h"
 #include "pipeline/inspect/dump/package_figures.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {
-
-constexpr std::size_t kGammas = 21;
 
 /// Where texture detail lies: a digit per fragment, eta of S_0 in tenths, '.' where nothing is stored.
 std::string eta_map(const PlaneTables& t, const std::vector<float>& eta) {
@@ -37,7 +36,8 @@ std::string allocation_text(const PlaneTables& t, std::optional<double> gamma) {
                                  fixed(f.gamma, 3),        fixed(f.quality_min, 1),
                                  fixed(f.quality_mean, 1), fixed(f.quality_max, 1),
                                  kilobytes(f.bytes)};
-    for (std::size_t g = 0; g < kGammas; g += 5) row.push_back(kilobytes(t.total_bytes[s * kGammas + g]));
+    for (std::size_t g = 0; g < kGammaSteps; g += 5)
+      row.push_back(kilobytes(t.total_bytes[s * kGammaSteps + g]));
     table.row(std::move(row));
   }
   return table.text();

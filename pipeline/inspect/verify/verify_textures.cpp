@@ -6,6 +6,7 @@
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "format/documents/allocation.h"
+#include "format/documents/tables.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/base/parallel.h"
@@ -15,8 +16,6 @@
 
 namespace texmesh {
 namespace {
-
-constexpr std::size_t kGammas = 21;
 
 std::string plane_field(std::uint32_t plane, const std::string& member) {
   return "plane " + std::to_string(plane) + ", " + member;
@@ -51,13 +50,13 @@ void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) 
 
 void check_total_bytes(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
   for (std::uint32_t s = 0; s <= t.scales; ++s)
-    for (std::size_t g = 0; g < kGammas; ++g) {
+    for (std::size_t g = 0; g < kGammaSteps; ++g) {
       const std::vector<float> quality = quality_of(t, s, static_cast<double>(g) / 20);
       std::uint64_t bytes = 0;
       for (const std::uint16_t i : t.order)
         bytes += bytes_to_show(t, nearest_rung(t, static_cast<double>(quality[i])), i);
       findings.require_equal(
-          bytes, t.total_bytes[s * kGammas + g], "tables-total", kTablesPath,
+          bytes, t.total_bytes[s * kGammaSteps + g], "tables-total", kTablesPath,
           plane_field(plane, "D_" + std::to_string(s) + "(" + fixed(static_cast<double>(g) / 20, 2) + ")"));
     }
 }

@@ -1,0 +1,60 @@
+# With TEXMESH_UNITY, several sources of a room are compiled as one: most of a source's time goes into headers that its
+# neighbours include, too. A change of a source then compiles its neighbours again, so this is for builds that are made once.
+# No name of a source clashes with a neighbour's: tests/house/check_unity.
+option(TEXMESH_UNITY "Compile several sources of a room as one: a faster build, a slower change" OFF)
+set(texmesh_unity_most 8)  # sources of a unit
+
+# Shares the sources of a room evenly among units, named after the room. CMake leaves sources with options of their own out of
+# units; so the units get these options (texmesh_seldom_run).
+function(texmesh_unity_room target room options)  # sources
+  list(LENGTH ARGN count)
+  math(EXPR units "(${count} + ${texmesh_unity_most} - 1) / ${texmesh_unity_most}")
+  set(at 0)
+  foreach(source ${ARGN})
+    math(EXPR unit "${at} * ${units} / ${count}")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room}_${unit})
+    if(options)
+      set_property(SOURCE ${source} PROPERTY COMPILE_OPTIONS)
+      set_source_files_properties(${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/Unity/unity_${room}_${unit}_cxx.cxx
+        PROPERTIES COMPILE_OPTIONS "${options}")
+    endif()
+    math(EXPR at "${at} + 1")
+  endforeach()
+endfunction()
+
+# To be called when the properties of all sources are set.
+function(texmesh_unity target)
+  if(NOT TEXMESH_UNITY)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  # g++ takes the sources of a unit for headers. It sees more overflows that are not there, too (CMakeLists.txt).
+  target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-array-bounds -Wno-stringop-overread)
+  get_target_property(sources ${target} SOURCES)
+  set(rooms)
+  foreach(source ${sources})
+    file(REAL_PATH ${source} source)
+    file(STRINGS ${source} macro REGEX "^#define " LIMIT_COUNT 1)
+    get_source_file_property(options ${source} COMPILE_OPTIONS)
+    if(macro)  # would reach the neighbours
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      continue()
+    endif()
+    file(RELATIVE_PATH path ${CMAKE_CURRENT_SOURCE_DIR} ${source})
+    string(REGEX REPLACE "^cpp/" "" path ${path})
+    string(REGEX MATCH "^[^/]*" room ${path})
+    if(room MATCHES "\\.cpp$")
+      set(room ${target})
+    endif()
+    if(options)
+      string(APPEND room _seldom)
+    endif()
+    list(APPEND rooms ${room})
+    list(APPEND sources_of_${room} ${source})
+    set(options_of_${room} "${options}")
+  endforeach()
+  list(REMOVE_DUPLICATES rooms)
+  foreach(room ${rooms})
+    texmesh_unity_room(${target} ${room} "${options_of_${room}}" ${sources_of_${room}})
+  endforeach()
+endfunction()
