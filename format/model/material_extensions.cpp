@@ -67,7 +67,7 @@ constexpr std::array kKinds{
     MaterialExtensionKind{"KHR_materials_ior", kIorFactors, {}},
     MaterialExtensionKind{"KHR_materials_iridescence", kIridescenceFactors, kIridescenceTextures},
     MaterialExtensionKind{"KHR_materials_pbrSpecularGlossiness", kSpecularGlossinessFactors,
-                          kSpecularGlossinessTextures},
+                          kSpecularGlossinessTextures, true},
     MaterialExtensionKind{"KHR_materials_sheen", kSheenFactors, kSheenTextures},
     MaterialExtensionKind{"KHR_materials_specular", kSpecularFactors, kSpecularTextures},
     MaterialExtensionKind{"KHR_materials_transmission", kTransmissionFactors, kTransmissionTextures},

@@ -24,11 +24,13 @@ struct ExtensionFactorKind {
   double lowest = 0, highest = 1e30;  // what the extension allows; values are clipped to it
 };
 
-/// A material extension of glTF that is carried from the source to the GLBs of all scales as it stands.
+/// A material extension of glTF: carried from the source to the GLBs of all scales as it stands, or converted
+/// to the base material by import.
 struct MaterialExtensionKind {
   std::string_view name;
   std::span<const ExtensionFactorKind> factors;
   std::span<const ExtensionTextureKind> textures;
+  bool converted = false;
   const ExtensionTextureKind* texture(std::string_view key) const {
     for (const ExtensionTextureKind& t : textures)
       if (t.key == key) return &t;

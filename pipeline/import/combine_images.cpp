@@ -13,16 +13,17 @@ struct Plane {
   Pixels pixels{1, 1, 1, {255}};
   std::string name;
 
-  Plane(const Model& model, std::int32_t index, FloatEncoding encoding) {
-    if (index < 0) return;
-    const Image& image = model.images.at(static_cast<std::size_t>(index));
-    pixels = decode_image(image, encoding);
+  Plane(const Model& model, CombinedImage from) {
+    if (from.index < 0) return;
+    const Image& image = model.images.at(static_cast<std::size_t>(from.index));
+    pixels = decode_image(image, from.encoding);
     name = image.name;
   }
   /// The texel nearest to (x, y) of a picture of the given size.
-  const std::uint8_t* at(std::uint32_t x, std::uint32_t y, std::uint32_t width, std::uint32_t height) const {
-    return pixels.at(static_cast<std::uint32_t>(std::uint64_t{x} * pixels.width_px / width),
-                     static_cast<std::uint32_t>(std::uint64_t{y} * pixels.height_px / height));
+  ImageTexel at(std::uint32_t x, std::uint32_t y, std::uint32_t width, std::uint32_t height) const {
+    return {pixels.at(static_cast<std::uint32_t>(std::uint64_t{x} * pixels.width_px / width),
+                      static_cast<std::uint32_t>(std::uint64_t{y} * pixels.height_px / height)),
+            pixels.channels};
   }
 };
 
@@ -51,25 +52,31 @@ std::int32_t combine(Model& model, const Plane& a, const Plane& b, std::uint32_t
 }  // namespace
 
 std::int32_t combine_alpha(Model& model, std::int32_t colour, std::int32_t alpha) {
-  const Plane a(model, colour, FloatEncoding::kSrgb), b(model, alpha, FloatEncoding::kAsIs);
+  const Plane a(model, {colour, FloatEncoding::kSrgb}), b(model, {alpha, FloatEncoding::kAsIs});
   const std::uint32_t last = b.pixels.channels - 1;
   bool own_alpha = false;  // of the second image: not all opaque
   for (std::size_t i = last; b.pixels.channels % 2 == 0 && i < b.pixels.data.size(); i += b.pixels.channels)
     own_alpha = own_alpha || b.pixels.data[i] != 255;
   const std::uint32_t from = own_alpha ? last : 0, step = a.pixels.channels >= 3 ? 1 : 0;
-  return combine(model, a, b, 4, [&](const std::uint8_t* c, const std::uint8_t* o, std::uint8_t* to) {
-    for (std::uint32_t k = 0; k < 3; ++k) to[k] = c[k * step];
-    to[3] = o[from];
+  return combine(model, a, b, 4, [&](const ImageTexel& c, const ImageTexel& o, std::uint8_t* to) {
+    for (std::uint32_t k = 0; k < 3; ++k) to[k] = c.channel[k * step];
+    to[3] = o.channel[from];
   });
 }
 
 std::int32_t combine_roughness_metallic(Model& model, std::int32_t roughness, std::int32_t metallic) {
-  const Plane a(model, roughness, FloatEncoding::kAsIs), b(model, metallic, FloatEncoding::kAsIs);
-  return combine(model, a, b, 3, [](const std::uint8_t* r, const std::uint8_t* m, std::uint8_t* to) {
-    to[0] = 255;  // occlusion: none
-    to[1] = r[0];
-    to[2] = m[0];
-  });
+  return combine_images(model, {roughness, FloatEncoding::kAsIs}, {metallic, FloatEncoding::kAsIs}, 3,
+                        [](const ImageTexel& r, const ImageTexel& m, std::uint8_t* to) {
+                          to[0] = 255;  // occlusion: none
+                          to[1] = r.channel[0];
+                          to[2] = m.channel[0];
+                        });
+}
+
+std::int32_t combine_images(
+    Model& model, CombinedImage a, CombinedImage b, std::uint32_t channels,
+    const std::function<void(const ImageTexel& a, const ImageTexel& b, std::uint8_t* to)>& texel) {
+  return combine(model, Plane(model, a), Plane(model, b), channels, texel);
 }
 
 }  // namespace texmesh

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 5;
+inline constexpr int kImportVersion = 6;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

@@ -6,6 +6,7 @@
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/import_images.h"
+#include "pipeline/import/specular_glossiness.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh::gltf {
@@ -21,6 +22,10 @@ const Json* member(const Json& object, const char* key) {
 const Json* extension(const Json& object, const char* name) {
   const Json* e = member(object, "extensions");
   return e && e->is_object() ? member(*e, name) : nullptr;
+}
+
+bool same_place(const TextureRef& a, const TextureRef& b) {
+  return a.texcoord == b.texcoord && a.transform == b.transform;
 }
 
 float to_unit(double v) { return static_cast<float>(std::clamp(v, 0.0, 1.0)); }
@@ -164,23 +169,43 @@ TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
   return ref;
 }
 
-/// The older PBR model: it is kept, and for the many viewers that have dropped it its diffuse part becomes a
-/// dielectric's base colour.
+/// The older PBR model, which most viewers have dropped, becomes the newer one.
 void MaterialReader::read_specular_glossiness(const Json& e, const std::string& place, Material& out) {
-  source_.note_once(
-      Severity::kInfo, "specular-glossiness", place,
-      "KHR_materials_pbrSpecularGlossiness is kept; viewers without it are shown the diffuse part as the "
-      "base colour of a dielectric");
-  if (const Json* d = member(e, "diffuseFactor")) {
-    const auto at = [&](std::size_t i) { return to_unit((*d)[i].get<double>()); };
-    out.base_colour = {at(0), at(1), at(2), at(3)};
-  } else {
-    out.base_colour = {1, 1, 1, 1};
+  source_.note_once(Severity::kInfo, "specular-glossiness", place,
+                    "KHR_materials_pbrSpecularGlossiness is converted to metallic-roughness");
+  const auto factor = [&](const char* key, std::size_t i) {
+    const Json* f = member(e, key);
+    return f ? to_unit((*f)[i].get<double>()) : 1.0f;
+  };
+  SpecularGlossiness factors;
+  for (int k = 0; k < 3; ++k) {
+    factors.diffuse[k] = factor("diffuseFactor", static_cast<std::size_t>(k));
+    factors.specular[k] = factor("specularFactor", static_cast<std::size_t>(k));
   }
-  out.metallic = 0;
-  out.roughness = to_unit(1 - e.value("glossinessFactor", 1.0));
-  out.base_colour_texture = texture(member(e, "diffuseTexture"), place + "/diffuseTexture");
-  out.metallic_roughness_texture = {};
+  factors.glossiness = to_unit(e.value("glossinessFactor", 1.0));
+  const TextureRef diffuse = texture(member(e, "diffuseTexture"), place + "/diffuseTexture");
+  TextureRef specular = texture(member(e, "specularGlossinessTexture"), place + "/specularGlossinessTexture");
+  if (diffuse.used() && specular.used() && !same_place(diffuse, specular)) {
+    source_.note_once(Severity::kWarning, "specular-glossiness-mean", place,
+                      "specularGlossinessTexture lies elsewhere than diffuseTexture; its mean is taken");
+    factors = mean_of_specular(model_, specular.image, factors);
+    specular = {};
+  }
+  out.base_colour_texture = out.metallic_roughness_texture = {};
+  if (!diffuse.used() && !specular.used()) {
+    const MetallicRoughness m = metallic_roughness_of(factors);
+    out.base_colour = {m.base_colour.x, m.base_colour.y, m.base_colour.z, factor("diffuseFactor", 3)};
+    out.metallic = m.metallic;
+    out.roughness = m.roughness;
+    return;
+  }
+  const MetallicRoughnessImages images =
+      convert_specular_glossiness(model_, {diffuse.image, specular.image}, factors);
+  out.base_colour_texture = out.metallic_roughness_texture = diffuse.used() ? diffuse : specular;
+  out.base_colour_texture.image = images.base_colour;
+  out.metallic_roughness_texture.image = images.metallic_roughness;
+  out.base_colour = {1, 1, 1, factor("diffuseFactor", 3)};
+  out.metallic = out.roughness = 1;
 }
 
 MaterialExtension MaterialReader::read_extension(const Json& e, const MaterialExtensionKind& kind,
@@ -221,6 +246,7 @@ void MaterialReader::read_extensions(const Json& material, const std::string& pl
   for (const auto& [name, value] : extensions->items()) {
     if (name == "KHR_materials_unlit") continue;
     if (const MaterialExtensionKind* kind = find_material_extension(name)) {
+      if (kind->converted) continue;
       out.extensions.push_back(read_extension(value, *kind, place + "/extensions/" + name));
       continue;
     }

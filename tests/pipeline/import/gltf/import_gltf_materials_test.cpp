@@ -193,21 +193,40 @@ TEST(ImportGltfMaterials, NeverOpensImagesOfUnusedMaterials) {
   EXPECT_EQ(resolver.asked, (std::vector<std::string>{"a.png"}));
 }
 
-TEST(ImportGltfMaterials, KeepsSpecularGlossinessAndFallsBackToItsDiffusePart) {
+TEST(ImportGltfMaterials, SpecularGlossinessBecomesMetallicRoughness) {
   json material = base_colour({{"index", 1}});
-  material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {
-      {"diffuseFactor", {0.5, 0.25, 1, 1}}, {"glossinessFactor", 0.75}, {"diffuseTexture", {{"index", 0}}}};
-  GltfBuilder b = textured(material);
-  b.json["textures"].push_back({{"source", 1}});
-  b.json["images"].push_back({{"uri", "metal.png"}});
-  const Model m = import(b);
-  EXPECT_TRUE(has_note(m, "specular-glossiness", Severity::kInfo));
-  EXPECT_EQ(m.materials.at(0).base_colour, (Vec4f{0.5f, 0.25f, 1, 1}));
-  EXPECT_EQ(m.materials.at(0).metallic, 0.0f);
-  EXPECT_EQ(m.materials.at(0).roughness, 0.25f);
-  EXPECT_TRUE(m.materials.at(0).base_colour_texture.used());
-  ASSERT_EQ(m.materials.at(0).extensions.size(), 1u);
-  EXPECT_EQ(m.materials.at(0).extensions[0].textures.at(0).texture.image, 0);
+  json& e = material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+  e = {{"diffuseFactor", {0, 0, 0, 0.5}}, {"specularFactor", {1, 0.5, 0.25}}, {"glossinessFactor", 0.75}};
+  const auto read = [&] {
+    GltfBuilder b = textured(material);
+    b.json["textures"].push_back({{"source", 1}});
+    b.json["images"].push_back({{"uri", "metal.png"}});
+    return import(b);
+  };
+  const Model metal = read();  // no diffuse light: a metal
+  EXPECT_TRUE(has_note(metal, "specular-glossiness", Severity::kInfo));
+  const Material& m = metal.materials.at(0);
+  EXPECT_NEAR(m.base_colour.x, 1, 1e-3);
+  EXPECT_NEAR(m.base_colour.y, 0.5, 0.01);
+  EXPECT_NEAR(m.base_colour.z, 0.25, 0.01);
+  EXPECT_EQ(m.base_colour.w, 0.5f);
+  EXPECT_NEAR(m.metallic, 1, 1e-3);
+  EXPECT_EQ(m.roughness, 0.25f);
+  EXPECT_FALSE(m.base_colour_texture.used());
+  EXPECT_TRUE(m.extensions.empty());
+
+  e["diffuseTexture"] = {{"index", 0}};
+  const Model with_texture = read();
+  EXPECT_TRUE(with_texture.materials.at(0).base_colour_texture.used());
+  EXPECT_TRUE(with_texture.materials.at(0).metallic_roughness_texture.used());
+  EXPECT_EQ(with_texture.materials.at(0).base_colour, (Vec4f{1, 1, 1, 0.5f}));
+  EXPECT_EQ(with_texture.images.size(), 2u);  // the source's own are not needed any more
+  EXPECT_EQ(with_texture.notes.size(), 1u);
+
+  e["specularGlossinessTexture"] = {{"index", 1}, {"texCoord", 1}};
+  const Model elsewhere = read();
+  EXPECT_TRUE(has_note(elsewhere, "specular-glossiness-mean", Severity::kWarning));
+  EXPECT_TRUE(elsewhere.materials.at(0).base_colour_texture.used());
 }
 
 TEST(ImportGltfMaterials, TexturesThatNoUvReachesAreLeftOut) {
@@ -228,6 +247,7 @@ TEST(ImportGltfMaterials, TexturesThatNoUvReachesAreLeftOut) {
 json all_extensions(GltfBuilder& b, MemoryResolver& resolver) {
   json out;
   for (const MaterialExtensionKind& kind : material_extensions()) {
+    if (kind.converted) continue;
     json& e = out[std::string(kind.name)] = json::object();
     for (const ExtensionFactorKind& f : kind.factors) {
       if (f.components == 1)
@@ -257,12 +277,15 @@ TEST(ImportGltfMaterials, EveryTextureOfEveryExtensionIsRead) {
     b.json["extensionsRequired"].push_back(name);
   }
   const Model m = import(b, resolver);
-  EXPECT_EQ(m.notes.size(), 1u);  // that specular-glossiness has a fallback
+  EXPECT_TRUE(m.notes.empty());
   const Material& r = m.materials.at(0);
-  ASSERT_EQ(r.extensions.size(), material_extensions().size());
+  std::vector<MaterialExtensionKind> carried;
+  for (const MaterialExtensionKind& kind : material_extensions())
+    if (!kind.converted) carried.push_back(kind);
+  ASSERT_EQ(r.extensions.size(), carried.size());
   std::size_t textures = 0;
   for (std::size_t e = 0; e < r.extensions.size(); ++e) {
-    const MaterialExtensionKind& kind = material_extensions()[e];
+    const MaterialExtensionKind& kind = carried[e];
     EXPECT_EQ(r.extensions[e].name, kind.name);
     ASSERT_EQ(r.extensions[e].factors.size(), kind.factors.size());
     for (std::size_t f = 0; f < kind.factors.size(); ++f) {
@@ -282,8 +305,8 @@ TEST(ImportGltfMaterials, EveryTextureOfEveryExtensionIsRead) {
       ++textures;
     }
   }
-  EXPECT_EQ(m.images.size(), textures);  // the plain base colour gave way to the diffuse texture
-  EXPECT_EQ(textures, 16u);
+  EXPECT_EQ(m.images.size(), textures + 1);  // and the base colour
+  EXPECT_EQ(textures, 14u);
 }
 
 TEST(ImportGltfMaterials, ExtensionsOfTheWrongKindAreRefused) {

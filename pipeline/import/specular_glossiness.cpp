@@ -1,0 +1,107 @@
+#include "pipeline/import/specular_glossiness.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/srgb.h"
+#include "pipeline/import/combine_images.h"
+#include "stages/image/decode_image.h"
+#include "stages/measure/sampled_curve.h"
+
+namespace texmesh {
+namespace {
+
+constexpr float kDielectric = 0.04f;  // of light from straight ahead
+constexpr float kNearZero = 1e-6f;
+
+float brightness(Vec3f c) { return std::sqrt(0.299f * c.x * c.x + 0.587f * c.y * c.y + 0.114f * c.z * c.z); }
+
+float unit(float v) { return std::clamp(v, 0.0f, 1.0f); }
+
+/// The root of the equation that both models' diffuse and specular light set for the metal's share.
+float metallic_of(float diffuse, float specular, float not_specular) {
+  if (specular < kDielectric) return 0;
+  const float a = kDielectric, b = diffuse * not_specular / (1 - a) + specular - 2 * a, c = a - specular;
+  return unit((-b + std::sqrt(std::max(b * b - 4 * a * c, 0.0f))) / (2 * a));
+}
+
+/// Light of texels with one or three colours; alpha is 1 where there is none.
+struct Texel {
+  Vec3f light;
+  float alpha = 1;
+};
+Texel texel_of(const std::uint8_t* t, std::uint32_t channels) {
+  const std::array<float, 256>& light = light_of_bytes();
+  const std::uint32_t step = channels >= 3 ? 1 : 0;
+  return {{light[t[0]], light[t[step]], light[t[2 * step]]},
+          channels % 2 == 0 ? static_cast<float>(t[channels - 1]) / 255 : 1};
+}
+
+Vec3f product(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+
+std::uint8_t byte_of(float v) { return static_cast<std::uint8_t>(unit(v) * 255 + 0.5f); }
+
+MetallicRoughness converted(const Texel& diffuse, const Texel& specular, const SpecularGlossiness& factors) {
+  return metallic_roughness_of({product(diffuse.light, factors.diffuse),
+                                product(specular.light, factors.specular),
+                                specular.alpha * factors.glossiness});
+}
+
+}  // namespace
+
+MetallicRoughness metallic_roughness_of(const SpecularGlossiness& point) {
+  const Vec3f d = point.diffuse, s = point.specular;
+  const float not_specular = 1 - std::max({s.x, s.y, s.z});
+  MetallicRoughness out;
+  out.roughness = 1 - point.glossiness;
+  out.metallic = metallic_of(brightness(d), brightness(s), not_specular);
+  const float share = out.metallic * out.metallic;
+  const float of_diffuse = not_specular / (1 - kDielectric) / std::max(1 - out.metallic, kNearZero);
+  const float reflected = kDielectric * (1 - out.metallic), of_metal = 1 / std::max(out.metallic, kNearZero);
+  for (int k = 0; k < 3; ++k)
+    out.base_colour[k] =
+        unit((1 - share) * unit(d[k] * of_diffuse) + share * unit((s[k] - reflected) * of_metal));
+  return out;
+}
+
+MetallicRoughnessImages convert_specular_glossiness(Model& model, const SpecularGlossinessImages& images,
+                                                    const SpecularGlossiness& factors) {
+  static const SampledCurve<4096> encode(srgb_of_light);
+  const auto combined = [&](std::uint32_t channels, auto&& texel) {
+    return combine_images(
+        model, {images.diffuse, FloatEncoding::kSrgb}, {images.specular, FloatEncoding::kSrgb}, channels,
+        [&](const ImageTexel& d, const ImageTexel& s, std::uint8_t* to) {
+          const Texel diffuse = texel_of(d.channel, d.channels), specular = texel_of(s.channel, s.channels);
+          texel(diffuse, converted(diffuse, specular, factors), to);
+        });
+  };
+  MetallicRoughnessImages out;
+  out.base_colour = combined(4, [](const Texel& diffuse, const MetallicRoughness& m, std::uint8_t* to) {
+    for (int k = 0; k < 3; ++k) to[k] = byte_of(encode(m.base_colour[k]));
+    to[3] = byte_of(diffuse.alpha);
+  });
+  out.metallic_roughness = combined(3, [](const Texel&, const MetallicRoughness& m, std::uint8_t* to) {
+    to[0] = 255;  // occlusion: none
+    to[1] = byte_of(m.roughness);
+    to[2] = byte_of(m.metallic);
+  });
+  return out;
+}
+
+SpecularGlossiness mean_of_specular(const Model& model, std::int32_t image,
+                                    const SpecularGlossiness& factors) {
+  const Pixels pixels = decode_image(model.images.at(static_cast<std::size_t>(image)), FloatEncoding::kSrgb);
+  const std::size_t count = std::size_t{pixels.width_px} * pixels.height_px;
+  double sum[4] = {0, 0, 0, 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Texel t = texel_of(&pixels.data[i * pixels.channels], pixels.channels);
+    for (int k = 0; k < 3; ++k) sum[k] += static_cast<double>(t.light[k]);
+    sum[3] += static_cast<double>(t.alpha);
+  }
+  SpecularGlossiness out = factors;
+  for (int k = 0; k < 3; ++k) out.specular[k] *= static_cast<float>(sum[k] / static_cast<double>(count));
+  out.glossiness *= static_cast<float>(sum[3] / static_cast<double>(count));
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,44 @@
+#pragma once
+#include <cstdint>
+
+#include "format/base/vec.h"
+#include "format/model/model.h"
+
+namespace texmesh {
+
+/// A point of the specular-glossiness model (KHR_materials_pbrSpecularGlossiness); linear light, 0..1.
+struct SpecularGlossiness {
+  Vec3f diffuse{1, 1, 1}, specular{1, 1, 1};
+  float glossiness = 1;
+};
+
+/// The same point of the metallic-roughness model; linear light, 0..1.
+struct MetallicRoughness {
+  Vec3f base_colour;
+  float metallic = 0, roughness = 0;
+};
+
+/// The metal and the colour whose diffuse and specular parts come nearest to the given ones, with 0.04 as
+/// what dielectrics reflect. The equation is that of Khronos' own examples of the two models. A dielectric
+/// that reflects more than 0.04, or in colours, has no equal.
+MetallicRoughness metallic_roughness_of(const SpecularGlossiness& point);
+
+/// Textures of the model, by texel in place of `material`'s factors; -1 = none.
+struct SpecularGlossinessImages {
+  std::int32_t diffuse = -1;   // sRGB, alpha
+  std::int32_t specular = -1;  // sRGB specular, alpha = glossiness
+};
+/// Images of the metallic-roughness model, added to model.images; the factors are multiplied in.
+struct MetallicRoughnessImages {
+  std::int32_t base_colour = -1, metallic_roughness = -1;
+};
+/// At least one image must be there. The larger size of two counts; the other image is sampled at the nearest
+/// texel. InputError when one does not decode.
+MetallicRoughnessImages convert_specular_glossiness(Model& model, const SpecularGlossinessImages& images,
+                                                    const SpecularGlossiness& factors);
+/// Mean of an image's texels, times the factors: what stands for a texture that lies elsewhere than the
+/// diffuse one. InputError when the image does not decode.
+SpecularGlossiness mean_of_specular(const Model& model, std::int32_t image,
+                                    const SpecularGlossiness& factors);
+
+}  // namespace texmesh
