@@ -15,6 +15,7 @@ inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
 inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
+inline constexpr const char* kPosterPath = "poster.jpg";            // not every package has it
 
 std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
@@ -43,6 +44,7 @@ enum class EntryKind : std::uint8_t {
   kFragmentFile,
   kSource,
   kSplitStream,
+  kPoster,
   kOther,
   kProvenance
 };

@@ -65,10 +65,10 @@ Results<QualityTable> measure_scales(const NestedScales& scales, const Perceptua
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
                   const PackageTables& tables, const ScaleFiles& files, const QualityTable& quality,
-                  const std::string& provenance, const PackageOptions& options, double jnd,
-                  const RunContext& context) {
+                  const Poster& poster, const std::string& provenance, const PackageOptions& options,
+                  double jnd, const RunContext& context) {
   return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                          jnd, provenance, options, context);
+                          poster, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -133,9 +133,12 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"quality", kQualityVersion, "scales x rungs -> measured quality of rendered samples"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder),
             outputs(kQualityTable), read_of(o, o.quality), {"libjpeg-turbo", "libwebp"}, measure_scales),
+      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
+            inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
+            read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kScaleFiles, kQualityTable, kProvenance),
+                   kScaleFiles, kQualityTable, kPoster, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

@@ -9,13 +9,14 @@
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/poster.h"
 #include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 2;
+inline constexpr int kPackageVersion = 3;
 
 struct PackageOptions {
   std::string title;
@@ -34,7 +35,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const QualityTable& quality, double jnd,
+                                           const QualityTable& quality, const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context);
 
