@@ -49,7 +49,7 @@ struct Fetched {
   bool whole_rungs = false;
   LoadReport load;
   std::optional<LoadReport> refined;
-  double texture_dssim = 0, ssim = 0;
+  double texture_flip = 0, flip = 0;  // predicted of what has come
 };
 
 /// Files as `unpack --fragments files` names them, the best rung of each fragment.
@@ -173,16 +173,15 @@ std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const Htt
   return open_transport(mirrors, options);
 }
 
-void predict(PackageReader& package, const DeliveryRequest& request, const TextureLoader& loader,
-             const std::vector<PlaneChoice>& planes, const ListOptions& options, Fetched& f) {
+void predict(PackageReader& package, const TextureLoader& loader, const std::vector<PlaneChoice>& planes,
+             const ListOptions& options, Fetched& f) {
   const FragmentList list = fragment_list(package, planes, options);
-  double loss = list.preview_loss;
-  for (std::size_t i = 0; i < list.offers.size(); ++i)
-    loss += list.offers[i].loss[static_cast<std::size_t>(
-        loader.held(list.fragments[i].plane, list.fragments[i].fragment) + 1)];
-  const double shown = list.total_weight > 0 ? 1 - loss / list.total_weight : 1;
-  f.texture_dssim = 1 - shown * (1 - mip_loss(package, planes, request.displayed_px));
-  f.ssim = predicted_ssim(package, request.displayed_px, f.scale, f.texture_dssim);
+  std::vector<std::int32_t> rungs;
+  for (const ListedFragment& listed : list.fragments)
+    rungs.push_back(loader.held(listed.plane, listed.fragment));
+  const TextureParts parts = parts_of(list, rungs);
+  f.texture_flip = texture_flip(package.quality(), parts);
+  f.flip = picture_flip(package.quality(), options.displayed_px, f.scale, parts);
 }
 
 Fetched fetch(const FetchArguments& a) {
@@ -212,6 +211,7 @@ Fetched fetch(const FetchArguments& a) {
   TextureLoader loader(package, *transport, f.whole_rungs);
   LoadOptions load;
   load.list.scale = f.scale;
+  load.list.displayed_px = request.displayed_px;
   load.htc = request.htc;
   load.htc.rtt_s = f.rtt_s;
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
@@ -220,8 +220,9 @@ Fetched fetch(const FetchArguments& a) {
   load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
   const auto budget_bytes =
       static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
-  const std::vector<PlaneChoice> planes =
-      texture_for_budget(package, request.displayed_px, load.list, budget_bytes).planes;
+  const TextureBudget budget = texture_for_budget(package, load.list, budget_bytes);
+  const std::vector<PlaneChoice>& planes = budget.planes;
+  load.list.group_weights = budget.list.group_weights;
   load.cancelled = http.cancelled;
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
@@ -230,7 +231,7 @@ Fetched fetch(const FetchArguments& a) {
     f.refined = loader.refine(planes, load, {seconds, ~0ull});
   f.texture_bytes = loader.bytes();
   writer.write();
-  predict(package, request, loader, planes, load.list, f);
+  predict(package, loader, planes, load.list, f);
   return f;
 }
 
@@ -252,8 +253,8 @@ Json fetch_json(const Fetched& f, double limit_s) {
          {"given_up", f.load.given_up},
          {"problems", f.load.problems},
          {"cancelled", f.load.cancelled},
-         {"texture_ssim", 1 - f.texture_dssim},
-         {"ssim", f.ssim}};
+         {"texture_flip", f.texture_flip},
+         {"flip", f.flip}};
   if (f.refined)
     j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
   return j;
@@ -277,8 +278,8 @@ void print(const Fetched& f, double limit_s) {
                              grouped(f.refined->transfer.bytes),
                              f.refined->out_of_time ? ", until its time was over" : "");
   std::cout << fmt::format(
-      "surface-weighted SSIM of the textures {:.4f}, predicted SSIM of the object {:.4f}{}\n",
-      1 - f.texture_dssim, f.ssim, f.load.cancelled ? "; cancelled" : "");
+      "predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n", f.flip,
+      f.texture_flip, f.load.cancelled ? "; cancelled" : "");
 }
 
 int run(FetchArguments& args) {

@@ -17,16 +17,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The fragments that the plan decided about, in the order of its rungs.
-FragmentList list_of(PackageReader& package, const DeliveryPlan& p) {
-  ListOptions options;
-  options.scale = p.scale;
-  return fragment_list(package, p.planes, options);
-}
-
 /// By plane: the rung of each fragment, row by row; -1 skipped, null where nothing is stored.
-Json planes_json(PackageReader& package, const DeliveryPlan& p) {
-  const FragmentList list = list_of(package, p);
+Json planes_json(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   Json planes = Json::array();
   for (const PlaneChoice& c : p.planes) {
     const PlaneTables& t = package.tables().planes[c.plane];
@@ -39,10 +31,10 @@ Json planes_json(PackageReader& package, const DeliveryPlan& p) {
   return planes;
 }
 
-Json plan_json(PackageReader& package, const DeliveryPlan& p) {
+Json plan_json(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   return {{"version", 1},
           {"scale", p.scale},
-          {"planes", planes_json(package, p)},
+          {"planes", planes_json(package, p, list)},
           {"first_picture_s", p.first_picture_s},
           {"mesh_s", p.mesh_s},
           {"complete_s", p.complete_s},
@@ -57,14 +49,13 @@ Json plan_json(PackageReader& package, const DeliveryPlan& p) {
           {"skipped", p.textures.skipped},
           {"mean_quality", p.mean_quality},
           {"worst_quality", p.worst_quality},
-          {"texture_ssim", 1 - p.texture_dssim},
-          {"ssim", p.ssim},
+          {"texture_flip", p.texture_flip},
+          {"flip", p.flip},
           {"warnings", p.warnings}};
 }
 
 /// How many fragments get which quality: "12 x 30, 40 x 53".
-std::string rungs_text(PackageReader& package, const DeliveryPlan& p) {
-  const FragmentList list = list_of(package, p);
+std::string rungs_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   std::map<int, int> count;
   for (std::size_t i = 0; i < list.fragments.size(); ++i)
     if (const std::int32_t r = p.textures.rungs[i]; r >= 0)
@@ -75,36 +66,36 @@ std::string rungs_text(PackageReader& package, const DeliveryPlan& p) {
   return text;
 }
 
-std::string textures_text(PackageReader& package, const DeliveryPlan& p) {
+std::string textures_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   std::string text;
   if (!p.textures.rungs.empty())
     text += fmt::format("fragments: {}, {} skipped; quality {:.0f} in the mean, {:.0f} at worst\n",
                         p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
-  if (const std::string rungs = rungs_text(package, p); !rungs.empty())
+  if (const std::string rungs = rungs_text(package, p, list); !rungs.empty())
     text += "rungs (fragments x quality): " + rungs + "\n";
   for (const std::string& w : p.warnings) text += "warning: " + w + "\n";
   return text;
 }
 
-std::string plan_text(PackageReader& package, const DeliveryPlan& p) {
+std::string plan_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   std::string text = fmt::format(
-      "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
+      "S_{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
       "first picture {} ({} bytes), mesh complete {}, textures {}\n"
       "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-      p.scale, p.ssim, 1 - p.texture_dssim, moment(p.first_picture_s),
+      p.scale, p.flip, p.texture_flip, moment(p.first_picture_s),
       grouped(p.bootstrap_bytes + p.first_picture_bytes), moment(p.mesh_s), moment(p.complete_s),
       grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes), grouped(p.mesh_bytes),
       grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes()));
-  return text + textures_text(package, p);
+  return text + textures_text(package, p, list);
 }
 
-std::string budget_text(PackageReader& package, const DeliveryPlan& p) {
+std::string budget_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   return fmt::format(
-             "S_{}, predicted SSIM {:.3f} of the rendered object, {:.3f} of its textures\n"
+             "S_{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
              "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-             p.scale, p.ssim, 1 - p.texture_dssim, grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes),
+             p.scale, p.flip, p.texture_flip, grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes),
              grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes())) +
-         textures_text(package, p);
+         textures_text(package, p, list);
 }
 
 struct PlanArguments : DeliveryArguments {
@@ -112,25 +103,25 @@ struct PlanArguments : DeliveryArguments {
 };
 
 struct CheckArguments : DeliveryArguments {
-  double min_ssim = 0, min_texture_ssim = 0;
+  double max_flip = 1, max_texture_flip = 1;
   std::string max_first_picture, max_bytes;
 };
 
 /// What check asks for.
 struct Gate {
-  double min_ssim = 0, min_texture_ssim = 0, max_first_picture_s = std::numeric_limits<double>::infinity();
+  double max_flip = 1, max_texture_flip = 1, max_first_picture_s = std::numeric_limits<double>::infinity();
   std::uint64_t max_bytes = ~0ull;
 };
 
 /// One sentence per limit that the plan misses.
 std::vector<std::string> why_not(const DeliveryPlan& plan, const Gate& gate, double time_limit_s) {
   std::vector<std::string> reasons;
-  if (!(plan.ssim >= gate.min_ssim))
+  if (!(plan.flip <= gate.max_flip))
     reasons.push_back(
-        fmt::format("predicted SSIM {:.4f}, expected at least {:.4f}", plan.ssim, gate.min_ssim));
-  if (!(1 - plan.texture_dssim >= gate.min_texture_ssim))
-    reasons.push_back(fmt::format("SSIM of the textures {:.4f}, expected at least {:.4f}",
-                                  1 - plan.texture_dssim, gate.min_texture_ssim));
+        fmt::format("predicted FLIP {:.4f}, expected at most {:.4f}", plan.flip, gate.max_flip));
+  if (!(plan.texture_flip <= gate.max_texture_flip))
+    reasons.push_back(fmt::format("predicted FLIP by the textures alone {:.4f}, expected at most {:.4f}",
+                                  plan.texture_flip, gate.max_texture_flip));
   if (!(plan.first_picture_s <= gate.max_first_picture_s))
     reasons.push_back(fmt::format("first picture {}, expected by {:.2f} s", moment(plan.first_picture_s),
                                   gate.max_first_picture_s));
@@ -151,32 +142,35 @@ int run_plan(PlanArguments& args) {
   PackageReader package(open_store(args.package));
   if (!budget) {
     const DeliveryPlan plan = plan_delivery(package, request);
-    std::cout << (args.json ? plan_json(package, plan).dump() + "\n" : plan_text(package, plan));
+    const FragmentList list = list_of(package, request, plan);
+    std::cout << (args.json ? plan_json(package, plan, list).dump() + "\n" : plan_text(package, plan, list));
     return kExitOk;
   }
   const DeliveryPlan plan = plan_budget(package, request, bytes);
-  Json j = plan_json(package, plan);
+  const FragmentList list = list_of(package, request, plan);
+  Json j = plan_json(package, plan, list);
   for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
-  std::cout << (args.json ? j.dump() + "\n" : budget_text(package, plan));
+  std::cout << (args.json ? j.dump() + "\n" : budget_text(package, plan, list));
   return plan.bytes() <= bytes ? kExitOk : kExitDifferent;
 }
 
 int run_check(const CheckArguments& args) {
   const DeliveryRequest request = delivery_request(args);
-  Gate gate{args.min_ssim, args.min_texture_ssim};
+  Gate gate{args.max_flip, args.max_texture_flip};
   if (!args.max_first_picture.empty())
     gate.max_first_picture_s = parse_duration(args.max_first_picture, "--max-first-picture");
   if (!args.max_bytes.empty()) gate.max_bytes = parse_bytes(args.max_bytes, "--max-bytes");
   PackageReader package(open_store(args.package));
   const DeliveryPlan plan = plan_delivery(package, request);
+  const FragmentList list = list_of(package, request, plan);
   const std::vector<std::string> reasons = why_not(plan, gate, request.time_limit_s);
   if (args.json) {
-    Json j = plan_json(package, plan);
+    Json j = plan_json(package, plan, list);
     j["good"] = reasons.empty();
     j["reasons"] = reasons;
     std::cout << j.dump() << '\n';
   } else {
-    std::cout << plan_text(package, plan);
+    std::cout << plan_text(package, plan, list);
     for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
     if (reasons.empty()) std::cout << "good enough\n";
   }
@@ -198,8 +192,9 @@ void add_plan_command(Command& app) {
       "  texmesh plan https://host/bust.texmesh --display 400 --time 1.5 --trace monday.csv --rtt 80\n"
       "  texmesh plan bust.texmesh --display 800 --budget 500kB");
   c.notes(
-      "plan plays the transfer over a model of the network and needs nothing but the package. The predicted "
-      "SSIM comes from what compile measured.\n"
+      "plan plays the transfer over a model of the network and needs nothing but the package. FLIP is "
+      "how much a lit picture of that height differs from one of the source, in the mean over the object: 0 "
+      "= equal, 1 = as different as can be. It comes from the table that compile measured.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c.on_run([args] { return run_plan(*args); });
 }
@@ -208,15 +203,17 @@ void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
   Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
   add_delivery_options(c, *args, true);
-  c.option("--min-ssim", args->min_ssim, "Least predicted SSIM of the rendered object").number_in(0, 1);
-  c.option("--min-texture-ssim", args->min_texture_ssim, "Least surface-weighted SSIM of the textures")
+  c.option("--max-flip", args->max_flip, "Most predicted FLIP of the lit object, 0 = equal to the source")
+      .number_in(0, 1);
+  c.option("--max-texture-flip", args->max_texture_flip,
+           "Most predicted FLIP by the textures alone, on the finest scale")
       .number_in(0, 1);
   c.option("--max-first-picture", args->max_first_picture, "Latest time of the first picture: 1s, 800ms")
       .value_name("TIME");
   c.option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB").value_name("SIZE");
   c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
   c.examples(
-      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --min-ssim 0.95 --max-first-picture 1s");
+      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --max-flip 0.08 --max-first-picture 1s");
   c.notes("Exit code: 0 good enough, 4 not good enough, 1 when the package cannot be read, 2 usage.");
   c.on_run([args] { return run_check(*args); });
 }

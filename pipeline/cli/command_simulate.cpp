@@ -196,8 +196,8 @@ Json result_json(const DeliveryPlan& p, double limit_s) {
           {"skipped", r.skipped},
           {"mean_quality", p.mean_quality},
           {"worst_quality", p.worst_quality},
-          {"texture_ssim", 1 - p.texture_dssim},
-          {"ssim", p.ssim},
+          {"texture_flip", p.texture_flip},
+          {"flip", p.flip},
           {"warnings", p.warnings}};
 }
 
@@ -226,18 +226,15 @@ std::string result_text(const DeliveryPlan& p, double limit_s) {
                         r.time_limit_s, r.end_s, r.deviation_percent, r.late_s);
   return text + fmt::format(
                     "{} bytes in {} fragments, {} skipped; quality {:.0f} in the mean, {:.0f} at worst; "
-                    "surface-weighted SSIM {:.4f}\n",
-                    grouped(r.bytes), r.rungs.size(), r.skipped, p.mean_quality, p.worst_quality,
-                    1 - p.texture_dssim);
+                    "predicted FLIP {:.4f} (0 = equal to the source)\n",
+                    grouped(r.bytes), r.rungs.size(), r.skipped, p.mean_quality, p.worst_quality, p.flip);
 }
 
 void simulate_package(const SimulateArguments& a) {
   const DeliveryRequest request = delivery_request(a);
   PackageReader package(open_store(a.package));
   const DeliveryPlan plan = plan_delivery(package, request);
-  ListOptions options;
-  options.scale = plan.scale;
-  const FragmentList list = fragment_list(package, plan.planes, options);
+  const FragmentList list = list_of(package, request, plan);
   const std::vector<double> qualities = qualities_of(package, plan, list);
   if (!a.plot.empty()) {
     BandwidthTrace link{{}, {}};

@@ -58,7 +58,7 @@ List list_of(const std::string& path) {
     FragmentOffer f = fragments.offers[i];
     const auto [plane, fragment] = fragments.fragments[i];
     const PlaneTables& t = package.tables().planes[plane];
-    if (role_weight(package.textures()[plane].role) < 1) continue;  // PSNR of base colour
+    if (package.textures()[plane].role != "base-colour") continue;  // PSNR of base colour
     const double weight = t.surface_fraction[fragment];
     // What a preview leaves is not in the tables as a mean squared error; as much worse as its SSIM says.
     const double lowest = t.mse[fragment],
@@ -255,7 +255,7 @@ int main(int argc, char** argv) {
     PackageReader reader(open_store(package));
     weight = 0;
     for (std::uint32_t p = 0; p < full_size(reader).size(); ++p)
-      if (role_weight(reader.textures()[p].role) == 1)
+      if (reader.textures()[p].role == "base-colour")
         for (const float s : reader.tables().planes[p].surface_fraction) weight += s;
   }
   print_policies(list, weight, runs);

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "delivery/cpp/decide/fragment_list.h"
+#include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/documents/viewing.h"
@@ -13,8 +13,7 @@ namespace texmesh {
 /// How somebody looks at the object, and over which network.
 struct DeliveryRequest {
   double displayed_px = 1000;  // displayed height, device pixels
-  StepRule rule = StepRule::kDefault;
-  bool measured = true;      // kDefault only: a finer scale where finer_where_seen() says so
+  StepRule rule = StepRule::kFlip;
   int scale = -1;            // -1 = by the rule
   double time_limit_s = 5;   // from the first request on
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
@@ -34,8 +33,11 @@ struct DeliveryPlan {
   double complete_s = 0;                       // the last fragment
   SimulationResult textures;                   // its times count from mesh_s
   double mean_quality = 0, worst_quality = 0;  // IJG quality of fragments, surface-weighted mean; skipped = 0
-  double ssim = 0;                             // predicted, from the package's measured table
-  double texture_dssim = 0;                    // surface-weighted 1 - SSIM of the textures as displayed
+  // Predicted FLIP of lit pictures of that height against S_0 with the source's texels: 0 = equal, 1 = as
+  // different as can be, which is also what nothing to show has.
+  double flip = 0;
+  double texture_flip = 0;          // what it would be of S_0 with these textures
+  PerGroup group_weights{1, 1, 1};  // ListOptions::group_weights of the list that `textures` is about
   std::vector<std::string> warnings;
   std::uint64_t bytes() const {
     return bootstrap_bytes + first_picture_bytes + mesh_bytes + table_bytes + texture_bytes;
@@ -51,23 +53,9 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
 /// warning.
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
-/// `scale`, which the step function finds good enough, or a finer scale: takes the next finer one as long as
-/// the package's measured table says that the difference is seen (0.004 of SSIM with the best textures). The
-/// step function knows distances only, and shading tells more. The table holds for objects that are displayed
-/// at least as high as the table's pictures.
-int finer_where_seen(const QualityTable& table, int scale, double displayed_px);
-/// SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's
-/// measured table (scale number, logarithm of the quantiser). Below the table's lowest quality the last line
-/// goes on.
-double predicted_ssim(const QualityTable& table, int scale, double quality);
-/// The same for a loss of the textures as they are displayed, mip_loss() included.
-double predicted_ssim(PackageReader& package, double displayed_px, int scale, double texture_dssim);
-/// The scale that the request asks for: DeliveryRequest::scale, or the rule's, or a finer scale by
-/// measurement.
+/// The scale that the request asks for: DeliveryRequest::scale, or the rule's.
 int wanted_scale(PackageReader& package, const DeliveryRequest& request);
-/// The quality at which the textures lose `texture_dssim` when all fragments have it: interpolated between
-/// the losses of the rungs of those planes whose role weighs most, base colours where there are some.
-double equivalent_quality(PackageReader& package, const std::vector<PlaneChoice>& planes,
-                          double texture_dssim);
+/// The list that a plan of this package is about.
+FragmentList list_of(PackageReader& package, const DeliveryRequest& request, const DeliveryPlan& plan);
 
 }  // namespace texmesh

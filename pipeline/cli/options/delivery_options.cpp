@@ -146,10 +146,10 @@ void add_method_options(Command& c, DeliveryArguments& a) {
       .rare();
   c.option(
        "--rule", a.rule,
-       "Which scale is enough: jnd = by the just-noticeable difference; error = by an error of one pixel; "
-       "default = the finer of jnd and error; edge = by edges of one pixel; measured = as default, or a "
-       "finer scale that compile has measured to look better")
-      .one_of_explained({"measured", "default", "jnd", "error", "edge"})
+       "Which scale is enough: flip = by lit pictures, which compile has compared with those of the finest "
+       "scale; jnd = by the just-noticeable difference; error = by an error of one pixel; edge = by edges of "
+       "one pixel")
+      .one_of_explained({"flip", "jnd", "error", "edge"})
       .value_name("NAME")
       .shows_default()
       .rare();
@@ -179,9 +179,7 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
   r.displayed_px =
       a.distance > 0 ? std::clamp(displayed_height_px(1, a.distance, a.camera), 1.0, 1e6) : a.display_px;
   r.scale = a.scale;
-  r.measured = a.rule == "measured";
-  r.rule = choice<StepRule>(a.rule, {{"measured", StepRule::kDefault},
-                                     {"default", StepRule::kDefault},
+  r.rule = choice<StepRule>(a.rule, {{"flip", StepRule::kFlip},
                                      {"jnd", StepRule::kJnd},
                                      {"error", StepRule::kError},
                                      {"edge", StepRule::kEdge}});

@@ -1,0 +1,31 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "delivery/cpp/decide/fragment_list.h"
+
+namespace texmesh {
+
+/// The best texture that so many bytes can show.
+struct TextureBudget {
+  std::vector<PlaneChoice> planes;
+  FragmentList list;
+  std::vector<std::int32_t> rungs;  // by offer; -1 = skipped
+  std::uint64_t bytes = 0;          // of fragments, at most the budget
+  TextureParts parts;               // what is lost
+  double flip = 0;                  // of the picture with the scale
+};
+
+/// Chooses between the planes for the display and their mips, so that few bytes are not spread over too many
+/// texels, and spends the bytes on fragments by rate and distortion (spend_bytes). What counts is the FLIP
+/// that is predicted of the picture with ListOptions::scale.
+///
+/// Bytes are first spent by the sum of the groups' losses (ListOptions::group_weights = 1). Losses add up as
+/// QualityTable::exponent says, so the groups' weights become those of that sum's slope where the bytes were
+/// spent, and the bytes are spent again; the better choice stays. FragmentList::group_weights has its
+/// weights.
+TextureBudget texture_for_budget(PackageReader& package, const ListOptions& options, std::uint64_t bytes);
+/// `loss` is for options.displayed_px.
+TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes);
+
+}  // namespace texmesh

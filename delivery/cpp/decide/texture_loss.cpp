@@ -1,0 +1,119 @@
+#include "delivery/cpp/decide/texture_loss.h"
+
+#include <algorithm>
+
+#include "format/base/errors.h"
+#include "format/documents/mip_choice.h"
+#include "format/documents/rate_distortion.h"
+
+namespace texmesh {
+namespace {
+
+/// Area of the object; where the package does not say it that of the bounding box. Object units squared.
+double surface_of(const Manifest& m) {
+  if (m.surface_area > 0) return m.surface_area;
+  const double x = m.bounds_max.x - m.bounds_min.x, y = m.bounds_max.y - m.bounds_min.y,
+               z = m.bounds_max.z - m.bounds_min.z;
+  return 2 * (x * y + y * z + z * x);
+}
+
+double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
+  const Manifest& m = package.manifest();
+  return std::max(0.0,
+                  display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px));
+}
+
+double combined(const QualityTable& table, double geometry, const TextureParts& parts) {
+  std::vector<double> losses{geometry};
+  for (std::size_t g = 0; g < kPlaneGroups; ++g) {
+    losses.push_back(parts.coded[g]);
+    losses.push_back(parts.coarser[g]);
+  }
+  return combined_flip(table, losses);
+}
+
+}  // namespace
+
+std::vector<PlaneChoice> full_size(PackageReader& package) {
+  std::vector<PlaneChoice> planes;
+  for (std::uint32_t p = 0; p < full_size_planes(package.textures()); ++p) planes.push_back({p, p});
+  return planes;
+}
+
+std::vector<PlaneChoice> planes_coarser(PackageReader& package, double displayed_px,
+                                        const std::array<int, kPlaneGroups>& levels) {
+  std::vector<PlaneChoice> planes = full_size(package);
+  for (PlaneChoice& choice : planes) {
+    const auto group = static_cast<std::size_t>(group_of(package.textures()[choice.base].role));
+    choice.plane = plane_at_level(package.textures(), choice.base,
+                                  level_for_display(package, choice.base, displayed_px) + levels[group]);
+  }
+  return planes;
+}
+
+std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px) {
+  return planes_coarser(package, displayed_px, {});
+}
+
+double texture_flip(const QualityTable& table, const TextureParts& parts) {
+  return combined(table, 0, parts);
+}
+
+double picture_flip(const QualityTable& table, double displayed_px, int scale, const TextureParts& parts) {
+  return combined(table, geometry_flip(table, displayed_px, scale), parts);
+}
+
+TextureLoss::TextureLoss(PackageReader& package, double displayed_px)
+    : package_(package),
+      displayed_px_(displayed_px),
+      curves_{GroupCurve(package.quality(), PlaneGroup::kColour, displayed_px),
+              GroupCurve(package.quality(), PlaneGroup::kNormal, displayed_px),
+              GroupCurve(package.quality(), PlaneGroup::kData, displayed_px)} {}
+
+PlaneGroup TextureLoss::group_of(std::uint32_t plane) const {
+  return texmesh::group_of(package_.textures()[plane].role);
+}
+
+const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
+  if (plane >= package_.tables().planes.size())
+    throw InputError(package_.store().name(), "texture plane " + std::to_string(plane),
+                     "one of " + std::to_string(package_.tables().planes.size()), "another");
+  const auto [found, is_new] = planes_.try_emplace(plane);
+  Plane& out = found->second;
+  if (!is_new) return out;
+  const PlaneTables& t = package_.tables().planes[plane];
+  const GroupCurve& curve = curves_[static_cast<std::size_t>(group_of(plane))];
+  const std::size_t fragments = t.fragment_count();
+  out.weights = surface_weights(t);
+  out.coded.resize((t.rung_count() + 1) * fragments);
+  for (const std::uint16_t f : t.order) {
+    out.weight += static_cast<double>(out.weights[f]);
+    out.coded[f] = curve.coded(t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[f]));
+    for (std::size_t r = 0; r < t.rung_count(); ++r)
+      out.coded[(r + 1) * fragments + f] = curve.coded(static_cast<double>(t.dssim[r * fragments + f]));
+  }
+  return out;
+}
+
+PerGroup TextureLoss::weights(const std::vector<PlaneChoice>& planes) {
+  PerGroup weights{};
+  for (const PlaneChoice& p : planes)
+    weights[static_cast<std::size_t>(group_of(p.plane))] += plane(p.plane).weight;
+  return weights;
+}
+
+PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
+  const std::vector<TextureInfo>& textures = package_.textures();
+  PerGroup loss{}, weights = this->weights(planes);
+  for (const PlaneChoice& p : planes) {
+    const auto group = static_cast<std::size_t>(group_of(p.plane));
+    const std::uint32_t for_display =
+        plane_at_level(textures, p.base, level_for_display(package_, p.base, displayed_px_));
+    const double levels = static_cast<double>(textures[p.plane].mip) - textures[for_display].mip;
+    if (!(levels > 0) || !(weights[group] > 0)) continue;
+    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(levels);
+  }
+  return loss;
+}
+
+}  // namespace texmesh
