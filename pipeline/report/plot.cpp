@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/portable_math.h"
 #include "pipeline/report/html.h"
 
 namespace texmesh {
@@ -16,7 +17,10 @@ constexpr double kLegendLine = 18;
 
 /// The step of 1, 2 or 5 times a power of ten that divides a span into about so many parts.
 double round_step(double span, int parts) {
-  const double least = span / parts, power = std::pow(10.0, std::floor(std::log10(least)));
+  const double least = span / parts;
+  double power = 1;
+  while (power > least) power /= 10;
+  while (power * 10 <= least) power *= 10;
   for (const double digit : {1.0, 2.0, 5.0})
     if (digit * power >= least * (1 - 1e-9)) return digit * power;
   return 10 * power;
@@ -29,8 +33,8 @@ class Canvas {
     top_value_ = step_ * std::ceil((plot.y_high > 0 ? plot.y_high : 1) / step_ - 1e-9);
   }
   double x(double v) const {
-    const double low = std::log(plot_.x_low), high = std::log(plot_.x_high);
-    const double at = (std::log(std::clamp(v, plot_.x_low, plot_.x_high)) - low) / (high - low);
+    const double low = portable::log(plot_.x_low), high = portable::log(plot_.x_high);
+    const double at = (portable::log(std::clamp(v, plot_.x_low, plot_.x_high)) - low) / (high - low);
     return kLeft + kPlotWidth * at;
   }
   double y(double v) const { return kTop + kPlotHeight * (1 - std::clamp(v, 0.0, top_value_) / top_value_); }
