@@ -83,6 +83,8 @@ struct QualityTable {
   friend bool operator==(const QualityTable&, const QualityTable&) = default;
 };
 
+/// The least displayed height at which a scale is compared with S_0 for ManifestScale::display_px_flip, px.
+inline constexpr double kLeastSwitchPx = 32;
 inline constexpr std::size_t kMaxQualitySizes = 8, kMaxQualitySamples = 100, kMaxCoarserLevels = 8;
 
 std::string write_quality(const QualityTable& table);           // canonical JSON

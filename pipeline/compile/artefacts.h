@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "format/base/bytes.h"
-#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/model/model.h"
 #include "pipeline/graph/artefact.h"
@@ -12,6 +11,7 @@
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
+#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
@@ -63,7 +63,7 @@ inline constexpr Artefact<Previews> kPreviews{"previews"};
 inline constexpr Artefact<Ladder> kLadder{"ladder"};
 inline constexpr Artefact<PackageTables> kTables{"lut"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
-inline constexpr Artefact<QualityTable> kQualityTable{"quality"};
+inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
 inline constexpr Artefact<Poster> kPoster{"poster"};
 inline constexpr Artefact<Bytes> kPackage{"package"};
 

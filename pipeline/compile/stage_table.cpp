@@ -53,18 +53,20 @@ Previews preview_fragments(const Fragments& fragments, const Planes& planes, int
   return make_previews(fragments, planes, {quality, subsampling}, context);
 }
 
-Results<QualityTable> measure_scales(const NestedScales& scales, const PerceptualValues& perceptual,
-                                     const Materials& materials, const Fragments& fragments,
-                                     const Planes& planes, const Ladder& ladder,
-                                     const QualityOptions& options, const RunContext& context) {
-  MeasuredQuality measured =
-      measure_quality(scales, perceptual, materials, fragments, planes, ladder, options, context);
-  return {std::move(measured.table), std::move(measured.notes)};
+Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const PerceptualValues& perceptual,
+                                          const Materials& materials, const Fragments& fragments,
+                                          const Planes& planes, const Ladder& ladder,
+                                          const Previews& previews, const PackageTables& tables,
+                                          const QualityOptions& options, const RunContext& context) {
+  MeasuredQuality measured = measure_quality(scales, perceptual, materials, fragments, planes, ladder,
+                                             previews, tables, options, context);
+  Notes notes = measured.notes;
+  return {std::move(measured), std::move(notes)};
 }
 
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
-                  const PackageTables& tables, const ScaleFiles& files, const QualityTable& quality,
+                  const PackageTables& tables, const ScaleFiles& files, const MeasuredQuality& quality,
                   const Poster& poster, const std::string& provenance, const PackageOptions& options,
                   double jnd, const RunContext& context) {
   return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
@@ -130,15 +132,16 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),
-      stage({"quality", kQualityVersion, "scales x rungs -> measured quality of rendered samples"},
-            inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder),
-            outputs(kQualityTable), read_of(o, o.quality), {"libjpeg-turbo", "libwebp"}, measure_scales),
+      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
+            inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder,
+                   kPreviews, kTables),
+            outputs(kQuality), read_of(o, o.quality), {"libjpeg-turbo", "libwebp"}, measure_pictures),
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kScaleFiles, kQualityTable, kPoster, kProvenance),
+                   kScaleFiles, kQuality, kPoster, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "format/base/portable_math.h"
 #include "stages/measure/cie_lab.h"
+#include "stages/measure/pixel_spans.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
@@ -14,44 +14,10 @@ namespace {
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
 
 using Curve = SampledCurve<16384>;
-
-/// One row of a separable filter, of any parity.
-using Kernel = std::vector<float>;  // [2 * radius + 1]
-
-/// A rectangle of pixels.
-struct PixelRectangle {
-  int x = 0, y = 0, width = 0, height = 0;
-  std::size_t count() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
-};
-
-/// Filters `lines` lines of `length` values that are `step` apart.
-void filter_lines(const std::vector<float>& from, std::vector<float>& to, int length, int lines,
-                  std::size_t step, std::size_t line_step, const Kernel& kernel) {
-  const int radius = static_cast<int>(kernel.size() / 2);
-  std::vector<float> line(static_cast<std::size_t>(length + 2 * radius));
-  for (int l = 0; l < lines; ++l) {
-    const float* in = from.data() + static_cast<std::size_t>(l) * line_step;
-    float* out = to.data() + static_cast<std::size_t>(l) * line_step;
-    for (int i = -radius; i < length + radius; ++i)
-      line[static_cast<std::size_t>(i + radius)] =
-          in[static_cast<std::size_t>(std::clamp(i, 0, length - 1)) * step];
-    for (int i = 0; i < length; ++i) {
-      float sum = 0;
-      const float* at = line.data() + i;
-      for (std::size_t k = 0; k < kernel.size(); ++k) sum += at[k] * kernel[k];
-      out[static_cast<std::size_t>(i) * step] = sum;
-    }
-  }
-}
-
-std::vector<float> filtered(const std::vector<float>& image, const PixelRectangle& box, const Kernel& along_x,
-                            const Kernel& along_y) {
-  const auto stride = static_cast<std::size_t>(box.width);
-  std::vector<float> half(image.size()), out(image.size());
-  filter_lines(image, half, box.width, box.height, 1, stride, along_x);
-  filter_lines(half, out, box.height, box.width, stride, 1, along_y);
-  return out;
-}
+using measure::filtered;
+using measure::Kernel;
+using measure::PixelSpans;
+using measure::SpanImage;
 
 double sum_of(const Kernel& kernel) {
   double sum = 0;
@@ -59,12 +25,15 @@ double sum_of(const Kernel& kernel) {
   return sum;
 }
 
-/// exp(-pi^2 x^2 / b), x in degrees: one term of a contrast sensitivity function.
-Kernel sensitivity(double b, int radius) {
+/// exp(-pi^2 x^2 / b), x in degrees: one term of a contrast sensitivity function. Three deviations of the
+/// widest term; narrow ones end where single precision no longer sees them.
+Kernel sensitivity(double b) {
+  constexpr double kUnseen = 1e-9;
   Kernel out;
-  for (int i = -radius; i <= radius; ++i) {
+  for (int i = -measure::kFilterReach; i <= measure::kFilterReach; ++i) {
     const double x = i / kPixelsPerDegree;
-    out.push_back(static_cast<float>(portable::exp(-portable::kPi * portable::kPi * x * x / b)));
+    const double weight = portable::exp(-portable::kPi * portable::kPi * x * x / b);
+    if (weight > kUnseen) out.push_back(static_cast<float>(weight));
   }
   return out;
 }
@@ -73,20 +42,19 @@ Kernel sensitivity(double b, int radius) {
 struct Term {
   double a, b;
 };
-std::vector<float> eye_filtered(const std::vector<float>& channel, const PixelRectangle& box,
-                                std::initializer_list<Term> terms) {
-  constexpr int kRadius = 10;  // three deviations of the widest term
+SpanImage eye_filtered(const SpanImage& channel, const PixelSpans& spans, std::initializer_list<Term> terms) {
   double whole = 0;
   for (const Term& t : terms) {
-    const double line = sum_of(sensitivity(t.b, kRadius));
+    const double line = sum_of(sensitivity(t.b));
     whole += t.a * std::sqrt(portable::kPi / t.b) * line * line;
   }
-  std::vector<float> out(channel.size());
+  SpanImage out{std::vector<float>(spans.count), 0};
   for (const Term& t : terms) {
-    const Kernel kernel = sensitivity(t.b, kRadius);
-    const std::vector<float> part = filtered(channel, box, kernel, kernel);
+    const Kernel kernel = sensitivity(t.b);
+    const SpanImage part = filtered(channel, spans, kernel, kernel);
     const auto weight = static_cast<float>(t.a * std::sqrt(portable::kPi / t.b) / whole);
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] += weight * part[i];
+    for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] += weight * part.values[i];
+    out.plain += weight * part.plain;
   }
   return out;
 }
@@ -139,92 +107,145 @@ const FeatureKernels& feature_kernels() {
   return kernels;
 }
 
-std::vector<float> feature_strength(const std::vector<float>& luma, const PixelRectangle& box,
-                                    const Kernel& derivative) {
+float strength(float x, float y) { return std::sqrt(x * x + y * y); }
+
+SpanImage feature_strength(const SpanImage& luma, const PixelSpans& spans, const Kernel& derivative) {
   const Kernel& smooth = feature_kernels().smooth;
-  std::vector<float> out = filtered(luma, box, derivative, smooth);
-  const std::vector<float> y = filtered(luma, box, smooth, derivative);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::sqrt(out[i] * out[i] + y[i] * y[i]);
+  SpanImage out = filtered(luma, spans, derivative, smooth);
+  const SpanImage y = filtered(luma, spans, smooth, derivative);
+  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] = strength(out.values[i], y.values[i]);
+  out.plain = strength(out.plain, y.plain);
   return out;
 }
 
-/// What is not plain background, and so far around it that filters neither see it nor are seen by it.
-PixelRectangle shown_rectangle(const Picture& picture) {
-  constexpr int kReach = 24;
-  const int side = static_cast<int>(picture.side_px);
-  int x0 = side, y0 = side, x1 = 0, y1 = 0;
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x) {
-      const auto i = static_cast<std::size_t>(y) * picture.side_px + static_cast<std::size_t>(x);
-      if (!picture.covered[i] && picture.linear[i] == picture.linear[0]) continue;
-      x0 = std::min(x0, x), x1 = std::max(x1, x + 1);
-      y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+/// Y, Cx, Cz, and the luma that features are seen in.
+struct Channels {
+  std::array<SpanImage, 3> opponent;
+  SpanImage luma;
+};
+
+Channels channels_of(const Picture& picture, const PixelSpans& spans) {
+  Channels out;
+  for (SpanImage& channel : out.opponent) channel.values.resize(spans.count);
+  out.luma.values.resize(spans.count);
+  const auto convert = [](Vec3f linear, auto&& opponent_at, float& luma) {
+    const Vec3d xyz = xyz_of_linear(clamped_colour(linear));
+    const Vec3f colour = to_float(opponent_of_xyz(xyz));
+    for (int c = 0; c < 3; ++c) opponent_at(c) = colour[c];
+    luma = static_cast<float>(xyz.y);
+  };
+  for (std::size_t y = 0; y < spans.rows.size(); ++y) {
+    const PixelSpans::Row& row = spans.rows[y];
+    for (std::size_t x = row.first; x < row.last; ++x) {
+      const std::size_t i = row.offset + (x - row.first);
+      convert(
+          picture.linear[y * picture.side_px + x],
+          [&](int c) -> float& { return out.opponent[static_cast<std::size_t>(c)].values[i]; },
+          out.luma.values[i]);
     }
-  x0 = std::max(std::min(x0, x1) - kReach, 0), y0 = std::max(std::min(y0, y1) - kReach, 0);
-  return {x0, y0, std::min(x1 + kReach, side) - x0, std::min(y1 + kReach, side) - y0};
+  }
+  convert(
+      picture.linear[0], [&](int c) -> float& { return out.opponent[static_cast<std::size_t>(c)].plain; },
+      out.luma.plain);
+  return out;
 }
 
-/// A pixel of the box that only sees background, where the box is not the whole picture.
-std::size_t plain_pixel(const PixelRectangle& box) { return box.x > 0 || box.y > 0 ? 0 : box.count() - 1; }
+Vec3f eye_lab(Vec3f opponent) {
+  const Vec3d xyz = xyz_of_opponent(to_double(opponent));
+  return hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), lab_curve());
+}
 
-/// Puts the values of a box into a whole picture, plain background around them.
-template <class T>
-std::vector<T> in_whole_picture(const std::vector<T>& part, const PixelRectangle& box, std::uint32_t side) {
-  std::vector<T> out(std::size_t{side} * side, part[plain_pixel(box)]);
-  for (int y = 0; y < box.height; ++y)
-    std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(y) * box.width, box.width,
-                out.begin() + static_cast<std::ptrdiff_t>(box.y + y) * side + box.x);
-  return out;
+/// What the comparison reads of one picture at one pixel.
+struct Seen {
+  Vec3f lab;
+  std::array<float, 2> detail;
+  bool covered;
+};
+Seen seen_at(const FlipPicture& picture, std::size_t y, std::uint32_t x) {
+  const FlipPicture::Row& row = picture.rows[y];
+  if (x < row.first || x >= row.last) return {picture.plain_lab, picture.plain_detail, false};
+  const std::size_t i = row.offset + (x - row.first);
+  return {picture.lab[i], {picture.detail[0][i], picture.detail[1][i]}, picture.covered[i] != 0};
+}
+
+double flip_at(const Seen& reference, const Seen& test) {
+  const double colour = static_cast<double>(colour_difference(reference.lab, test.lab));
+  if (!(colour > 0)) return 0;
+  const float edges = std::fabs(reference.detail[0] - test.detail[0]),
+              points = std::fabs(reference.detail[1] - test.detail[1]);
+  const double feature = std::sqrt(static_cast<double>(std::max(edges, points)) / std::sqrt(2.0));
+  return portable::pow(colour, 1 - std::min(1.0, feature));
 }
 
 }  // namespace
 
+void FlipSum::add(const FlipSum& other) {
+  sum += other.sum;
+  pixels += other.pixels;
+  for (std::size_t i = 0; i < histogram.size(); ++i) histogram[i] += other.histogram[i];
+}
+
+double FlipSum::percentile(double part) const {
+  const double rank = part * static_cast<double>(pixels);
+  double below = 0;
+  for (std::size_t i = 0; i < histogram.size(); ++i) {
+    const double here = histogram[i];
+    if (here > 0 && below + here >= rank)
+      return i == 0 ? 0 : (static_cast<double>(i - 1) + (rank - below) / here) / kFlipSteps;
+    below += here;
+  }
+  return 0;
+}
+
 FlipPicture prepare_flip(const Picture& picture) {
   FlipPicture out;
-  out.side_px = picture.side_px;
-  out.covered = picture.covered;
   if (picture.linear.empty()) return out;
-  const PixelRectangle box = shown_rectangle(picture);
-  std::array<std::vector<float>, 3> opponent;  // Y, Cx, Cz
-  for (auto& channel : opponent) channel.resize(box.count());
-  std::vector<float> luma(box.count());
-  for (std::size_t i = 0; i < luma.size(); ++i) {
-    const std::size_t x = i % static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.x),
-                      y = i / static_cast<std::size_t>(box.width) + static_cast<std::size_t>(box.y);
-    const Vec3d xyz = xyz_of_linear(clamped_colour(picture.linear[y * picture.side_px + x]));
-    const Vec3f colour = to_float(opponent_of_xyz(xyz));
-    for (int c = 0; c < 3; ++c) opponent[static_cast<std::size_t>(c)][i] = colour[c];
-    luma[i] = static_cast<float>(xyz.y);
+  const PixelSpans spans = measure::shown_spans(picture);
+  for (std::size_t y = 0; y < spans.rows.size(); ++y) {
+    const PixelSpans::Row& row = spans.rows[y];
+    out.rows.push_back({row.first, row.last, row.offset});
+    const auto covered = picture.covered.begin() + static_cast<std::ptrdiff_t>(y * picture.side_px);
+    out.covered.insert(out.covered.end(), covered + row.first, covered + row.last);
   }
-  opponent[0] = eye_filtered(opponent[0], box, {{1, 0.0047}});
-  opponent[1] = eye_filtered(opponent[1], box, {{1, 0.0053}});
-  opponent[2] = eye_filtered(opponent[2], box, {{34.1, 0.04}, {13.5, 0.025}});
-  std::vector<Vec3f> lab(box.count());
-  for (std::size_t i = 0; i < lab.size(); ++i) {
-    const Vec3d xyz = xyz_of_opponent(to_double(Vec3f{opponent[0][i], opponent[1][i], opponent[2][i]}));
-    lab[i] = hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), lab_curve());
+  Channels channels = channels_of(picture, spans);
+  std::array<SpanImage, 3>& opponent = channels.opponent;
+  opponent[0] = eye_filtered(opponent[0], spans, {{1, 0.0047}});
+  opponent[1] = eye_filtered(opponent[1], spans, {{1, 0.0053}});
+  opponent[2] = eye_filtered(opponent[2], spans, {{34.1, 0.04}, {13.5, 0.025}});
+  out.lab.resize(spans.count);
+  for (std::size_t i = 0; i < out.lab.size(); ++i)
+    out.lab[i] = eye_lab({opponent[0].values[i], opponent[1].values[i], opponent[2].values[i]});
+  out.plain_lab = eye_lab({opponent[0].plain, opponent[1].plain, opponent[2].plain});
+  const Kernel* features[2] = {&feature_kernels().edge, &feature_kernels().point};
+  for (std::size_t k = 0; k < 2; ++k) {
+    SpanImage detail = feature_strength(channels.luma, spans, *features[k]);
+    out.detail[k] = std::move(detail.values);
+    out.plain_detail[k] = detail.plain;
   }
-  out.lab = in_whole_picture(lab, box, picture.side_px);
-  out.detail[0] = in_whole_picture(feature_strength(luma, box, feature_kernels().edge), box, picture.side_px);
-  out.detail[1] =
-      in_whole_picture(feature_strength(luma, box, feature_kernels().point), box, picture.side_px);
   return out;
 }
 
-double flip_of(const FlipPicture& reference, const FlipPicture& test) {
-  double sum = 0;
-  std::uint64_t pixels = 0;
-  for (std::size_t i = 0; i < reference.lab.size(); ++i) {
-    if (!reference.covered[i] && !test.covered[i]) continue;
-    ++pixels;
-    const double colour = static_cast<double>(colour_difference(reference.lab[i], test.lab[i]));
-    if (!(colour > 0)) continue;
-    const float edges = std::fabs(reference.detail[0][i] - test.detail[0][i]),
-                points = std::fabs(reference.detail[1][i] - test.detail[1][i]);
-    const double feature = std::sqrt(static_cast<double>(std::max(edges, points)) / std::sqrt(2.0));
-    sum += portable::pow(colour, 1 - std::min(1.0, feature));
+FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test) {
+  FlipSum sum;
+  for (std::size_t y = 0; y < reference.rows.size(); ++y) {
+    const FlipPicture::Row &a = reference.rows[y], &b = test.rows[y];
+    const bool none = a.first == a.last;
+    const std::uint32_t first = none ? b.first : b.first == b.last ? a.first : std::min(a.first, b.first);
+    for (std::uint32_t x = first; x < std::max(a.last, b.last); ++x) {
+      const Seen r = seen_at(reference, y, x), t = seen_at(test, y, x);
+      if (!r.covered && !t.covered) continue;
+      const double flip = flip_at(r, t);
+      const auto step = static_cast<std::size_t>(std::clamp(flip * kFlipSteps, 0.0, kFlipSteps - 1.0));
+      ++sum.pixels;
+      ++sum.histogram[flip > 0 ? step + 1 : 0];
+      sum.sum += flip;
+    }
   }
-  return pixels ? sum / static_cast<double>(pixels) : 0;
+  return sum;
+}
+
+double flip_of(const FlipPicture& reference, const FlipPicture& test) {
+  return compare_flip(reference, test).mean();
 }
 
 }  // namespace texmesh

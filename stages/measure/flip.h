@@ -3,23 +3,47 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/measure/image_compare.h"
+#include "stages/measure/picture.h"
 
 namespace texmesh {
 
-/// The parts of a picture that FLIP compares. They are computed once for a reference.
+/// The parts of a picture that FLIP compares. They are computed once for a reference. Of each row one range
+/// of columns is kept, around all that is not plain background; outside of it the plain values hold.
 struct FlipPicture {
-  std::uint32_t side_px = 0;
+  struct Row {
+    std::uint32_t first = 0, last = 0;  // columns first to last - 1
+    std::size_t offset = 0;             // of `first` in the lists below
+  };
+  std::vector<Row> rows;
   std::vector<Vec3f> lab;                    // as the eye filters it, Hunt-adjusted
   std::array<std::vector<float>, 2> detail;  // strength of edges, of points
   std::vector<std::uint8_t> covered;
+  Vec3f plain_lab;
+  std::array<float, 2> plain_detail{};
 };
+/// Costs by what the picture shows; the values are those of the whole picture.
 FlipPicture prepare_flip(const Picture& picture);
 
-/// Mean LDR-FLIP (Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild: FLIP: A Difference
-/// Evaluator for Alternating Images, 2020) over the pixels that either picture covers, at its standard 67
-/// pixels per degree: 0 = equal, 1 = black against white. Both parts, colours and features, as published;
-/// borders are replicated. Same bits on every machine.
+inline constexpr int kFlipSteps = 1024;
+
+/// FLIP over the pixels that either picture covers, of any number of pictures.
+struct FlipSum {
+  double sum = 0;
+  std::uint64_t pixels = 0;
+  /// Pixels without a difference; then those of each step of 1 / kFlipSteps.
+  std::vector<std::uint32_t> histogram = std::vector<std::uint32_t>(kFlipSteps + 1);
+  void add(const FlipSum& other);
+  double mean() const { return pixels ? sum / static_cast<double>(pixels) : 0; }
+  /// The value that this part (0..1) of the pixels does not exceed, within 1 / kFlipSteps.
+  double percentile(double part) const;
+};
+
+/// LDR-FLIP (Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild: FLIP: A Difference Evaluator
+/// for Alternating Images, 2020) over the pixels that either picture covers, at its standard 67 pixels per
+/// degree: 0 = equal, 1 = black against white. Both parts, colours and features, as published; borders are
+/// replicated. Both pictures have one size. Same bits on every machine.
+FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test);
+/// Its mean.
 double flip_of(const FlipPicture& reference, const FlipPicture& test);
 
 }  // namespace texmesh

@@ -7,6 +7,7 @@
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "stages/measure/cie_lab.h"
+#include "stages/measure/pixel_spans.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
@@ -57,9 +58,51 @@ class Gaussian {
   std::vector<float> weights_;
 };
 
-const Gaussian& ssim_window() {
-  static const Gaussian window(1.5, 5);
-  return window;
+measure::SpanImage under_window(const measure::SpanImage& image, const measure::PixelSpans& spans) {
+  static const measure::Kernel window = [] {
+    constexpr double kDeviation = 1.5;
+    measure::Kernel k;
+    double sum = 0;
+    for (int i = -5; i <= 5; ++i) sum += portable::exp(-i * i / (2 * kDeviation * kDeviation));
+    for (int i = -5; i <= 5; ++i)
+      k.push_back(static_cast<float>(portable::exp(-i * i / (2 * kDeviation * kDeviation)) / sum));
+    return k;
+  }();
+  return measure::filtered(image, spans, window, window);
+}
+
+measure::SpanImage product(const measure::SpanImage& a, const measure::SpanImage& b) {
+  measure::SpanImage out{a.values, a.plain * b.plain};
+  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] *= b.values[i];
+  return out;
+}
+
+float luma_of(Vec3f c) {
+  return 0.2126f * srgb_curve()(c.x) + 0.7152f * srgb_curve()(c.y) + 0.0722f * srgb_curve()(c.z);
+}
+
+/// The values of a picture's spans on wider ones.
+measure::SpanImage on_spans(const measure::SpanImage& image, const measure::PixelSpans& from,
+                            const measure::PixelSpans& to) {
+  measure::SpanImage out{std::vector<float>(to.count, image.plain), image.plain};
+  for (std::size_t y = 0; y < to.rows.size(); ++y) {
+    const measure::PixelSpans::Row &a = from.rows[y], &b = to.rows[y];
+    if (a.first == a.last) continue;
+    std::copy_n(image.values.begin() + static_cast<std::ptrdiff_t>(a.offset), a.last - a.first,
+                out.values.begin() + static_cast<std::ptrdiff_t>(b.offset + (a.first - b.first)));
+  }
+  return out;
+}
+
+struct Windows {
+  float a_mean, b_mean, a_square, b_square, product;
+};
+double ssim_of(const Windows& w) {
+  constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
+  const double a = static_cast<double>(w.a_mean), b = static_cast<double>(w.b_mean);
+  const double va = static_cast<double>(w.a_square) - a * a, vb = static_cast<double>(w.b_square) - b * b;
+  const double covariance = static_cast<double>(w.product) - a * b;
+  return (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (va + vb + kC2));
 }
 
 double compressed(double distance) { return distance > 0 ? portable::pow(distance, kHyabExponent) : 0; }
@@ -93,18 +136,18 @@ std::vector<Vec3f> eye_lab(const Picture& picture) {
 
 LumaPicture prepare_luma(const Picture& picture) {
   LumaPicture out;
-  out.side_px = picture.side_px;
   out.covered = picture.covered;
-  out.luma.resize(picture.linear.size());
-  for (std::size_t i = 0; i < picture.linear.size(); ++i) {
-    const Vec3f c = picture.linear[i];
-    out.luma[i] = 0.2126f * srgb_curve()(c.x) + 0.7152f * srgb_curve()(c.y) + 0.0722f * srgb_curve()(c.z);
+  if (picture.linear.empty()) return out;
+  out.spans = measure::shown_spans(picture);
+  out.luma.values.resize(out.spans.count);
+  for (std::size_t y = 0; y < out.spans.rows.size(); ++y) {
+    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    for (std::size_t x = row.first; x < row.last; ++x)
+      out.luma.values[row.offset + (x - row.first)] = luma_of(picture.linear[y * picture.side_px + x]);
   }
-  out.luma_mean = out.luma;
-  ssim_window().blur(out.luma_mean, out.side_px);
-  out.luma_square_mean.resize(out.luma.size());
-  for (std::size_t i = 0; i < out.luma.size(); ++i) out.luma_square_mean[i] = out.luma[i] * out.luma[i];
-  ssim_window().blur(out.luma_square_mean, out.side_px);
+  out.luma.plain = luma_of(picture.linear[0]);
+  out.mean = under_window(out.luma, out.spans);
+  out.square_mean = under_window(product(out.luma, out.luma), out.spans);
   return out;
 }
 
@@ -113,18 +156,20 @@ ComparedPicture prepare_comparison(const Picture& picture) {
 }
 
 PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test) {
-  constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
-  std::vector<float> product(reference.luma.size());
-  for (std::size_t i = 0; i < product.size(); ++i) product[i] = reference.luma[i] * test.luma[i];
-  ssim_window().blur(product, reference.side_px);
+  const measure::PixelSpans both = measure::union_of(reference.spans, test.spans);
+  const measure::SpanImage products = under_window(
+      product(on_spans(reference.luma, reference.spans, both), on_spans(test.luma, test.spans, both)), both);
   PictureDifference sum;
-  for (std::size_t i = 0; i < product.size(); ++i) {
-    if (!reference.covered[i] && !test.covered[i]) continue;
-    const double a = reference.luma_mean[i], b = test.luma_mean[i];
-    const double va = reference.luma_square_mean[i] - a * a, vb = test.luma_square_mean[i] - b * b;
-    const double covariance = product[i] - a * b;
-    sum.ssim += (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (va + vb + kC2));
-    ++sum.pixels;
+  for (std::uint32_t y = 0; y < both.rows.size(); ++y) {
+    const measure::PixelSpans::Row& row = both.rows[y];
+    for (std::uint32_t x = row.first; x < row.last; ++x) {
+      const std::size_t at = std::size_t{y} * both.side_px + x;
+      if (!reference.covered[at] && !test.covered[at]) continue;
+      sum.ssim += ssim_of({reference.mean.at(reference.spans, x, y), test.mean.at(test.spans, x, y),
+                           reference.square_mean.at(reference.spans, x, y),
+                           test.square_mean.at(test.spans, x, y), products.at(both, x, y)});
+      ++sum.pixels;
+    }
   }
   return sum;
 }

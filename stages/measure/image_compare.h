@@ -3,22 +3,18 @@
 #include <vector>
 
 #include "format/base/vec.h"
+#include "stages/measure/picture.h"
+#include "stages/measure/pixel_spans.h"
 
 namespace texmesh {
 
-/// A picture in linear light, square, row-major, with the pixels that show the object.
-struct Picture {
-  std::uint32_t side_px = 0;
-  std::vector<Vec3f> linear;          // RGB of BT.709 primaries, 0..1 (brighter is cut off)
-  std::vector<std::uint8_t> covered;  // 0 or 1
-};
-
-/// What SSIM compares, computed once for many comparisons.
+/// What SSIM compares, computed once for many comparisons. Costs by what the picture shows; the values are
+/// those of the whole picture.
 struct LumaPicture {
-  std::uint32_t side_px = 0;
-  std::vector<float> luma;                         // sRGB-encoded, 0..1
-  std::vector<float> luma_mean, luma_square_mean;  // under a Gaussian of deviation 1.5 px
-  std::vector<std::uint8_t> covered;
+  measure::PixelSpans spans;
+  measure::SpanImage luma;               // sRGB-encoded, 0..1
+  measure::SpanImage mean, square_mean;  // under a Gaussian of deviation 1.5 px
+  std::vector<std::uint8_t> covered;     // of the whole picture
 };
 LumaPicture prepare_luma(const Picture& picture);
 

@@ -93,8 +93,16 @@ std::size_t index_of_scale(const NestedScales& scales, int scale) {
 
 double displayed(float px) { return std::clamp(static_cast<double>(px), 0.0, kAnyDisplayPx); }
 
+double displayed_by_pictures(const MeasuredQuality& quality, int scale) {
+  const std::vector<int>& measured = quality.table.scales;
+  const auto it = std::ranges::find(measured, scale);
+  if (it == measured.end() || quality.display_px_flip.size() != measured.size())
+    fail("quality", "a displayed height of scale " + std::to_string(scale), "none");
+  return displayed(quality.display_px_flip[static_cast<std::size_t>(it - measured.begin())]);
+}
+
 std::vector<ManifestScale> describe_scales(const NestedScales& scales, const PerceptualValues& perceptual,
-                                           const ScaleFiles& files) {
+                                           const ScaleFiles& files, const MeasuredQuality& quality) {
   std::vector<ManifestScale> result;
   for (const ScaleFile& file : files.files) {
     const std::size_t k = index_of_scale(scales, file.scale);
@@ -113,6 +121,7 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
     s.display_px_jnd = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_jnd[k]);
     s.display_px_error = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_error[k]);
     s.display_px_edge = k == 0 ? kAnyDisplayPx : displayed(perceptual.display_px_edge[k]);
+    s.display_px_flip = k == 0 ? kAnyDisplayPx : displayed_by_pictures(quality, file.scale);
     result.push_back(std::move(s));
   }
   std::ranges::sort(result, {}, &ManifestScale::scale);
@@ -130,8 +139,8 @@ double surface_area(const Mesh& mesh, const NestedScale& scale) {
 }
 
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
-                        const ScaleFiles& files, const Fragments& fragments, double jnd,
-                        const std::string& title) {
+                        const ScaleFiles& files, const Fragments& fragments, const MeasuredQuality& quality,
+                        double jnd, const std::string& title) {
   Manifest m;
   m.title = title;
   m.origin = scales.mesh.origin;
@@ -143,8 +152,8 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   m.object_height = static_cast<double>(perceptual.object_height);
   m.surface_area = surface_area(scales.mesh, scales.scales.front());
   m.jnd = jnd;
-  m.scales = describe_scales(scales, perceptual, files);
-  m.steps = step_function(m.scales, StepRule::kDefault);
+  m.scales = describe_scales(scales, perceptual, files, quality);
+  m.steps = step_function(m.scales, StepRule::kFlip);
   m.plane_count = static_cast<std::uint32_t>(fragments.planes.size());
   return m;
 }
@@ -225,16 +234,16 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const QualityTable& quality, const Poster& poster, double jnd,
+                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
-  Manifest manifest = describe_model(scales, perceptual, files, fragments, jnd, options.title);
+  Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, options.title);
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(tables)});
-  entries.push_back({kQualityPath, to_bytes(write_quality(quality))});
+  entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
   for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
   if (!poster.file.empty()) {

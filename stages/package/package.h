@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
+#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/poster.h"
@@ -35,7 +35,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const QualityTable& quality, const Poster& poster, double jnd,
+                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context);
 

@@ -4,170 +4,164 @@
 #include <cmath>
 #include <string>
 
-#include "format/base/box.h"
-#include "stages/base/parallel.h"
-#include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
-#include "stages/quality/rung_textures.h"
-#include "stages/render/shade.h"
+#include "format/documents/manifest.h"
+#include "stages/quality/table_fit.h"
 
 namespace texmesh {
 namespace {
 
-using quality::LevelCount;
-using quality::RungChoice;
-using quality::ShownTextures;
-using TextureSizes = std::vector<Vec2<std::uint32_t>>;  // per shown texture, px
+using namespace quality;  // NOLINT: the room's own parts
 
-/// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
-/// the whole picture, one pixel wide, covers 0.5 %.
-constexpr double kLeastCovered = 0.002;
+constexpr std::size_t kSizes = 3;  // of the table
 
-BoundingSphere sphere_of(const Mesh& mesh) {
-  if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
-  const BoundingSphere sphere = bounding_sphere(mesh.positions);
-  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
-  return sphere;
-}
-
-/// The sphere around the place where nearly all positions lie, whatever a few others do.
-BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
-  constexpr double kCrowd = 0.98, kMargin = 1.25;
-  const std::size_t n = mesh.positions.size();
-  BoundingSphere s;
-  std::vector<double> values(n);
-  const auto at_rank = [&](std::size_t rank) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
-    return values[rank];
-  };
-  for (int k = 0; k < 3; ++k) {
-    for (std::size_t p = 0; p < n; ++p) values[p] = mesh.positions[p][k];
-    s.centre[k] = at_rank(n / 2);
+/// All displayed heights that are rendered, rising.
+struct Height {
+  double displayed_px = 0;
+  std::optional<std::size_t> rank;  // among the table's sizes
+};
+std::vector<Height> heights_below(double largest_px) {
+  std::vector<Height> heights;
+  for (std::size_t half = 0;; ++half) {
+    double px = std::ldexp(largest_px, -static_cast<int>(half / 2));
+    if (half % 2 == 1) px *= std::sqrt(0.5);
+    const bool in_table = half % 2 == 0 && half / 2 < kSizes;
+    if (px < kLeastSwitchPx && !in_table) break;
+    heights.push_back({px, in_table ? std::optional(kSizes - 1 - half / 2) : std::nullopt});
   }
-  for (std::size_t p = 0; p < n; ++p) values[p] = length(to_double(mesh.positions[p]) - s.centre);
-  s.radius = kMargin * at_rank(static_cast<std::size_t>(kCrowd * static_cast<double>(n - 1)));
-  return s.radius > 0 && s.radius < bounds.radius ? s : bounds;
+  std::reverse(heights.begin(), heights.end());
+  return heights;
 }
 
-/// What all pictures share.
-struct Studio {
-  std::vector<RenderScene> scenes;  // per kept scale, S_0 first
-  std::vector<RenderTexture> source;
-  std::vector<std::vector<RenderTexture>> rungs;  // per column
-  RenderEnvironment environment;
+double surface_area_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
+  }
+  return area;
+}
+
+/// Scales with meshes of their own: a view costs by the positions that it looks at.
+struct KeptScales {
+  std::vector<int> numbers;
+  std::vector<Mesh> meshes;
 };
-
-struct ReferencePicture {
-  LumaPicture luma;
-  FlipPicture flip;
-};
-ReferencePicture prepare_reference(const Picture& picture) {
-  return {prepare_luma(picture), prepare_flip(picture)};
+KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perceptual) {
+  KeptScales out;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) {
+    if (k > 0 && !perceptual.kept[k]) continue;
+    out.numbers.push_back(scales.scales[k].scale);
+    out.meshes.push_back(extract_scale(scales, scales.scales[k]));
+  }
+  return out;
 }
 
-PictureDifference difference_of(const ReferencePicture& reference, const Picture& test) {
-  PictureDifference sum = compare_luma(reference.luma, prepare_luma(test));
-  sum.difference = flip_of(reference.flip, prepare_flip(test)) * static_cast<double>(sum.pixels);
-  return sum;
-}
-
-/// Everything that one view compares: [scale][rung]. One view at a time is in memory.
-std::vector<PictureDifference> measure_view(const Studio& studio, const RenderCamera& camera,
-                                            std::uint32_t side, const RunContext& context) {
-  const std::size_t rungs = studio.rungs.size();
-  const Visibility finest = look(studio.scenes[0], camera, side, context);
-  const ReferencePicture original =
-      prepare_reference(shade(studio.scenes[0], finest, studio.source, studio.environment, context));
-  std::vector<PictureDifference> found(studio.scenes.size() * rungs);
-  RunContext serial = context;
-  serial.threads = 1;
-  parallel_for(context, studio.scenes.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      const Visibility coarser = s == 0 ? Visibility{} : look(studio.scenes[s], camera, side, serial);
-      const Visibility& view = s == 0 ? finest : coarser;
-      for (std::size_t r = 0; r < rungs; ++r) {
-        PictureDifference& cell = found[s * rungs + r];
-        if (r > 0 && studio.source.empty()) {  // nothing that shows has rungs
-          cell = found[s * rungs];
-          continue;
-        }
-        cell = difference_of(original,
-                             shade(studio.scenes[s], view, studio.rungs[r], studio.environment, serial));
-      }
-    }
+/// Whether nobody can tell the scale from S_0 in any view.
+bool passes(const Losses& losses, const QualityOptions& options) {
+  constexpr double kPart = 0.95;
+  return std::all_of(losses.begin(), losses.end(), [&](const Loss& loss) {
+    return loss.flip.mean() <= options.flip_mean && loss.flip.percentile(kPart) <= options.flip_p95;
   });
-  return found;
 }
 
-RenderCamera camera_of_view(int view, const QualityTable& table, const BoundingSphere& sphere) {
-  return perspective_camera(camera_of(view, static_cast<int>(table.views), sphere.centre, sphere.radius));
-}
+/// The switch sizes, found from small heights to large ones.
+class SwitchSizes {
+ public:
+  SwitchSizes(std::size_t scales, const QualityOptions& options)
+      : options_(options), alive_(scales, 1), display_px_(scales, 0) {
+    alive_[0] = 0;
+    display_px_[0] = static_cast<float>(kAnyDisplayPx);
+  }
+  const std::vector<std::uint8_t>& alive() const { return alive_; }
+  const std::vector<float>& display_px() const { return display_px_; }
 
-/// What the views show of S_0.
-struct Coverage {
-  std::uint64_t pixels = 0;
-  LevelCount levels;
+  void judge(const Cells& geometry, double displayed_px) {
+    for (std::size_t k = 1; k < alive_.size(); ++k) {
+      if (!alive_[k]) continue;
+      alive_[k] = passes(geometry[k], options_);
+      if (alive_[k]) display_px_[k] = static_cast<float>(displayed_px);
+    }
+  }
+
+ private:
+  const QualityOptions& options_;
+  std::vector<std::uint8_t> alive_;
+  std::vector<float> display_px_;
 };
 
-Coverage coverage_of_views(const RenderScene& scene, const BoundingSphere& sphere, const TextureSizes& sizes,
-                           const QualityTable& table, const RunContext& context) {
-  Coverage seen{0, LevelCount(sizes.size())};
-  for (int v = 0; v < static_cast<int>(table.views); ++v) {
+/// The scales that the table needs of a size beside those that still pass.
+std::vector<std::uint8_t> rendered_scales(std::vector<std::uint8_t> alive, std::optional<std::size_t> rank) {
+  const std::size_t n = alive.size();
+  for (std::size_t k = 1; rank && k < n; ++k)
+    if (*rank == 0 || k + 1 == n || (*rank == 1 && (n - 1 - k) % 2 == 0)) alive[k] = 1;
+  return alive;
+}
+
+std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,
+                                      Studio& studio, SwitchSizes& sizes, const RunContext& context) {
+  const std::vector<Height> heights = heights_below(options.largest_px);
+  const double quarter = heights.back().displayed_px / 4;
+  std::vector<SizeCells> table_cells;
+  for (std::size_t i = 0; i < heights.size(); ++i) {
     context.check_cancelled();
-    const Visibility view = look(scene, camera_of_view(v, table, sphere), table.size_px, context);
-    for (std::size_t i = 0; i + 1 < view.first.size(); ++i) seen.pixels += view.first[i] < view.first[i + 1];
-    seen.levels.add(scene, view, sizes);
+    context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
+    const double px = heights[i].displayed_px;
+    SizeCells cells{px, {}, {}, {}};
+    render_size(sampler,
+                {rendered_scales(sizes.alive(), heights[i].rank), px > quarter * 1.001, heights[i].rank},
+                studio, cells, context);
+    if (px >= kLeastSwitchPx) sizes.judge(cells.geometry, px);
+    if (heights[i].rank) table_cells.push_back(std::move(cells));
   }
-  return seen;
+  return table_cells;
 }
 
-std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
-  const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
-    return length(to_double(p) - sphere.centre) > sphere.radius;
-  });
-  return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
+/// What the knots of all groups and the scales lose at one size, rendered or not.
+struct RawLosses {
+  PictureLosses geometry;
+  std::vector<PictureLosses> coded, coarser;  // per group
+};
+std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes, const ViewChoice& views) {
+  std::vector<RawLosses> out;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
+    RawLosses raw;
+    const RawLosses* smaller = i > 0 ? &out.back() : nullptr;
+    raw.geometry = losses_of(sizes[i].geometry, views, below ? &below->geometry : nullptr,
+                             smaller ? &smaller->geometry : nullptr);
+    for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
+      const GroupCells& group = sizes[i].groups[g];
+      raw.coded.push_back(losses_of(group.coded, views, below ? &below->groups[g].coded : nullptr,
+                                    smaller ? &smaller->coded[g] : nullptr));
+      raw.coarser.push_back(losses_of(group.coarser, views, below ? &below->groups[g].coarser : nullptr,
+                                      smaller ? &smaller->coarser[g] : nullptr));
+    }
+    out.push_back(std::move(raw));
+  }
+  return out;
 }
 
-/// Chooses the sphere that the pictures frame, and returns what they show. It is the object's sphere, unless
-/// that one shows next to nothing of the object and the crowd's sphere shows more.
-Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, const QualityTable& table,
-                      BoundingSphere& sphere, Notes& notes, const RunContext& context) {
-  const double all = static_cast<double>(table.views) * table.size_px * table.size_px;
-  Coverage seen = coverage_of_views(scene, sphere, sizes, table, context);
-  if (static_cast<double>(seen.pixels) >= kLeastCovered * all) return seen;
-  const BoundingSphere crowd = crowd_sphere(*scene.mesh, sphere);
-  if (crowd.radius < sphere.radius) {
-    Coverage closer = coverage_of_views(scene, crowd, sizes, table, context);
-    if (closer.pixels > seen.pixels) {
-      sphere = crowd;
-      add_warning(notes, "far-outliers", "",
-                  "quality was measured without the " + count_outside(*scene.mesh, crowd) +
-                      " positions that lie so far from all others that pictures of the whole object show "
-                      "next to nothing");
-      seen = std::move(closer);
+void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfGroup>& groups,
+                const ViewChoice& views, QualityTable& table) {
+  const std::vector<RawLosses> raw = raw_losses(sizes, views);
+  for (const PlanesOfGroup& group : groups) table.groups.push_back({group.group, {}});
+  std::vector<TogetherLoss> together;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    table.sizes_px.push_back(static_cast<std::uint32_t>(std::lround(sizes[i].displayed_px)));
+    table.geometry.push_back(raw[i].geometry);
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g].knots, raw[i].coded[g],
+                                                     raw[i].coarser[g], groups[g].group,
+                                                     sizes[i].displayed_px));
+    for (const TogetherCell& cell : sizes[i].together) {
+      TogetherLoss& sample = together.emplace_back();
+      sample.measured = pooled(cell.losses).flip.mean();
+      sample.parts.push_back(static_cast<double>(raw[i].geometry.flip[cell.scale]));
+      for (std::size_t g = 0; g < groups.size(); ++g)
+        sample.parts.push_back(static_cast<double>(raw[i].coded[g].flip[cell.knots[g]]));
     }
   }
-  return seen;
-}
-
-/// Means over all covered pixels of all views. Without a covered pixel the pictures count as equal.
-void fill_table(QualityTable& table, const std::vector<std::vector<PictureDifference>>& views, Notes& notes) {
-  for (std::size_t i = 0; i < views[0].size(); ++i) {
-    PictureDifference sum;
-    for (const auto& view : views) {
-      sum.ssim += view[i].ssim;
-      sum.difference += view[i].difference;
-      sum.pixels += view[i].pixels;
-    }
-    if (sum.pixels == 0 && i == 0)
-      add_warning(notes, "quality-not-measured", "",
-                  "no picture of " + std::to_string(table.size_px) +
-                      " px shows anything of the object; its scales count as equal");
-    if (sum.pixels == 0) sum = {1, 0, 1};
-    const auto n = static_cast<double>(sum.pixels);
-    table.ssim.push_back(static_cast<float>(std::clamp(sum.ssim / n, 0.0, 1.0)));
-    table.difference.push_back(static_cast<float>(std::clamp(sum.difference / n, 0.0, 1.0)));
-  }
+  fit_exponent(together, table);
 }
 
 }  // namespace
@@ -175,43 +169,39 @@ void fill_table(QualityTable& table, const std::vector<std::vector<PictureDiffer
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,
+                                const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
-  BoundingSphere sphere = sphere_of(scales.mesh);
-  const ShownTextures shown = quality::find_shown(materials, fragments, scales.mesh);
-  TextureSizes sizes;
-  for (const quality::ShownTexture& t : shown.textures)
-    sizes.push_back({fragments.planes[t.plane].width_px, fragments.planes[t.plane].height_px});
+  if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
+  const KeptScales kept = kept_scales(scales, perceptual);
+  const ShownTextures shown = find_shown(materials, fragments, scales.mesh);
+  const TextureData data = texture_data(fragments, pixels, ladder, previews, tables);
+  const std::vector<PlanesOfGroup> groups = find_groups(shown, fragments);
   MeasuredQuality result;
-  QualityTable& table = result.table;
-  table.views = static_cast<std::uint32_t>(options.views);
-  table.size_px = static_cast<std::uint32_t>(options.size_px);
   Studio studio;
-  for (std::size_t k = 0; k < scales.scales.size(); ++k) {
-    const NestedScale& scale = scales.scales[k];
-    if (k > 0 && !perceptual.kept[k]) continue;
-    table.scales.push_back(scale.scale);
-    studio.scenes.push_back(
-        {&scales.mesh, &scale.triangles, &scale.triangle_source, &shown.materials, sizes.size()});
-  }
-
-  const Coverage seen = frame_object(studio.scenes[0], sizes, table, sphere, result.notes, context);
-  const std::vector<std::uint32_t> first = seen.levels.first_levels();
-  const auto textures = [&](const RungChoice& choice) {
-    return quality::textures_of(shown, fragments, pixels, ladder, choice, first, context);
-  };
+  studio.views = choose_views(options.views, options.large_views);
+  for (const Mesh& mesh : kept.meshes)
+    studio.scenes.push_back(render_scene(mesh, shown.materials, shown.textures.size()));
+  TextureSizes sizes;
+  for (const ShownTexture& t : shown.textures)
+    sizes.push_back({fragments.planes[t.plane].width_px, fragments.planes[t.plane].height_px});
+  const Coverage seen = frame_object(studio.scenes[0], sizes, static_cast<double>(perceptual.object_height),
+                                     options.views, options.largest_px, result.notes, context);
+  if (seen.pixels == 0)
+    add_warning(result.notes, "quality-not-measured", "",
+                "no picture shows anything of the object; its scales count as equal");
+  studio.frame = seen.frame;
   studio.environment = studio_environment(context);
-  studio.source = textures(quality::source_choice(fragments));
-  for (const RungChoice& choice : quality::sampled_choices(shown, fragments, ladder, options.rung_samples)) {
-    table.rungs.push_back(choice.quality);
-    studio.rungs.push_back(textures(choice));
-  }
+  for (std::size_t t = 0; t < shown.textures.size(); ++t)
+    studio.textures.push_back(source_texture(data, shown.textures[t], seen.first_levels[t], context));
 
-  std::vector<std::vector<PictureDifference>> found;
-  for (int v = 0; v < options.views; ++v) {
-    context.report((v + 1.0) / (options.views + 1.0));
-    found.push_back(measure_view(studio, camera_of_view(v, table, sphere), table.size_px, context));
-  }
-  fill_table(table, found, result.notes);
+  const TextureSampler sampler{data, shown, groups, options.rung_samples,
+                               surface_area_of(scales.mesh, scales.scales[0].triangles)};
+  SwitchSizes switch_sizes(kept.meshes.size(), options);
+  const std::vector<SizeCells> cells = render_heights(sampler, options, studio, switch_sizes, context);
+  result.table.views = static_cast<std::uint32_t>(options.views);
+  result.table.scales = kept.numbers;
+  fill_table(cells, groups, studio.views, result.table);
+  result.display_px_flip = switch_sizes.display_px();
   return result;
 }
 

@@ -1,59 +1,79 @@
 #pragma once
-#include "format/base/note.h"
-#include "format/documents/quality_table.h"
+#include "format/documents/tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
+#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 3;
+inline constexpr int kQualityVersion = 4;
 
 struct QualityOptions {
   int views = 4;
-  int size_px = 192;
+  int large_views = 2;
+  int largest_px = 1024;
   int rung_samples = 4;
+  double flip_mean = 0.05;
+  double flip_p95 = 0.15;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("views", s.views, Range{1, 64},
-      "directions from which every sample is rendered, spread over the sphere");
-    v("size_px", s.size_px, Range{32, 1024}, "side of a rendered view");
+      "directions from which scales are rendered at displayed heights up to a quarter of the largest");
+    v("large_views", s.large_views, Range{1, 64},
+      "as many of the views show scales at larger heights, and textures at all heights");
+    v("largest_px", s.largest_px, Range{128, 2048}, "largest displayed height of the object that is rendered");
     v("rung_samples", s.rung_samples, Range{1, 16}, "rungs that are rendered, spread over the ladder");
+    v("flip_mean", s.flip_mean, Range{0, 1},
+      "mean FLIP of a view up to which a scale counts as equal to S_0");
+    v("flip_p95", s.flip_p95, Range{0, 1},
+      "FLIP of the 95th percentile of a view's pixels up to which a scale counts as equal to S_0");
   }
 };
 
-/// What was measured, and what of the object its pictures do not show.
-struct MeasuredQuality {
-  QualityTable table;
-  Notes notes;
-};
-
-/// Renders kept scales x sampled rungs from fixed views with the reference renderer (stages/render), in the
-/// studio's light. Compares each picture with that of S_0 and the source's texels, over the pixels that
-/// either covers: SSIM of luma (stages/measure/image_compare.h), and FLIP as published
-/// (stages/measure/flip.h).
-/// - Pictures: perspective, 4 x 4 samples a pixel; the object's bounding sphere fills 0.96 of the side. All
-///   maps of the material show that the renderer knows: base colour with alpha, metallic-roughness, normal,
-///   occlusion, emission; all of them read with mips, whatever the sampler says.
+/// Renders kept scales and sampled rungs with the reference renderer (stages/render), in the studio's light,
+/// and compares each picture with that of S_0 and the source's texels, over the pixels that either covers:
+/// FLIP as published (stages/measure/flip.h) and SSIM of luma (stages/measure/image_compare.h). Means and
+/// percentiles are of the pixels of all views together.
+/// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
+///   displayed height is the length on screen that O_V has at the sphere's centre. All maps of the material
+///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
+///   all of them read with mips, whatever the sampler says.
+/// - Heights: largest_px, and all that are sqrt(2) apart below it, down to kLeastSwitchPx. The table's sizes
+///   are the largest, its half and its quarter.
+/// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
+///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
+///   and all lower ones; 0 = it passes nowhere. FLIP publishes no thresholds: these are our own. S_0 has
+///   kAnyDisplayPx.
+/// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
+///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
+///   the ratio to the size below, linear between the neighbours in the list of scales.
+/// - Groups: one group's planes are coded, the others have the source's texels. At the least size
+///   `rung_samples` of the ladder are rendered, first and last among them, the previews, and mips that are 1
+///   to 3 levels coarser; at the half the first and the last rung, the previews, and one coarser level; at the
+///   largest the first and the last rung. The others follow by the ratio to the size below. Planes are those
+///   that a client shows at the size (format/documents/mip_choice.h). Planes of one group have the rung whose
+///   quality is nearest to that of the group's first plane. FLIP of knots is scaled so that the mean over
+///   fragments of GroupCurve::coded() is what was measured for whole planes.
+/// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size, 2 at
+///   the half, 1 at the largest, the exponent that predicts best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size
 ///   away), they show the place in which nearly all positions lie, and a warning says what they leave out.
-/// - Rungs: `rung_samples` of one plane's ladder, first and last among them, rising; all other planes have
-///   the rung whose quality is nearest. The plane is the first that shows, colours before normals before
-///   other numbers. Where none shows it is the first of all, and the columns are equal. A model without
-///   planes gets one column (rung quality 100).
+///   Heights are then that place's.
 /// - What shows in no picture at all (a thread thinner than a sample, specks, an alpha of 0 everywhere) has
-///   no measured difference: values of 1 and 0, and a warning.
+///   no measured difference: all losses are 0, all scales pass everywhere, and a warning says so.
 /// StageError when S_0 has no extent. Same bytes for any thread count and machine.
 ///
-/// The pictures are rasterised, not ray-cast by Embree: Embree's kernels take reciprocals by rcpps, whose
-/// last bits differ between makers of processors on every instruction set, and a hierarchy per scale costs
-/// more than one pass over its triangles.
+/// Fewer views at large heights cost little: beyond a quarter of the largest height few scales are left, and
+/// a scale that fails does so in most views.
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,
+                                const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -1,32 +1,14 @@
 #include "stages/quality/rung_textures.h"
 
 #include <algorithm>
-#include <cstdlib>
 
+#include "format/documents/mip_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
 
 namespace texmesh::quality {
 namespace {
-
-/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest).
-std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
-  std::vector<std::size_t> out;
-  const auto n = static_cast<std::size_t>(wanted);
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t k = n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1);
-    if (out.empty() || k > out.back()) out.push_back(k);
-  }
-  return out;
-}
-
-/// Planes of other codecs or roles have other rungs.
-std::int32_t nearest_rung(const PlaneLadder& plane, int quality) {
-  std::size_t best = 0;
-  for (std::size_t r = 1; r < plane.rungs.size(); ++r)
-    if (std::abs(plane.rungs[r].quality - quality) < std::abs(plane.rungs[best].quality - quality)) best = r;
-  return static_cast<std::int32_t>(best);
-}
 
 // A fragment of the source, cut out of the plane's pixels.
 Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
@@ -54,83 +36,122 @@ void put_block(const Pixels& block, std::uint32_t x0, std::uint32_t y0, Channels
     }
 }
 
-struct PlaneSource {
-  const TexturePlane& plane;
-  const Pixels& pixels;
-  const PlaneLadder& ladder;
-  std::int32_t rung;
-  bool srgb;
+/// Where texels of a level come from.
+struct PlaneTexels {
+  std::uint32_t plane = 0;
+  std::optional<std::size_t> rung;  // nothing: the source
+  bool srgb = false;
 };
 
-void put_plane(const PlaneSource& from, std::uint32_t first_level, Channels channels, Pixels& level,
-               const RunContext& context) {
-  const TexturePlane& plane = from.plane;
+void put_plane(const TextureData& data, const PlaneTexels& from, std::uint32_t first_level, Channels channels,
+               Pixels& level, const RunContext& context) {
+  const TexturePlane& plane = data.fragments.planes[from.plane];
+  const PlaneLadder& ladder = data.ladder.planes[from.plane];
+  const Pixels& pixels = data.pixels[from.plane];
+  const std::uint32_t halvings = first_level - plane.mip;
   const std::uint64_t most_pixels =
       static_cast<std::uint64_t>(plane.fragment_width_px) * plane.fragment_height_px;
   RunContext serial = context;
   serial.threads = 1;
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
-      const auto rung = static_cast<std::size_t>(from.rung);
-      const bool stored = from.rung != kSourceRung && !fragment_stream(from.ladder.rungs[rung], f).empty();
+      const bool stored = from.rung && !fragment_stream(ladder.rungs[*from.rung], f).empty();
       const TexelRectangle place = padded_fragment_rectangle(plane, f);
-      Pixels block = stored ? decode_fragment(from.ladder, rung, f, most_pixels) : cut(from.pixels, place);
-      block = coarser_level(std::move(block), from.srgb, first_level, serial);
-      put_block(block, place.left_px >> first_level, place.top_px >> first_level, channels, level);
+      Pixels block = stored ? decode_fragment(ladder, *from.rung, f, most_pixels) : cut(pixels, place);
+      block = coarser_level(std::move(block), from.srgb, halvings, serial);
+      put_block(block, place.left_px >> halvings, place.top_px >> halvings, channels, level);
     }
   });
 }
 
+/// The largest mip of a plane that is not coarser than `level`.
+std::uint32_t plane_towards(const TextureData& data, std::uint32_t plane, std::uint32_t level) {
+  return plane_at_level(data.infos, plane, static_cast<double>(level));
+}
+
+/// An empty texture with room for its first level, at most one that has whole texels along both axes.
+RenderTexture empty_texture(const TexturePlane& full_size, const ShownTexture& shown,
+                            std::uint32_t first_level) {
+  RenderTexture texture;
+  texture.width_px = full_size.width_px;
+  texture.height_px = full_size.height_px;
+  texture.srgb = shown.srgb;
+  texture.first_level = first_level;
+  while (std::min(full_size.width_px, full_size.height_px) >> texture.first_level == 0)
+    --texture.first_level;
+  Pixels& level = texture.levels.emplace_back();
+  level.width_px = full_size.width_px >> texture.first_level;
+  level.height_px = full_size.height_px >> texture.first_level;
+  level.channels = (full_size.channels >= 3 ? 3 : 1) + (shown.alpha ? 1 : 0);
+  level.data.resize(std::size_t{level.width_px} * level.height_px * level.channels);
+  return texture;
+}
+
+Pixels decoded_preview(const TextureData& data, std::uint32_t plane) {
+  constexpr std::uint64_t kMaxPreviewPixels = 1u << 26;
+  return decode_jpeg(data.previews.planes[plane].file, kMaxPreviewPixels);
+}
+
 }  // namespace
 
-RungChoice source_choice(const Fragments& fragments) {
-  return {100, std::vector<std::int32_t>(fragments.planes.size(), kSourceRung)};
+TextureData texture_data(const Fragments& fragments, const std::vector<Pixels>& pixels, const Ladder& ladder,
+                         const Previews& previews, const PackageTables& tables) {
+  TextureData data{fragments, pixels, ladder, previews, tables, {}};
+  for (const TexturePlane& plane : fragments.planes) {
+    TextureInfo& info = data.infos.emplace_back();
+    info.mip = plane.mip;
+    info.base = plane.base;
+  }
+  return data;
 }
 
-std::vector<RungChoice> sampled_choices(const ShownTextures& shown, const Fragments& fragments,
-                                        const Ladder& ladder, int samples) {
-  if (!shown.sampled_plane) return {source_choice(fragments)};
-  std::vector<RungChoice> out;
-  const PlaneLadder& sampled = ladder.planes[*shown.sampled_plane];
-  for (const std::size_t r : spread_rungs(sampled.rungs.size(), samples)) {
-    RungChoice& choice = out.emplace_back();
-    choice.quality = sampled.rungs[r].quality;
-    for (const PlaneLadder& plane : ladder.planes)
-      choice.rungs.push_back(nearest_rung(plane, choice.quality));
-  }
-  return out;
+RenderTexture source_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                             const RunContext& context) {
+  RenderTexture texture = empty_texture(data.fragments.planes[shown.plane], shown, first_level);
+  Pixels& level = texture.levels[0];
+  const std::uint32_t colours = level.channels - (shown.alpha ? 1 : 0), first = texture.first_level;
+  put_plane(data, {plane_towards(data, shown.plane, first), {}, shown.srgb}, first, {0, colours}, level,
+            context);
+  if (shown.alpha)
+    put_plane(data, {plane_towards(data, *shown.alpha, first), {}, false}, first, {colours, 1}, level,
+              context);
+  complete_mips(texture, context);
+  return texture;
 }
 
-std::vector<RenderTexture> textures_of(const ShownTextures& shown, const Fragments& fragments,
-                                       const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                       const RungChoice& choice,
-                                       const std::vector<std::uint32_t>& first_levels,
-                                       const RunContext& context) {
-  std::vector<RenderTexture> out;
-  for (std::size_t t = 0; t < shown.textures.size(); ++t) {
-    const ShownTexture& from = shown.textures[t];
-    const TexturePlane& plane = fragments.planes[from.plane];
-    RenderTexture& texture = out.emplace_back();
-    texture.width_px = plane.width_px;
-    texture.height_px = plane.height_px;
-    texture.srgb = from.srgb;
-    // A mip has whole texels of both axes.
-    texture.first_level = first_levels[t];
-    while (std::min(plane.width_px, plane.height_px) >> texture.first_level == 0) --texture.first_level;
-    const std::uint32_t colours = plane.channels >= 3 ? 3 : 1;
-    Pixels& level = texture.levels.emplace_back();
-    level.width_px = plane.width_px >> texture.first_level;
-    level.height_px = plane.height_px >> texture.first_level;
-    level.channels = colours + (from.alpha ? 1 : 0);
-    level.data.resize(std::size_t{level.width_px} * level.height_px * level.channels);
-    const auto put = [&](std::uint32_t p, bool srgb, Channels channels) {
-      put_plane({fragments.planes[p], pixels[p], ladder.planes[p], choice.rungs[p], srgb},
-                texture.first_level, channels, level, context);
-    };
-    put(from.plane, from.srgb, {0, colours});
-    if (from.alpha) put(*from.alpha, false, {colours, 1});
-    complete_mips(texture, context);
+RenderTexture coded_texture(const TextureData& data, const ShownTexture& shown, const PlaneRung& colour,
+                            const std::optional<PlaneRung>& alpha, std::uint32_t first_level,
+                            const RunContext& context) {
+  RenderTexture texture = empty_texture(data.fragments.planes[shown.plane], shown, first_level);
+  Pixels& level = texture.levels[0];
+  const std::uint32_t colours = level.channels - (shown.alpha ? 1 : 0), first = texture.first_level;
+  put_plane(data, {colour.plane, colour.rung, shown.srgb}, first, {0, colours}, level, context);
+  if (alpha) put_plane(data, {alpha->plane, alpha->rung, false}, first, {colours, 1}, level, context);
+  complete_mips(texture, context);
+  return texture;
+}
+
+RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown, const RunContext& context) {
+  Pixels image = decoded_preview(data, shown.plane);
+  if (shown.alpha) {
+    const Pixels alpha = decoded_preview(data, *shown.alpha);  // each is as fine as its bytes allow
+    Pixels both{image.width_px, image.height_px, image.channels + 1, {}};
+    for (std::uint32_t y = 0; y < image.height_px; ++y)
+      for (std::uint32_t x = 0; x < image.width_px; ++x) {
+        both.data.insert(both.data.end(), image.at(x, y), image.at(x, y) + image.channels);
+        both.data.push_back(
+            *alpha.at(x * alpha.width_px / image.width_px, y * alpha.height_px / image.height_px));
+      }
+    image = std::move(both);
   }
+  return render_texture(std::move(image), shown.srgb, 0, context);
+}
+
+RenderTexture coarser_texture(const RenderTexture& source, std::uint32_t first_level) {
+  RenderTexture out{source.width_px, source.height_px, source.srgb, first_level, {}};
+  const auto last = source.first_level + static_cast<std::uint32_t>(source.levels.size()) - 1;
+  out.first_level = std::clamp(first_level, source.first_level, last);
+  out.levels.assign(source.levels.begin() + (out.first_level - source.first_level), source.levels.end());
   return out;
 }
 

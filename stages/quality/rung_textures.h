@@ -1,38 +1,52 @@
 #pragma once
-// Inside the room only: textures as they look at a rung.
+// Inside the room only: textures as they look at one displayed height.
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "format/documents/quality_table.h"
+#include "format/documents/tables.h"
+#include "format/documents/textures.h"
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
+#include "stages/data/previews.h"
 #include "stages/quality/shown_textures.h"
 #include "stages/render/render_texture.h"
 
 namespace texmesh::quality {
 
-inline constexpr std::int32_t kSourceRung = -1;  // the source's texels
-
-/// A column of the quality table. Each plane has a rung of its own here, though a column is still named by
-/// one quality.
-struct RungChoice {
-  int quality = 100;
-  std::vector<std::int32_t> rungs;  // per plane of Fragments: index of the rung, or kSourceRung
+/// What textures are made of. All of one model.
+struct TextureData {
+  const Fragments& fragments;
+  const std::vector<Pixels>& pixels;
+  const Ladder& ladder;
+  const Previews& previews;
+  const PackageTables& tables;
+  std::vector<TextureInfo> infos;  // of the planes: mip and base alone
 };
+TextureData texture_data(const Fragments& fragments, const std::vector<Pixels>& pixels, const Ladder& ladder,
+                         const Previews& previews, const PackageTables& tables);
 
-/// The source's texels everywhere.
-RungChoice source_choice(const Fragments& fragments);
-/// `samples` rungs of the sampled plane, spread over its ladder, first and last among them (one: the last).
-/// All other planes at the rung whose quality is nearest. One choice of quality 100 without planes.
-std::vector<RungChoice> sampled_choices(const ShownTextures& shown, const Fragments& fragments,
-                                        const Ladder& ladder, int samples);
+/// The source's texels. Mips finer than `first_level` are not kept.
+RenderTexture source_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                             const RunContext& context);
 
-/// All shown textures at that choice. Mips finer than first_levels are not kept, and no texture has two full
-/// copies in memory. Fragments that no rung stores look as in the source.
-std::vector<RenderTexture> textures_of(const ShownTextures& shown, const Fragments& fragments,
-                                       const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                       const RungChoice& choice,
-                                       const std::vector<std::uint32_t>& first_levels,
-                                       const RunContext& context);
+/// A rung of a plane: its index in the ladder.
+struct PlaneRung {
+  std::uint32_t plane = 0;
+  std::size_t rung = 0;
+};
+/// The texels of that plane, which is a mip of the texture's or the texture's own, with that alpha. Mips finer
+/// than `first_level` are not kept. Fragments that no rung stores look as in the source.
+RenderTexture coded_texture(const TextureData& data, const ShownTexture& shown, const PlaneRung& colour,
+                            const std::optional<PlaneRung>& alpha, std::uint32_t first_level,
+                            const RunContext& context);
+
+/// The preview alone, as it is shown before anything else is there.
+RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown, const RunContext& context);
+
+/// The source's mips from that one on.
+RenderTexture coarser_texture(const RenderTexture& source, std::uint32_t first_level);
 
 }  // namespace texmesh::quality

@@ -17,12 +17,6 @@ std::optional<std::uint32_t> plane_of(const Fragments& fragments, std::int32_t i
   return std::nullopt;
 }
 
-int rank_of(TextureRole role) {
-  if (is_colour(role)) return 0;
-  if (role == TextureRole::kNormal) return 1;
-  return role == TextureRole::kAlpha ? 3 : 2;
-}
-
 bool shows(const Material& material, TextureUse use) {
   if (material.unlit) return use == TextureUse::kBaseColour;
   const Vec3f e = material.emissive;
@@ -78,24 +72,15 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
   // The small pictures stand for larger ones, in which a sampler without mips would not have to flicker.
   for (RenderMaterial& m : shown.materials)
     for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
-
-  const auto before = [&](std::uint32_t p, std::uint32_t best) {
-    return rank_of(fragments.planes[p].role) < rank_of(fragments.planes[best].role);
-  };
-  for (const ShownTexture& t : shown.textures)
-    if (!shown.sampled_plane || before(t.plane, *shown.sampled_plane)) shown.sampled_plane = t.plane;
-  if (!shown.textures.empty()) return shown;
-  for (std::uint32_t p = 0; p < fragments.planes.size(); ++p)
-    if (!shown.sampled_plane || before(p, *shown.sampled_plane)) shown.sampled_plane = p;
   return shown;
 }
 
 // By areas: the renderer goes by the longer side of a pixel's footprint, so it never asks for a finer mip.
 void LevelCount::add(const RenderScene& scene, const Visibility& view,
-                     const std::vector<Vec2<std::uint32_t>>& sizes) {
+                     const std::vector<Vec2<std::uint32_t>>& sizes, double magnification) {
   for (const RenderFragment& fragment : view.fragments) {
     const Triangle& triangle = (*scene.triangles)[fragment.triangle];
-    const double pixels = area_in_picture(scene, view, triangle);
+    const double pixels = area_in_picture(scene, view, triangle) * magnification * magnification;
     if (!(pixels > 0)) continue;
     for (const TextureSlot& slot : scene.material_of(fragment.triangle).textures) {
       if (slot.texture < 0) continue;

@@ -22,9 +22,6 @@ struct ShownTexture {
 struct ShownTextures {
   std::vector<ShownTexture> textures;
   std::vector<RenderMaterial> materials;  // their slots count `textures`
-  /// The plane whose rungs are sampled: the first that shows, colours before normals before other numbers.
-  /// Where none shows, the first of all in the same order. Nothing for a model without planes.
-  std::optional<std::uint32_t> sampled_plane;
 };
 
 /// What the reference renderer reads. References to coordinates that the mesh does not have, all but the base
@@ -37,8 +34,9 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
 class LevelCount {
  public:
   explicit LevelCount(std::size_t textures) : wanted_(textures) {}
-  /// A view of S_0. `sizes`: width and height of each texture in px.
-  void add(const RenderScene& scene, const Visibility& view, const std::vector<Vec2<std::uint32_t>>& sizes);
+  /// A view of S_0 that stands for one so many times as large. `sizes`: width and height of each texture, px.
+  void add(const RenderScene& scene, const Visibility& view, const std::vector<Vec2<std::uint32_t>>& sizes,
+           double magnification);
   /// At most kMaxFirstLevel each.
   std::vector<std::uint32_t> first_levels() const;
 

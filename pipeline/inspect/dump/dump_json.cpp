@@ -109,6 +109,7 @@ Json scales_json(PackageReader& p) {
                     {"display_px_jnd", s.display_px_jnd},
                     {"display_px_error", s.display_px_error},
                     {"display_px_edge", s.display_px_edge},
+                    {"display_px_flip", s.display_px_flip},
                     {"floor", s.floor},
                     {"path", s.glb.path}});
   return {{"scales", list}};
@@ -214,16 +215,7 @@ Json tables_json(PackageReader& p, std::optional<double> gamma) {
                         {"error", t.model_error}}},
                       {"scales", scales}});
   }
-  const QualityTable& q = p.quality();
-  Json samples = Json::array();
-  for (std::size_t s = 0; s < q.scales.size(); ++s)
-    for (std::size_t r = 0; r < q.rungs.size(); ++r)
-      samples.push_back({{"scale", q.scales[s]},
-                         {"quality", q.rungs[r]},
-                         {"ssim", q.ssim[s * q.rungs.size() + r]},
-                         {"difference", q.difference[s * q.rungs.size() + r]}});
-  return {{"tables", planes},
-          {"measured_quality", {{"views", q.views}, {"size_px", q.size_px}, {"samples", samples}}}};
+  return {{"tables", planes}, {"measured_quality", Json::parse(write_quality(p.quality()))}};
 }
 
 Json entry_json(const std::string& path, std::uint64_t offset, std::uint64_t bytes,

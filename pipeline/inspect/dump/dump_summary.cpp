@@ -131,7 +131,7 @@ std::string options_text(const Provenance& provenance) {
 std::string scales_text(PackageReader& p) {
   TextTable table;
   for (const char* header : {"scale", "triangles", "vertices", "kB", "major", "max error", "rms error",
-                             "p95 [%]", "p99 [%]", "jnd [px]", "error [px]", "edge [px]"})
+                             "p95 [%]", "p99 [%]", "flip [px]", "jnd [px]", "error [px]", "edge [px]"})
     table.column(header);
   std::string floors;
   for (const ManifestScale& s : p.manifest().scales)
@@ -139,11 +139,11 @@ std::string scales_text(PackageReader& p) {
   for (const ManifestScale& s : p.manifest().scales)
     table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
                kilobytes(s.glb.bytes), s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
-               percent(s.p95, 2), percent(s.p99, 2), pixels(s.display_px_jnd), pixels(s.display_px_error),
-               pixels(s.display_px_edge)});
-  return "scales (errors in object units; px = displayed height up to which the scale is enough, by the "
-         "just-noticeable\n"
-         "difference, by an error of one pixel, by its edges)\n" +
+               percent(s.p95, 2), percent(s.p99, 2), pixels(s.display_px_flip), pixels(s.display_px_jnd),
+               pixels(s.display_px_error), pixels(s.display_px_edge)});
+  return "scales (errors in object units; px = displayed height up to which the scale is enough, by lit "
+         "pictures, by the\n"
+         "just-noticeable difference, by an error of one pixel, by its edges)\n" +
          table.text() + floors;
 }
 

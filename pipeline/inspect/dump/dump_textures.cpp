@@ -67,22 +67,52 @@ std::string gamma_text(const PlaneTables& t, double gamma) {
          table.text();
 }
 
-std::string measured_text(const QualityTable& q) {
+std::string fraction(float value) { return fixed(static_cast<double>(value), 4); }
+
+std::string geometry_text(const QualityTable& q) {
   TextTable table;
   table.column("scale");
-  for (const int rung : q.rungs) table.column(fmt::format("SSIM q{}", rung));
-  for (const int rung : q.rungs) table.column(fmt::format("diff q{}", rung));
+  for (const char* what : {"FLIP", "p95", "1-SSIM"})
+    for (const std::uint32_t px : q.sizes_px) table.column(fmt::format("{} {} px", what, px));
   for (std::size_t s = 0; s < q.scales.size(); ++s) {
     std::vector<std::string> row{fmt::format("S_{}", q.scales[s])};
-    for (std::size_t r = 0; r < q.rungs.size(); ++r)
-      row.push_back(fixed(static_cast<double>(q.ssim[s * q.rungs.size() + r]), 4));
-    for (std::size_t r = 0; r < q.rungs.size(); ++r)
-      row.push_back(fixed(static_cast<double>(q.difference[s * q.rungs.size() + r]), 4));
+    for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
+      for (const PictureLosses& losses : q.geometry) row.push_back(fraction((losses.*list)[s]));
     table.row(std::move(row));
   }
-  return fmt::format("measured quality against S_0 with the source's texture ({} views of {} px)\n", q.views,
-                     q.size_px) +
-         table.text();
+  return table.text();
+}
+
+std::string groups_text(const QualityTable& q) {
+  TextTable table;
+  table.column("planes", Align::kLeft);
+  table.column("px");
+  table.column("shown as", Align::kLeft);
+  for (const char* header : {"texels' 1-SSIM", "FLIP", "p95", "1-SSIM"}) table.column(header);
+  const auto add = [&](const GroupLosses& group, std::uint32_t px, std::vector<std::string> how,
+                       const PictureLosses& losses, std::size_t i) {
+    std::vector<std::string> row{std::string(enum_name(group.group)), std::to_string(px)};
+    row.insert(row.end(), how.begin(), how.end());
+    for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
+      row.push_back(fraction((losses.*list)[i]));
+    table.row(std::move(row));
+  };
+  for (const GroupLosses& group : q.groups)
+    for (std::size_t i = 0; i < group.sizes.size(); ++i) {
+      const TextureLosses& t = group.sizes[i];
+      for (std::size_t k = 0; k < t.texel_dssim.size(); ++k)
+        add(group, q.sizes_px[i], {"coded", fraction(t.texel_dssim[k])}, t.coded, k);
+      for (std::size_t l = 0; l < t.coarser.size(); ++l)
+        add(group, q.sizes_px[i], {fmt::format("{} mips coarser", l + 1), ""}, t.coarser, l);
+    }
+  return q.groups.empty() ? "" : table.text();
+}
+
+std::string measured_text(const QualityTable& q) {
+  return fmt::format("lit pictures against S_0 with the source's textures ({} views)\n", q.views) +
+         geometry_text(q) + groups_text(q) +
+         fmt::format("losses add up with exponent {}; mean error of that {} %\n",
+                     fixed(static_cast<double>(q.exponent), 2), percent(static_cast<double>(q.error), 1));
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ class Verifier {
     });
     guarded(findings_, "quality", kQualityPath, [&] {
       const QualityTable quality = read_quality(store_.read(package_.manifest.quality));
-      if (package_.tables) check_quality(package_.manifest, *package_.tables, quality, findings_);
+      if (package_.textures) check_quality(package_.manifest, *package_.textures, quality, findings_);
     });
     guarded(findings_, "provenance", kProvenancePath, [&] {
       const Provenance provenance = read_provenance(store_.read(package_.manifest.provenance));

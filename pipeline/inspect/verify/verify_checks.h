@@ -34,8 +34,10 @@ void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& te
 void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
                         Findings& findings);
 
-void check_quality(const Manifest& manifest, const PackageTables& tables, const QualityTable& quality,
-                   Findings& findings);
+/// Scales and groups are those of the package, S_0 loses nothing, and the manifest's switch sizes lie between
+/// the heights that were rendered.
+void check_quality(const Manifest& manifest, const std::vector<TextureInfo>& textures,
+                   const QualityTable& quality, Findings& findings);
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 

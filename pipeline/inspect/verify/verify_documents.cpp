@@ -38,17 +38,17 @@ void check_scales(const Manifest& m, Findings& findings) {
   }
 }
 
-/// The default rule shows the finer of what the JND and an error of one pixel ask for.
+/// The default rule shows what lit pictures cannot tell from S_0.
 void check_steps(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.steps.size(); ++k) {
     const ManifestStep& step = m.steps[k];
     for (const ManifestScale& s : m.scales) {
       if (s.scale != step.scale) continue;
-      const double enough = std::min(s.display_px_jnd, s.display_px_error);
-      findings.require(
-          step.up_to_px <= enough * (1 + 1e-5), "step", kManifestPath, at("steps", k, "/0"),
-          "at most " + number(enough) + ", up to which S_" + std::to_string(s.scale) + " is enough",
-          number(step.up_to_px));
+      findings.require(step.up_to_px <= s.display_px_flip * (1 + 1e-5), "step", kManifestPath,
+                       at("steps", k, "/0"),
+                       "at most " + number(s.display_px_flip) + ", up to which S_" + std::to_string(s.scale) +
+                           " is enough",
+                       number(step.up_to_px));
     }
   }
 }
@@ -125,19 +125,42 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   check_first_picture(m, index, findings);
 }
 
-void check_quality(const Manifest& m, const PackageTables& tables, const QualityTable& q,
+/// Switch sizes are heights that were rendered.
+static void check_switch_sizes(const Manifest& m, const QualityTable& q, Findings& findings) {
+  constexpr double kDigits = 1e-5;  // six are written
+  const double largest = q.sizes_px.back();
+  for (std::size_t k = 1; k < m.scales.size(); ++k) {
+    const double px = m.scales[k].display_px_flip;
+    findings.require(px == 0 || (px >= kLeastSwitchPx * (1 - kDigits) && px <= largest * (1 + kDigits)),
+                     "scale", kManifestPath, at("scales/displayPxFlip", k),
+                     "0, or " + number(kLeastSwitchPx) + " to " + number(largest), number(px));
+  }
+  findings.require(m.scales[0].display_px_flip == kAnyDisplayPx, "scale", kManifestPath,
+                   "/scales/displayPxFlip/0", number(kAnyDisplayPx), number(m.scales[0].display_px_flip));
+}
+
+static void check_geometry(const QualityTable& q, Findings& findings) {
+  for (std::size_t i = 0; i < q.geometry.size(); ++i)
+    for (const auto* list : {&q.geometry[i].flip, &q.geometry[i].flip_p95, &q.geometry[i].dssim})
+      findings.require((*list)[0] == 0, "quality", kQualityPath, at("geometry", i),
+                       "no loss of S_0, which is what is compared with",
+                       number(static_cast<double>((*list)[0])));
+}
+
+void check_quality(const Manifest& m, const std::vector<TextureInfo>& textures, const QualityTable& q,
                    Findings& findings) {
-  for (std::size_t k = 0; k < q.scales.size(); ++k)
-    findings.require(std::any_of(m.scales.begin(), m.scales.end(),
-                                 [&](const ManifestScale& s) { return s.scale == q.scales[k]; }),
-                     "quality", kQualityPath, at("scales", k), "a scale of the package",
-                     std::to_string(q.scales[k]));
-  std::set<int> rungs;
-  for (const PlaneTables& t : tables.planes) rungs.insert(t.rung_quality.begin(), t.rung_quality.end());
-  if (rungs.empty()) rungs.insert(100);
-  for (std::size_t k = 0; k < q.rungs.size(); ++k)
-    findings.require(rungs.count(q.rungs[k]) > 0, "quality", kQualityPath, at("rungs", k),
-                     "a quality of the ladder", std::to_string(q.rungs[k]));
+  std::vector<int> kept;
+  for (const ManifestScale& s : m.scales) kept.push_back(s.scale);
+  findings.require(q.scales == kept, "quality", kQualityPath, "/scales", "the scales of the package",
+                   std::to_string(q.scales.size()) + " others or in another order");
+  std::set<PlaneGroup> groups;
+  for (const TextureInfo& t : textures) groups.insert(group_of(t.role));
+  std::set<PlaneGroup> found;
+  for (const GroupLosses& group : q.groups) found.insert(group.group);
+  findings.require(groups == found, "quality", kQualityPath, "/groups", "the groups that the planes have",
+                   std::to_string(found.size()) + " of " + std::to_string(groups.size()) + ", or others");
+  check_geometry(q, findings);
+  check_switch_sizes(m, q, findings);
 }
 
 /// Which option has the rungs of a plane.

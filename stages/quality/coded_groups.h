@@ -1,0 +1,45 @@
+#pragma once
+// Inside the room only: groups of planes, and the rungs at which they are sampled.
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stages/quality/rung_textures.h"
+
+namespace texmesh::quality {
+
+struct PlanesOfGroup {
+  PlaneGroup group = PlaneGroup::kColour;
+  std::vector<std::uint32_t> planes;  // full-size ones that show; where none of the group shows, all of it
+};
+/// Groups that the model has, rising.
+std::vector<PlanesOfGroup> find_groups(const ShownTextures& shown, const Fragments& fragments);
+
+/// One way to show all planes of a group: a rung of each, or the previews.
+struct Knot {
+  std::vector<PlaneRung> rungs;  // per plane of the group; the plane is that of the displayed height
+  bool previews = false;
+  std::vector<double> dssim, weight;  // per fragment of all planes: 1 - SSIM, and its part of the surface
+  double mean_dssim = 0;              // weighted
+};
+
+/// How large the object is displayed.
+struct Display {
+  double surface_area = 0, object_height = 0;  // object units
+  double displayed_px = 0;
+};
+
+/// The mip of a full-size plane that a client shows (format/documents/mip_choice.h), at most the last one
+/// with whole texels along both axes.
+std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
+
+/// From the highest rung to the lowest, and last the previews. `samples` rungs of the first plane's ladder,
+/// first and last among them (one: the last); the others have the rung whose quality is nearest.
+std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
+                               const Display& display);
+
+/// The texture at that knot, which must have the texture's planes; nothing where it has not.
+std::optional<RenderTexture> texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
+                                        std::uint32_t source_first_level, const RunContext& context);
+
+}  // namespace texmesh::quality

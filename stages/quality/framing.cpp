@@ -1,0 +1,116 @@
+#include "stages/quality/framing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "stages/data/stage.h"
+
+namespace texmesh::quality {
+namespace {
+
+/// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
+/// the whole picture, one pixel wide, covers 0.5 %.
+constexpr double kLeastCovered = 0.002;
+constexpr double kLookedAtPx = 192;  // displayed height at which the coverage is looked at
+
+BoundingSphere sphere_of(const Mesh& mesh) {
+  if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
+  return sphere;
+}
+
+/// The sphere around the place where nearly all positions lie, whatever a few others do.
+BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
+  constexpr double kCrowd = 0.98, kMargin = 1.25;
+  const std::size_t n = mesh.positions.size();
+  BoundingSphere s;
+  std::vector<double> values(n);
+  const auto at_rank = [&](std::size_t rank) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
+    return values[rank];
+  };
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t p = 0; p < n; ++p) values[p] = static_cast<double>(mesh.positions[p][k]);
+    s.centre[k] = at_rank(n / 2);
+  }
+  for (std::size_t p = 0; p < n; ++p) values[p] = length(to_double(mesh.positions[p]) - s.centre);
+  s.radius = kMargin * at_rank(static_cast<std::size_t>(kCrowd * static_cast<double>(n - 1)));
+  return s.radius > 0 && s.radius < bounds.radius ? s : bounds;
+}
+
+struct Seen {
+  std::uint64_t pixels = 0, of = 0;
+  std::vector<std::uint32_t> first_levels;
+};
+
+Seen look_around(const RenderScene& scene, const Frame& frame, const TextureSizes& sizes, int views,
+                 double largest_px, const RunContext& context) {
+  Seen seen;
+  LevelCount levels(sizes.size());
+  for (int v = 0; v < views; ++v) {
+    context.check_cancelled();
+    const PicturePlace place = place_picture(frame, v, views, kLookedAtPx);
+    const Visibility view = look(scene, place.camera, place.side_px, context);
+    for (std::size_t i = 0; i + 1 < view.first.size(); ++i) seen.pixels += view.first[i] < view.first[i + 1];
+    seen.of += static_cast<std::uint64_t>(place.side_px) * place.side_px;
+    levels.add(scene, view, sizes, largest_px / kLookedAtPx);
+  }
+  seen.first_levels = levels.first_levels();
+  return seen;
+}
+
+std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
+  const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
+    return length(to_double(p) - sphere.centre) > sphere.radius;
+  });
+  return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
+}
+
+}  // namespace
+
+ViewChoice choose_views(int views, int large_views) {
+  ViewChoice out{views, std::vector<std::uint8_t>(static_cast<std::size_t>(views))};
+  const int wanted = std::min(views, large_views);
+  for (int i = 0; i < wanted; ++i) out.large[static_cast<std::size_t>((2 * i + 1) * views / (2 * wanted))] = 1;
+  return out;
+}
+
+PicturePlace place_picture(const Frame& frame, int view, int views, double displayed_px) {
+  constexpr double kLargestSide = 8192;
+  PicturePlace out{perspective_camera(camera_of(view, views, frame.sphere.centre, frame.sphere.radius)), 0};
+  const double distance = length(out.camera.eye - frame.sphere.centre);
+  const double side = displayed_px * 2 * distance * out.camera.tan_half_fov / frame.extent;
+  out.side_px = static_cast<std::uint32_t>(std::clamp(std::ceil(side), 1.0, kLargestSide));
+  // A little more is seen than the frame, so that the height is exact.
+  out.camera.tan_half_fov *= out.side_px / std::clamp(side, 0.5, kLargestSide);
+  return out;
+}
+
+Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
+                      double largest_px, Notes& notes, const RunContext& context) {
+  Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}};
+  if (!(extent > 0)) out.frame.extent = 2 * out.frame.sphere.radius;
+  Seen seen = look_around(scene, out.frame, sizes, views, largest_px, context);
+  if (static_cast<double>(seen.pixels) < kLeastCovered * static_cast<double>(seen.of)) {
+    const BoundingSphere crowd = crowd_sphere(*scene.mesh, out.frame.sphere);
+    const Frame closer{crowd, 2 * crowd.radius};
+    if (crowd.radius < out.frame.sphere.radius) {
+      Seen more = look_around(scene, closer, sizes, views, largest_px, context);
+      if (more.pixels > seen.pixels) {
+        out.frame = closer;
+        add_warning(notes, "far-outliers", "",
+                    "quality was measured without the " + count_outside(*scene.mesh, crowd) +
+                        " positions that lie so far from all others that pictures of the whole object show "
+                        "next to nothing");
+        seen = std::move(more);
+      }
+    }
+  }
+  out.pixels = seen.pixels;
+  out.first_levels = std::move(seen.first_levels);
+  return out;
+}
+
+}  // namespace texmesh::quality

@@ -1,0 +1,207 @@
+#include "stages/quality/size_cells.h"
+
+#include <algorithm>
+#include <deque>
+#include <functional>
+
+namespace texmesh::quality {
+namespace {
+
+constexpr double kHigh = 0.95;  // the percentile
+
+/// Which textures stand for the source's: per shown texture an index into the studio's, -1 = the source's.
+using Replaced = std::vector<std::int32_t>;
+
+Materials materials_with(const Materials& source, const Replaced& replaced) {
+  Materials out = source;
+  for (RenderMaterial& m : out)
+    for (TextureSlot& slot : m.textures)
+      if (slot.texture >= 0 && replaced[static_cast<std::size_t>(slot.texture)] >= 0)
+        slot.texture = replaced[static_cast<std::size_t>(slot.texture)];
+  return out;
+}
+
+/// Shots of one size, each with the place where its losses go.
+class SizeShots {
+ public:
+  SizeShots(const TextureSampler& sampler, Studio& studio, const RunContext& context)
+      : sampler_(sampler), studio_(studio), context_(context), source_(studio.textures.size()) {}
+
+  /// Textures of the knot, made when they are first asked for.
+  Replaced coded(const GroupCells& group, std::size_t knot) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      if (auto texture = texture_at(sampler_.data, sampler_.shown.textures[t], group.knots[knot],
+                                    studio_.textures[t].first_level, context_))
+        out[t] = add(std::move(*texture));
+    return out;
+  }
+
+  /// The source's mips, `levels` coarser than those of the group's planes at this size.
+  Replaced coarser(const GroupCells& group, std::uint32_t levels) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      for (const PlaneRung& r : group.knots[0].rungs) {
+        const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
+        if ((plane.mip > 0 ? plane.base : r.plane) != sampler_.shown.textures[t].plane) continue;
+        out[t] = add(coarser_texture(studio_.textures[t], plane.mip + levels));
+      }
+    return out;
+  }
+
+  Replaced none() const { return Replaced(source_, -1); }
+
+  void take(std::size_t scale, const Replaced& replaced, Losses& to, bool large_views = true) {
+    const bool changes = scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
+    if (!changes) {
+      to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
+      return;
+    }
+    materials_.push_back(materials_with(sampler_.shown.materials, replaced));
+    shots_.push_back({scale, &materials_.back(), large_views});
+    to_.push_back(&to);
+  }
+
+  void render(double displayed_px, bool with_ssim) {
+    std::vector<Losses> losses =
+        take_shots(studio_, sampler_.shown.materials, displayed_px, shots_, with_ssim, context_);
+    for (std::size_t i = 0; i < to_.size(); ++i) *to_[i] = std::move(losses[i]);
+    studio_.textures.resize(source_);
+  }
+
+ private:
+  std::int32_t add(RenderTexture texture) {
+    studio_.textures.push_back(std::move(texture));
+    return static_cast<std::int32_t>(studio_.textures.size() - 1);
+  }
+
+  const TextureSampler& sampler_;
+  Studio& studio_;
+  const RunContext& context_;
+  std::size_t source_;
+  std::deque<Materials> materials_;
+  std::vector<Shot> shots_;
+  std::vector<Losses*> to_;
+};
+
+/// The knots that are rendered: all, the ends, or the ends of the rungs.
+bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
+  const std::size_t previews = knots - 1, lowest = previews - 1;
+  return rank == 0 || knot == 0 || knot == lowest || (rank == 1 && knot == previews);
+}
+
+std::size_t coarser_samples(std::size_t rank) { return rank == 0 ? kCoarserLevels : rank == 1 ? 1 : 0; }
+
+/// Scales of the samples that tell how losses add up, and whether their textures have the lowest rung or one
+/// in the middle.
+struct TogetherSample {
+  std::size_t scale;
+  bool lowest;
+};
+std::vector<TogetherSample> together_samples(std::size_t scales, std::size_t rank) {
+  if (scales < 2) return {};
+  const std::size_t near = 1 + (scales - 1) / 3, far = std::min(scales - 1, 1 + 2 * (scales - 1) / 3);
+  if (rank == 0) return {{near, true}, {near, false}, {far, true}, {far, false}};
+  if (rank == 1) return {{near, true}, {far, true}};
+  return {{near, true}};
+}
+
+Replaced both(Replaced a, const Replaced& b) {
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (b[i] >= 0) a[i] = b[i];
+  return a;
+}
+
+constexpr std::size_t kKinds = 3;  // of losses
+double value_of(const Loss& loss, std::size_t kind) {
+  return kind == 0 ? loss.flip.mean() : kind == 1 ? loss.flip.percentile(kHigh) : loss.mean_dssim();
+}
+constexpr std::vector<float> PictureLosses::* kLists[kKinds] = {&PictureLosses::flip, &PictureLosses::flip_p95,
+                                                               &PictureLosses::dssim};
+
+/// Linear in the index between the neighbours that have a value; beyond them theirs. Some must have one.
+double interpolated(const std::vector<std::optional<double>>& values, std::size_t at) {
+  std::size_t below = at, above = at;
+  while (below > 0 && !values[below]) --below;
+  while (above + 1 < values.size() && !values[above]) ++above;
+  if (!values[below]) return values[above].value_or(1);
+  if (!values[above]) return *values[below];
+  if (above == below) return *values[at];
+  const double part = static_cast<double>(at - below) / static_cast<double>(above - below);
+  return (1 - part) * *values[below] + part * *values[above];
+}
+
+void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
+               const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded, SizeShots& shots) {
+  group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
+  const std::size_t knots = group.knots.size();
+  group.coded.resize(knots);
+  coded.assign(knots, shots.none());
+  group.coarser.resize(kCoarserLevels);
+  for (std::size_t k = 0; k < knots; ++k) {
+    if (!is_sampled(k, knots, rank)) continue;
+    coded[k] = shots.coded(group, k);
+    shots.take(0, coded[k], group.coded[k]);
+  }
+  for (std::size_t l = 0; l < coarser_samples(rank); ++l)
+    shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l]);
+}
+
+void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
+                  SizeShots& shots) {
+  const Display display{sampler.surface_area, studio.frame.extent, cells.displayed_px};
+  cells.groups.resize(sampler.groups.size());
+  std::vector<std::vector<Replaced>> coded(cells.groups.size());
+  for (std::size_t g = 0; g < cells.groups.size(); ++g)
+    add_group(sampler, rank, display, sampler.groups[g], cells.groups[g], coded[g], shots);
+  const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
+  cells.together.resize(samples.size());  // shots hold places in it
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    TogetherCell& cell = cells.together[i];
+    cell.scale = samples[i].scale;
+    Replaced all = shots.none();
+    for (std::size_t g = 0; g < cells.groups.size(); ++g) {
+      const std::size_t lowest = cells.groups[g].knots.size() - 2;
+      cell.knots.push_back(samples[i].lowest ? lowest : lowest / 2);
+      all = both(std::move(all), coded[g][cell.knots[g]]);
+    }
+    shots.take(cell.scale, all, cell.losses);
+  }
+}
+
+}  // namespace
+
+void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& studio, SizeCells& cells,
+                 const RunContext& context) {
+  SizeShots shots(sampler, studio, context);
+  cells.geometry.resize(studio.scenes.size());
+  for (std::size_t k = 1; k < task.scales.size(); ++k)
+    if (task.scales[k]) shots.take(k, shots.none(), cells.geometry[k], task.large_views);
+  if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
+  shots.render(cells.displayed_px, task.rank.has_value());
+}
+
+PictureLosses losses_of(const Cells& cells, const ViewChoice& views, const Cells* smaller_cells,
+                        const PictureLosses* smaller) {
+  PictureLosses out;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    const auto below = [&](std::size_t i) { return static_cast<double>((smaller->*kLists[kind])[i]); };
+    std::vector<std::optional<double>> ratio(cells.size());
+    for (std::size_t i = 0; smaller && i < cells.size(); ++i) {
+      if (cells[i].empty()) continue;
+      constexpr double kNothing = 1e-6;
+      const Losses& there = (*smaller_cells)[i];
+      const double from = there.empty() ? below(i) : value_of(pooled(there, views), kind);
+      if (from > kNothing) ratio[i] = value_of(pooled(cells[i], views), kind) / from;
+    }
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const double value = !cells[i].empty() ? value_of(pooled(cells[i]), kind)
+                           : smaller         ? below(i) * interpolated(ratio, i)
+                                             : 0;
+      (out.*kLists[kind]).push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
+    }
+  }
+  return out;
+}
+
+}  // namespace texmesh::quality

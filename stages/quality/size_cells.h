@@ -1,0 +1,60 @@
+#pragma once
+// Inside the room only: what is rendered at one of the table's displayed heights, and what follows from it.
+#include <cstdint>
+#include <vector>
+
+#include "stages/quality/coded_groups.h"
+#include "stages/quality/shots.h"
+
+namespace texmesh::quality {
+
+/// What pictures of one list lose; an element without losses was not rendered.
+using Cells = std::vector<Losses>;
+
+/// A coarser scale with all groups coded.
+struct TogetherCell {
+  std::size_t scale = 0;
+  std::vector<std::size_t> knots;  // per group
+  Losses losses;
+};
+
+struct GroupCells {
+  std::vector<Knot> knots;
+  Cells coded;    // per knot
+  Cells coarser;  // 1, 2 .. levels
+};
+
+struct SizeCells {
+  double displayed_px = 0;
+  Cells geometry;  // per kept scale; S_0 stays empty
+  std::vector<GroupCells> groups;
+  std::vector<TogetherCell> together;
+};
+
+inline constexpr std::size_t kCoarserLevels = 3;
+
+/// What the textures of one size are made from.
+struct TextureSampler {
+  const TextureData& data;
+  const ShownTextures& shown;
+  const std::vector<PlanesOfGroup>& groups;
+  int rung_samples = 4;
+  double surface_area = 0;
+};
+
+/// What is asked of one displayed height.
+struct SizeTask {
+  std::vector<std::uint8_t> scales;  // per kept scale: 1 = rendered with the source's texels; S_0 is not
+  bool large_views = false;          // large views alone show these
+  std::optional<std::size_t> rank;   // of the table's sizes, 0 = the least: textures are rendered as quality.h says
+};
+/// Fills `cells`, whose height is given. The studio's textures are the source's, before and behind.
+void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& studio, SizeCells& cells,
+                 const RunContext& context);
+
+/// Losses of a list of cells. Those that were not rendered follow from `smaller`, the losses at the size
+/// below, by the ratio of rendered neighbours, of the large views alone.
+PictureLosses losses_of(const Cells& cells, const ViewChoice& views, const Cells* smaller_cells,
+                        const PictureLosses* smaller);
+
+}  // namespace texmesh::quality

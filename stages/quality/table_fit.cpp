@@ -1,0 +1,101 @@
+#include "stages/quality/table_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/documents/picture_prediction.h"
+
+namespace texmesh::quality {
+namespace {
+
+constexpr float kLeastDssim = 1e-6f;  // of the one knot of textures that lose nothing
+
+/// What the table says where all fragments have that knot.
+double predicted_flip(const GroupCurve& curve, const Knot& knot) {
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < knot.dssim.size(); ++i) {
+    if (!(knot.weight[i] > 0)) continue;
+    sum += knot.weight[i] * curve.coded(knot.dssim[i]);
+    total += knot.weight[i];
+  }
+  return total > 0 ? sum / total : 0;
+}
+
+void make_rising(std::vector<float>& values) {
+  for (std::size_t i = 1; i < values.size(); ++i) values[i] = std::max(values[i], values[i - 1]);
+}
+
+/// Indices of the knots that stay. Rungs may lose the same, and a preview may be better than the lowest rung.
+std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < knots.size(); ++k) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return knots[a].mean_dssim < knots[b].mean_dssim; });
+  std::vector<std::size_t> out;
+  for (const std::size_t k : order) {
+    const auto dssim = static_cast<float>(knots[k].mean_dssim);
+    const float before = out.empty() ? kLeastDssim : static_cast<float>(knots[out.back()].mean_dssim);
+    if (dssim > before) out.push_back(k);
+  }
+  return out;
+}
+
+}  // namespace
+
+TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded, PictureLosses coarser,
+                             PlaneGroup group, double displayed_px) {
+  TextureLosses out;
+  out.coarser = std::move(coarser);
+  make_rising(out.coarser.flip);
+  std::vector<std::size_t> kept = rising_knots(knots);
+  const bool nothing = kept.empty();
+  if (nothing) kept.push_back(knots.size() - 1);
+  for (const std::size_t k : kept) {
+    out.texel_dssim.push_back(nothing ? kLeastDssim : static_cast<float>(knots[k].mean_dssim));
+    out.coded.flip.push_back(coded.flip[k]);
+    out.coded.flip_p95.push_back(coded.flip_p95[k]);
+    out.coded.dssim.push_back(coded.dssim[k]);
+  }
+  make_rising(out.coded.flip);
+  const std::vector<float> measured = out.coded.flip;
+  for (int step = 0; step < 3 && !nothing; ++step) {
+    QualityTable table;
+    table.sizes_px = {static_cast<std::uint32_t>(std::lround(displayed_px))};
+    table.groups = {{group, {out}}};
+    const GroupCurve curve(table, group, displayed_px);
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      const double predicted = predicted_flip(curve, knots[kept[i]]);
+      if (predicted > 0)
+        out.coded.flip[i] = static_cast<float>(std::min(
+            1.0, static_cast<double>(out.coded.flip[i]) * static_cast<double>(measured[i]) / predicted));
+    }
+    make_rising(out.coded.flip);
+  }
+  return out;
+}
+
+void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table) {
+  constexpr int kSteps = 64;           // of the exponent in a unit
+  constexpr double kUnseen = 1e-4;     // samples that lose less say nothing
+  table.exponent = 1;
+  table.error = 0;
+  QualityTable tried;
+  double least = 1e300;
+  for (int step = 0; step <= 3 * kSteps; ++step) {
+    tried.exponent = static_cast<float>(1 + static_cast<double>(step) / kSteps);
+    double sum = 0;
+    std::size_t count = 0;
+    for (const TogetherLoss& s : samples) {
+      if (!(s.measured > kUnseen)) continue;
+      sum += std::fabs(combined_flip(tried, s.parts) - s.measured) / s.measured;
+      ++count;
+    }
+    if (count == 0) return;
+    if (sum >= least) continue;
+    least = sum;
+    table.exponent = tried.exponent;
+    table.error = static_cast<float>(sum / static_cast<double>(count));
+  }
+}
+
+}  // namespace texmesh::quality
