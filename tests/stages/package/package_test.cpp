@@ -34,7 +34,7 @@ struct Inputs {
   Previews previews;
   PackageTables tables;
   ScaleFiles files;
-  QualityTable quality;
+  MeasuredQuality quality;
   PackageOptions options;
 
   explicit Inputs(std::size_t planes) {
@@ -55,7 +55,11 @@ struct Inputs {
     perceptual.display_px_error = {2e9f, 500, 200};
     perceptual.display_px_jnd = {2e9f, 700, 150};
     perceptual.object_height = 2;
-    quality = {{0, 4, 9}, {100}, {1, 0.9f, 0.8f}, {0, 0.1f, 0.2f}, 4, 128};
+    quality.table.views = 4;
+    quality.table.sizes_px = {128};
+    quality.table.scales = {0, 4, 9};
+    quality.table.geometry = {{{0, 0.1f, 0.2f}, {0, 0.3f, 0.4f}, {0, 0.1f, 0.2f}}};
+    quality.display_px_flip = {1e9f, 450, 90.5097f};
     for (std::size_t p = 0; p < planes; ++p) add_plane(p);
   }
 

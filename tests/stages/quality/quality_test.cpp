@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "format/documents/manifest.h"
+#include "format/documents/picture_prediction.h"
 #include "stages/base/run_context.h"
 #include "stages/ladder/ladder.h"
-#include "stages/measure/image_compare.h"
-#include "stages/measure/render_view.h"
+#include "stages/lut/lut.h"
+#include "stages/previews/previews.h"
+#include "stages/zim/zim.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -23,6 +27,8 @@ struct Sample {
   Fragments fragments;
   std::vector<Pixels> pixels;
   Ladder ladder;
+  Previews previews;
+  PackageTables tables;
 };
 
 // The sheet of n x n quads seen only at every `step`-th row and column.
@@ -39,12 +45,22 @@ NestedScale every(int n, int step, int number) {
   return s;
 }
 
+/// What the stages before this one make of planes and pixels.
+void encode(Sample& s) {
+  const RunContext context;
+  s.previews = make_previews(s.fragments, s.pixels, {}, context);
+  s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, LadderOptions{}, context);
+  s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context), s.ladder,
+                          s.previews, {}, context);
+}
+
 Sample sample_sheet(bool textured) {
   Sample s;
   constexpr int kQuads = 32;
   s.scales.mesh = testing::sheet(kQuads, 0.2f);
   for (int k = 0; k < 4; ++k) s.scales.scales.push_back(every(kQuads, 1 << k, 3 * k));
   s.perceptual.kept = {1, 1, 0, 1};
+  s.perceptual.object_height = 1;
   if (!textured) return s;
 
   TexturePlane plane;
@@ -54,6 +70,8 @@ Sample sample_sheet(bool textured) {
   plane.coverage.assign(256 * 256 / 8, 0xff);
   plane.covered_texels.assign(4, 128 * 128);
   plane.surface_fraction.assign(4, 0.25f);
+  plane.features.assign(4, 1);
+  plane.eta.assign(4, 0.5f);
   s.fragments.planes.push_back(plane);
   s.materials[0].base_colour_texture.image = 0;
   Pixels p{256, 256, 3, {}};
@@ -64,60 +82,131 @@ Sample sample_sheet(bool textured) {
         p.data.push_back(
             static_cast<std::uint8_t>(90 + 60 * ((x / 8 + y / 12 + c) % 2) + 40 * random.uniform()));
   s.pixels.push_back(std::move(p));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, LadderOptions{}, RunContext{});
+  encode(s);
   return s;
 }
 
-QualityTable measure(const Sample& s, const QualityOptions& options = {}, int threads = 1) {
+MeasuredQuality measure_all(const Sample& s, const QualityOptions& options, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, options,
-                         context)
-      .table;
+  return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, s.previews,
+                         s.tables, options, context);
 }
-
-Notes notes_of(const Sample& s) {
-  return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, {}, {}).notes;
+/// Small, so that tests are quick.
+QualityOptions small_options() {
+  QualityOptions options;
+  options.views = 3;
+  options.large_views = 2;
+  options.largest_px = 256;
+  return options;
 }
+QualityTable measure(const Sample& s) { return measure_all(s, small_options()).table; }
 
-TEST(Quality, TableHasKeptScalesAndSpreadRungs) {
+TEST(Quality, TableHasKeptScalesSizesAndGroups) {
   const QualityTable t = measure(sample_sheet(true));
   EXPECT_EQ(t.scales, (std::vector<int>{0, 3, 9}));
-  ASSERT_EQ(t.rungs.size(), 4u);
-  EXPECT_EQ(t.rungs.front(), 5);
-  EXPECT_EQ(t.rungs.back(), 97);
-  EXPECT_TRUE(std::is_sorted(t.rungs.begin(), t.rungs.end()));
-  EXPECT_EQ(t.ssim.size(), 12u);
-  EXPECT_EQ(t.difference.size(), 12u);
-  EXPECT_EQ(t.views, 4u);
-  EXPECT_EQ(t.size_px, 192u);
-}
-
-TEST(Quality, OriginalAtTheTopRungIsNearlyEqualAndLowerIsWorse) {
-  const QualityTable t = measure(sample_sheet(true));
-  EXPECT_GT(t.ssim[3], 0.97);
-  EXPECT_LT(t.difference[3], 0.08);  // grain in the colours, of which 4:2:0 keeps a quarter
-  for (std::size_t s = 0; s < t.scales.size(); ++s)
-    for (std::size_t r = 1; r < t.rungs.size(); ++r) {
-      // On another surface more texture is not exactly monotone: it no longer lies where the original's does.
-      const float slack = s == 0 ? 0 : 0.02f;
-      EXPECT_GE(t.ssim[s * 4 + r] + slack, t.ssim[s * 4 + r - 1]) << s << " " << r;
-      EXPECT_LE(t.difference[s * 4 + r], t.difference[s * 4 + r - 1] + slack) << s << " " << r;
-    }
-  for (std::size_t s = 1; s < t.scales.size(); ++s) {
-    EXPECT_LT(t.ssim[s * 4 + 3], t.ssim[s * 4 - 1]);
-    EXPECT_GT(t.difference[s * 4 + 3], t.difference[s * 4 - 1]);
+  EXPECT_EQ(t.sizes_px, (std::vector<std::uint32_t>{64, 128, 256}));
+  EXPECT_EQ(t.views, 3u);
+  ASSERT_EQ(t.geometry.size(), 3u);
+  for (const PictureLosses& g : t.geometry) EXPECT_EQ(g.size(), 3u);
+  ASSERT_EQ(t.groups.size(), 1u);
+  EXPECT_EQ(t.groups[0].group, PlaneGroup::kColour);
+  ASSERT_EQ(t.groups[0].sizes.size(), 3u);
+  for (const TextureLosses& losses : t.groups[0].sizes) {
+    EXPECT_GE(losses.texel_dssim.size(), 3u);
+    EXPECT_EQ(losses.coarser.size(), 3u);
   }
-  EXPECT_LT(t.ssim[0], t.ssim[3] - 0.05) << "quality 5 must show";
+  EXPECT_EQ(read_quality(std::vector<std::uint8_t>([&] {
+              const std::string json = write_quality(t);
+              return std::vector<std::uint8_t>(json.begin(), json.end());
+            }())),
+            t);
 }
 
-TEST(Quality, UntexturedModelHasOneColumnAndIdentity) {
-  const QualityTable t = measure(sample_sheet(false));
-  EXPECT_EQ(t.rungs, std::vector<int>{100});
-  EXPECT_EQ(t.ssim[0], 1.f);
-  EXPECT_EQ(t.difference[0], 0.f);
-  EXPECT_LT(t.ssim[1], 1.f);
-  EXPECT_LT(t.ssim[2], t.ssim[1]);
+TEST(Quality, LossesGrowWithScaleAndWithWorseTexels) {
+  const QualityTable t = measure(sample_sheet(true));
+  for (const PictureLosses& g : t.geometry) {
+    EXPECT_EQ(g.flip[0], 0);
+    EXPECT_EQ(g.flip_p95[0], 0);
+    EXPECT_EQ(g.dssim[0], 0);
+    EXPECT_GT(g.flip[1], 0);
+    EXPECT_GT(g.flip[2], g.flip[1]);
+    EXPECT_GT(g.flip_p95[2], g.flip[2]);
+    EXPECT_GT(g.dssim[2], g.dssim[1]);
+  }
+  for (const TextureLosses& losses : t.groups[0].sizes) {
+    EXPECT_TRUE(std::ranges::is_sorted(losses.texel_dssim));
+    EXPECT_TRUE(std::ranges::is_sorted(losses.coded.flip));
+    EXPECT_GT(losses.coded.flip.back(), 1.5f * losses.coded.flip.front());
+    EXPECT_TRUE(std::ranges::is_sorted(losses.coarser.flip));
+    EXPECT_GT(losses.coarser.flip.back(), 0);
+  }
+}
+
+TEST(Quality, KnotsGiveWhatWasMeasuredWhenFragmentsAreRead) {
+  // Fragments of one rung differ; the mean of what the curve says of each is what the picture shows.
+  const Sample s = sample_sheet(true);
+  const QualityTable t = measure(s);
+  const PlaneTables& plane = s.tables.planes[0];
+  const GroupCurve curve(t, PlaneGroup::kColour, 64);
+  const TextureLosses& losses = t.groups[0].sizes[0];
+  double sum = 0;
+  for (std::size_t f = 0; f < 4; ++f) sum += curve.coded(static_cast<double>(plane.dssim[f])) / 4;
+  const double lowest = static_cast<double>(losses.coded.flip[losses.coded.size() - 2]);
+  EXPECT_NEAR(sum, lowest, 0.1 * lowest);
+}
+
+TEST(Quality, SamplesOfEverythingTogetherArePredicted) {
+  const QualityTable t = measure(sample_sheet(true));
+  EXPECT_GE(t.exponent, 1);
+  EXPECT_LE(t.exponent, 4);
+  EXPECT_GT(t.error, 0);
+  EXPECT_LT(t.error, 0.2);
+}
+
+TEST(Quality, EqualScalesPassEverywhereAndLoseNothing) {
+  Sample s = sample_sheet(false);
+  for (NestedScale& scale : s.scales.scales) {
+    const int number = scale.scale;
+    scale = s.scales.scales[0];
+    scale.scale = number;
+  }
+  const MeasuredQuality m = measure_all(s, small_options());
+  EXPECT_EQ(m.display_px_flip, (std::vector<float>{static_cast<float>(kAnyDisplayPx), 256, 256}));
+  for (const PictureLosses& g : m.table.geometry)
+    for (const auto* list : {&g.flip, &g.flip_p95, &g.dssim})
+      for (const float x : *list) EXPECT_NEAR(x, 0, 1e-6);
+  EXPECT_TRUE(m.table.groups.empty());
+  EXPECT_EQ(m.table.exponent, 1);
+  EXPECT_EQ(m.table.error, 0);
+}
+
+TEST(Quality, SwitchSizesAreHeightsOfTheGridAndFollowTheThresholds) {
+  const Sample s = sample_sheet(true);
+  QualityOptions options = small_options();
+  const std::vector<float> usual = measure_all(s, options).display_px_flip;
+  ASSERT_EQ(usual.size(), 3u);
+  EXPECT_GE(usual[1], usual[2]) << "the finer scale serves longer";
+  for (const float px : usual) {
+    if (px == 0 || px == static_cast<float>(kAnyDisplayPx)) continue;
+    const double halves = 2 * std::log2(256 / static_cast<double>(px));
+    EXPECT_NEAR(halves, std::round(halves), 1e-5) << px;
+  }
+  options.flip_mean = options.flip_p95 = 1;
+  EXPECT_EQ(measure_all(s, options).display_px_flip[2], 256) << "anything passes";
+  options.flip_mean = 0;
+  EXPECT_EQ(measure_all(s, options).display_px_flip[1], 0) << "nothing passes";
+  options = small_options();
+  options.flip_p95 = 0;
+  EXPECT_EQ(measure_all(s, options).display_px_flip[1], 0);
+}
+
+TEST(Quality, AScaleThatIsVisiblyDifferentPassesNowhere) {
+  Sample s = sample_sheet(false);
+  NestedScale& coarsest = s.scales.scales.back();
+  coarsest.triangles.resize(coarsest.triangles.size() / 2);
+  coarsest.triangle_source.resize(coarsest.triangles.size());
+  EXPECT_EQ(measure_all(s, small_options()).display_px_flip.back(), 0);
 }
 
 TEST(Quality, FragmentsThatNoRungStoresStayAsTheSource) {
@@ -127,81 +216,90 @@ TEST(Quality, FragmentsThatNoRungStoresStayAsTheSource) {
     rung.offset.assign(5, 0);
   }
   const QualityTable t = measure(s);
-  for (std::size_t r = 0; r < t.rungs.size(); ++r) EXPECT_EQ(t.ssim[r], 1.f);
+  const PictureLosses& coded = t.groups[0].sizes[0].coded;
+  EXPECT_EQ(coded.flip.front(), 0);
+  EXPECT_EQ(coded.dssim.front(), 0);
 }
 
-TEST(Quality, VertexColoursEmissionAndNormalsShow) {
+TEST(Quality, VertexColoursShow) {
   Sample s = sample_sheet(false);
   const QualityTable plain = measure(s);
   testing::Random random{3};
   for (std::size_t w = 0; w < s.scales.mesh.wedge_count(); ++w)
     s.scales.mesh.colours.push_back({static_cast<float>(random.uniform()), 0.5f, 0.5f, 1});
-  const QualityTable coloured = measure(s);
-  EXPECT_LT(coloured.ssim[2], plain.ssim[2]);
-  s.materials[0].emissive = {1, 1, 1};
-  EXPECT_GT(measure(s).ssim[2], coloured.ssim[2]) << "a glare hides the difference";
+  EXPECT_GT(measure(s).geometry[1].flip[2], plain.geometry[1].flip[2]);
 }
 
-TEST(Quality, ModelsWithoutColoursHaveTheRungsOfTheirOwnMaps) {
+TEST(Quality, GroupsAreMeasuredApart) {
+  Sample s = sample_sheet(true);
+  s.fragments.planes.push_back(s.fragments.planes[0]);
+  s.fragments.planes[1].role = TextureRole::kNormal;
+  s.fragments.planes[1].image = 1;
+  Pixels flat = s.pixels[0];
+  for (std::size_t i = 0; i < flat.data.size(); ++i) flat.data[i] = i % 3 == 2 ? 255 : 128;
+  s.pixels.push_back(flat);
+  encode(s);
+  s.materials[0].normal_texture.image = 1;
+  const QualityTable t = measure(s);
+  ASSERT_EQ(t.groups.size(), 2u);
+  EXPECT_EQ(t.groups[1].group, PlaneGroup::kNormal);
+  EXPECT_EQ(t.groups[0].sizes[0].coded, measure(sample_sheet(true)).groups[0].sizes[0].coded)
+      << "a flat normal map changes no colours";
+  EXPECT_LT(t.groups[1].sizes[0].coded.flip[0], 0.01f);
+  EXPECT_EQ(t.groups[1].sizes[0].coarser.flip.back(), 0) << "flat stays flat";
+}
+
+TEST(Quality, PlanesThatDoNotShowLoseNothing) {
   Sample s = sample_sheet(true);
   std::swap(s.materials[0].base_colour_texture, s.materials[0].normal_texture);
   s.fragments.planes[0].role = TextureRole::kNormal;
+  encode(s);
   const QualityTable normals = measure(s);
-  EXPECT_EQ(normals.rungs, measure(sample_sheet(true)).rungs);
-  EXPECT_LT(normals.ssim[0], normals.ssim[3] - 0.02) << "bad normals must show";
-  EXPECT_GT(normals.difference[0], normals.difference[3] + 0.01f);
-
+  ASSERT_EQ(normals.groups.size(), 1u);
+  EXPECT_GT(normals.groups[0].sizes[0].coded.flip.back(), 0.02f) << "bad normals must show";
   s.materials[0].unlit = true;
   const QualityTable unseen = measure(s);
-  EXPECT_EQ(unseen.rungs, normals.rungs);
-  EXPECT_EQ(unseen.ssim[0], 1.f);
-  EXPECT_EQ(unseen.difference[0], 0.f);
-  for (std::size_t r = 1; r < 4; ++r) EXPECT_EQ(unseen.ssim[8 + r], unseen.ssim[8]);
-}
-
-TEST(Quality, ColoursAreSampledBeforeOtherMaps) {
-  Sample s = sample_sheet(true);
-  s.fragments.planes.insert(s.fragments.planes.begin(), s.fragments.planes[0]);
-  s.pixels.push_back(s.pixels[0]);
-  s.ladder.planes.push_back(s.ladder.planes[0]);
-  s.fragments.planes[0].role = TextureRole::kNormal;
-  s.fragments.planes[1].image = 1;
-  s.ladder.planes[0].rungs.resize(2);
-  s.materials[0].normal_texture.image = 0;
-  s.materials[0].base_colour_texture.image = 1;
-  EXPECT_EQ(measure(s).rungs, measure(sample_sheet(true)).rungs);
+  ASSERT_EQ(unseen.groups.size(), 1u);
+  for (const TextureLosses& losses : unseen.groups[0].sizes)
+    for (const float x : losses.coded.flip) EXPECT_EQ(x, 0);
 }
 
 TEST(Quality, WhatIsTransparentIsNotMeasured) {
   Sample s = sample_sheet(true);
   s.materials[0].alpha_mode = AlphaMode::kBlend;
   s.materials[0].base_colour = {1, 1, 1, 0};
-  const QualityTable t = measure(s);
-  for (float x : t.ssim) EXPECT_EQ(x, 1.f);
-  const Notes notes = notes_of(s);
-  ASSERT_EQ(notes.size(), 1u);
-  EXPECT_EQ(notes[0].code, "quality-not-measured");
+  const MeasuredQuality m = measure_all(s, small_options());
+  for (const PictureLosses& g : m.table.geometry)
+    for (const float x : g.flip) EXPECT_EQ(x, 0);
+  EXPECT_EQ(m.display_px_flip.back(), 256);
 }
 
 TEST(Quality, SameForAnyNumberOfThreads) {
   const Sample s = sample_sheet(true);
-  QualityOptions options;
-  options.views = 3;
-  options.size_px = 96;
-  EXPECT_EQ(measure(s, options, 1), measure(s, options, 8));
+  const MeasuredQuality one = measure_all(s, small_options(), 1), four = measure_all(s, small_options(), 4);
+  EXPECT_EQ(one.table, four.table);
+  EXPECT_EQ(one.display_px_flip, four.display_px_flip);
 }
 
-TEST(Quality, OptionsAreTaken) {
-  QualityOptions options;
-  options.views = 1;
-  options.size_px = 64;
-  options.rung_samples = 1;
-  const QualityTable t = measure(sample_sheet(true), options);
-  EXPECT_EQ(t.rungs, std::vector<int>{97});
-  EXPECT_EQ(t.views, 1u);
-  EXPECT_EQ(t.size_px, 64u);
-  options.rung_samples = 16;
-  EXPECT_EQ(measure(sample_sheet(true), options).rungs, LadderOptions{}.rungs);
+TEST(Quality, OneRungOneViewAndTexturesOfOnePixelDo) {
+  QualityOptions options = small_options();
+  options.views = options.large_views = options.rung_samples = 1;
+  EXPECT_EQ(measure_all(sample_sheet(true), options).table.views, 1u);
+  Sample s = sample_sheet(true);
+  TexturePlane& plane = s.fragments.planes[0];
+  plane.width_px = plane.height_px = 1;
+  plane.fragment_width_px = plane.fragment_height_px = 16;
+  plane.columns = plane.rows = 1;
+  plane.coverage.assign(1, 0xff);
+  plane.covered_texels = {1};
+  plane.surface_fraction = {1};
+  plane.features = {1};
+  plane.eta = {0};
+  s.pixels[0] = {16, 16, 3, std::vector<std::uint8_t>(768, 99)};
+  encode(s);
+  const QualityTable t = measure(s);
+  ASSERT_EQ(t.groups.size(), 1u);
+  EXPECT_FALSE(write_quality(t).empty());
 }
 
 /// Adds a triangle of that side, so far away, to all scales.
@@ -223,24 +321,19 @@ void add_stray(Sample& s, float away, float side) {
 }
 
 TEST(Quality, AStrayTriangleFarAwayChangesLittle) {
-  for (bool textured : {false, true}) {
-    const Sample alone = sample_sheet(textured);
-    EXPECT_TRUE(notes_of(alone).empty());
-    const QualityTable want = measure(alone);
-    for (float away : {300.f, 1e5f}) {
-      SCOPED_TRACE(away);
-      if (textured && away < 1e5f) continue;  // dear
-      Sample s = alone;
-      add_stray(s, away, 0.02f);
-      const QualityTable t = measure(s);
-      ASSERT_EQ(t.ssim.size(), want.ssim.size());
-      EXPECT_LT(t.ssim.back(), t.ssim[t.rungs.size() - 1]) << "the coarsest differs from S_0";
-      for (std::size_t i = 0; i < t.ssim.size(); ++i) EXPECT_NEAR(t.ssim[i], want.ssim[i], 0.1) << i;
-      const Notes notes = notes_of(s);
-      ASSERT_EQ(notes.size(), 1u);
-      EXPECT_EQ(notes[0].code, "far-outliers");
-      EXPECT_NE(notes[0].text.find("the 3 of "), std::string::npos) << notes[0].text;
-    }
+  const Sample alone = sample_sheet(false);
+  const MeasuredQuality want = measure_all(alone, small_options());
+  EXPECT_TRUE(want.notes.empty());
+  for (float away : {300.f, 1e5f}) {
+    SCOPED_TRACE(away);
+    Sample s = alone;
+    add_stray(s, away, 0.02f);
+    s.perceptual.object_height = away;
+    const MeasuredQuality m = measure_all(s, small_options());
+    EXPECT_GT(m.table.geometry[0].flip.back(), 0.3f * want.table.geometry[0].flip.back());
+    ASSERT_EQ(m.notes.size(), 1u);
+    EXPECT_EQ(m.notes[0].code, "far-outliers");
+    EXPECT_NE(m.notes[0].text.find("the 3 of "), std::string::npos) << m.notes[0].text;
   }
 }
 
@@ -253,15 +346,16 @@ TEST(Quality, WhatNoPictureShowsCountsAsEqual) {
   for (NestedScale& scale : specks.scales.scales) scale.triangles.clear(), scale.triangle_source.clear();
   specks.scales.mesh = Mesh{};
   specks.scales.mesh.triangle_material = {0};
+  specks.scales.mesh.triangle_part = {0};
   add_stray(specks, 1000, 0.01f);
   add_stray(specks, -1000, 0.01f);
   for (const Sample* s : {&thread, &specks}) {
-    const QualityTable t = measure(*s);
-    for (float x : t.ssim) EXPECT_EQ(x, 1.f);
-    for (float x : t.difference) EXPECT_EQ(x, 0.f);
-    const Notes notes = notes_of(*s);
-    ASSERT_EQ(notes.size(), 1u);
-    EXPECT_EQ(notes[0].code, "quality-not-measured");
+    const MeasuredQuality m = measure_all(*s, small_options());
+    for (const PictureLosses& g : m.table.geometry)
+      for (float x : g.flip) EXPECT_EQ(x, 0.f);
+    EXPECT_EQ(m.display_px_flip.back(), 256);
+    ASSERT_EQ(m.notes.size(), 1u);
+    EXPECT_EQ(m.notes[0].code, "quality-not-measured");
   }
 }
 
@@ -271,125 +365,6 @@ TEST(Quality, NothingToLookAtIsAnError) {
   EXPECT_THROW(measure(s), StageError);
   s.scales.mesh.positions.clear();
   EXPECT_THROW(measure(s), StageError);
-}
-
-TEST(RenderView, ASphereCoversItsDiscWithoutHoles) {
-  const Mesh mesh = testing::sphere(24, 48);
-  std::vector<std::uint32_t> source(mesh.triangles.size(), 0);
-  const std::vector<Material> materials(1);
-  ViewScene scene;
-  scene.mesh = &mesh;
-  scene.triangles = &mesh.triangles;
-  scene.triangle_source = &source;
-  scene.materials = &materials;
-  scene.base_plane = scene.emissive_plane = {-1};
-  for (int v = 0; v < 4; ++v) {
-    const ViewBuffer view = look_at(scene, camera_of(v, 4, {0, 0, 0}, 1), 100);
-    const double disc = 3.14159265 * 96 * 96;  // samples: radius 0.96 * 100
-    EXPECT_NEAR(static_cast<double>(view.samples.size()), disc, 0.02 * disc);
-    for (int y = 0; y < 100; ++y)
-      for (int x = 0; x < 100; ++x)
-        if ((x - 49.5) * (x - 49.5) + (y - 49.5) * (y - 49.5) < 46.5 * 46.5) {
-          EXPECT_EQ(view.hits[static_cast<std::size_t>(y) * 100 + static_cast<std::size_t>(x)], 4);
-        }
-    const Picture picture = draw(view, {});
-    EXPECT_NEAR(picture.linear[50 * 100 + 50].x, 1, 0.01) << "the middle faces the head-light";
-    EXPECT_NEAR(picture.linear[0].x, 0.2, 1e-6);
-  }
-}
-
-TEST(RenderView, TextureStandsTheRightWayUp) {
-  Mesh mesh = testing::sheet(1, 0);
-  std::vector<std::uint32_t> source(2, 0);
-  std::vector<Material> materials(1);
-  materials[0].base_colour_texture.image = 0;
-  materials[0].base_colour_texture.wrap_s = materials[0].base_colour_texture.wrap_t = Wrap::kClamp;
-  materials[0].unlit = true;
-  ViewScene scene{&mesh, &mesh.triangles, &source, &materials, {0}, {-1}, {{2, 2}}};
-  MipTexture texture;
-  texture.width_px = texture.height_px = 2;
-  texture.levels.push_back({2, 2, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}}});  // top row first
-  build_mips(texture);
-  ASSERT_EQ(texture.levels.size(), 2u);
-  EXPECT_EQ(texture.levels[1].texels[0], (Vec3f{0.5f, 0.5f, 0.5f}));
-  ViewCamera camera;
-  camera.x = {1, 0, 0};
-  camera.y = {0, 1, 0};
-  camera.z = {0, 0, 1};
-  camera.centre = {0.5, 0.5, 0};
-  camera.radius = 0.75;
-  const Picture picture = draw(look_at(scene, camera, 60), {texture});
-  auto at = [&](int x, int y) {
-    return picture.linear[static_cast<std::size_t>(y) * 60 + static_cast<std::size_t>(x)];
-  };
-  EXPECT_GT(at(15, 15).x, 0.9);  // red: u = 0, v = 0, top left of the image, where y is high
-  EXPECT_LT(at(15, 15).y, 0.1);
-  EXPECT_GT(at(44, 15).y, 0.9);
-  EXPECT_GT(at(15, 44).z, 0.9);
-  EXPECT_GT(at(44, 44).x, 0.9);
-}
-
-TEST(RenderView, FinePatternsAreFilteredNotAliased) {
-  // A checkerboard of single texels, seen at 1/16 of its size, is even grey.
-  Mesh mesh = testing::sheet(1, 0);
-  std::vector<std::uint32_t> source(2, 0);
-  std::vector<Material> materials(1);
-  materials[0].unlit = true;
-  ViewScene scene{&mesh, &mesh.triangles, &source, &materials, {0}, {-1}, {{512, 512}}};
-  MipTexture texture;
-  texture.width_px = texture.height_px = 512;
-  texture.levels.push_back({512, 512, {}});
-  for (int i = 0; i < 512 * 512; ++i) {
-    const float c = static_cast<float>((i + i / 512) % 2);
-    texture.levels[0].texels.push_back({c, c, c});
-  }
-  build_mips(texture);
-  ViewCamera camera{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5, 0.5, 0}, 0.75};
-  const Picture picture = draw(look_at(scene, camera, 48), {texture});
-  for (int i = 12; i < 36; ++i)
-    EXPECT_NEAR(picture.linear[static_cast<std::size_t>(i) * 48 + 24].x, 0.5, 0.01);
-}
-
-Picture grey(float level, std::uint32_t side = 32) {
-  return {side, std::vector<Vec3f>(side * side, {level, level, level}),
-          std::vector<std::uint8_t>(side * side, 1)};
-}
-
-TEST(ImageCompare, EqualIsEqualAndColoursCount) {
-  const ComparedPicture a = prepare_comparison(grey(0.2f));
-  const PictureDifference same = compare_pictures(a, a);
-  EXPECT_EQ(same.pixels, 1024u);
-  EXPECT_NEAR(same.ssim / 1024, 1, 1e-9);
-  EXPECT_EQ(same.difference, 0);
-
-  const PictureDifference lighter = compare_pictures(a, prepare_comparison(grey(0.22f)));
-  const PictureDifference bright = compare_pictures(a, prepare_comparison(grey(0.6f)));
-  EXPECT_GT(lighter.difference, 0);
-  EXPECT_GT(bright.difference, 3 * lighter.difference);
-
-  Picture red = grey(0.2f);
-  for (Vec3f& c : red.linear) c = {0.5f, 0.12f, 0.12f};
-  const PictureDifference hue = compare_pictures(a, prepare_comparison(red));
-  EXPECT_GT(hue.difference / 1024, 0.2);
-}
-
-// The largest difference that FLIP knows, by definition nearly 1 (green against blue).
-TEST(ImageCompare, GreenAgainstBlueIsOne) {
-  Picture green = grey(0), blue = grey(0);
-  for (Vec3f& c : green.linear) c = {0, 1, 0};
-  for (Vec3f& c : blue.linear) c = {0, 0, 1};
-  const PictureDifference d = compare_pictures(prepare_comparison(green), prepare_comparison(blue));
-  EXPECT_NEAR(d.difference / 1024, 1, 1e-3);
-}
-
-TEST(ImageCompare, OnlyCoveredPixelsCount) {
-  Picture a = grey(0.2f), b = grey(0.2f);
-  std::fill(a.covered.begin(), a.covered.end(), 0);
-  std::fill(b.covered.begin(), b.covered.end(), 0);
-  EXPECT_EQ(compare_pictures(prepare_comparison(a), prepare_comparison(b)).pixels, 0u);
-  a.covered[5] = 1;
-  b.covered[9] = 1;
-  EXPECT_EQ(compare_pictures(prepare_comparison(a), prepare_comparison(b)).pixels, 2u);
 }
 
 }  // namespace
