@@ -45,10 +45,10 @@ EntryName parse_texture_path(std::string_view text) {
 
 EntryName parse_any_spelling(std::string_view path) {
   constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},      {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},          {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},        {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream}};
+      {kManifestPath, EntryKind::kManifest},       {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},           {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},         {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream}, {kPosterPath, EntryKind::kPoster}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -96,6 +96,7 @@ enum Place : int {
   kFirstMesh,
   kPreviews,
   kTableStreamsPlace,
+  kPosterPlace,
   kInterleaved,
   kOthers,
   kLast
@@ -119,6 +120,8 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
       return kPreviews;
     case EntryKind::kTableStreams:
       return kTableStreamsPlace;
+    case EntryKind::kPoster:
+      return kPosterPlace;
     case EntryKind::kRung:
       return kInterleaved;
     case EntryKind::kProvenance:

@@ -15,6 +15,7 @@ inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
 inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
+inline constexpr const char* kPosterPath = "poster.jpg";            // not every package has it
 
 /// Most texture planes of a package, mips included, and most rungs of a plane.
 inline constexpr std::uint32_t kMaxPackagePlanes = 10000, kMaxPackageRungs = 100;
@@ -46,6 +47,7 @@ enum class EntryKind : std::uint8_t {
   kFragmentFile,
   kSource,
   kSplitStream,
+  kPoster,
   kOther,
   kProvenance
 };

@@ -30,6 +30,12 @@ struct StreamRef {
   friend bool operator==(const StreamRef&, const StreamRef&) = default;
 };
 
+/// poster.jpg: one picture of the whole object, for lists and search engines.
+struct PosterRef : EntryRef {
+  std::uint32_t width_px = 0, height_px = 0;
+  friend bool operator==(const PosterRef&, const PosterRef&) = default;
+};
+
 struct ByteRange {
   std::uint64_t offset = 0, bytes = 0;
   friend bool operator==(const ByteRange&, const ByteRange&) = default;

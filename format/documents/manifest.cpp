@@ -58,6 +58,13 @@ Json stream_json(const StreamRef& ref) {
   return j;
 }
 
+Json poster_json(const PosterRef& ref) {
+  Json j = ref_json(static_cast<const EntryRef&>(ref));
+  j["widthPx"] = ref.width_px;
+  j["heightPx"] = ref.height_px;
+  return j;
+}
+
 /// One array per property: as objects, forty scales would spend half of the 16 KiB on names.
 Json scales_json(const std::vector<ManifestScale>& scales) {
   Json j;
@@ -115,6 +122,7 @@ Json manifest_json(const Manifest& m) {
   j["quality"] = ref_json(m.quality);
   j["provenance"] = ref_json(m.provenance);
   if (m.stream) j["stream"] = stream_json(*m.stream);
+  if (m.poster) j["poster"] = poster_json(*m.poster);
   return j;
 }
 
@@ -165,6 +173,16 @@ StreamRef read_stream(const JsonAt& at) {
   ref.bytes = at["bytes"].integer(1);
   ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
   ref.head_digest = at["headSha256"].digest();
+  return ref;
+}
+
+PosterRef read_poster(const JsonAt& at) {
+  PosterRef ref;
+  read_ref(at, kPosterPath, ref);
+  if (ref.bytes > kMaxPosterBytes)
+    at["bytes"].fail("at most " + std::to_string(kMaxPosterBytes), std::to_string(ref.bytes));
+  ref.width_px = static_cast<std::uint32_t>(at["widthPx"].integer(1, kMaxPosterSide));
+  ref.height_px = static_cast<std::uint32_t>(at["heightPx"].integer(1, kMaxPosterSide));
   return ref;
 }
 
@@ -281,6 +299,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_ref(at["quality"], kQualityPath, m.quality);
   read_ref(at["provenance"], kProvenancePath, m.provenance);
   if (document.contains("stream")) m.stream = read_stream(at["stream"]);
+  if (document.contains("poster")) m.poster = read_poster(at["poster"]);
   return m;
 }
 

@@ -40,6 +40,9 @@ struct ManifestScale {
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
 
+/// Longest side of a poster, px, and most bytes of its file.
+inline constexpr std::uint32_t kMaxPosterSide = 4096;
+inline constexpr std::uint64_t kMaxPosterBytes = 1'000'000;
 /// Longest ManifestScale::floor, bytes.
 inline constexpr std::size_t kMaxFloorBytes = 100;
 
@@ -73,6 +76,7 @@ struct Manifest {
   PagedRef index, tables;
   EntryRef textures, quality, provenance;
   std::optional<StreamRef> stream;  // vertex splits (since 1.1)
+  std::optional<PosterRef> poster;
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 

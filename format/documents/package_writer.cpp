@@ -52,6 +52,7 @@ class ManifestFiller {
     for (ManifestScale& s : manifest_.scales) set(s.glb, mesh_path(s.scale));
     fill_first_picture();
     fill_stream();
+    if (manifest_.poster) set(*manifest_.poster, kPosterPath);
   }
 
  private:
@@ -120,6 +121,7 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
     if (!paths.insert(e.path).second) fail_package("entry " + e.path, "one entry of that path", "two");
   }
   std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
+  if (manifest.poster) needed.emplace_back(kPosterPath);
   for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
   for (std::uint32_t p = 0; p < textures.size(); ++p) {
     if (textures[p].mip == 0) needed.push_back(preview_path(p));
@@ -129,6 +131,8 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
   }
   for (const std::string& path : needed)
     if (!paths.contains(path)) fail_package("entry " + path, "an entry", "none");
+  if (!manifest.poster && paths.contains(kPosterPath))
+    fail_package("manifest", "the poster's width and height", "none");
   if (manifest.scales.empty() || manifest.plane_count != textures.size())
     fail_package("manifest", "scales, and as many planes as textures", std::to_string(manifest.plane_count));
 }

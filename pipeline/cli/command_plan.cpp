@@ -1,14 +1,16 @@
 #include <fmt/format.h>
 #include <iostream>
-#include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/cli/check_gate.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/options/units.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
@@ -104,35 +106,10 @@ struct PlanArguments : DeliveryArguments {
 
 struct CheckArguments : DeliveryArguments {
   double max_flip = 1, max_texture_flip = 1;
-  std::string max_first_picture, max_bytes;
+  std::string max_first_picture, max_bytes, junit;
+  int views = 12;
+  bool predicted_only = false;
 };
-
-/// What check asks for.
-struct Gate {
-  double max_flip = 1, max_texture_flip = 1, max_first_picture_s = std::numeric_limits<double>::infinity();
-  std::uint64_t max_bytes = ~0ull;
-};
-
-/// One sentence per limit that the plan misses.
-std::vector<std::string> why_not(const DeliveryPlan& plan, const Gate& gate, double time_limit_s) {
-  std::vector<std::string> reasons;
-  if (!(plan.flip <= gate.max_flip))
-    reasons.push_back(
-        fmt::format("predicted FLIP {:.4f}, expected at most {:.4f}", plan.flip, gate.max_flip));
-  if (!(plan.texture_flip <= gate.max_texture_flip))
-    reasons.push_back(fmt::format("predicted FLIP by the textures alone {:.4f}, expected at most {:.4f}",
-                                  plan.texture_flip, gate.max_texture_flip));
-  if (!(plan.first_picture_s <= gate.max_first_picture_s))
-    reasons.push_back(fmt::format("first picture {}, expected by {:.2f} s", moment(plan.first_picture_s),
-                                  gate.max_first_picture_s));
-  if (!(plan.complete_s <= 1.01 * time_limit_s))
-    reasons.push_back(
-        fmt::format("complete {}, expected by {:.2f} s", moment(plan.complete_s), time_limit_s));
-  if (plan.bytes() > gate.max_bytes)
-    reasons.push_back(
-        fmt::format("{} bytes, expected at most {}", grouped(plan.bytes()), grouped(gate.max_bytes)));
-  return reasons;
-}
 
 int run_plan(PlanArguments& args) {
   const bool budget = !args.budget.empty();
@@ -163,7 +140,18 @@ int run_check(const CheckArguments& args) {
   PackageReader package(open_store(args.package));
   const DeliveryPlan plan = plan_delivery(package, request);
   const FragmentList list = list_of(package, request, plan);
-  const std::vector<std::string> reasons = why_not(plan, gate, request.time_limit_s);
+  std::vector<GateResult> results = check_plan(plan, gate, request.time_limit_s);
+  if (args.max_flip < 1 && !args.predicted_only) {
+    const auto sizes = check_switch_sizes(package, args.max_flip, args.views, context_of(0));
+    results.insert(results.end(), sizes.begin(), sizes.end());
+  }
+  if (!args.junit.empty()) {
+    const std::string xml = gate_junit(args.package, results);
+    write_output_file(args.junit, std::span(reinterpret_cast<const std::uint8_t*>(xml.data()), xml.size()));
+  }
+  std::vector<std::string> reasons;
+  for (const GateResult& r : results)
+    if (!r.failure.empty()) reasons.push_back(r.failure);
   if (args.json) {
     Json j = plan_json(package, plan, list);
     j["good"] = reasons.empty();
@@ -203,18 +191,30 @@ void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
   Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
   add_delivery_options(c, *args, true);
-  c.option("--max-flip", args->max_flip, "Most predicted FLIP of the lit object, 0 = equal to the source")
+  c.option(
+       "--max-flip", args->max_flip,
+       "Most FLIP of the lit object, 0 = equal to the source: of the plan as predicted, and of each scale at "
+       "its switch size beside S_0, rendered, in its worst view")
       .number_in(0, 1);
+  c.flag("--predicted-only", args->predicted_only,
+         "--max-flip goes by the plan alone: nothing is rendered, and little of the package is read");
+  c.option("--views", args->views, "Directions from which switch sizes are rendered")
+      .integer_in(1, 64)
+      .shows_default();
   c.option("--max-texture-flip", args->max_texture_flip,
            "Most predicted FLIP by the textures alone, on the finest scale")
       .number_in(0, 1);
   c.option("--max-first-picture", args->max_first_picture, "Latest time of the first picture: 1s, 800ms")
       .value_name("TIME");
   c.option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB").value_name("SIZE");
+  c.option("--junit", args->junit, "Write a test case for every limit as JUnit XML").value_name("FILE");
   c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
   c.examples(
-      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --max-flip 0.08 --max-first-picture 1s");
-  c.notes("Exit code: 0 good enough, 4 not good enough, 1 when the package cannot be read, 2 usage.");
+      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --max-flip 0.08 --max-first-picture 1s\n"
+      "  texmesh check bust.texmesh --time 3 --bandwidth 2Mbit/s --max-flip 0.05 --junit check.xml");
+  c.notes(
+      "texmesh report shows the pictures behind the rendered FLIP.\n"
+      "Exit code: 0 good enough, 4 not good enough, 1 when the package cannot be read, 2 usage.");
   c.on_run([args] { return run_check(*args); });
 }
 

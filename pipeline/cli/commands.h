@@ -14,6 +14,7 @@ void add_unpack_command(Command& app);  // command_pack.cpp
 void add_pack_command(Command& app);
 void add_debug_command(Command& app);
 void add_render_command(Command& app);
+void add_report_command(Command& app);
 void add_study_command(Command& app);
 void add_plan_command(Command& app);
 void add_check_command(Command& app);  // command_plan.cpp

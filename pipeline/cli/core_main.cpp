@@ -19,6 +19,7 @@ void add_commands(Command& program) {
   add_verify_command(program);
   add_diff_command(program);
   add_render_command(program);
+  add_report_command(program);
   add_debug_command(program);
   program.group("Export");
   add_extract_command(program);

@@ -15,6 +15,7 @@
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
+#include "stages/data/poster.h"
 #include "stages/data/predictors.h"
 #include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
@@ -63,6 +64,7 @@ inline constexpr Artefact<Ladder> kLadder{"ladder"};
 inline constexpr Artefact<PackageTables> kTables{"lut"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
 inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
+inline constexpr Artefact<Poster> kPoster{"poster"};
 inline constexpr Artefact<Bytes> kPackage{"package"};
 
 }  // namespace texmesh

@@ -9,6 +9,7 @@
 #include "stages/lut/lut.h"
 #include "stages/package/package.h"
 #include "stages/perceptual_values/perceptual_values.h"
+#include "stages/poster/poster.h"
 #include "stages/quality/quality.h"
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
@@ -35,6 +36,7 @@ struct CompileOptions {
   LutOptions lut;
   ScalesOptions scales;
   QualityOptions quality;
+  PosterOptions poster;
   PackageOptions package;
 
   /// Paths of the fields that a profile or a flag has set, to whatever value: resolve_options() leaves them
@@ -56,6 +58,7 @@ struct CompileOptions {
     f("lut", s.lut);
     f("scales", s.scales);
     f("quality", s.quality);
+    f("poster", s.poster);
     f("package", s.package);
   }
 };

@@ -67,10 +67,10 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
                   const PackageTables& tables, const ScaleFiles& files, const MeasuredQuality& quality,
-                  const std::string& provenance, const PackageOptions& options, double jnd,
-                  const RunContext& context) {
+                  const Poster& poster, const std::string& provenance, const PackageOptions& options,
+                  double jnd, const RunContext& context) {
   return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                          jnd, provenance, options, context);
+                          poster, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -133,12 +133,15 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),
       stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
-            inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder, kPreviews,
-                   kTables),
+            inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder,
+                   kPreviews, kTables),
             outputs(kQuality), read_of(o, o.quality), {"libjpeg-turbo", "libwebp"}, measure_pictures),
+      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
+            inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
+            read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kScaleFiles, kQuality, kProvenance),
+                   kScaleFiles, kQuality, kPoster, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

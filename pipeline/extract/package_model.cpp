@@ -57,20 +57,46 @@ Model scale_model(PackageReader& package, int scale, const RunContext& context) 
   return read_model({package.scale_glb(scale), entry}, entry, context);
 }
 
+/// Mesh and materials of a scale. The list of textures counts the package's images.
+RenderedModel bare_scale(PackageReader& package, int scale, const RunContext& context) {
+  package.scale_index(scale);  // says which scales there are
+  Model source = scale_model(package, scale, context);
+  RenderedModel model = untextured_model(std::move(source.mesh), source.materials);
+  const std::vector<PackageImage> images = package_images(package);
+  for (TextureImage& texture : model.texture_images)
+    texture.image = image_named(images, source.images.at(texture.image).name).image;
+  return model;
+}
+
 }  // namespace
 
 RenderedModel package_model(PackageReader& package, const PackageChoice& choice, const RunContext& context) {
-  package.scale_index(choice.scale);  // says which scales there are
   if (choice.textures == PackageTextures::kRung) require_rung(package, choice.rung);
-  Model source = scale_model(package, choice.scale, context);
-  RenderedModel model = untextured_model(std::move(source.mesh), source.materials);
+  RenderedModel model = bare_scale(package, choice.scale, context);
   if (choice.scale != 0) model.bounds = bounding_sphere(scale_model(package, 0, context).mesh.positions);
   const std::vector<PackageImage> images = package_images(package);
   for (const TextureImage& from : model.texture_images) {
-    const PackageImage& image = image_named(images, source.images.at(from.image).name);
+    const auto image = std::find_if(images.begin(), images.end(),
+                                    [&](const PackageImage& i) { return i.image == from.image; });
     model.textures.push_back(
-        render_texture(image_texels(package, image, choice, context), from.srgb, 0, context));
+        render_texture(image_texels(package, *image, choice, context), from.srgb, 0, context));
   }
+  return model;
+}
+
+RenderedModel package_scale(PackageReader& package, int scale, const RenderedModel& textured,
+                            const RunContext& context) {
+  RenderedModel model = bare_scale(package, scale, context);
+  model.bounds = textured.bounds;
+  const std::vector<TextureImage>& all = textured.texture_images;
+  for (RenderMaterial& material : model.materials)
+    for (TextureSlot& slot : material.textures) {
+      if (slot.texture < 0) continue;
+      const auto found =
+          std::find(all.begin(), all.end(), model.texture_images[static_cast<std::size_t>(slot.texture)]);
+      slot.texture = found == all.end() ? -1 : static_cast<std::int32_t>(found - all.begin());
+    }
+  model.texture_images = all;
   return model;
 }
 

@@ -24,6 +24,13 @@ struct PackageChoice {
 /// A scale of a package with whole textures, for the renderer. `bounds` are those of S_0 for every scale, so
 /// that a camera sees all scales alike. InputError for a scale or rung that is not there; FormatError when
 /// the package is damaged. Same result for any thread count.
+/// `texture_images` count the images of textures.json.
 RenderedModel package_model(PackageReader& package, const PackageChoice& choice, const RunContext& context);
+
+/// Another scale for the textures of `textured`, which package_model() made: its materials count these, and
+/// its own list of textures stays empty. A texture that `textured` does not have is not shown. Bounds and
+/// errors as package_model().
+RenderedModel package_scale(PackageReader& package, int scale, const RenderedModel& textured,
+                            const RunContext& context);
 
 }  // namespace texmesh

@@ -1,13 +1,6 @@
 #include "pipeline/inspect/package_tree.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -18,110 +11,32 @@
 #include "format/container/layout.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/new_folder.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
 
-[[noreturn]] void fail_output(const fs::path& path, const char* expected) {
-  throw InputError(path.string(), "", expected, std::strerror(errno));
-}
-
-void sync_folder(const fs::path& folder) {
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) fail_output(folder, "a folder");
-  const int rc = ::fsync(fd);
-  ::close(fd);
-  if (rc != 0) fail_output(folder, "a folder that can be synced");
-}
-
-void write_new_file(const fs::path& path, const Bytes& bytes) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
-  if (fd < 0) fail_output(path, "a new file");
-  std::size_t at = 0;
-  bool ok = true;
-  while (ok && at < bytes.size()) {
-    const ssize_t n = ::write(fd, bytes.data() + at, bytes.size() - at);
-    if (n < 0 && errno == EINTR) continue;
-    ok = n > 0;
-    if (ok) at += static_cast<std::size_t>(n);
-  }
-  ok = ok && ::fdatasync(fd) == 0;
-  const int error = errno;
-  ::close(fd);
-  errno = error;
-  if (!ok) fail_output(path, "a writable file");
-}
-
 bool holds_unpacked_package(const fs::path& folder) {
   return fs::is_regular_file(fs::symlink_status(folder / kManifestPath));
 }
 
-/// A folder under a temporary name that takes its final name in publish(), or disappears with this object.
+/// A folder for a package's entries.
 class NewTree {
  public:
-  NewTree(const std::string& folder, bool force) : force_(force) {
-    std::error_code ec;
-    target_ =
-        fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
-    if (fs::exists(target_, ec)) target_ = fs::canonical(target_);
-    check_target();
-    std::string name =
-        (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
-    if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "a writable folder");
-    tree_ = name;
-  }
-  ~NewTree() {
-    std::error_code ec;
-    if (!tree_.empty()) fs::remove_all(tree_, ec);
-  }
-  NewTree(const NewTree&) = delete;
-  NewTree& operator=(const NewTree&) = delete;
-
+  NewTree(const std::string& folder, bool force)
+      : folder_(folder, {force, holds_unpacked_package,
+                         "an empty folder, or nothing yet (--force replaces an unpacked package)",
+                         "an unpacked package, the only thing that --force replaces"}) {}
   void add(const std::string& path, const Bytes& bytes) {
     if (!is_valid_entry_path(path))
       throw FormatError("package", path, "a path of the package format", "another");
-    const fs::path file = tree_ / path, folder = file.parent_path();
-    if (folders_.insert(folder).second) fs::create_directories(folder);
-    write_new_file(file, bytes);
+    folder_.add(path, bytes);
   }
-
-  void publish() {
-    for (const auto& e : fs::recursive_directory_iterator(tree_))
-      if (e.is_directory()) sync_folder(e.path());
-    if (::chmod(tree_.c_str(), 0755) != 0) fail_output(tree_, "a folder of one's own");
-    sync_folder(tree_);
-    check_target();
-    if (fs::exists(target_) && !fs::is_empty(target_)) {
-      // Both names stay whole at any moment: the old tree moves into the temporary name, which
-      // the destructor removes.
-      if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0)
-        fail_output(target_, "a folder that can be replaced");
-    } else {
-      if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");
-      tree_.clear();
-    }
-    sync_folder(target_.parent_path());
-  }
+  void publish() { folder_.publish(); }
 
  private:
-  void check_target() const {
-    if (!fs::exists(fs::symlink_status(target_))) return;
-    if (!fs::is_directory(target_))
-      throw InputError(target_.string(), "", "a folder, or nothing yet", "a file");
-    if (fs::is_empty(target_)) return;
-    if (!force_)
-      throw InputError(target_.string(), "",
-                       "an empty folder, or nothing yet (--force replaces an unpacked package)",
-                       "a folder with files");
-    if (!holds_unpacked_package(target_))
-      throw InputError(target_.string(), "", "an unpacked package, the only thing that --force replaces",
-                       "a folder with other files");
-  }
-
-  fs::path target_, tree_;
-  std::set<fs::path> folders_;
-  bool force_;
+  NewFolder folder_;
 };
 
 /// Everything that belongs into the container, in order: manifest and index, then what the index names.

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 
@@ -206,12 +205,6 @@ std::vector<std::string> Site::packages() const {
     list_packages("/proc/self/fd/" + std::to_string(root_), "", 0, found);
   for (std::string& p : found) p = std::string(kPrefix.substr(1)) + percent_encoded(p);
   return found;
-}
-
-std::string Site::package_list() const {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const std::string& url : packages()) list.push_back({{"url", url}});
-  return nlohmann::ordered_json{{"packages", list}}.dump();
 }
 
 std::string viewer_folder(const std::string& wanted) {

@@ -28,10 +28,9 @@ class SiteFile {
   std::string type_, etag_;
 };
 
-/// What `texmesh view` serves: the viewer's files beneath `/`, packages beneath `/packages/`, and
-/// `/packages.json`, a list of them. Nothing else can be reached: paths go down part by part, follow no
-/// symbolic link, and in a folder of packages lead to `.texmesh` files and into unpacked packages only,
-/// whatever stands beside them.
+/// The files that `texmesh view` serves: the viewer's beneath `/`, packages beneath `/packages/`. Nothing
+/// else can be reached: paths go down part by part, follow no symbolic link, and in a folder of packages lead
+/// to `.texmesh` files and into unpacked packages only, whatever stands beside them.
 class Site {
  public:
   /// `package` is a .texmesh file, an unpacked package, or a folder of such; `viewer` a folder with
@@ -46,9 +45,6 @@ class Site {
   std::optional<SiteFile> open(const std::string& path) const;
   /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
   std::vector<std::string> packages() const;
-  /// `{"packages":[{"url":"packages/bust.texmesh"}, ...]}`, what the viewer offers to choose from, by the
-  /// names of the files.
-  std::string package_list() const;
 
  private:
   int viewer_ = -1, root_ = -1;  // folders

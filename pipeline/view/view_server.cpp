@@ -4,14 +4,17 @@
 
 #include <algorithm>
 #include <charconv>
+#include <string_view>
 
 #include "format/base/errors.h"
+#include "pipeline/view/package_card.h"
 
 namespace texmesh {
 namespace {
 
 constexpr std::size_t kThreads = 64;  // each open connection holds one, and browsers keep six per page
 constexpr std::size_t kChunkBytes = 64 << 10;
+constexpr std::string_view kPosters = "/posters/";
 
 bool parse_number(std::string_view text, std::uint64_t& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -82,7 +85,13 @@ void answer(const Site& site, const httplib::Request& request, httplib::Response
   }
   if (request.path == "/packages.json") {
     response.status = 200;
-    return response.set_content(site.package_list(), "application/json");
+    return response.set_content(package_list(site), "application/json");
+  }
+  if (request.path.starts_with(kPosters)) {
+    const auto poster = package_poster(site, "/packages/" + request.path.substr(kPosters.size()));
+    if (!poster) return plain_answer(response, 404, "not found\n");
+    response.status = 200;
+    return response.set_content(reinterpret_cast<const char*>(poster->data()), poster->size(), "image/jpeg");
   }
   auto file = site.open(request.path);
   if (!file) return plain_answer(response, 404, "not found\n");

@@ -177,6 +177,20 @@ double flip_at(const Seen& reference, const Seen& test) {
   return portable::pow(colour, 1 - std::min(1.0, feature));
 }
 
+/// Calls visit(x, y, FLIP) for every pixel that either picture covers, row by row.
+template <class Visit>
+void for_each_flip(const FlipPicture& reference, const FlipPicture& test, Visit&& visit) {
+  for (std::size_t y = 0; y < reference.rows.size(); ++y) {
+    const FlipPicture::Row &a = reference.rows[y], &b = test.rows[y];
+    const bool none = a.first == a.last;
+    const std::uint32_t first = none ? b.first : b.first == b.last ? a.first : std::min(a.first, b.first);
+    for (std::uint32_t x = first; x < std::max(a.last, b.last); ++x) {
+      const Seen r = seen_at(reference, y, x), t = seen_at(test, y, x);
+      if (r.covered || t.covered) visit(std::size_t{x}, y, flip_at(r, t));
+    }
+  }
+}
+
 }  // namespace
 
 void FlipSum::add(const FlipSum& other) {
@@ -227,21 +241,22 @@ FlipPicture prepare_flip(const Picture& picture) {
 
 FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test) {
   FlipSum sum;
-  for (std::size_t y = 0; y < reference.rows.size(); ++y) {
-    const FlipPicture::Row &a = reference.rows[y], &b = test.rows[y];
-    const bool none = a.first == a.last;
-    const std::uint32_t first = none ? b.first : b.first == b.last ? a.first : std::min(a.first, b.first);
-    for (std::uint32_t x = first; x < std::max(a.last, b.last); ++x) {
-      const Seen r = seen_at(reference, y, x), t = seen_at(test, y, x);
-      if (!r.covered && !t.covered) continue;
-      const double flip = flip_at(r, t);
-      const auto step = static_cast<std::size_t>(std::clamp(flip * kFlipSteps, 0.0, kFlipSteps - 1.0));
-      ++sum.pixels;
-      ++sum.histogram[flip > 0 ? step + 1 : 0];
-      sum.sum += flip;
-    }
-  }
+  for_each_flip(reference, test, [&](std::size_t, std::size_t, double flip) {
+    const auto step = static_cast<std::size_t>(std::clamp(flip * kFlipSteps, 0.0, kFlipSteps - 1.0));
+    ++sum.pixels;
+    ++sum.histogram[flip > 0 ? step + 1 : 0];
+    sum.sum += flip;
+  });
   return sum;
+}
+
+std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& test) {
+  const std::size_t side = reference.rows.size();
+  std::vector<float> map(side * side, 0);
+  for_each_flip(reference, test, [&](std::size_t x, std::size_t y, double flip) {
+    map[y * side + x] = static_cast<float>(flip);
+  });
+  return map;
 }
 
 double flip_of(const FlipPicture& reference, const FlipPicture& test) {

@@ -43,6 +43,8 @@ struct FlipSum {
 /// degree: 0 = equal, 1 = black against white. Both parts, colours and features, as published; borders are
 /// replicated. Both pictures have one size. Same bits on every machine.
 FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test);
+/// The same of every pixel, row by row; 0 where neither picture shows the object.
+std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& test);
 /// Its mean.
 double flip_of(const FlipPicture& reference, const FlipPicture& test);
 

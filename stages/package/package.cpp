@@ -139,8 +139,8 @@ double surface_area(const Mesh& mesh, const NestedScale& scale) {
 }
 
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
-                        const ScaleFiles& files, const Fragments& fragments,
-                        const MeasuredQuality& quality, double jnd, const std::string& title) {
+                        const ScaleFiles& files, const Fragments& fragments, const MeasuredQuality& quality,
+                        double jnd, const std::string& title) {
   Manifest m;
   m.title = title;
   m.origin = scales.mesh.origin;
@@ -234,7 +234,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, double jnd,
+                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
@@ -246,6 +246,10 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
   for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  if (!poster.file.empty()) {
+    manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
+    entries.push_back({kPosterPath, poster.file});
+  }
   if (!files.stream.empty()) entries.push_back({kSplitStreamPath, files.stream});
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     context.check_cancelled();

@@ -9,6 +9,7 @@
 #include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/poster.h"
 #include "stages/data/previews.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
@@ -34,7 +35,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, double jnd,
+                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context);
 

@@ -39,6 +39,10 @@ function advice(error: unknown, text: string, url: string): string {
 interface Listed {
   url: string;
   name?: string;
+  /** What the package calls itself. */
+  title?: string;
+  /** URL of a picture of the object. */
+  poster?: string;
 }
 
 /** Offers the packages that packages.json beside the page lists; false when there is none. */
@@ -52,7 +56,8 @@ export async function offerPackages(): Promise<boolean> {
   }
   const items = list.filter((p) => typeof p.url === 'string').map((p) => {
     const name = p.name ?? readable(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
-    return make('li', {}, make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, name));
+    const poster = typeof p.poster === 'string' ? [make('img', { src: p.poster, alt: p.title ?? '', loading: 'lazy', width: '72', height: '72' })] : [];
+    return make('li', {}, make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, ...poster, make('span', {}, name)));
   });
   if (items.length) box().replaceChildren(make('h2', {}, 'Packages'), make('ul', {}, ...items));
   else {

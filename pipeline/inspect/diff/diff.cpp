@@ -60,6 +60,8 @@ std::string maker(const std::string& path) {
     case EntryKind::kMesh:
     case EntryKind::kSplitStream:
       return "scales";
+    case EntryKind::kPoster:
+      return "poster";
     case EntryKind::kTables:
       return "lut";
     case EntryKind::kQuality:

@@ -66,6 +66,10 @@ Json summary_json(PackageReader& p) {
                         {"positions", f.positions},
                         {"uv", f.uv},
                         {"others", f.others}});
+  Json poster = nullptr;
+  if (m.poster)
+    poster = {
+        {"width_px", m.poster->width_px}, {"height_px", m.poster->height_px}, {"bytes", m.poster->bytes}};
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
   return {{"package",
            {{"id", to_hex(p.id())},
@@ -88,6 +92,7 @@ Json summary_json(PackageReader& p) {
             {"edge", steps_json(step_function(m.scales, StepRule::kEdge))}}},
           {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
           {"stream", stream},
+          {"poster", poster},
           {"textures", textures},
           {"bytes", kinds},
           {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};

@@ -158,6 +158,9 @@ std::string summary_text(PackageReader& p) {
   s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n",
                    vector_text(m.origin), vector_text(m.bounds_min), vector_text(m.bounds_max),
                    vector_text(size));
+  if (m.poster)
+    s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
+                     kilobytes(m.poster->bytes));
   s += fmt::format(
       "start     {} kB show the object: manifest and index, then one range of {} bytes from {}\n\n",
       kilobytes(m.first_picture_offset + m.first_picture_bytes), m.first_picture_bytes,

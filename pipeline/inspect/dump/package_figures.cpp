@@ -15,13 +15,14 @@ struct Kind {
   std::vector<EntryKind> kinds;
 };
 
-const std::array<Kind, 8>& kinds() {
-  static const std::array<Kind, 8> list{
+const std::array<Kind, 9>& kinds() {
+  static const std::array<Kind, 9> list{
       {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
        {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
        {"meshes", {EntryKind::kMesh}},
        {"vertex-split stream", {EntryKind::kSplitStream}},
        {"previews", {EntryKind::kPreview}},
+       {"poster", {EntryKind::kPoster}},
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"source images", {EntryKind::kSource}},
        {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};

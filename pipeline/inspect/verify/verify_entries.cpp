@@ -6,6 +6,7 @@
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/inspect/verify/verify_guard.h"
+#include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
 
@@ -20,6 +21,8 @@ void EntryVerifier::check_entry(const EntryRef& e) {
   } else if (name.kind == EntryKind::kSplitStream) {
     guarded(findings_, "split-stream", e.path,
             [&] { check_split_stream(package_.manifest, store_.read(e), context_, findings_); });
+  } else if (name.kind == EntryKind::kPoster) {
+    guarded(findings_, "poster", e.path, [&] { check_poster_entry(e); });
   } else if (name.kind == EntryKind::kSource) {
     guarded(findings_, "source", e.path, [&] { check_source_entry(e, name); });
   } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
@@ -79,6 +82,17 @@ void EntryVerifier::check_source_entry(const EntryRef& e, const EntryName& name)
                      (*package_.textures)[name.number].source_extension == name.extension;
   if (findings_.require(named, "entry-set", e.path, "", "to be named by textures.json", "not there"))
     check_source((*package_.textures)[name.number], std::move(bytes), findings_);
+}
+
+void EntryVerifier::check_poster_entry(const EntryRef& e) {
+  const Bytes bytes = store_.read(e);
+  const std::optional<PosterRef>& poster = package_.manifest.poster;
+  if (!findings_.require(poster.has_value(), "entry-set", e.path, "", "to be named by the manifest",
+                         "not there"))
+    return;
+  const Pixels pixels = decode_jpeg(bytes, std::uint64_t{kMaxPosterSide} * kMaxPosterSide);
+  findings_.require_equal(poster->width_px, pixels.width_px, "poster", e.path, "width");
+  findings_.require_equal(poster->height_px, pixels.height_px, "poster", e.path, "height");
 }
 
 void EntryVerifier::check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name,

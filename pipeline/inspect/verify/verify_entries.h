@@ -42,6 +42,7 @@ class EntryVerifier {
   void check_mesh_entry(const EntryRef& e, int number);
   void check_texture_entry(const EntryRef& e, const EntryName& name);
   void check_source_entry(const EntryRef& e, const EntryName& name);
+  void check_poster_entry(const EntryRef& e);
   void check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name, Bytes bytes);
 
   CheckedStore& store_;

@@ -8,6 +8,8 @@ export const anyDisplayPx = 1e9;
 export const mostPreviewPx = 4096;
 /** Path of the vertex-split stream. */
 export const splitStreamPath = 'mesh/stream.bin';
+/** Path of the picture of the whole object. */
+export const posterPath = 'poster.jpg';
 
 const digits = (n: number, least: number): string => String(n).padStart(least, '0');
 

@@ -32,6 +32,11 @@ export interface StreamRef {
   headBytes: number;
   headSha256: Uint8Array;
 }
+/** The picture of the whole object, for lists and search engines. */
+export interface PosterRef extends EntryRef {
+  widthPx: number;
+  heightPx: number;
+}
 /** Offset and length in bytes. */
 export interface ByteRange {
   offset: number;
@@ -94,6 +99,7 @@ export interface Manifest {
   quality: EntryRef;
   provenance: EntryRef;
   stream?: StreamRef;
+  poster?: PosterRef;
 }
 
 const largest = 1e300;
@@ -126,6 +132,13 @@ function readPagedRef(at: JsonAt, path: string): PagedRef {
 function readStream(at: JsonAt): StreamRef {
   const range = readRange(at);
   return { path: layout.splitStreamPath, ...range, ...readHead(at, range.bytes) };
+}
+
+function readPoster(at: JsonAt): PosterRef {
+  const ref = readRef(at, layout.posterPath);
+  if (ref.bytes > 1e6) at.at('bytes').fail('at most 1000000', `${ref.bytes}`);
+  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).integer(1, 4096));
+  return { ...ref, widthPx, heightPx };
 }
 
 function readVector(at: JsonAt): Vector3 {
@@ -242,6 +255,7 @@ export function readManifest(json: Uint8Array): Manifest {
     quality: readRef(at.at('quality'), paths.qualityPath),
     provenance: readRef(at.at('provenance'), paths.provenancePath),
     ...(at.has('stream') ? { stream: readStream(at.at('stream')) } : {}),
+    ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),
   };
 }
 

@@ -1,0 +1,99 @@
+#include "pipeline/io/new_folder.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace fs = std::filesystem;
+namespace {
+
+[[noreturn]] void fail_output(const fs::path& path, const char* expected) {
+  throw InputError(path.string(), "", expected, std::strerror(errno));
+}
+
+void sync_folder(const fs::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) fail_output(folder, "a folder");
+  const int rc = ::fsync(fd);
+  ::close(fd);
+  if (rc != 0) fail_output(folder, "a folder that can be synced");
+}
+
+void write_new_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
+  if (fd < 0) fail_output(path, "a new file");
+  std::size_t at = 0;
+  bool ok = true;
+  while (ok && at < bytes.size()) {
+    const ssize_t n = ::write(fd, bytes.data() + at, bytes.size() - at);
+    if (n < 0 && errno == EINTR) continue;
+    ok = n > 0;
+    if (ok) at += static_cast<std::size_t>(n);
+  }
+  ok = ok && ::fdatasync(fd) == 0;
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  if (!ok) fail_output(path, "a writable file");
+}
+
+}  // namespace
+
+NewFolder::NewFolder(const std::string& folder, FolderRule rule) : rule_(std::move(rule)) {
+  std::error_code ec;
+  target_ = fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
+  if (fs::exists(target_, ec)) target_ = fs::canonical(target_);
+  check_target();
+  std::string name =
+      (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
+  if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "a writable folder");
+  tree_ = name;
+}
+
+NewFolder::~NewFolder() {
+  std::error_code ec;
+  if (!tree_.empty()) fs::remove_all(tree_, ec);
+}
+
+void NewFolder::add(const std::string& path, std::span<const std::uint8_t> bytes) {
+  const fs::path file = tree_ / path, folder = file.parent_path();
+  if (folders_.insert(folder).second) fs::create_directories(folder);
+  write_new_file(file, bytes);
+}
+
+void NewFolder::publish() {
+  for (const auto& e : fs::recursive_directory_iterator(tree_))
+    if (e.is_directory()) sync_folder(e.path());
+  if (::chmod(tree_.c_str(), 0755) != 0) fail_output(tree_, "a folder of one's own");
+  sync_folder(tree_);
+  check_target();
+  if (fs::exists(target_) && !fs::is_empty(target_)) {
+    // Both names stay whole at any moment: the old tree moves into the temporary name, which
+    // the destructor removes.
+    if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0)
+      fail_output(target_, "a folder that can be replaced");
+  } else {
+    if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");
+    tree_.clear();
+  }
+  sync_folder(target_.parent_path());
+}
+
+void NewFolder::check_target() const {
+  if (!fs::exists(fs::symlink_status(target_))) return;
+  if (!fs::is_directory(target_))
+    throw InputError(target_.string(), "", "a folder, or nothing yet", "a file");
+  if (fs::is_empty(target_)) return;
+  if (!rule_.replace) throw InputError(target_.string(), "", rule_.instead, "a folder with files");
+  if (!rule_.known(target_))
+    throw InputError(target_.string(), "", rule_.replaceable, "a folder with other files");
+}
+
+}  // namespace texmesh

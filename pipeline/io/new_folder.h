@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <span>
+#include <string>
+
+namespace texmesh {
+
+/// What may become of a folder that is there already and holds files.
+struct FolderRule {
+  bool replace = false;  // where `known` says yes
+  std::function<bool(const std::filesystem::path& folder)>
+      known;            // whether the folder is of the kind written
+  std::string instead;  // for the error without `replace`: what is expected in place of a folder with files
+  std::string replaceable;  // for the error with `replace`: the only kind of folder that is replaced
+};
+
+/// A folder under a temporary name beside its own, which takes its own name in publish(), or disappears with
+/// this object. InputError when the folder cannot be written, or when the rule forbids to replace what is
+/// there.
+class NewFolder {
+ public:
+  NewFolder(const std::string& folder, FolderRule rule);
+  ~NewFolder();
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+
+  /// A file of the folder; `path` is relative, the caller vouches that it leads nowhere else. No path twice.
+  void add(const std::string& path, std::span<const std::uint8_t> bytes);
+  /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step.
+  void publish();
+
+ private:
+  void check_target() const;
+
+  std::filesystem::path target_, tree_;
+  std::set<std::filesystem::path> folders_;
+  FolderRule rule_;
+};
+
+}  // namespace texmesh

@@ -1,0 +1,31 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace texmesh {
+
+/// A line or a row of dots of a Plot.
+struct PlotSeries {
+  std::string name;    // plain text; "" = not in the legend
+  std::string colour;  // class of the page's style: "a" to "e", or "q" for what stands back
+  std::vector<std::pair<double, double>> points;
+  bool strong = false, dashed = false, dots = false;
+  bool steps = false;  // horizontal from each point to the next, not straight
+};
+
+/// A picture of lines for the page, as SVG in the page's colours. The horizontal axis is logarithmic.
+struct Plot {
+  std::string title, x_name, y_name;  // plain text; the title is what a reader who sees no picture gets
+  double x_low = 1, x_high = 10;      // 0 < x_low < x_high
+  double y_high = 1;                  // the vertical axis goes from 0 to at least this
+  std::vector<PlotSeries> series;
+  std::string svg() const;
+};
+
+/// "1.2 MB", "340 kB", "12 B": at most three digits.
+std::string short_bytes(double bytes);
+
+/// A number with thin blanks between groups of three digits.
+std::string thin_grouped(unsigned long long value);
+
+}  // namespace texmesh

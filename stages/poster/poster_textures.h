@@ -1,0 +1,25 @@
+#pragma once
+// Inside the room only: materials and textures as a small picture needs them.
+#include <cstdint>
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/data/fragments.h"
+#include "stages/data/pixels.h"
+#include "stages/render/render_material.h"
+#include "stages/render/render_texture.h"
+
+namespace texmesh::poster {
+
+struct PosterMaterials {
+  std::vector<RenderMaterial> materials;  // their slots count `textures`
+  std::vector<RenderTexture> textures;
+};
+
+/// Textures come from the coarsest mip whose longer side has `least_side_px`, or from the full size.
+/// References to texture coordinates that the mesh does not have show nothing.
+PosterMaterials poster_materials(const std::vector<Material>& materials, const Fragments& fragments,
+                                 const std::vector<Pixels>& pixels, const Mesh& mesh,
+                                 std::uint32_t least_side_px, const RunContext& context);
+
+}  // namespace texmesh::poster
