@@ -58,7 +58,7 @@ PictureLosses read_losses(const JsonAt& at, std::size_t count) {
           read_fractions(at["dssim"], count)};
 }
 
-TextureLosses read_texture(const JsonAt& at) {
+TextureLosses read_texture_losses(const JsonAt& at) {
   TextureLosses t;
   const JsonAt dssim = at["texelDssim"];
   for (std::size_t i = 0, n = dssim.array(1, kMaxQualitySamples); i < n; ++i) {
@@ -80,7 +80,7 @@ GroupLosses read_group(const JsonAt& at, std::size_t sizes) {
   if (found == names.end()) at["group"].fail("colour, normal or data", name);
   group.group = static_cast<PlaneGroup>(found - names.begin());
   at["sizes"].array(sizes, sizes);
-  for (std::size_t i = 0; i < sizes; ++i) group.sizes.push_back(read_texture(at["sizes"][i]));
+  for (std::size_t i = 0; i < sizes; ++i) group.sizes.push_back(read_texture_losses(at["sizes"][i]));
   return group;
 }
 

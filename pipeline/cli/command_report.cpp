@@ -17,7 +17,7 @@ struct ReportArguments {
   bool json = false;
 };
 
-int run(const ReportArguments& args) {
+int run_report(const ReportArguments& args) {
   check_report_folder(args.folder);  // not after the work
   PackageReader package(open_store(args.package));
   const Report report = make_report(package, args.options, context_of(args.jobs));
@@ -70,7 +70,7 @@ void add_report_command(Command& app) {
       "The same package gives the same files on every machine.\n"
       "Exit code: 0 every switch size holds, 4 one does not, 1 when the package or the source cannot be read "
       "or DIR not be written, 2 usage. With 4 the report is written, too.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_report(*args); });
 }
 
 }  // namespace texmesh

@@ -212,7 +212,7 @@ std::string prediction_text(const std::vector<Row>& rows) {
                                     100 * mean_error(rows), rank_correlation(rows));
 }
 
-int run(const PredictionArguments& args) {
+int run_prediction(const PredictionArguments& args) {
   if (!args.against.empty() && args.packages.size() > 1)
     throw UsageError("study prediction: --against", "", "one package", std::to_string(args.packages.size()));
   std::vector<Row> rows;
@@ -254,7 +254,7 @@ void add_prediction_study(Command& study) {
       "FLIP is of lit pictures against S_0 with the source's texels, 0 = equal: of the plan, of its scale "
       "with the source's texels, of S_0 with its textures.\n"
       "Exit code: 0, 1 when a file cannot be read, 2 usage.");
-  c.on_run([args] { return run(*args); });
+  c.on_run([args] { return run_prediction(*args); });
 }
 
 }  // namespace texmesh

@@ -18,7 +18,7 @@ namespace {
   throw InputError(path.string(), "", expected, std::strerror(errno));
 }
 
-void sync_folder(const fs::path& folder) {
+void sync_new_folder(const fs::path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) fail_output(folder, "a folder");
   const int rc = ::fsync(fd);
@@ -70,9 +70,9 @@ void NewFolder::add(const std::string& path, std::span<const std::uint8_t> bytes
 
 void NewFolder::publish() {
   for (const auto& e : fs::recursive_directory_iterator(tree_))
-    if (e.is_directory()) sync_folder(e.path());
+    if (e.is_directory()) sync_new_folder(e.path());
   if (::chmod(tree_.c_str(), 0755) != 0) fail_output(tree_, "a folder of one's own");
-  sync_folder(tree_);
+  sync_new_folder(tree_);
   check_target();
   if (fs::exists(target_) && !fs::is_empty(target_)) {
     // Both names stay whole at any moment: the old tree moves into the temporary name, which
@@ -83,7 +83,7 @@ void NewFolder::publish() {
     if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");
     tree_.clear();
   }
-  sync_folder(target_.parent_path());
+  sync_new_folder(target_.parent_path());
 }
 
 void NewFolder::check_target() const {

@@ -150,7 +150,7 @@ Channels channels_of(const Picture& picture, const PixelSpans& spans) {
   return out;
 }
 
-Vec3f eye_lab(Vec3f opponent) {
+Vec3f flip_lab(Vec3f opponent) {
   const Vec3d xyz = xyz_of_opponent(to_double(opponent));
   return hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), flip_lab_curve());
 }
@@ -228,8 +228,8 @@ FlipPicture prepare_flip(const Picture& picture) {
   opponent[2] = eye_filtered(opponent[2], spans, {{34.1, 0.04}, {13.5, 0.025}});
   out.lab.resize(spans.count);
   for (std::size_t i = 0; i < out.lab.size(); ++i)
-    out.lab[i] = eye_lab({opponent[0].values[i], opponent[1].values[i], opponent[2].values[i]});
-  out.plain_lab = eye_lab({opponent[0].plain, opponent[1].plain, opponent[2].plain});
+    out.lab[i] = flip_lab({opponent[0].values[i], opponent[1].values[i], opponent[2].values[i]});
+  out.plain_lab = flip_lab({opponent[0].plain, opponent[1].plain, opponent[2].plain});
   const Kernel* features[2] = {&feature_kernels().edge, &feature_kernels().point};
   for (std::size_t k = 0; k < 2; ++k) {
     SpanImage detail = feature_strength(channels.luma, spans, *features[k]);
