@@ -54,15 +54,16 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   c.triangles = m.scales[key.scale].triangles;
   c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
   std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key.coding);
-  c.model = read_model(*file, mesh_path(c.scale), source_.context);
+  Model model = read_model(*file, mesh_path(c.scale), source_.context);
+  c.mesh = source_.lit_mesh(model);
   if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
   if (!source_.request.recentre) file->move_to(m.origin);
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
-  c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);
-  c.geometry = source_.difference(*c.views, source_.best_textures);
+  c.windows = std::make_unique<LitViews>(c.mesh, source_.windows, source_.context);
+  c.geometry = source_.window_meter->difference(*c.windows, source_.best_textures, source_.context);
   return c;
 }
 

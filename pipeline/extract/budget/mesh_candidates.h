@@ -25,10 +25,10 @@ struct MeshCandidate {
   std::vector<int> levels;
   std::uint64_t triangles = 0;
   std::shared_ptr<const StandaloneGlb> file;
-  Model model;
-  std::unique_ptr<ModelViews> views;
+  LitMesh mesh;
+  std::unique_ptr<LitViews> windows;
   std::uint64_t fixed_bytes = 0;  // the file without its images' bytes
-  double geometry = 0;            // difference with the best textures
+  double geometry = 0;            // difference with the best textures, in the windows
 
   /// The file with these images. An image that is not given has no bytes.
   std::vector<std::uint8_t> file_with(const std::map<std::uint32_t, FileImageData>& images) const;
