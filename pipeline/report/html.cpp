@@ -98,13 +98,20 @@ std::string html_section(const std::string& id, const std::string& heading, cons
 }
 
 std::string html_page(const std::string& title, const std::string& body) {
-  return std::string(kReportFirstLine) +
-         "<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-         "content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light "
-         "dark\">\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' "
-         "file:; style-src 'unsafe-inline'\">\n<title>" +
-         html_escaped(title) + "</title>\n<style>" + std::string(kStyle) + "</style>\n</head>\n<body>\n" +
-         body + "</body>\n</html>\n";
+  std::string out(kReportFirstLine);
+  out += R"(<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'">
+<title>)";
+  out += html_escaped(title);
+  out += "</title>\n<style>";
+  out += kStyle;
+  out += "</style>\n</head>\n<body>\n";
+  out += body;
+  return out + "</body>\n</html>\n";
 }
 
 }  // namespace texmesh

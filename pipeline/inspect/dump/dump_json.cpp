@@ -33,6 +33,27 @@ Json steps_json(const std::vector<ManifestStep>& steps) {
   return list;
 }
 
+Json stream_json(PackageReader& p) {
+  Json stream = Json::array();
+  if (p.manifest().stream)
+    for (const StreamFigures& f : stream_figures(p.split_stream_head()))
+      stream.push_back({{"scale", f.scale},
+                        {"triangles", f.triangles},
+                        {"points", f.points},
+                        {"blocks", f.blocks},
+                        {"bytes", f.bytes},
+                        {"connectivity", f.connectivity},
+                        {"positions", f.positions},
+                        {"uv", f.uv},
+                        {"others", f.others}});
+  return stream;
+}
+
+Json poster_json(const Manifest& m) {
+  if (!m.poster) return nullptr;
+  return {{"width_px", m.poster->width_px}, {"height_px", m.poster->height_px}, {"bytes", m.poster->bytes}};
+}
+
 Json summary_json(PackageReader& p) {
   const Manifest& m = p.manifest();
   Json kinds = Json::array(), textures = Json::array();
@@ -54,22 +75,6 @@ Json summary_json(PackageReader& p) {
     if (t.lossless) textures.back()["lossless"] = true;
     if (!t.source_extension.empty()) textures.back()["source"] = t.source.path;
   }
-  Json stream = Json::array();
-  if (m.stream)
-    for (const StreamFigures& f : stream_figures(p.split_stream_head()))
-      stream.push_back({{"scale", f.scale},
-                        {"triangles", f.triangles},
-                        {"points", f.points},
-                        {"blocks", f.blocks},
-                        {"bytes", f.bytes},
-                        {"connectivity", f.connectivity},
-                        {"positions", f.positions},
-                        {"uv", f.uv},
-                        {"others", f.others}});
-  Json poster = nullptr;
-  if (m.poster)
-    poster = {
-        {"width_px", m.poster->width_px}, {"height_px", m.poster->height_px}, {"bytes", m.poster->bytes}};
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
   return {{"package",
            {{"id", to_hex(p.id())},
@@ -91,8 +96,8 @@ Json summary_json(PackageReader& p) {
             {"error", steps_json(step_function(m.scales, StepRule::kError))},
             {"edge", steps_json(step_function(m.scales, StepRule::kEdge))}}},
           {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
-          {"stream", stream},
-          {"poster", poster},
+          {"stream", stream_json(p)},
+          {"poster", poster_json(m)},
           {"textures", textures},
           {"bytes", kinds},
           {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};
