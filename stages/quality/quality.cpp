@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <list>
 #include <string>
 
 #include "format/base/box.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/measure/image_compare.h"
 #include "stages/quality/rung_textures.h"
@@ -186,12 +188,15 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   table.views = static_cast<std::uint32_t>(options.views);
   table.size_px = static_cast<std::uint32_t>(options.size_px);
   Studio studio;
+  std::list<Mesh> coarser;  // as their files light them
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
     const NestedScale& scale = scales.scales[k];
     if (k > 0 && !perceptual.kept[k]) continue;
     table.scales.push_back(scale.scale);
-    studio.scenes.push_back(
-        {&scales.mesh, &scale.triangles, &scale.triangle_source, &shown.materials, sizes.size()});
+    if (k > 0) coarser.push_back(lit_scale(scales, k, context));
+    studio.scenes.push_back(k > 0 ? render_scene(coarser.back(), shown.materials, sizes.size())
+                                  : RenderScene{&scales.mesh, &scale.triangles, &scale.triangle_source,
+                                                &shown.materials, sizes.size()});
   }
 
   const Coverage seen = frame_object(studio.scenes[0], sizes, table, sphere, result.notes, context);

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 3;
+inline constexpr int kQualityVersion = 4;
 
 struct QualityOptions {
   int views = 4;
