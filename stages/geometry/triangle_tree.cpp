@@ -50,11 +50,6 @@ double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction)
   return t > 0 ? t : kInfinity;
 }
 
-struct OnTriangle {
-  double distance2 = kInfinity;
-  std::array<double, 3> weight{};
-};
-
 void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
   const Vec3d along = c[j] - c[i];
   const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - c[i], along) / l, 0.0, 1.0) : 0;
@@ -65,8 +60,11 @@ void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::siz
   best.weight[i] = 1 - t, best.weight[j] += t;
 }
 
-OnTriangle closest_on(const std::array<Vec3d, 3>& c, Vec3d p) {
+}  // namespace
+
+OnTriangle closest_on_triangle(const std::array<Vec3d, 3>& c, Vec3d p) {
   OnTriangle best;
+  best.distance2 = kInfinity;
   const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
   const double square = dot(n, n);
   if (square > 0) {
@@ -80,8 +78,6 @@ OnTriangle closest_on(const std::array<Vec3d, 3>& c, Vec3d p) {
   for (std::size_t k = 0; k < 3; ++k) try_segment(p, c, k, (k + 1) % 3, best);
   return best;
 }
-
-}  // namespace
 
 TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triangle> triangles)
     : order_(triangles.size()) {
@@ -157,7 +153,7 @@ TriangleTree::Found TriangleTree::search(Vec3d p, double limit2, std::uint64_t& 
     if (n.count > 0) {
       tried += n.count;
       for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-        if (const OnTriangle on = closest_on(corners_[i], p); on.distance2 < best.on.distance2)
+        if (const OnTriangle on = closest_on_triangle(corners_[i], p); on.distance2 < best.on.distance2)
           best = {on, order_[i]};
       continue;
     }

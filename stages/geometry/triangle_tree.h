@@ -11,6 +11,13 @@
 
 namespace texmesh {
 
+/// The point of a triangle that is closest to another point.
+struct OnTriangle {
+  double distance2 = 0;            // square of the distance
+  std::array<double, 3> weight{};  // of the corners, >= 0, summing to 1
+};
+OnTriangle closest_on_triangle(const std::array<Vec3d, 3>& corners, Vec3d p);
+
 /// A bounding-volume tree over a small triangle mesh (a wrap) for rays and closest points, in plain double
 /// arithmetic: the same bits on every machine, which a ray caster with SIMD dispatch does not promise.
 /// Binary, split at the median of the centres. Safe to ask from many threads.

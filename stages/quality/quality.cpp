@@ -5,6 +5,7 @@
 #include <string>
 
 #include "format/documents/manifest.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/quality/table_fit.h"
 
 namespace texmesh {
@@ -41,17 +42,19 @@ double surface_area_of(const Mesh& mesh, const std::vector<Triangle>& triangles)
   return area;
 }
 
-/// Scales with meshes of their own: a view costs by the positions that it looks at.
+/// Scales with meshes of their own, as their files light them: a view costs by the positions that it looks
+/// at.
 struct KeptScales {
   std::vector<int> numbers;
   std::vector<Mesh> meshes;
 };
-KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perceptual) {
+KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                       const RunContext& context) {
   KeptScales out;
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
     if (k > 0 && !perceptual.kept[k]) continue;
     out.numbers.push_back(scales.scales[k].scale);
-    out.meshes.push_back(extract_scale(scales, scales.scales[k]));
+    out.meshes.push_back(k == 0 ? extract_scale(scales, scales.scales[0]) : lit_scale(scales, k, context));
   }
   return out;
 }
@@ -172,7 +175,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
                                 const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
   if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
-  const KeptScales kept = kept_scales(scales, perceptual);
+  const KeptScales kept = kept_scales(scales, perceptual, context);
   const ShownTextures shown = find_shown(materials, fragments, scales.mesh);
   const TextureData data = texture_data(fragments, pixels, ladder, previews, tables);
   const std::vector<PlanesOfGroup> groups = find_groups(shown, fragments);

@@ -158,7 +158,7 @@ class DracoPrimitive {
   void add_normals() {
     normal_id_ = add_attribute(mesh_, draco::GeometryAttribute::NORMAL, 3, draco::DT_FLOAT32, false,
                                primitive_.wedges.size(),
-                               [&](std::uint32_t i) { return coding_.mesh.normals[primitive_.wedges[i]]; });
+                               [&](std::uint32_t i) { return coding_.frames.normals[primitive_.wedges[i]]; });
     attributes_.push_back({"NORMAL", normal_id_, {{"componentType", 5126}, {"count", 0}, {"type", "VEC3"}}});
   }
 
@@ -181,7 +181,7 @@ class DracoPrimitive {
   void add_tangents() {
     const int id = add_attribute(
         mesh_, draco::GeometryAttribute::GENERIC, 4, draco::DT_FLOAT32, false, primitive_.wedges.size(),
-        [&](std::uint32_t i) { return coding_.mesh.tangents[primitive_.wedges[i]]; });
+        [&](std::uint32_t i) { return coding_.frames.tangents[primitive_.wedges[i]]; });
     // From -1 to 1, so that w stays 1 or -1.
     quantised_.push_back({id, {coding_.options.tangent_bits, {-1, -1, -1}, 2}, 4});
     attributes_.push_back({"TANGENT", id, {{"componentType", 5126}, {"count", 0}, {"type", "VEC4"}}});

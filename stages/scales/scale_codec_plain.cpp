@@ -145,7 +145,7 @@ class PlainPrimitive {
   Stream coded_normals() const {
     constexpr float kOne = std::numeric_limits<T>::max();
     return make_stream<T, 3>(n_, 4 * sizeof(T), [&](std::size_t i) {
-      const Vec3f n = coding_.mesh.normals[primitive_.wedges[i]];
+      const Vec3f n = coding_.frames.normals[primitive_.wedges[i]];
       auto code = [](float x) {
         return static_cast<T>(std::floor(std::clamp(x, -1.0f, 1.0f) * kOne + 0.5f));
       };
@@ -156,14 +156,14 @@ class PlainPrimitive {
   std::size_t normals() {
     const bool fine = coding_.options.normal_bits > 8;
     if (compact()) writer_.use_extension("KHR_mesh_quantization", true);
-    const Stream s = !compact()
-                         ? make_stream<float, 3>(n_, 12,
-                                                 [&](std::size_t i) {
-                                                   const Vec3f n = coding_.mesh.normals[primitive_.wedges[i]];
-                                                   return std::array<float, 3>{n.x, n.y, n.z};
-                                                 })
-                     : fine ? coded_normals<std::int16_t>()
-                            : coded_normals<std::int8_t>();
+    const Stream s = !compact() ? make_stream<float, 3>(n_, 12,
+                                                        [&](std::size_t i) {
+                                                          const Vec3f n =
+                                                              coding_.frames.normals[primitive_.wedges[i]];
+                                                          return std::array<float, 3>{n.x, n.y, n.z};
+                                                        })
+                     : fine     ? coded_normals<std::int16_t>()
+                                : coded_normals<std::int8_t>();
     Json accessor{{"bufferView", add(s, false)}, {"componentType", !compact() ? 5126 : fine ? 5122 : 5120}};
     if (compact()) accessor["normalized"] = true;
     accessor["count"] = n_;
@@ -182,7 +182,7 @@ class PlainPrimitive {
   Stream coded_tangents() const {
     constexpr float kOne = std::numeric_limits<T>::max();
     return make_stream<T, 4>(n_, 4 * sizeof(T), [&](std::size_t i) {
-      const Vec4f t = coding_.mesh.tangents[primitive_.wedges[i]];
+      const Vec4f t = coding_.frames.tangents[primitive_.wedges[i]];
       auto code = [](float x) {
         return static_cast<T>(std::floor(std::clamp(x, -1.0f, 1.0f) * kOne + 0.5f));
       };
@@ -195,7 +195,7 @@ class PlainPrimitive {
     const Stream s = !compact() ? make_stream<float, 4>(n_, 16,
                                                         [&](std::size_t i) {
                                                           const Vec4f t =
-                                                              coding_.mesh.tangents[primitive_.wedges[i]];
+                                                              coding_.frames.tangents[primitive_.wedges[i]];
                                                           return std::array<float, 4>{t.x, t.y, t.z, t.w};
                                                         })
                      : fine     ? coded_tangents<std::int16_t>()

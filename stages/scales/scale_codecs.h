@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "stages/geometry/scale_frames.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_grid.h"
 #include "stages/scales/scales.h"
@@ -16,7 +17,7 @@ struct ScalePrimitive {
   std::vector<std::uint16_t> wedge_part;  // where parts are merged to one node: of each wedge; else empty
 };
 
-/// How the primitives of all scales are written.
+/// How the primitives of all scales are written; `frames` are those of the scale in hand.
 struct ScaleCoding {
   const Mesh& mesh;
   const ScalesOptions& options;
@@ -24,6 +25,7 @@ struct ScaleCoding {
   bool write_uv[2] = {false, false};
   bool fine_colours = false;   // 16 bits, because 8 would change them
   std::vector<bool> tangents;  // per material: its primitives have them where their wedges do
+  ScaleFrames frames;          // stand for the mesh's normals and tangents
   /// Every wedge of the primitive has a tangent and its material needs it.
   bool writes_tangents(const ScalePrimitive& primitive) const;
   const std::vector<Vec2f>& uv_values(int set) const { return set == 0 ? mesh.uv0 : mesh.uv1; }

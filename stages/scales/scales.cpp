@@ -54,7 +54,7 @@ bool needs_fine_colours(const std::vector<Vec4f>& colours) {
 ScaleCoding make_coding(const Mesh& mesh, const std::vector<Material>& materials,
                         const std::vector<Image>& images, const ScalesOptions& options) {
   constexpr int kDracoBits = 24, kShortBits = 16;  // floats hold no more than 24; an unsigned short 16
-  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours), {}};
+  ScaleCoding coding{mesh, options, {}, {}, {false, false}, needs_fine_colours(mesh.colours), {}, {}};
   for (const Material& m : materials) coding.tangents.push_back(needs_tangents(m));
   const bool draco = options.mesh_codec == MeshCodec::kDraco;
   coding.write_uv[1] = !mesh.uv1.empty() && uses_texcoord(materials, 1);
@@ -316,7 +316,9 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   result.files.resize(kept.size());
   parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      result.files[i] = write_scale(coding, scales.scales[kept[i]], materials, preview_files);
+      ScaleCoding lit = coding;
+      lit.frames = scale_frames(scales, kept[i], context);
+      result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files);
       context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
     }
   });

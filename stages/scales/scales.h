@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 5;
+inline constexpr int kScalesVersion = 6;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -65,6 +65,9 @@ struct ScalesOptions {
 ///   Triangles with two corners in one place of the grid are left out, and a note says how many of S_0's.
 ///   Positions stay in the local frame (Mesh::origin is the manifest's).
 /// - Texture coordinates of unused sets are left out, and textures whose coordinates the mesh does not have.
+/// - Normals and tangents of coarse scales are fitted: see stages/geometry/scale_frames.h. Those of the
+/// stream
+///   are S_0's.
 /// - Tangents of the source are kept where a normal map needs them; none are made, since glTF says how a
 ///   viewer makes them (MikkTSpace).
 /// - draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same under

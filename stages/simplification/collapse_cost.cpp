@@ -9,7 +9,7 @@ namespace {
 
 // A full step of a colour channel counts as much as a shift by a twentieth of the diagonal.
 constexpr double kColourLength = 0.05;
-constexpr double kTint = 0.01;  // of the colours' weight where there is a texture
+constexpr double kTint = 0.5;  // of the colours' weight where there is a texture
 // Where charts are folded to slivers the gradient of the texture runs away; its square must not.
 constexpr double kSteepest = 64;
 

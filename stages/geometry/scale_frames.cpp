@@ -1,0 +1,216 @@
+#include "stages/geometry/scale_frames.h"
+
+#include <algorithm>
+
+#include "format/base/no_index.h"
+#include "stages/base/parallel.h"
+#include "stages/geometry/triangle_tree.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kSamplesPerNormal = 8;  // more make no difference that shows
+constexpr int kSteps = 4;
+constexpr int kMostWalks = 3;
+constexpr double kLeastFacing = 0.25;  // cosine between a sample and the triangle that it is put on
+
+/// Where S_0's positions are in a scale: the position that they have collapsed into, one of twins for all;
+/// kNoIndex = vanished with its component.
+std::vector<std::uint32_t> places_in(const NestedScales& scales, const NestedScale& scale) {
+  std::vector<std::uint32_t> place(scales.mesh.positions.size());
+  for (std::uint32_t p = 0; p < place.size(); ++p) place[p] = p;
+  for (std::size_t i = scale.collapse_count; i-- > 0;) {
+    const Collapse& c = scales.collapses[i];
+    const bool gone = c.to == kNoIndex || c.vanishes_with_component();
+    place[c.from] = gone ? kNoIndex : place[c.to];
+  }
+  if (!scales.twin.empty())
+    for (std::uint32_t& p : place)
+      if (p != kNoIndex) p = scales.twin[p];
+  return place;
+}
+
+/// Area that each wedge of S_0 stands for; 0 = not in use.
+std::vector<double> wedge_areas(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  std::vector<double> area(mesh.wedge_count(), 0);
+  for (const Triangle& t : triangles) {
+    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+    const double third = length(cross(at(1) - at(0), at(2) - at(0))) / 6;
+    for (const std::uint32_t w : t) area[w] += third;
+  }
+  return area;
+}
+
+/// The scale's triangles, around each place, and the normals that are sought.
+class Fit {
+ public:
+  Fit(const NestedScales& scales, const NestedScale& scale)
+      : mesh_(scales.mesh), place_(places_in(scales, scale)), normal_of_(mesh_.wedge_count(), kNoIndex) {
+    add_faces(scale);
+    around_place(scale);
+  }
+  void take_samples(const std::vector<Triangle>& finest, const RunContext& context);
+  void improve();
+  ScaleFrames frames() const;
+
+ private:
+  struct Face {
+    std::array<std::uint32_t, 3> normal, place;  // index into normals_; of the corners
+    std::array<Vec3d, 3> corners;
+    Vec3d up;  // unit, zero without area
+  };
+  /// A wedge of S_0 on a face.
+  struct Sample {
+    std::uint32_t wedge = 0, face = kNoIndex;
+    std::array<double, 3> weight{};
+    double area = 0;
+  };
+  std::uint32_t place(std::uint32_t wedge) const { return place_[mesh_.wedge_position[wedge]]; }
+  void add_faces(const NestedScale& scale);
+  void around_place(const NestedScale& scale);
+  void put_on_face(Sample& sample) const;
+
+  const Mesh& mesh_;
+  std::vector<std::uint32_t> place_, normal_of_;  // per position; per wedge
+  std::vector<Vec3d> normals_;
+  std::vector<Face> faces_;
+  std::vector<std::uint32_t> begin_, around_;  // faces at a place: around_[begin_[place]] and on
+  std::vector<Sample> samples_;
+};
+
+void Fit::add_faces(const NestedScale& scale) {
+  for (const Triangle& t : scale.triangles) {
+    Face face;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t w = t[k];
+      if (normal_of_[w] == kNoIndex) {
+        normal_of_[w] = static_cast<std::uint32_t>(normals_.size());
+        normals_.push_back(to_double(mesh_.normals[w]));
+      }
+      face.normal[k] = normal_of_[w];
+      face.place[k] = place(w);
+      face.corners[k] = to_double(mesh_.positions[mesh_.wedge_position[w]]);
+    }
+    face.up = normalized(cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[0]));
+    faces_.push_back(face);
+  }
+}
+
+void Fit::around_place(const NestedScale& scale) {
+  begin_.assign(mesh_.positions.size() + 1, 0);
+  for (const Triangle& t : scale.triangles)
+    for (const std::uint32_t w : t) ++begin_[place(w) + 1];
+  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
+  around_.resize(begin_.back());
+  std::vector<std::uint32_t> end(begin_.begin(), begin_.end() - 1);
+  for (std::uint32_t f = 0; f < scale.triangles.size(); ++f)
+    for (const std::uint32_t w : scale.triangles[f]) around_[end[place(w)]++] = f;
+}
+
+/// From the place that the sample's position has collapsed into, on to the places at which nearer triangles
+/// meet.
+void Fit::put_on_face(Sample& sample) const {
+  const Vec3d at = to_double(mesh_.positions[mesh_.wedge_position[sample.wedge]]);
+  const Vec3d n = to_double(mesh_.normals[sample.wedge]);
+  double best = 0;
+  std::uint32_t last = kNoIndex, p = place(sample.wedge);
+  for (int walk = 0; walk < kMostWalks && p != last; ++walk) {
+    last = p;
+    const std::uint32_t before = sample.face;
+    for (std::uint32_t i = begin_[p]; i < begin_[p + 1]; ++i) {
+      const Face& face = faces_[around_[i]];
+      if (!(dot(face.up, n) > kLeastFacing)) continue;
+      const double height = dot(face.up, at - face.corners[0]);
+      if (sample.face != kNoIndex && height * height >= best) continue;
+      const OnTriangle found = closest_on_triangle(face.corners, at);
+      if (sample.face != kNoIndex && found.distance2 >= best) continue;
+      best = found.distance2;
+      sample.face = around_[i];
+      sample.weight = found.weight;
+    }
+    if (sample.face == before) return;
+    const auto nearest = std::max_element(sample.weight.begin(), sample.weight.end());
+    p = faces_[sample.face].place[static_cast<std::size_t>(nearest - sample.weight.begin())];
+  }
+}
+
+void Fit::take_samples(const std::vector<Triangle>& finest, const RunContext& context) {
+  const std::vector<double> area = wedge_areas(mesh_, finest);
+  for (std::uint32_t w = 0; w < area.size(); ++w)
+    if (area[w] > 0 && place(w) != kNoIndex) samples_.push_back({w, kNoIndex, {}, area[w]});
+  const std::size_t every = samples_.size() / (kSamplesPerNormal * normals_.size() + 1) + 1;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < samples_.size(); i += every) samples_[count++] = samples_[i];
+  samples_.resize(count);
+  parallel_for(context, count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) put_on_face(samples_[i]);
+  });
+}
+
+/// Steps of least squares with lumped weights, which never overshoot.
+void Fit::improve() {
+  std::vector<Vec3d> change(normals_.size());
+  std::vector<double> weight(normals_.size());
+  for (int step = 0; step < kSteps; ++step) {
+    std::fill(change.begin(), change.end(), Vec3d{});
+    std::fill(weight.begin(), weight.end(), 0);
+    for (const Sample& s : samples_) {
+      if (s.face == kNoIndex) continue;
+      const std::array<std::uint32_t, 3>& corner = faces_[s.face].normal;
+      Vec3d here;
+      for (std::size_t k = 0; k < 3; ++k) here = here + normals_[corner[k]] * s.weight[k];
+      const Vec3d missing = to_double(mesh_.normals[s.wedge]) - normalized(here);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double w = s.weight[k] * s.area;
+        change[corner[k]] = change[corner[k]] + missing * w;
+        weight[corner[k]] += w;
+      }
+    }
+    for (std::size_t i = 0; i < normals_.size(); ++i) {
+      if (!(weight[i] > 0)) continue;
+      const Vec3d next = normals_[i] + change[i] * (1 / weight[i]);
+      if (dot(next, next) > 1e-6) normals_[i] = normalized(next);
+    }
+  }
+}
+
+ScaleFrames Fit::frames() const {
+  ScaleFrames out{mesh_.normals, mesh_.tangents};
+  for (std::uint32_t w = 0; w < normal_of_.size(); ++w) {
+    if (normal_of_[w] == kNoIndex) continue;
+    const Vec3d n = normals_[normal_of_[w]];
+    out.normals[w] = to_float(n);
+    if (out.tangents.empty() || out.tangents[w].w == 0) continue;
+    const Vec4f old = out.tangents[w];
+    const Vec3d t{old.x, old.y, old.z}, along = t - n * dot(t, n);
+    if (!(dot(along, along) > 1e-6)) continue;
+    const Vec3f turned = to_float(normalized(along));
+    out.tangents[w] = {turned.x, turned.y, turned.z, old.w};
+  }
+  return out;
+}
+
+}  // namespace
+
+ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const RunContext& context) {
+  if (index == 0 || scales.mesh.normals.empty()) return {scales.mesh.normals, scales.mesh.tangents};
+  Fit fit(scales, scales.scales.at(index));
+  fit.take_samples(scales.scales[0].triangles, context);
+  fit.improve();
+  return fit.frames();
+}
+
+Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& context) {
+  const NestedScale& scale = scales.scales.at(index);
+  Mesh out = extract_scale(scales, scale);
+  const ScaleFrames frames = scale_frames(scales, index, context);
+  for (std::size_t t = 0; t < scale.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t from = scale.triangles[t][k], to = out.triangles[t][k];
+      if (!frames.normals.empty()) out.normals[to] = frames.normals[from];
+      if (!frames.tangents.empty()) out.tangents[to] = frames.tangents[from];
+    }
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,28 @@
+#pragma once
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/data/nested_scales.h"
+
+namespace texmesh {
+
+/// What a scale is lit by, per wedge of NestedScales::mesh; empty where that mesh has none.
+struct ScaleFrames {
+  std::vector<Vec3f> normals;   // unit
+  std::vector<Vec4f> tangents;  // at right angles to the normals
+};
+
+/// Normals with which scale `index` is lit as S_0 is. S_0's own are those that the surface has in the very
+/// points of the scale's vertices, which stand for nothing around them. Each sample, a wedge of S_0, is put
+/// where the scale is nearest: first among the triangles around the vertex that the sample's position has
+/// collapsed into, then from place to place as long as triangles come nearer; never on triangles that look
+/// away from the sample. Then least squares by a few damped steps, interpolation along the triangles
+/// included. Wedges without samples keep S_0's normal. Tangents of S_0 are turned to the new normals. S_0
+/// itself, and wedges that the scale does not use, have S_0's values. Same bits for any thread count. About
+/// 0.5 us per wedge of S_0 on one core, less for coarse scales.
+ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const RunContext& context);
+
+/// extract_scale() with these normals and tangents.
+Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& context);
+
+}  // namespace texmesh
