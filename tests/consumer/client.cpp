@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
     PackageReader package(open_store(argv[1]));
     DeliveryRequest request;
     const DeliveryPlan plan = plan_delivery(package, request);
-    std::cout << "S_" << plan.scale << ", " << plan.bytes() << " bytes, SSIM " << plan.ssim << '\n';
+    std::cout << "S_" << plan.scale << ", " << plan.bytes() << " bytes, FLIP " << plan.flip << '\n';
     if (package.manifest().stream) {
       SplitStreamReader stream(package.split_stream_head());
       stream.read_to_scale(0, package.entry(kSplitStreamPath));

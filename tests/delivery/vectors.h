@@ -30,7 +30,7 @@ inline const std::map<HtcOrder, const char*> kOrders{
     {HtcOrder::kCredit, "credit"}, {HtcOrder::kBeta0, "beta0"}, {HtcOrder::kFinest, "finest"}};
 inline const std::map<Estimator, const char*> kEstimators{
     {Estimator::kLast, "last"}, {Estimator::kHarmonic, "harmonic"}, {Estimator::kEwma, "ewma"}};
-inline const std::map<StepRule, const char*> kRules{{StepRule::kDefault, "default"},
+inline const std::map<StepRule, const char*> kRules{{StepRule::kFlip, "flip"},
                                                     {StepRule::kJnd, "jnd"},
                                                     {StepRule::kError, "error"},
                                                     {StepRule::kEdge, "edge"}};

@@ -1,3 +1,4 @@
+#include "tests/delivery/vector_packages.h"
 #include "tests/delivery/vectors.h"
 
 #include <cmath>
@@ -13,7 +14,7 @@
 namespace texmesh {
 namespace {
 
-// ---- packages: what a client reads in the golden ones
+// ---- packages: what a client reads in those beside the vectors
 
 std::string hex(const Sha256& digest) {
   static constexpr char kDigits[] = "0123456789abcdef";
@@ -114,47 +115,69 @@ Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
           {"budget_rungs", rd}};
 }
 
-Json budgets(PackageReader& package, double displayed_px, const ListOptions& options) {
+Json parts_json(const TextureParts& parts) { return {{"coded", parts.coded}, {"coarser", parts.coarser}}; }
+
+Json planes_json(const std::vector<PlaneChoice>& planes) {
+  Json shown = Json::array();
+  for (const PlaneChoice& p : planes) shown.push_back({p.base, p.plane});
+  return shown;
+}
+
+Json budgets(PackageReader& package, const ListOptions& options) {
   Json out = Json::array();
   for (const std::uint64_t bytes : {0ull, 1500ull, 6000ull, 20000ull, 1000000ull}) {
-    const TextureBudget b = texture_for_budget(package, displayed_px, options, bytes);
-    Json shown = Json::array();
-    for (const PlaneChoice& p : b.planes) shown.push_back({p.base, p.plane});
+    const TextureBudget b = texture_for_budget(package, options, bytes);
     out.push_back({{"budget_bytes", bytes},
-                   {"planes", shown},
-                   {"mip_loss", mip_loss(package, b.planes, displayed_px)},
+                   {"planes", planes_json(b.planes)},
+                   {"group_weights", b.list.group_weights},
                    {"rungs", b.rungs},
                    {"bytes", b.bytes},
-                   {"dssim", b.dssim}});
+                   {"parts", parts_json(b.parts)},
+                   {"texture_flip", texture_flip(package.quality(), b.parts)},
+                   {"flip", b.flip}});
   }
   return out;
 }
 
+/// What single losses look like at a displayed height.
+Json curves(const QualityTable& table, double displayed_px) {
+  Json groups = Json::array(), scales = Json::array();
+  for (const PlaneGroup group : {PlaneGroup::kColour, PlaneGroup::kNormal, PlaneGroup::kData}) {
+    const GroupCurve curve(table, group, displayed_px);
+    Json coded = Json::array(), coarser = Json::array();
+    for (const double dssim : {0.0, 1e-5, 0.001, 0.01, 0.07, 0.4, 1.9})
+      coded.push_back({dssim, curve.coded(dssim)});
+    for (const double levels : {0.0, 0.25, 1.0, 2.5, 7.0}) coarser.push_back({levels, curve.coarser(levels)});
+    groups.push_back({{"group", enum_name(group)}, {"dssim_flip", coded}, {"levels_flip", coarser}});
+  }
+  for (const double scale : {0.0, 1.5, 4.0, 30.0})
+    scales.push_back({scale, geometry_flip(table, displayed_px, scale)});
+  return {{"groups", groups}, {"scale_flip", scales}};
+}
+
 Json lists(PackageReader& package) {
   Json out = Json::array();
-  for (const double px : {40.0, 200.0, 1000.0}) {
+  for (const double px : {40.0, 200.0, 1000.0, 3000.0}) {
     const auto planes = planes_for_display(package, px);
-    Json shown = Json::array();
-    for (const PlaneChoice& p : planes) shown.push_back({p.base, p.plane});
     ListOptions o;
     o.scale = select_scale(package.manifest(), px);
+    o.displayed_px = px;
+    o.group_weights = {1, 0.5, 0.75};
     const FragmentList list = fragment_list(package, planes, o);
-    Json fragments = Json::array(), qualities = Json::array();
+    Json fragments = Json::array();
     for (const ListedFragment& f : list.fragments) fragments.push_back({f.plane, f.fragment});
-    for (const double dssim : {0.0, 0.003, 0.02, 0.2}) {
-      const double quality = equivalent_quality(package, planes, dssim);
-      qualities.push_back({dssim, quality, predicted_ssim(package.quality(), o.scale, quality)});
-    }
+    const Json weights = o.group_weights;
+    o.group_weights = {1, 1, 1};
     out.push_back({{"displayed_px", px},
                    {"scale", o.scale},
-                   {"finer_where_seen", finer_where_seen(package.quality(), o.scale, px)},
-                   {"planes", shown},
+                   {"curves", curves(package.quality(), px)},
+                   {"planes", planes_json(planes)},
+                   {"group_weights", weights},
                    {"fragments", fragments},
                    {"offers", offers_json(list.offers)},
-                   {"total_weight", list.total_weight},
                    {"preview_loss", list.preview_loss},
-                   {"dssim_quality_ssim", qualities},
-                   {"budgets", budgets(package, px, o)}});
+                   {"coarser", list.coarser},
+                   {"budgets", budgets(package, o)}});
   }
   return out;
 }
@@ -173,8 +196,6 @@ Json plans(PackageReader& package) {
           r.network.link = BandwidthTrace::constant(bytes_s);
           r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
           const DeliveryPlan p = plan_delivery(package, r);
-          Json shown = Json::array();
-          for (const PlaneChoice& c : p.planes) shown.push_back({c.base, c.plane});
           out.push_back({{"policy", name},
                          {"displayed_px", px},
                          {"bytes_s", bytes_s},
@@ -182,12 +203,12 @@ Json plans(PackageReader& package) {
                          {"time_limit_s", limit_s},
                          {"wanted_scale", wanted_scale(package, r)},
                          {"scale", p.scale},
-                         {"planes", shown},
+                         {"planes", planes_json(p.planes)},
                          {"rungs", p.textures.rungs},
                          {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
                          {"bytes", p.bytes()},
-                         {"texture_dssim", p.texture_dssim},
-                         {"ssim", p.ssim}});
+                         {"texture_flip", p.texture_flip},
+                         {"flip", p.flip}});
         }
   return out;
 }
@@ -229,10 +250,26 @@ Json split_stream(PackageReader& package) {
   return out;
 }
 
+/// Writes the packages with TEXMESH_WRITE_VECTORS, or says whether they are as they would be written.
+void expect_package(const std::string& path, const std::vector<std::uint8_t>& bytes) {
+  if (std::getenv("TEXMESH_WRITE_VECTORS")) {
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    return;
+  }
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream there;
+  there << in.rdbuf();
+  EXPECT_TRUE(there.str() == std::string(bytes.begin(), bytes.end())) << path;
+}
+
 Json packages() {
   Json cases = Json::array();
-  for (const char* name : {"v1.0-scan", "v1.1-scan"}) {
-    const std::string path = std::string("tests/golden/") + name + ".texmesh";
+  for (const bool second : {false, true}) {
+    const char* name = second ? "v1.1-scan" : "v1.0-scan";
+    const std::string path = std::string("delivery/vectors/") + name + ".texmesh";
+    expect_package(kRoot + "/" + path, vector_package(kRoot + "/tests/golden/" + name + ".texmesh",
+                                                      second ? 1.5f : 1.0f, second));
     PackageReader package(open_store(kRoot + "/" + path));
     Json planes = Json::array();
     for (std::uint32_t p = 0; p < package.tables().planes.size(); ++p)

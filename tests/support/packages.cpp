@@ -164,6 +164,7 @@ void add_scale(PackageParts& p, int scale, const Mesh& mesh) {
   s.display_px_jnd = scale ? 300 : kAnyDisplayPx;
   s.display_px_error = scale ? 200 : kAnyDisplayPx;
   s.display_px_edge = scale ? 100 : kAnyDisplayPx;
+  s.display_px_flip = scale ? 200 : kAnyDisplayPx;
   p.manifest.scales.push_back(s);
 }
 
@@ -253,7 +254,10 @@ PackageParts make_package_parts() {
   p.manifest.object_height = 2;
   p.manifest.steps = {{200, 5}, {kAnyDisplayPx, 0}};
   p.manifest.plane_count = 1;
-  p.quality = {{0, 5}, {20, 70}, {0.9f, 1, 0.8f, 0.9f}, {0.1f, 0, 0.2f, 0.1f}, 2, 64};
+  const PictureLosses scales{{0, 0.1f}, {0, 0.2f}, {0, 0.05f}};
+  const TextureLosses colours{
+      {0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{0.1f}, {0.2f}, {0.05f}}};
+  p.quality = {2, {64}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
   p.provenance = make_provenance();
   return p;
 }

@@ -14,7 +14,7 @@ export type * from './scene/api';
 const names = {
   policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static'],
   order: ['credit', 'beta0', 'finest'],
-  rule: ['measured', 'default', 'jnd', 'error', 'edge'],
+  rule: ['flip', 'jnd', 'error', 'edge'],
   meshes: ['glb', 'stream', 'auto'],
 } as const;
 

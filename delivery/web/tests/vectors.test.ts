@@ -130,29 +130,36 @@ function checkTables(table: t.PlaneTables, v: Json): void {
   for (const [budget, rungs] of v.budget_rungs) expectBits(t.allocateRd(table, budget), rungs, `budget ${budget}`);
 }
 
+function checkCurves(quality: t.QualityTable, displayedPx: number, v: Json): void {
+  for (const { group, dssim_flip, levels_flip } of v.groups) {
+    const curve = new t.GroupCurve(quality, group, displayedPx);
+    for (const [dssim, flip] of dssim_flip) expectBits([curve.coded(dssim)], [flip], `${group} of ${dssim}`);
+    for (const [levels, flip] of levels_flip) expectBits([curve.coarser(levels)], [flip], `${group}, ${levels} levels`);
+  }
+  for (const [scale, flip] of v.scale_flip) expectBits([t.geometryFlip(quality, displayedPx, scale)], [flip], `scale ${scale}`);
+}
+
 async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
   const data = await reader.data();
-  const planes = t.planesForDisplay(data, v.displayed_px);
+  const displayedPx = v.displayed_px;
+  checkCurves(data.quality, displayedPx, v.curves);
+  const planes = t.planesForDisplay(data, displayedPx);
   expect(planes.map((p) => [p.base, p.plane])).toEqual(v.planes);
-  const list = t.fragmentList(data, planes, { scale: v.scale });
+  const list = t.fragmentList(data, planes, { scale: v.scale, displayedPx, groupWeights: v.group_weights });
   expect(list.fragments.map((f) => [f.plane, f.fragment])).toEqual(v.fragments);
   camelCased(v.offers).forEach((o: Json, i: number) => {
     for (const name of Object.keys(o))
       expectBits([(list.offers[i] as Json)[name]].flat(), [o[name]].flat(), `offer ${i}: ${name}`);
   });
-  expectBits([list.totalWeight, list.previewLoss], [v.total_weight, v.preview_loss], 'weight');
+  expectBits([...list.previewLoss, ...list.coarser], [...v.preview_loss, ...v.coarser], 'losses');
   for (const b of v.budgets) {
-    const budget = t.textureForBudget(data, v.displayed_px, { scale: v.scale }, b.budget_bytes);
+    const budget = t.textureForBudget(data, displayedPx, { scale: v.scale }, b.budget_bytes);
+    const what = `budget of ${b.budget_bytes}`;
     expect(budget.planes.map((p) => [p.base, p.plane])).toEqual(b.planes);
-    expectBits(budget.rungs, b.rungs, `rungs for ${b.budget_bytes}`);
-    const numbers = [t.mipLoss(data, budget.planes, v.displayed_px), budget.bytes, budget.dssim];
-    expectBits(numbers, [b.mip_loss, b.bytes, b.dssim], `budget of ${b.budget_bytes}`);
-  }
-  const quality = await reader.quality();
-  expect(t.finerWhereSeen(quality, v.scale, v.displayed_px)).toBe(v.finer_where_seen);
-  for (const [dssim, equivalent, ssim] of v.dssim_quality_ssim) {
-    const q = t.equivalentQuality(data, planes, dssim);
-    expectBits([q, t.predictedSsim(quality, v.scale, q)], [equivalent, ssim], `dssim ${dssim}`);
+    expectBits(budget.list.groupWeights, b.group_weights, what);
+    expectBits(budget.rungs, b.rungs, what);
+    expectBits([...budget.parts.coded, ...budget.parts.coarser], [...b.parts.coded, ...b.parts.coarser], what);
+    expectBits([budget.bytes, t.textureFlip(data.quality, budget.parts), budget.flip], [b.bytes, b.texture_flip, b.flip], what);
   }
 }
 
@@ -166,14 +173,14 @@ async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
     htc: { ...base.htc, policy: v.policy },
     link: { ...base.link, bytesS: v.bytes_s, rttS: v.rtt_s },
   };
-  const [data, quality] = [await reader.data(), await reader.quality()];
-  expect(t.wantedScale(data.manifest, quality, request)).toBe(v.wanted_scale);
-  const p = t.planDelivery(data, quality, request)!;
+  const data = await reader.data();
+  expect(t.wantedScale(data.manifest, request)).toBe(v.wanted_scale);
+  const p = t.planDelivery(data, request)!;
   expect(p.scale).toBe(v.scale);
   expect(p.planes.map((c) => [c.base, c.plane])).toEqual(v.planes);
   expectBits(p.rungs, v.rungs, 'rungs');
   expectBits([p.firstPictureS, p.meshS, p.completeS], v.times_s, 'times');
-  expectBits([p.fixedBytes + p.bytes, p.textureDssim, p.ssim], [v.bytes, v.texture_dssim, v.ssim], 'plan');
+  expectBits([p.fixedBytes + p.bytes, p.textureFlip, p.flip], [v.bytes, v.texture_flip, v.flip], 'plan');
 }
 
 async function digestOf(values: ArrayLike<number> & { buffer: ArrayBufferLike }, bytesEach = 4): Promise<string> {

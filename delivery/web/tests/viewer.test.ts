@@ -1,21 +1,16 @@
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { type Manifest, type PackageData, PackageReader, type PlaneTables, type QualityTable, equivalentQuality, predictedSsim } from '../src/reader';
+import { type Manifest, PackageReader, type PlaneTables } from '../src/reader';
 import { golden, readText, root } from './support/files';
 
 interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number | null; rung: number | null }
 interface Turn { at: number; plannedS: number; actualS: number; skipped: boolean }
-interface Shown { base: number; plane: number; role: string; rungs: Int16Array }
 const viewer = (file: string): Promise<unknown> => import(join(root, 'examples/viewer/src', file));
 const { capsWith, choicesFromAddress, kPolicies, readable } = (await viewer('choices.ts')) as {
   capsWith(bytesPerSecond: number): [string, number][];
   choicesFromAddress(query: URLSearchParams): Choices;
   kPolicies: [string, string][];
   readable(url: string): string;
-};
-const { meanColourDssim, pictureSsim } = (await viewer('session/prediction.ts')) as {
-  meanColourDssim(planes: Shown[], tables: readonly (PlaneTables | undefined)[]): number;
-  pictureSsim(data: PackageData, table: QualityTable, state: { scale: number; planes: Shown[] }): number;
 };
 const { stepData } = (await viewer('panel/scale_plot.ts')) as { stepData(m: Manifest): number[][] };
 const { ladderData } = (await viewer('panel/ladder_plot.ts')) as { ladderData(t: PlaneTables): number[][] };
@@ -52,39 +47,6 @@ const tables = (more: Partial<PlaneTables> = {}): PlaneTables => ({
   sizeBytes: Uint32Array.of(10, 20, 30, 40), dssim: Float32Array.of(0.25, 0.125, 0.125, 0.0625), skipDssim: Float32Array.of(0.5, 0.75),
   coveredTexels: Uint32Array.of(100, 100), surfaceFraction: Float32Array.of(0.5, 0.5), ...more,
 } as PlaneTables);
-const shown = (role: string, ...rungs: number[]): Shown => ({ base: 0, plane: 0, role, rungs: Int16Array.from(rungs) });
-
-describe("the viewer's prediction", () => {
-  it('takes the loss of each fragment as the fragment is shown, by its surface', () => {
-    expect(meanColourDssim([shown('base-colour', 1, 0)], [tables()])).toBe((0.125 + 0.125) / 2);
-    expect(meanColourDssim([shown('base-colour', -1, 1)], [tables()])).toBe((0.5 + 0.0625) / 2);
-    expect(meanColourDssim([shown('emissive', 0, 0)], [tables({ surfaceFraction: Float32Array.of(0, 1) })])).toBe(0.125);
-    // Format 1.0 does not say what a preview loses.
-    expect(meanColourDssim([shown('base-colour', -1, -1)], [tables({ skipDssim: new Float32Array() })])).toBe(1);
-  });
-  it('leaves out textures without colour, and planes that were not read', () => {
-    expect(meanColourDssim([shown('normal', 0, 0), shown('base-colour', 1, 1)], [tables()])).toBe((0.125 + 0.0625) / 2);
-    for (const planes of [[], [shown('normal', 0, 0)]]) expect(meanColourDssim(planes, [tables()])).toBeNaN();
-    expect(meanColourDssim([shown('base-colour', 0, 0)], [undefined])).toBeNaN();
-  });
-  it('is what the measured table says of a uniform quality with the same loss', async () => {
-    const reader = await PackageReader.openBytes(golden('v1.1-scan'));
-    const [data, table] = [await reader.data(), await reader.quality()];
-    const role = data.textures[0].role;
-    const fragments = data.tables[0]!.columns * data.tables[0]!.rows;
-    const of = (rung: number, scale = 0): number =>
-      pictureSsim(data, table, { scale, planes: [{ base: 0, plane: 0, role, rungs: new Int16Array(fragments).fill(rung) }] });
-    const top = data.tables[0]!.rungQuality.length - 1;
-    data.tables[0]!.rungQuality.forEach((quality, rung) => {
-      const loss = meanColourDssim([{ base: 0, plane: 0, role, rungs: new Int16Array(fragments).fill(rung) }], data.tables);
-      expect(of(rung)).toBe(predictedSsim(table, 0, equivalentQuality(data, [{ base: 0, plane: 0 }], loss)));
-      expect(of(rung)).toBeCloseTo(predictedSsim(table, 0, quality), 3);
-    });
-    expect(of(-1)).toBeLessThan(of(0));
-    expect(of(0)).toBeLessThan(of(top));
-    expect(pictureSsim(data, table, { scale: 0, planes: [] })).toBe(predictedSsim(table, 0, 100)); // no texture loses nothing
-  });
-});
 
 describe("the viewer's plots", () => {
   it('of scales ask by each rule for triangles of a scale, for no fewer on a larger display', async () => {

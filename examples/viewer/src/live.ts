@@ -34,7 +34,7 @@ export interface Live {
   firstPictureS: number;
   doneS: number;
   limitS: number;
-  predictedSsim: number;
+  predictedFlip: number;
   bytes: number;
   expected: number;
   requests: number;
@@ -53,7 +53,7 @@ export interface Live {
 export function emptyLive(): Live {
   return {
     manifest: null, textures: [], tables: [], packageBytes: 0, title: '', phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
-    firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedSsim: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
+    firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedFlip: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
     rungs: new Map(), skipped: new Map(), turns: [], transfers: [], problem: '', problems: 0,
   };
 }

@@ -26,19 +26,40 @@ TEST(FragmentList, LeavesToThePreviewWhatNoRungShowsBetter) {
   EXPECT_EQ(list.fragments[0].fragment, 0u);
   const PlaneTables& t = package.tables().planes[0];
   const std::vector<float> w = surface_weights(t);
-  EXPECT_NEAR(list.total_weight, w[0] + w[1] + w[2], 1e-6);
-  EXPECT_NEAR(list.preview_loss, 0.125 * w[1] + 0.25 * w[2], 1e-6);
+  const GroupCurve curve(package.quality(), PlaneGroup::kColour, 1000);
+  const double all = static_cast<double>(w[0]) + w[1] + w[2];
+  EXPECT_NEAR(list.preview_loss[0], (curve.coded(0.125) * w[1] + curve.coded(0.25) * w[2]) / all, 1e-9);
+  EXPECT_NEAR(list.offers[0].loss[0], curve.coded(0.5) * w[0] / all, 1e-9);
+  EXPECT_NEAR(list.offers[0].loss[1], curve.coded(0.25) * w[0] / all, 1e-9);
 
-  const TextureBudget budget = texture_for_budget(package, 1e4, {}, 1 << 20);
+  ListOptions options;
+  options.displayed_px = 1e4;
+  const TextureBudget budget = texture_for_budget(package, options, 1 << 20);
   EXPECT_EQ(budget.rungs, std::vector<std::int32_t>{0}) << "the upper rung shows no more";
-  EXPECT_NEAR(budget.dssim, (0.25 * w[0] + list.preview_loss) / list.total_weight, 1e-6);
+  EXPECT_NEAR(budget.parts.coded[0], curve.coded(0.25) * w[0] / all + list.preview_loss[0], 1e-9);
+  EXPECT_EQ(budget.flip, combined_flip(package.quality(), budget.parts.coded)) << "S_0 loses nothing";
+}
+
+TEST(FragmentList, OffersAddUpToWhatTheGroupLoses) {
+  PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
+  const FragmentList list = fragment_list(package, full_size(package), {});
+  const GroupCurve curve(package.quality(), PlaneGroup::kColour, 1000);
+  EXPECT_NEAR(parts_of(list, std::vector<std::int32_t>{-1, -1, -1}).coded[0], curve.coded(0.5), 1e-9);
+  EXPECT_NEAR(parts_of(list, std::vector<std::int32_t>{1, 1, 1}).coded[0], curve.coded(0.25), 1e-9);
+
+  ListOptions light;
+  light.group_weights = {0.5, 1, 1};
+  const FragmentList half = fragment_list(package, full_size(package), light);
+  EXPECT_NEAR(half.offers[0].loss[0], list.offers[0].loss[0] / 2, 1e-12);
+  EXPECT_NEAR(parts_of(half, std::vector<std::int32_t>{1, 1, 1}).coded[0], curve.coded(0.25), 1e-9)
+      << "weights change what is bought, not what is lost";
 }
 
 TEST(FragmentList, HasAllFragmentsWherePreviewsAreNotMeasured) {
   PackageReader package = open_with({});
   const FragmentList list = fragment_list(package, full_size(package), {});
   EXPECT_EQ(list.fragments.size(), 3u);
-  EXPECT_EQ(list.preview_loss, 0);
+  EXPECT_EQ(list.preview_loss, PerGroup{});
 }
 
 TEST(FragmentList, NothingIsFetchedWhereThePreviewsShowMost) {
@@ -48,7 +69,8 @@ TEST(FragmentList, NothingIsFetchedWhereThePreviewsShowMost) {
   request.network.link = {{0}, {1e6}};
   const DeliveryPlan plan = plan_delivery(package, request);
   EXPECT_EQ(plan.texture_bytes, 0u);
-  EXPECT_NEAR(plan.texture_dssim, 0.125, 1e-3);
+  const GroupCurve curve(package.quality(), PlaneGroup::kColour, request.displayed_px);
+  EXPECT_NEAR(plan.texture_flip, curve.coded(0.125), 1e-6);
 }
 
 }  // namespace

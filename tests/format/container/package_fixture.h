@@ -34,7 +34,7 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
     s.scale = scale;
     s.triangles = static_cast<std::uint32_t>(100 - scale);
     s.vertices = 50;
-    s.display_px_jnd = s.display_px_error = s.display_px_edge =
+    s.display_px_jnd = s.display_px_error = s.display_px_edge = s.display_px_flip =
         scale == 0 ? kAnyDisplayPx : 1000 - 100 * scale;
     m.scales.push_back(s);
   }
@@ -84,7 +84,8 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
     textures.push_back(info);
     tables.planes.push_back(t);
   }
-  const QualityTable quality{{0, 4, 9}, {100}, {1, 0.9f, 0.8f}, {0, 0.1f, 0.2f}, 4, 128};
+  QualityTable quality{4, {128}, {0, 4, 9}, {}, {}, 1, 0};
+  quality.geometry = {{{0, 0.1f, 0.2f}, {0, 0.2f, 0.4f}, {0, 0.1f, 0.2f}}};
   const auto text = [](const std::string& s) { return std::vector<std::uint8_t>(s.begin(), s.end()); };
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, text(write_quality(quality))});

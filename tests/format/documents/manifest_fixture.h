@@ -39,6 +39,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
     s.display_px_jnd = k == 0 ? kAnyDisplayPx : 12345.6;
     s.display_px_error = k == 0 ? kAnyDisplayPx : 23456.7;
     s.display_px_edge = k == 0 ? kAnyDisplayPx : 1234.56;
+    s.display_px_flip = k == 0 ? kAnyDisplayPx : 2345.67;
     m.scales.push_back(s);
   }
   if (scales > 1) m.scales.back().floor = std::string(long_numbers ? kMaxFloorBytes : 20, 'f');

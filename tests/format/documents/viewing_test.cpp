@@ -10,19 +10,20 @@
 namespace texmesh {
 namespace {
 
-/// Scales 0, 3, 7, 9; heights up to which the coarser three are enough by JND, error and edges.
+/// Scales 0, 3, 7, 9; heights up to which the coarser three are enough by JND, error, edges and lit pictures.
 Manifest make_manifest() {
   Manifest m;
   m.object_height = 2;
   m.scales.resize(4);
   const int number[4]{0, 3, 7, 9};
   const double jnd[4]{kAnyDisplayPx, 4000, 500, 80}, error[4]{kAnyDisplayPx, 2000, 400, 100},
-      edge[4]{kAnyDisplayPx, 360, 90, 40};
+      edge[4]{kAnyDisplayPx, 360, 90, 40}, flip[4]{kAnyDisplayPx, 1024, 362, 64};
   for (std::size_t k = 0; k < 4; ++k) {
     ManifestScale& s = m.scales[k];
     s.scale = number[k];
     s.triangles = static_cast<std::uint32_t>(160000 >> (4 * k));
     s.display_px_jnd = jnd[k], s.display_px_error = error[k], s.display_px_edge = edge[k];
+    s.display_px_flip = flip[k];
     s.p95 = k == 0 ? 0 : 51.2 / jnd[k];
     s.error_rms = k == 0 ? 0 : 0.5 * m.object_height / error[k];
     s.error_max = 4 * s.error_rms;
@@ -54,7 +55,7 @@ TEST(Viewing, StepFunctionsOfEveryRule) {
   using Steps = std::vector<std::pair<int, double>>;
   EXPECT_EQ(steps(StepRule::kJnd), (Steps{{9, 80}, {7, 500}, {3, 4000}, {0, kAnyDisplayPx}}));
   EXPECT_EQ(steps(StepRule::kError), (Steps{{9, 100}, {7, 400}, {3, 2000}, {0, kAnyDisplayPx}}));
-  EXPECT_EQ(steps(StepRule::kDefault), (Steps{{9, 80}, {7, 400}, {3, 2000}, {0, kAnyDisplayPx}}));
+  EXPECT_EQ(steps(StepRule::kFlip), (Steps{{9, 64}, {7, 362}, {3, 1024}, {0, kAnyDisplayPx}}));
   // O_V / E_S 40, 90, 360 and, from 16 times the triangles, 4 * 360 for S_0: the nearer ratio wins.
   EXPECT_EQ(steps(StepRule::kEdge), (Steps{{9, 60}, {7, 180}, {3, 720}, {0, kAnyDisplayPx}}));
 }
@@ -68,17 +69,20 @@ TEST(Viewing, ScalesThatAcceptNoMoreGiveNoStep) {
   ASSERT_EQ(steps.size(), 2u);
   EXPECT_EQ(steps[0].scale, 9);
   EXPECT_LT(steps[0].up_to_px, kAnyDisplayPx);
+  m.scales[3].display_px_flip = 0;  // can be told from S_0 at every height
+  EXPECT_EQ(step_function(m.scales, StepRule::kFlip).size(), 3u);
+  EXPECT_EQ(step_function(m.scales, StepRule::kFlip)[0].scale, 7);
   m.scales.resize(1);
   EXPECT_EQ(step_function(m.scales, StepRule::kEdge), (std::vector<ManifestStep>{{kAnyDisplayPx, 0}}));
 }
 
 TEST(Viewing, ScaleAtAHeight) {
   const Manifest m = make_manifest();
-  const std::vector<ManifestStep> steps = step_function(m.scales, StepRule::kDefault);
+  const std::vector<ManifestStep> steps = step_function(m.scales, StepRule::kFlip);
   EXPECT_EQ(scale_at(steps, 0), 9);
-  EXPECT_EQ(scale_at(steps, 80), 9);
-  EXPECT_EQ(scale_at(steps, 80.1), 7);
-  EXPECT_EQ(scale_at(steps, 2001), 0);
+  EXPECT_EQ(scale_at(steps, 64), 9);
+  EXPECT_EQ(scale_at(steps, 64.1), 7);
+  EXPECT_EQ(scale_at(steps, 1025), 0);
   EXPECT_EQ(scale_at(steps, 1e12), 0);
 }
 
@@ -133,7 +137,7 @@ TEST(Viewing, AClippedObjectNeedsTheScaleOfItsPart) {
   EXPECT_EQ(select_scale(m, 6000, clip_to({-4000, -3000, 4000, 3000}, view), StepRule::kJnd), 3);
   // The other rules know no shapes.
   EXPECT_EQ(select_scale(m, 6000, {800, 600, true}, StepRule::kError), 0);
-  EXPECT_EQ(select_scale(m, 6000, {800, 600, true}, StepRule::kDefault), 0);
+  EXPECT_EQ(select_scale(m, 6000, {800, 600, true}, StepRule::kFlip), 0);
   EXPECT_EQ(select_scale(m, 150, {80, 60, true}, StepRule::kEdge), 7);
   // Nothing to be seen.
   EXPECT_EQ(select_scale(m, 6000, {0, 0, true}), 9);

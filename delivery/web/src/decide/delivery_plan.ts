@@ -1,10 +1,9 @@
 import { bootstrapBytes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
-import type { QualityTable } from '../format/quality_table';
 import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './network_model';
-import { InTime, choiceInTime, finerWhereSeen } from './scale_choice';
+import { InTime, choiceInTime } from './scale_choice';
 import { StepRule, selectScale } from './viewing';
 
 /** How somebody looks at the object, and over which link. */
@@ -12,8 +11,6 @@ export interface DeliveryRequest {
   /** Displayed height, device px. */
   displayedPx: number;
   rule: StepRule;
-  /** The default rule takes a finer scale where finerWhereSeen says so. */
-  measured: boolean;
   /** Scale by hand; -1: by the rule. */
   scale: number;
   /** Seconds from the first request on. */
@@ -27,7 +24,7 @@ export interface DeliveryRequest {
 /** 1000 px, 5 s, 100 kB/s. */
 export function defaultDeliveryRequest(): DeliveryRequest {
   const link = { bytesS: 1e5, rttS: 0, connections: 6 };
-  return { displayedPx: 1000, rule: 'default', measured: true, scale: -1, timeLimitS: 5, beta0BytesS: 0, htc: defaultHtcOptions(), link };
+  return { displayedPx: 1000, rule: 'flip', scale: -1, timeLimitS: 5, beta0BytesS: 0, htc: defaultHtcOptions(), link };
 }
 
 /** The delivery that a viewer will get. */
@@ -40,11 +37,9 @@ export interface DeliveryPlan extends InTime {
   completeS: number;
 }
 
-/** The scale that the request asks for: its own, or the rule's, or a finer one by measurement. */
-export function wantedScale(manifest: Manifest, quality: QualityTable, request: DeliveryRequest): number {
-  if (request.scale >= 0) return request.scale;
-  const scale = selectScale(manifest, request.displayedPx, undefined, request.rule);
-  return request.measured && request.rule === 'default' ? finerWhereSeen(quality, scale, request.displayedPx) : scale;
+/** The scale that the request asks for: its own, or the rule's. */
+export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: DeliveryRequest): number {
+  return scale >= 0 ? scale : selectScale(manifest, displayedPx, undefined, rule);
 }
 
 /** Bytes of a range that the first request has not brought yet. */
@@ -75,11 +70,11 @@ function timesOf(m: Manifest, link: LinkOptions, scale: number) {
  * Decides as delivery/cpp's plan_delivery over a link of constant rate, to the same bits; undefined when the package
  * has no such scale. The tables of all planes are needed.
  */
-export function planDelivery(data: PackageData, quality: QualityTable, request: DeliveryRequest): DeliveryPlan | undefined {
+export function planDelivery(data: PackageData, request: DeliveryRequest): DeliveryPlan | undefined {
   const { manifest } = data;
   const { link, displayedPx } = request;
-  const wanted = wantedScale(manifest, quality, request);
-  const steps = choiceInTime(data, quality, {
+  const wanted = wantedScale(manifest, request);
+  const steps = choiceInTime(data, {
     displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
     afterMesh: (scale) => {
       const { moved, manifestS, meshS } = timesOf(manifest, link, scale);

@@ -1,66 +1,92 @@
-import { PackageData } from '../format/package_data';
-import type { QualityTable } from '../format/quality_table';
-import { fragmentCount } from '../format/tables';
-import { logQuantiser } from './allocation';
-import { PlaneChoice, roleWeight } from './fragment_list';
+import type { PlaneGroup, QualityTable, TextureLosses } from '../format/quality_table';
 import { clamp } from './numbers';
-import { surfaceWeights } from './rate_distortion';
+import { exp, log, pow } from './portable_math';
 
-const belowLowest = 2; // the line through the two lowest rungs goes on for so many of their steps
+// FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a quality table:
+// format/documents/picture_prediction.cpp, bit for bit.
 
-/** On a line through the values at the two points of a rising axis around `at`; `least` of their distance below the first. */
-function interpolated(axis: readonly number[], at: number, least: number, value: (i: number) => number): number {
-  let i = 0;
-  while (i + 2 < axis.length && axis[i + 1] < at) ++i;
-  const next = Math.min(i + 1, axis.length - 1);
-  const part = next > i ? clamp((at - axis[i]) / (axis[next] - axis[i]), least, 1) : 0;
-  return (1 - part) * value(i) + part * value(next);
+const leastFlip = 1e-6; // what logarithms take for 0
+const leastDssim = 1e-9;
+const mostLevels = 8;
+
+const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
+
+/** Two neighbours on a rising axis around `at`, and the way from the first to the second. */
+function between(axis: readonly number[], at: number, value: (x: number) => number = (x) => x): [first: number, second: number, part: number] {
+  let first = 0;
+  while (first + 2 < axis.length && axis[first + 1] < at) ++first;
+  const second = Math.min(first + 1, axis.length - 1);
+  if (second === first) return [first, second, 0];
+  const from = value(axis[first]);
+  return [first, second, clamp((value(at) - from) / (value(axis[second]) - from), 0, 1)];
 }
 
-/**
- * SSIM of the rendered object for a scale and a mean quality of its textures: bilinear in the package's measured table
- * (scale number, log-quantiser of the quality), and below its lowest quality on the same line.
- */
-export function predictedSsim({ scales, rungs, ssim }: QualityTable, scale: number, quality: number): number {
-  const axis = rungs.map(logQuantiser);
-  const ofScale = (s: number): number =>
-    // Textures of which little more than a preview has come are worse than the lowest rung.
-    interpolated(axis, logQuantiser(quality), -belowLowest, (r) => ssim[s * rungs.length + r]);
-  return Math.max(0, interpolated(scales, scale, 0, ofScale));
+const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] => between(sizesPx, Math.max(displayedPx, 1), log);
+
+/** One of the two displayed heights around the one that is asked for. */
+class Curve {
+  private readonly logDssim_: number[];
+  private readonly logFlip_: number[];
+  private readonly coarser_: Float32Array;
+
+  constructor({ texelDssim, coded, coarser }: TextureLosses) {
+    let least = leastFlip;
+    this.logDssim_ = [...texelDssim].map(log);
+    this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
+    this.coarser_ = coarser.flip;
+  }
+  at(logDssim: number): number {
+    const [x, y] = [this.logDssim_, this.logFlip_];
+    let i = 0;
+    if (x.length === 1) return exp(y[0] + (logDssim - x[0]));
+    while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
+    const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+    return exp(y[i] + (logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[i]));
+  }
+  atLevel(levels: number): number {
+    const values = this.coarser_;
+    const value = (i: number): number => (i === 0 ? 0 : (values[Math.min(i, values.length) - 1] ?? 0));
+    const whole = Math.floor(clamp(levels, 0, mostLevels));
+    return mixed(value(whole), value(whole + 1), clamp(levels - whole, 0, 1));
+  }
 }
 
-/**
- * The uniform quality whose textures lose as much as these do: by interpolation over the uniform rungs' losses, of those planes whose role
- * weighs most, base colours where there are some.
- */
-export function equivalentQuality(data: PackageData, planes: readonly PlaneChoice[], textureDssim: number): number {
-  const weightOf = ({ plane }: PlaneChoice): number => roleWeight(data.textures[plane].role);
-  const heaviest = Math.max(...planes.map(weightOf));
-  let weight = 0;
-  let rungs: number[] = [];
-  let losses: number[] = [];
-  for (const choice of planes) {
-    const t = data.tables[choice.plane];
-    if (!t || weightOf(choice) < heaviest) continue;
-    if (rungs.length === 0) {
-      rungs = [...t.rungQuality];
-      losses = rungs.map(() => 0);
-    }
-    if (t.rungQuality.length !== rungs.length) continue;
-    const weights = surfaceWeights(t);
-    for (const f of t.order) {
-      weight += weights[f];
-      rungs.forEach((_, r) => (losses[r] += Math.fround(weights[f] * t.dssim[r * fragmentCount(t) + f]))); // a product of floats there
-    }
+/** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
+export class GroupCurve {
+  private readonly curves_: Curve[];
+  private readonly part_: number;
+
+  constructor(table: QualityTable, group: PlaneGroup, displayedPx: number) {
+    const [first, second, part] = sizeAt(table, displayedPx);
+    const sizes = table.groups.find((g) => g.group === group)?.sizes;
+    this.curves_ = sizes ? [new Curve(sizes[first]), new Curve(sizes[second])] : [];
+    this.part_ = part;
   }
-  if (!(weight > 0)) return 100;
-  const [first, ...curve] = losses.map((loss, r) => ({ quality: rungs[r], loss: loss / weight }));
-  if (textureDssim >= first.loss) return Math.max(1, (first.quality * first.loss) / Math.max(textureDssim, 1e-9));
-  let above = first;
-  for (const at of curve) {
-    const span = above.loss - at.loss;
-    if (textureDssim >= at.loss) return above.quality + (span > 0 ? (above.loss - textureDssim) / span : 1) * (at.quality - above.quality);
-    above = at;
+  /** FLIP where the texels' 1 - SSIM is `dssim`. */
+  coded(dssim: number): number {
+    if (!(dssim > leastDssim)) return 0;
+    const [first, second] = this.curves_;
+    const x = log(dssim);
+    return Math.min(1, first ? mixed(first.at(x), second.at(x), this.part_) : dssim);
   }
-  return above.quality;
+  /** FLIP with mips that are so many `levels` coarser than those for the display. */
+  coarser(levels: number): number {
+    const [first, second] = this.curves_;
+    return first && levels > 0 ? mixed(first.atLevel(levels), second.atLevel(levels), this.part_) : 0;
+  }
+}
+
+/** FLIP of a scale with the source's texels. */
+export function geometryFlip(table: QualityTable, displayedPx: number, scale: number): number {
+  const [s, nextScale, scalePart] = between(table.scales, scale);
+  const [size, nextSize, sizePart] = sizeAt(table, displayedPx);
+  const at = (i: number): number => mixed(table.geometry[i].flip[s], table.geometry[i].flip[nextScale], scalePart);
+  return mixed(at(size), at(nextSize), sizePart);
+}
+
+/** Losses of scale and groups together, at most 1. */
+export function combinedFlip({ exponent }: QualityTable, losses: readonly number[]): number {
+  let sum = 0;
+  for (const loss of losses) if (loss > 0) sum += pow(loss, exponent);
+  return sum > 0 ? Math.min(1, pow(sum, 1 / exponent)) : 0;
 }

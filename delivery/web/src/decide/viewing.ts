@@ -32,10 +32,10 @@ export function viewingDistance(objectHeight: number, heightPx: number, camera: 
 }
 
 /**
- * The rule that decides about the scale: the just-noticeable difference; an error of one pixel; the O_V / E_S that matches the
- * displayed height best; or (default) the finer of jnd and error, which is what Manifest.steps holds.
+ * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0, which is what Manifest.steps
+ * holds; jnd = the just-noticeable difference; error = an error of one pixel; edge = the O_V / E_S that matches the displayed height best.
  */
-export type StepRule = 'default' | 'jnd' | 'error' | 'edge';
+export type StepRule = 'flip' | 'jnd' | 'error' | 'edge';
 
 function edgeLimit(scales: readonly ManifestScale[], k: number): number {
   if (k > 1) return Math.sqrt(scales[k].displayPxEdge * scales[k - 1].displayPxEdge);
@@ -46,8 +46,8 @@ function edgeLimit(scales: readonly ManifestScale[], k: number): number {
 
 function limitOf(scales: readonly ManifestScale[], k: number, rule: StepRule): number {
   if (rule === 'edge') return edgeLimit(scales, k);
-  const { displayPxJnd, displayPxError } = scales[k];
-  return Math.min(rule === 'error' ? Infinity : displayPxJnd, rule === 'jnd' ? Infinity : displayPxError);
+  const { displayPxJnd, displayPxError, displayPxFlip } = scales[k];
+  return rule === 'jnd' ? displayPxJnd : rule === 'error' ? displayPxError : displayPxFlip;
 }
 
 /** The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's. */
@@ -128,10 +128,9 @@ function accepts(
   part: VisiblePart,
   rule: StepRule,
 ): boolean {
-  if (rule === 'edge') return displayedPx <= limitOf(scales, k, rule);
   const s = scales[k];
-  const seen = Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
-  return (seen || rule === 'error') && (displayedPx <= s.displayPxError || rule === 'jnd');
+  if (rule === 'jnd') return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
+  return displayedPx <= limitOf(scales, k, rule);
 }
 
 /**
@@ -142,7 +141,7 @@ export function selectScale(
   manifest: Manifest,
   displayedPx: number,
   part: VisiblePart = wholeObject,
-  rule: StepRule = 'default',
+  rule: StepRule = 'flip',
 ): number {
   const { scales } = manifest;
   if (!part.clipped) return scaleAt(stepFunction(scales, rule), displayedPx);

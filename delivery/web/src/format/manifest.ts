@@ -56,6 +56,8 @@ export interface ManifestScale {
   displayPxJnd: number;
   displayPxError: number;
   displayPxEdge: number;
+  /** By lit pictures: up to this height no view of the scale can be told from S_0's; 0 = at no height. */
+  displayPxFlip: number;
   /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". Since 1.1. */
   floor: string;
 }
@@ -96,7 +98,7 @@ export interface Manifest {
 
 const largest = 1e300;
 const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
-const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge'] as const;
+const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge', 'displayPxFlip'] as const;
 
 function readOffset(at: JsonAt): number {
   const offset = at.integer(64);

@@ -1,4 +1,5 @@
 import type { Manifest } from './manifest';
+import type { QualityTable } from './quality_table';
 import type { PlaneTables } from './tables';
 import type { TextureInfo } from './textures';
 
@@ -7,4 +8,5 @@ export interface PackageData {
   manifest: Manifest;
   textures: readonly TextureInfo[];
   tables: readonly (PlaneTables | undefined)[];
+  quality: QualityTable;
 }

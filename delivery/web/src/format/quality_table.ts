@@ -1,46 +1,102 @@
 import { qualityPath } from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
 
-/** Measured quality of scale x rung samples: quality.json (format/SPEC.md, section 11). */
-export interface QualityTable {
-  views: number;
-  sizePx: number;
-  /** Scale numbers, rising. */
-  scales: number[];
-  /** IJG qualities, rising. */
-  rungs: number[];
-  /** [scale index * rungs + rung index] SSIM of pictures, 1 = equal. */
-  ssim: Float32Array;
-  /** Mean FLIP of pictures in the same shape, 0 = equal. */
-  difference: Float32Array;
+/** Planes whose loss shows in the same way. */
+export type PlaneGroup = 'colour' | 'normal' | 'data';
+/** Groups in the order of documents. */
+export const planeGroups: readonly PlaneGroup[] = ['colour', 'normal', 'data'];
+
+/** The group of a role of textures.json. */
+export function groupOf(role: string): PlaneGroup {
+  if (role === 'normal') return role;
+  return role === 'data' || role === 'occlusion-roughness-metallic' ? 'data' : 'colour';
 }
 
-function readRising(at: JsonAt, least: number, most: number): number[] {
-  const values: number[] = [];
-  for (let i = 0, n = at.array(1, 100); i < n; ++i) {
-    const v = at.at(i).integer(least, most);
-    if (i > 0 && v <= values[i - 1]) at.at(i).fail('a rising number', `${v}`);
-    values.push(v);
-  }
-  return values;
+/** How lit pictures differ from those of S_0 with the source's texels; arrays of one length. */
+export interface PictureLosses {
+  /** Mean FLIP over the pixels that either picture covers, 0 = equal. */
+  flip: Float32Array;
+  /** 95th percentile of FLIP over those pixels. */
+  flipP95: Float32Array;
+  /** 1 - mean SSIM of luma. */
+  dssim: Float32Array;
+}
+/** What a group's textures lose at one displayed height, on S_0, with all other groups as in the source. */
+export interface TextureLosses {
+  /** Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; a sample each. */
+  texelDssim: Float32Array;
+  coded: PictureLosses;
+  /** With the source's texels of mips that are 1, 2 .. levels coarser than those for that height. */
+  coarser: PictureLosses;
+}
+/** What choices of scale and textures change in lit pictures: quality.json. */
+export interface QualityTable {
+  views: number;
+  /** Displayed heights of the object, px, rising. */
+  sizesPx: number[];
+  /** Losses of parts add up as (sum of loss^exponent)^(1 / exponent). */
+  exponent: number;
+  /** Mean of |predicted - measured| / measured of FLIP; 0 where nothing was sampled. */
+  error: number;
+  /** Scale numbers, rising. */
+  scales: number[];
+  /** By size; of each scale, with the source's texels. */
+  geometry: PictureLosses[];
+  /** Those that the model has; by size. */
+  groups: { group: PlaneGroup; sizes: TextureLosses[] }[];
+}
+
+const mostSizes = 8;
+
+function readRising(at: JsonAt, mostValues: number, least: number, most: number): number[] {
+  let before = -Infinity;
+  return at.each(1, mostValues, (one) => {
+    const v = one.integer(least, most);
+    if (v <= before) one.fail('a rising number', `${v}`);
+    return (before = v);
+  });
 }
 
 function readFractions(at: JsonAt, count: number): Float32Array {
-  at.array(count, count);
-  return Float32Array.from({ length: count }, (_, i) => at.at(i).number(0, 1));
+  return Float32Array.from(at.each(count, count, (one) => one.number(0, 1)));
+}
+
+function readLosses(at: JsonAt, count: number): PictureLosses {
+  const [flip, flipP95, dssim] = ['flip', 'flipP95', 'dssim'].map((name) => readFractions(at.at(name), count));
+  return { flip, flipP95, dssim };
+}
+
+function readTexture(at: JsonAt): TextureLosses {
+  let before = 0;
+  const texelDssim = Float32Array.from(at.at('texelDssim').each(1, 100, (one) => {
+    const v = Math.fround(one.number(0, 2));
+    if (!(v > before)) one.fail('a rising number above 0', `${v}`);
+    return (before = v);
+  }));
+  const coarser = at.at('coarser');
+  return { texelDssim, coded: readLosses(at.at('coded'), texelDssim.length), coarser: readLosses(coarser, coarser.at('flip').array(0, 8)) };
 }
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */
 export function readQuality(json: Uint8Array): QualityTable {
   const at = parseJson(json, qualityPath, 4 << 20);
-  const views = at.at('views').integer(1, 10000);
-  const sizePx = at.at('sizePx').integer(1, 65536);
-  const scales = readRising(at.at('scales'), 0, 99);
-  const rungs = readRising(at.at('rungs'), 1, 100);
-  const count = scales.length * rungs.length;
+  const sizesPx = readRising(at.at('sizesPx'), mostSizes, 1, 65536);
+  const scales = readRising(at.at('scales'), 100, 0, 99);
+  const sizes = sizesPx.length;
+  let last = -1;
   return {
-    views, sizePx, scales, rungs,
-    ssim: readFractions(at.at('ssim'), count),
-    difference: readFractions(at.at('difference'), count),
+    views: at.at('views').integer(1, 10000),
+    sizesPx,
+    exponent: Math.fround(at.at('exponent').number(1, 4)),
+    error: Math.fround(at.at('error').number(0, 1e6)),
+    scales,
+    geometry: at.at('geometry').each(sizes, sizes, (one) => readLosses(one, scales.length)),
+    groups: at.at('groups').each(0, planeGroups.length, (one) => {
+      const name = one.at('group').text(20);
+      const place = planeGroups.indexOf(name as PlaneGroup);
+      if (place <= last) one.at('group').fail('colour, normal or data, in this order', name);
+      last = place;
+      return { group: planeGroups[place], sizes: one.at('sizes').each(sizes, sizes, readTexture) };
+    }),
   };
 }

@@ -226,7 +226,7 @@ export class PackageDocuments {
   }
   /** Data that decisions about textures are made from, with the tables of these planes. */
   async data(planes?: readonly number[], signal?: AbortSignal): Promise<PackageData> {
-    const [textures, tables] = [await this.textures(signal), await this.tables(planes, signal)];
-    return { manifest: this.manifest, textures, tables };
+    const [textures, tables, quality] = await Promise.all([this.textures(signal), this.tables(planes, signal), this.quality(signal)]);
+    return { manifest: this.manifest, textures, tables, quality };
   }
 }

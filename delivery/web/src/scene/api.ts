@@ -44,11 +44,8 @@ export interface LoadOptions {
   order?: HtcOrder;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;
-  /**
-   * The rule that says which scale is enough: a rule of the step function, or (default) measured. Measured is the step function's
-   * default, and a finer scale as long as the package's own measurements say that the difference is seen.
-   */
-  rule?: StepRule | 'measured';
+  /** The rule that says which scale is enough. Default flip: by lit pictures, which the package's build has compared. */
+  rule?: StepRule;
   /** This scale (or the nearest one that the package has) instead of the scale for the display. */
   scale?: number;
   /** This rung of every fragment (the highest one where there are fewer) instead of rungs that fit the time. */

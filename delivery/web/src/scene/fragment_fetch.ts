@@ -1,5 +1,6 @@
 import type { Mesh } from 'three';
 import { type FragmentList, fragmentList } from '../decide/fragment_list';
+import { type PerGroup, everyGroup } from '../decide/texture_loss';
 import { isAbort, throwIfAborted } from '../format/errors';
 import { sleepS } from '../http/clock';
 import type { Levels } from '../worker/protocol';
@@ -17,6 +18,8 @@ const gapBytes = 1024;
 export class FragmentFetch {
   readonly fates = new FragmentFates();
   readonly transfers: Transfers;
+  /** What each group's losses weigh beside the others'. */
+  groupWeights: PerGroup = everyGroup(1);
 
   constructor(
     private readonly load_: LoadContext,
@@ -48,13 +51,13 @@ export class FragmentFetch {
    * camera sees, and by `unseen` at least.
    */
   async listOf(scale: number, unseen: number): Promise<FragmentList> {
-    const { planes, transfers } = this;
+    const { planes, transfers, load_: { view } } = this;
     const seen = new Map<number, Float32Array | undefined>();
     for (const { plane } of planes.all()) {
       await sleepS(0); // the page goes on in between
       seen.set(plane, this.shares_(plane));
     }
-    const list = fragmentList(planes.data, planes.all(), { scale });
+    const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, groupWeights: this.groupWeights });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);

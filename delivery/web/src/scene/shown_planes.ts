@@ -1,4 +1,4 @@
-import { fullSize, planesForDisplay, type PlaneChoice } from '../decide/fragment_list';
+import { fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
 import { fullSizePlanes, mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';

@@ -1,10 +1,10 @@
-import type { FragmentList, PlaneChoice } from '../decide/fragment_list';
+import type { FragmentList } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
-import { choiceInTime, finerWhereSeen } from '../decide/scale_choice';
+import { choiceInTime } from '../decide/scale_choice';
+import type { PlaneChoice } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
-import type { QualityTable } from '../format/quality_table';
 import { sleepS } from '../http/clock';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS, timePlanOptions } from './fetch_in_time';
@@ -32,8 +32,7 @@ const mostFruitlessRounds = 3;
 /** Reads the documents that decisions about textures are made from. */
 export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
   const data = await readPlaneData(load, source);
-  const quality = await load.reader.quality(load.signal);
-  return new TextureLoad(load, scale, source, quality, new FragmentFetch(load, new ShownPlanes(load, data)));
+  return new TextureLoad(load, scale, source, new FragmentFetch(load, new ShownPlanes(load, data)));
 }
 
 /**
@@ -49,7 +48,6 @@ export class TextureLoad {
     private readonly load_: LoadContext,
     private readonly scale_: ShownScale,
     private readonly source_: ScaleSource,
-    private readonly quality_: QualityTable,
     private readonly fetching_: FragmentFetch,
   ) {
     this.planes_ = fetching_.planes;
@@ -120,29 +118,30 @@ export class TextureLoad {
   private timer_(share: number): Promise<void> {
     return sleepS(clamp(share * this.inTime_.leftS(), 0, longestTimerS));
   }
-  /** The scale that is enough at a displayed height: by the rule, or finer where a finer scale was measured to be seen. */
+  /** The scale that is enough at a displayed height. */
   private scaleFor_(heightPx: number, part: VisiblePart | undefined): number {
-    const { options: { rule = 'measured' }, reader } = this.load_;
-    const scale = selectScale(reader.manifest, heightPx, part, rule === 'measured' ? 'default' : rule);
-    const hidden = part?.clipped && part.widthPx === 0;
-    return rule === 'measured' && !hidden ? finerWhereSeen(this.quality_, scale, heightPx) : scale;
+    const { options: { rule }, reader } = this.load_;
+    return selectScale(reader.manifest, heightPx, part, rule);
   }
   /** Scale and planes for the display, or those that look best in the time. */
   private async choice_(): Promise<{ scale: number; planes: PlaneChoice[] }> {
-    const { load_: load, planes_: planes } = this;
+    const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
     if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) return { scale: wanted, planes: planes.forDisplay() };
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
     const limitAfterMeshS = (scale: number): number => this.inTime_.leftS() - composeS - meshS(this.source_.bytesOf(scale));
-    const steps = choiceInTime(planes.data, this.quality_, {
+    const steps = choiceInTime(planes.data, {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined, connections: client.options.connections,
       afterMesh: (scale) => ({ plan: timePlanOptions(load, limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
     for (;;) {
       const { done, value } = steps.next();
-      if (done) return value!;
+      if (done) {
+        fetching.groupWeights = value!.list.groupWeights;
+        return value!;
+      }
       await sleepS(0); // the page goes on meanwhile
       throwIfAborted(load.signal);
     }

@@ -1,5 +1,5 @@
 import { Texture, type WebGLRenderer } from 'three';
-import type { PlaneChoice } from '../decide/fragment_list';
+import type { PlaneChoice } from '../decide/texture_loss';
 import type { TextureInfo } from '../format/textures';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';

@@ -4,11 +4,10 @@ import { setUp } from '../support/transferring';
 
 describe('the scale', () => {
   it('is the wanted one when time is plenty, the coarsest when there is none', async () => {
-    const { reader, data } = await setUp();
-    const quality = await reader.quality();
+    const { data } = await setUp();
     const at = (timeLimitS: number, scale = -1) => {
       const base = defaultDeliveryRequest();
-      return planDelivery(data, quality, { ...base, displayedPx: 1e6, timeLimitS, scale });
+      return planDelivery(data, { ...base, displayedPx: 1e6, timeLimitS, scale });
     };
     const coarsest = data.manifest.scales[data.manifest.scales.length - 1].scale;
     expect(at(1e3)).toMatchObject({ scale: 0, late: false });

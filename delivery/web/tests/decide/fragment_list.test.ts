@@ -9,6 +9,6 @@ describe('fragment list', () => {
     const shorter = fragmentList({ ...data, tables }, fullSize(data.textures), { scale: 0 });
     expect(shorter.fragments).toEqual(list.fragments.filter((f) => f.plane !== 0));
     expect(shorter.fragments.length).toBeLessThan(list.fragments.length);
-    expect([shorter.totalWeight, shorter.previewLoss]).toEqual([list.totalWeight, 0]);
+    expect(shorter.previewLoss).toEqual([0, 0, 0]);
   });
 });

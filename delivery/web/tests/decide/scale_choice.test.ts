@@ -1,11 +1,22 @@
 import { expect, it } from 'vitest';
-import { finerWhereSeen } from '../../src/decide/scale_choice';
+import { choiceInTime } from '../../src/decide/scale_choice';
+import { defaultTimePlan, setUp } from '../support/transferring';
 
-it('a finer scale is taken while it was measured to be seen', () => {
-  const ssim = Float32Array.from([0.9, 0.999, 0.89, 0.998, 0.88, 0.97, 0.8, 0.9]);
-  const table = { views: 4, sizePx: 192, scales: [0, 2, 5, 9], rungs: [10, 90], ssim, difference: ssim };
-  expect(finerWhereSeen(table, 9, 400)).toBe(2);
-  expect(finerWhereSeen(table, 2, 400)).toBe(2);
-  expect(finerWhereSeen(table, 9, 100)).toBe(9); // smaller than it was measured at
-  expect(finerWhereSeen(table, 7, 400)).toBe(7); // not in the table
+it('a coarser scale is taken where little time is left, and only where it looks better', async () => {
+  const { data } = await setUp();
+  const choose = (limitS: (scale: number) => number) => {
+    const steps = choiceInTime(data, {
+      displayedPx: 1000, wanted: 0, connections: 6,
+      afterMesh: (scale) => ({ plan: { ...defaultTimePlan, timeLimitS: limitS(scale) }, linkBytesS: 1e5 }),
+    });
+    for (;;) {
+      const { done, value } = steps.next();
+      if (done) return value!;
+    }
+  };
+  expect(choose(() => 100).scale).toBe(0);
+  const rushed = choose((scale) => (scale === 0 ? 0 : 100));
+  expect(rushed.scale).toBeGreaterThan(0);
+  expect(rushed).toMatchObject({ late: false });
+  expect(rushed.flip).toBeGreaterThan(rushed.textureFlip);
 });

@@ -42,7 +42,7 @@ describe('a load', () => {
     const nothing = { widthPx: 0, heightPx: 0, clipped: true };
     const wanted: number[] = [];
     for (const display of [{ heightPx: 20 }, { heightPx: 20, part: narrow }, { heightPx: 4000 }, { heightPx: 4000, part: nothing }]) {
-      const l = await loading(url, fakeServer(files), { display });
+      const l = await loading(url, fakeServer(files), { display, rule: 'jnd' });
       await l.model.done;
       wanted.push(l.model.state.wantedScale);
       await l.model.refine();
@@ -74,7 +74,7 @@ describe('a load', () => {
     const finer = reader.manifest.steps[1];
     for (const [from, to, scale] of [[0.98, 1.05, step.scale], [0.98, 1.15, finer.scale], [1.02, 0.95, finer.scale], [1.02, 0.85, step.scale]]) {
       let px = from * step.upToPx;
-      const l = await loading(url, fakeServer(files), { time: 3, rule: 'default', display: () => px });
+      const l = await loading(url, fakeServer(files), { time: 3, display: () => px });
       const taken: number[] = [];
       l.model.on('decision', () => {
         if (taken.length > 0) return;

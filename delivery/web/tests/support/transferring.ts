@@ -3,6 +3,7 @@ import { sha256 } from '../../src/format/sha256';
 import { FormatError, type FragmentList, PackageReader, fragmentList, fullSize } from '../../src/reader';
 import { Transfers, type Wish } from '../../src/scene/transfers';
 import { WorkerPool } from '../../src/worker/pool';
+import type { TimePlanOptions } from '../../src/decide/plan_types';
 import type { WorkerRequest } from '../../src/worker/protocol';
 import { type Fault, fakeServer } from './fake_server';
 import { golden } from './files';
@@ -10,6 +11,9 @@ import { golden } from './files';
 // Transfers of the golden scan's fragments, without workers and without a scene.
 
 export const url = 'http://host/scan.texmesh';
+
+/** The guard over a link of 100 kB/s without latency. */
+export const defaultTimePlan: TimePlanOptions = { policy: 'guard', order: 'credit', timeLimitS: 5, initialBytesS: 1e5, rttS: 0 };
 
 /** Instead of a worker: checks digests, decodes nothing. */
 export async function decode(request: WorkerRequest): Promise<[unknown, Transferable[]]> {

@@ -4,7 +4,7 @@ import type { Live } from '../live';
 
 const kFigures = [
   ['scale', 'scale shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'], ['time', 'complete after'],
-  ['ssim', 'predicted SSIM'],
+  ['flip', 'predicted FLIP'],
 ] as const;
 type Figure = (typeof kFigures)[number][0];
 
@@ -30,7 +30,7 @@ export class Figures {
     this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–', l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
     this.set('first', secondsOrDash(l.firstPictureS));
     this.set('time', secondsOrDash(l.doneS), Number.isFinite(l.limitS) && Number.isFinite(l.doneS) ? `of ${format.seconds(l.limitS)}` : '');
-    this.set('ssim', Number.isFinite(l.predictedSsim) ? l.predictedSsim.toFixed(3) : '–');
+    this.set('flip', Number.isFinite(l.predictedFlip) ? l.predictedFlip.toFixed(3) : '–');
   }
 
   private set(figure: Figure, text: string, more = ''): void {

@@ -8,7 +8,7 @@ import type { SectionPlots } from './section';
 export function scalePlot(live: () => Live): SectionPlots {
   return {
     title: 'Scales',
-    note: 'Triangles that are enough at a displayed height: nobody can tell them from the original, and no error is beyond a pixel. The dot is what is shown.',
+    note: 'Triangles that are enough at a displayed height: up to there, lit pictures of the scale differed from those of S0 by less than the build allows, in every view that it rendered. The dot is what is shown.',
     open: true,
     plots: [{
       options: {
@@ -38,7 +38,7 @@ const kLeastPx = 16;
 
 /** Triangles over displayed height by the three rules, on the union of their steps. */
 export function stepData(m: Manifest): number[][] {
-  const rules = (['default', 'jnd', 'error'] as const).map((rule) => stepFunction(m.scales, rule));
+  const rules = (['flip', 'jnd', 'error'] as const).map((rule) => stepFunction(m.scales, rule));
   const ends = rules.flat().map((s) => s.upToPx).filter((x) => x < 1e8);
   const most = Math.max(4096, ...ends.map((x) => x * 1.6));
   const heights = [...new Set([kLeastPx, ...ends.filter((e) => e > kLeastPx), most])].sort((a, b) => a - b);

@@ -7,7 +7,7 @@ import type { Stage } from '../stage/stage';
 export interface Readers {
   /** Reads the tables of a plane. */
   tables: (plane: number) => void;
-  /** Predicts the picture's SSIM anew. */
+  /** Predicts anew how much the picture differs from the source's. */
   prediction: () => void;
 }
 

@@ -1,4 +1,4 @@
-import { open } from 'texmesh';
+import { open, shownFlip } from 'texmesh';
 import type { LoadedModel, TexmeshPackage } from 'texmesh';
 import type { Choices } from '../choices';
 import type { Live } from '../live';
@@ -6,7 +6,6 @@ import type { Stage } from '../stage/stage';
 import { Listener } from './listener';
 import { chosenDetail, stageOptions } from './load_options';
 import { Original } from './original';
-import { pictureSsim } from './prediction';
 
 /** One package on the stage: opens the package and loads it as chosen. `live` is what the panel shows of the load. */
 export class Session {
@@ -155,10 +154,10 @@ export class Session {
 
   /** What the package's measured table says of the picture that stands now. */
   private async predict(pkg: TexmeshPackage, model: LoadedModel, signal: AbortSignal): Promise<void> {
-    const data = await pkg.data(model.state.planes.map((p) => p.plane));
-    const table = await pkg.quality();
+    const { planes, scale, displayedPx } = model.state;
+    const data = await pkg.data(planes.flatMap((p) => [p.base, p.plane]));
     if (signal.aborted) return;
-    this.live.predictedSsim = pictureSsim(data, table, model.state);
+    this.live.predictedFlip = shownFlip(data, displayedPx, scale, planes);
     this.listener.changed();
   }
 

@@ -1,0 +1,94 @@
+import type { PackageData } from '../format/package_data';
+import type { QualityTable } from '../format/quality_table';
+import { FragmentList, ListOptions, fragmentList, partsOf } from './fragment_list';
+import { sumOf } from './numbers';
+import { pow } from './portable_math';
+import { spendBytes } from './rate_distortion';
+import { bytesAtRung } from './rung_choice';
+import { PerGroup, PlaneChoice, TextureLoss, TextureParts, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
+
+// delivery/cpp/decide/texture_budget.cpp, bit for bit.
+
+/** Levels below the display's that are tried. */
+const mostCoarser = 4;
+const reweightings = 2;
+/** Losses as spendBytes counts them. */
+const lossUnit = 2 ** 40;
+/** Of a group beside the others. */
+const leastWeight = 1e-3;
+
+/** How bytes are best spent on textures. */
+export interface TextureSpending {
+  planes: PlaneChoice[];
+  list: FragmentList;
+  /** Rungs by offer; -1 = skipped. */
+  rungs: number[];
+  /** What is lost. */
+  parts: TextureParts;
+  /** Of the picture with the scale. */
+  flip: number;
+}
+/** Options that have to be said. */
+export type SpendingOptions = Partial<ListOptions> & Pick<ListOptions, 'scale'>;
+
+function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOptions, budget: number): TextureSpending {
+  const { data, displayedPx } = loss;
+  const list = fragmentList(data, planes, { ...options, displayedPx }, loss);
+  const curves = list.offers.map((f) => ({ bytes: [0, ...f.bytes], loss: f.loss.map((l) => Math.floor(l * lossUnit)) }));
+  const rungs = spendBytes(curves, budget).map((way) => way - 1);
+  const parts = partsOf(list, rungs);
+  return { planes, list, rungs, parts, flip: pictureFlip(data.quality, displayedPx, options.scale, parts) };
+}
+
+/** The slopes of the predicted FLIP by the groups' losses. */
+function slopesOf({ exponent }: QualityTable, { flip, parts }: TextureSpending): PerGroup {
+  if (!(flip > 0)) return everyGroup(1);
+  return parts.coded.map((coded) => Math.max(leastWeight, pow(Math.max(coded / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
+}
+
+/** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
+export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes: number): Generator<TextureSpending> {
+  const { data, displayedPx } = loss;
+  const spend = (levels: PerGroup): TextureSpending => spendOn(loss, planesForDisplay(data, displayedPx, levels), options, bytes);
+  let from: PerGroup | undefined = everyGroup(0);
+  let best = spend(from);
+  // All groups together, then each that the package has.
+  const steps: number[][] = [[1, 1, 1], ...loss.weights(best.planes).flatMap((w, g) => (w > 0 ? [everyGroup(0).map((_, i) => +(i === g))] : []))];
+  while (from) {
+    // Downhill; every step makes something coarser.
+    const at: PerGroup = from;
+    from = undefined;
+    for (const step of steps) {
+      const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
+      if (Math.max(...to) > mostCoarser) continue;
+      yield best;
+      const now = spend(to);
+      if (now.flip >= best.flip) continue;
+      best = now;
+      from = to;
+    }
+  }
+  for (let i = 0; i < reweightings && data.quality.exponent > 1; ++i) {
+    yield best;
+    const now = spendOn(loss, best.planes, { ...options, groupWeights: slopesOf(data.quality, best) }, bytes);
+    if (now.flip >= best.flip) break;
+    best = now;
+  }
+  yield best;
+}
+
+/** The best texture that so many bytes can show. */
+export interface TextureBudget extends TextureSpending {
+  /** Bytes of fragments, at most the budget. */
+  bytes: number;
+}
+
+/**
+ * Chooses between the planes for the display and their mips, so that few bytes are not spread over texels that they
+ * cannot make good; fragments share the bytes by rate and distortion. What counts is the FLIP that is predicted of the picture. Needs
+ * the tables of all planes.
+ */
+export function textureForBudget(data: PackageData, displayedPx: number, options: SpendingOptions, bytes: number): TextureBudget {
+  const best = [...budgetSteps(new TextureLoss(data, displayedPx), options, bytes)].pop()!;
+  return { ...best, bytes: sumOf(best.list.offers.map((f, i) => bytesAtRung(f, best.rungs[i]))) };
+}

@@ -1,0 +1,171 @@
+import { InputError } from '../format/errors';
+import { fullSizePlanes } from '../format/layout';
+import type { Manifest } from '../format/manifest';
+import type { PackageData } from '../format/package_data';
+import { QualityTable, groupOf, planeGroups } from '../format/quality_table';
+import { PlaneTables, fragmentCount } from '../format/tables';
+import { TextureInfo } from '../format/textures';
+import { sumOf } from './numbers';
+import { log } from './portable_math';
+import { GroupCurve, combinedFlip, geometryFlip } from './prediction';
+import { surfaceWeights } from './rate_distortion';
+
+// delivery/cpp/decide/texture_loss.cpp, bit for bit.
+
+/** Which plane shows each texture: the full-size one or a mip of it. */
+export interface PlaneChoice {
+  base: number;
+  plane: number;
+}
+/** A number for each group of planes, in the order of planeGroups. */
+export type PerGroup = readonly [colour: number, normal: number, data: number];
+/** Of every group the same. */
+export const everyGroup = (value: number): PerGroup => [value, value, value];
+
+/** What textures lose in lit pictures: FLIP of each group by itself, on S_0. */
+export interface TextureParts {
+  /** Because of their rungs. */
+  coded: PerGroup;
+  /** Because their mips are coarser than those for the display. */
+  coarser: PerGroup;
+}
+
+const ln2 = 0.693147180559945309417;
+
+/** Tables of a plane that were read; InputError where they were not. */
+export function tablesOf(data: PackageData, plane: number): PlaneTables {
+  const t = data.tables[plane];
+  if (!t) throw new InputError('', `texture plane ${plane}`, 'a plane whose tables were read', 'another');
+  return t;
+}
+
+/** Number of the group of a plane. */
+export const groupIndex = (data: PackageData, plane: number): number => planeGroups.indexOf(groupOf(data.textures[plane].role));
+
+/** Every texture at full size. */
+export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
+  return Array.from({ length: fullSizePlanes(textures) }, (_, p) => ({ base: p, plane: p }));
+}
+
+/** Area of the object; where the package does not say the area, that of the bounding box. */
+function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
+  const [x, y, z] = boundsMin.map((least, i) => boundsMax[i] - least);
+  return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
+}
+
+/** How often the texels of a full-size plane may be halved until one stands for a pixel; at least 0. */
+function displayLevel(data: PackageData, base: number, displayedPx: number): number {
+  const { coveredTexels, surfaceFraction } = tablesOf(data, base);
+  const texelsPerArea = sumOf(coveredTexels) / (sumOf(surfaceFraction) * surfaceOf(data.manifest));
+  if (!(texelsPerArea > 0 && texelsPerArea < Infinity)) return 0;
+  return Math.max(0, log(Math.sqrt(texelsPerArea) / (displayedPx / data.manifest.objectHeight)) / ln2);
+}
+
+/** The largest mip of a texture that is at most as coarse as `level`, or the full-size plane. */
+function planeAtLevel({ textures }: PackageData, base: number, level: number): number {
+  const mips = textures.map((t) => (t.mip > 0 && t.base === base && t.mip <= level ? t.mip : 0));
+  const mip = Math.max(...mips);
+  return mip > 0 ? mips.indexOf(mip) : base;
+}
+
+/**
+ * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high (device
+ * px), or by group so many `levels` coarser. Needs the tables of the full-size planes.
+ */
+export function planesForDisplay(data: PackageData, displayedPx: number, levels: PerGroup = everyGroup(0)): PlaneChoice[] {
+  return fullSize(data.textures).map(({ base }) => {
+    const level = displayLevel(data, base, displayedPx) + levels[groupIndex(data, base)];
+    return { base, plane: planeAtLevel(data, base, level) };
+  });
+}
+
+const combined = (table: QualityTable, geometry: number, { coded, coarser }: TextureParts): number =>
+  combinedFlip(table, [geometry, ...coded.flatMap((loss, g) => [loss, coarser[g]])]);
+
+/** FLIP of the textures alone: 0 = equal to S_0 with the source's texels. */
+export function textureFlip(table: QualityTable, parts: TextureParts): number {
+  return combined(table, 0, parts);
+}
+/** FLIP of a scale with textures. */
+export function pictureFlip(table: QualityTable, displayedPx: number, scale: number, parts: TextureParts): number {
+  return combined(table, geometryFlip(table, displayedPx, scale), parts);
+}
+
+/** Of a plane: FLIP of an object that looks all over like one fragment. */
+interface PlaneLoss {
+  /** [F] surfaceWeights(). */
+  weights: Float32Array;
+  /** Of the stored fragments together. */
+  weight: number;
+  /** [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview. */
+  coded: Float64Array;
+}
+
+/** What fragments lose in lit pictures of one displayed height, by the package's quality table. */
+export class TextureLoss {
+  private readonly curves_: GroupCurve[];
+  private readonly planes_ = new Map<number, PlaneLoss>();
+
+  constructor(
+    readonly data: PackageData,
+    readonly displayedPx: number,
+  ) {
+    this.curves_ = planeGroups.map((group) => new GroupCurve(data.quality, group, displayedPx));
+  }
+  plane(plane: number): PlaneLoss {
+    let loss = this.planes_.get(plane);
+    if (!loss) this.planes_.set(plane, (loss = this.measure_(plane)));
+    return loss;
+  }
+  private measure_(plane: number): PlaneLoss {
+    const t = tablesOf(this.data, plane);
+    const curve = this.curves_[groupIndex(this.data, plane)];
+    const weights = surfaceWeights(t);
+    const fragments = fragmentCount(t);
+    const coded = new Float64Array((t.rungQuality.length + 1) * fragments);
+    for (const f of t.order) {
+      coded[f] = curve.coded(t.skipDssim[f] ?? 1);
+      for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f]);
+    }
+    return { weights, weight: sumOf([...t.order].map((f) => weights[f])), coded };
+  }
+  /** The weight of each group's stored fragments. */
+  weights(planes: readonly PlaneChoice[]): PerGroup {
+    const weights: [number, number, number] = [0, 0, 0];
+    for (const { plane } of planes) weights[groupIndex(this.data, plane)] += this.plane(plane).weight;
+    return weights;
+  }
+  /** TextureParts.coarser, as the mean over each group's surface. */
+  coarser(planes: readonly PlaneChoice[]): PerGroup {
+    const { data, displayedPx } = this;
+    const loss: [number, number, number] = [0, 0, 0];
+    const weights = this.weights(planes);
+    for (const { base, plane } of planes) {
+      const group = groupIndex(data, plane);
+      const levels = data.textures[plane].mip - data.textures[planeAtLevel(data, base, displayLevel(data, base, displayedPx))].mip;
+      if (levels > 0 && weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser(levels);
+    }
+    return loss;
+  }
+}
+
+/** A texture as it is shown: the rung of each fragment, row by row; -1 = the preview. */
+export interface ShownTexture extends PlaneChoice {
+  rungs: ArrayLike<number>;
+}
+/**
+ * FLIP that is predicted of a picture that shows this scale and these textures. Needs the tables of their planes, and of the full-size
+ * ones.
+ */
+export function shownFlip(data: PackageData, displayedPx: number, scale: number, planes: readonly ShownTexture[]): number {
+  const loss = new TextureLoss(data, displayedPx);
+  const surface = loss.weights(planes);
+  const coded: [number, number, number] = [0, 0, 0];
+  for (const { plane, rungs } of planes) {
+    const { weights, coded: losses } = loss.plane(plane);
+    const t = tablesOf(data, plane);
+    const group = groupIndex(data, plane);
+    for (const f of t.order) coded[group] += (weights[f] / (surface[group] || 1)) * losses[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
+  }
+  return pictureFlip(data.quality, displayedPx, scale, { coded, coarser: loss.coarser(planes) });
+}

@@ -1,0 +1,102 @@
+#include "format/documents/picture_prediction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace texmesh {
+namespace {
+
+PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
+
+/// Two displayed heights, colours alone; losses are exact in binary.
+QualityTable make_table(float exponent = 1) {
+  QualityTable t{1, {64, 1024}, {0, 4, 8}, {}, {}, exponent, 0};
+  t.geometry = {losses({0, 0.125f, 0.25f}), losses({0, 0.25f, 0.5f})};
+  const TextureLosses small{{0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.0625f, 0.125f})};
+  const TextureLosses large{{0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.125f, 0.25f})};
+  t.groups = {{PlaneGroup::kColour, {small, large}}};
+  return t;
+}
+
+TEST(GroupCurve, GoesThroughTheSamples) {
+  const QualityTable t = make_table();
+  const GroupCurve at64(t, PlaneGroup::kColour, 64), at1024(t, PlaneGroup::kColour, 1024);
+  EXPECT_NEAR(at64.coded(0.015625), 0.03125, 1e-12);
+  EXPECT_NEAR(at64.coded(0.25), 0.125, 1e-12);
+  EXPECT_NEAR(at1024.coded(0.25), 0.25, 1e-12);
+  EXPECT_NEAR(at64.coded(0.0625), 0.0625, 1e-12) << "half the way in logarithms";
+  EXPECT_EQ(at64.coarser(1), 0.0625);
+  EXPECT_EQ(at64.coarser(1.5), 0.09375);
+  EXPECT_EQ(at64.coarser(3), 0.125) << "the last level's";
+}
+
+TEST(GroupCurve, NothingLostIsNothing) {
+  const GroupCurve curve(make_table(), PlaneGroup::kColour, 300);
+  EXPECT_EQ(curve.coded(0), 0);
+  EXPECT_EQ(curve.coarser(0), 0);
+}
+
+TEST(GroupCurve, RisesWithDssimAndLevels) {
+  const QualityTable t = make_table();
+  for (const double px : {10.0, 64.0, 300.0, 1024.0, 5000.0}) {
+    const GroupCurve curve(t, PlaneGroup::kColour, px);
+    double before = 0;
+    for (double dssim = 1e-6; dssim < 2; dssim *= 1.1) {
+      const double now = curve.coded(dssim);
+      EXPECT_GE(now, before) << px << " px, " << dssim;
+      EXPECT_LE(now, 1);
+      before = now;
+    }
+    before = 0;
+    for (double level = 0; level < 10; level += 0.125) {
+      EXPECT_GE(curve.coarser(level), before);
+      before = curve.coarser(level);
+    }
+  }
+}
+
+TEST(GroupCurve, HeightsBetweenAreLinearInTheLogarithm) {
+  const QualityTable t = make_table();
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coded(0.25), (0.125 + 0.25) / 2, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coarser(1), (0.0625 + 0.125) / 2, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 8).coded(0.25), 0.125, 1e-12) << "the nearest height";
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 9999).coded(0.25), 0.25, 1e-12);
+}
+
+TEST(GroupCurve, GroupsThatTheTableDoesNotHaveLoseTheirTexels) {
+  const GroupCurve curve(make_table(), PlaneGroup::kNormal, 300);
+  EXPECT_EQ(curve.coded(0.375), 0.375);
+  EXPECT_EQ(curve.coded(1.5), 1);
+  EXPECT_EQ(curve.coarser(2), 0);
+}
+
+TEST(GroupCurve, OneSampleIsALine) {
+  QualityTable t = make_table();
+  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), {}};
+  const GroupCurve curve(t, PlaneGroup::kColour, 64);
+  EXPECT_NEAR(curve.coded(0.25), 0.125, 1e-12);
+  EXPECT_NEAR(curve.coded(0.125), 0.0625, 1e-12);
+}
+
+TEST(GeometryFlip, BetweenScalesAndHeights) {
+  const QualityTable t = make_table();
+  EXPECT_EQ(geometry_flip(t, 300, 0), 0);
+  EXPECT_EQ(geometry_flip(t, 64, 4), 0.125);
+  EXPECT_EQ(geometry_flip(t, 64, 6), 0.1875);
+  EXPECT_NEAR(geometry_flip(t, 256, 8), 0.375, 1e-12);
+  EXPECT_EQ(geometry_flip(t, 64, 99), 0.25) << "the last scale's";
+  EXPECT_EQ(geometry_flip({}, 64, 3), 0);
+}
+
+TEST(CombinedFlip, AddsUpByTheExponent) {
+  const std::vector<double> losses{0.3, 0, 0.4};
+  EXPECT_NEAR(combined_flip(make_table(1), losses), 0.7, 1e-12);
+  EXPECT_NEAR(combined_flip(make_table(2), losses), 0.5, 1e-12);
+  EXPECT_EQ(combined_flip(make_table(2), std::vector<double>{0, 0}), 0);
+  EXPECT_EQ(combined_flip(make_table(1), std::vector<double>{0.75, 0.75}), 1);
+  EXPECT_NEAR(combined_flip(make_table(3), std::vector<double>{0.25}), 0.25, 1e-12);
+}
+
+}  // namespace
+}  // namespace texmesh
