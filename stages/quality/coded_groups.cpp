@@ -10,14 +10,13 @@
 namespace texmesh::quality {
 namespace {
 
-/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest).
+/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest). Short
+/// ladders repeat some, so that all sizes have the same number of knots.
 std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
   std::vector<std::size_t> out;
   const auto n = static_cast<std::size_t>(wanted);
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t k = n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1);
-    if (out.empty() || k > out.back()) out.push_back(k);
-  }
+  for (std::size_t i = 0; i < n; ++i)
+    out.push_back(n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1));
   return out;
 }
 

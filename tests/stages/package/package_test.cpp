@@ -59,7 +59,7 @@ struct Inputs {
     quality.table.sizes_px = {128};
     quality.table.scales = {0, 4, 9};
     quality.table.geometry = {{{0, 0.1f, 0.2f}, {0, 0.3f, 0.4f}, {0, 0.1f, 0.2f}}};
-    quality.display_px_flip = {1e9f, 450, 90.5097f};
+    quality.display_px_flip = {1e9f, 512, 128};
     for (std::size_t p = 0; p < planes; ++p) add_plane(p);
   }
 
@@ -186,21 +186,19 @@ TEST(Package, ManifestDescribesTheModel) {
   EXPECT_EQ(m.origin, (Vec3d{5e6, 0, -5e6}));
   EXPECT_EQ(m.bounds_max.x - m.bounds_min.x, 2);
   // The finer of both rules: each scale up to the smaller of its two sizes.
-  EXPECT_EQ(m.steps, (std::vector<ManifestStep>{{150, 9}, {500, 4}, {kAnyDisplayPx, 0}}));
+  EXPECT_EQ(m.steps, (std::vector<ManifestStep>{{128, 9}, {512, 4}, {kAnyDisplayPx, 0}}));
 }
 
 TEST(Package, StepsLeaveOutScalesThatAreNeverTheAnswer) {
   Inputs inputs(0);
-  inputs.perceptual.display_px_jnd = {2e9f, 100, 150};  // S_4 accepts less than the coarser S_9
-  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{150, 9}, {kAnyDisplayPx, 0}}));
-  inputs.perceptual.display_px_jnd = inputs.perceptual.display_px_error = {2e9f, 150.0001f, 150};
-  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{150, 9}, {kAnyDisplayPx, 0}}));
-  inputs.perceptual.display_px_jnd =
-      inputs.perceptual.display_px_error = {2e9f, 2e9f, 2e9f};  // a flat object
-  EXPECT_EQ(manifest_of(inputs.assemble()).steps,
-            (std::vector<ManifestStep>{{9.99e8, 9}, {kAnyDisplayPx, 0}}));
-  inputs.perceptual.display_px_jnd = {0, 0, 0};
+  inputs.quality.display_px_flip = {1e9f, 128, 181};  // S_4 accepts less than the coarser S_9
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{181, 9}, {kAnyDisplayPx, 0}}));
+  inputs.quality.display_px_flip = {1e9f, 1024, 1024};
+  EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{1024, 9}, {kAnyDisplayPx, 0}}));
+  inputs.quality.display_px_flip = {1e9f, 0, 0};  // neither serves
   EXPECT_EQ(manifest_of(inputs.assemble()).steps, (std::vector<ManifestStep>{{kAnyDisplayPx, 0}}));
+  inputs.quality.display_px_flip.pop_back();
+  EXPECT_THROW(inputs.assemble(), StageError);
 }
 
 TEST(Package, DeterministicAndReproducedFromItsOwnEntries) {

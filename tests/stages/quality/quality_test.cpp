@@ -243,10 +243,12 @@ TEST(Quality, GroupsAreMeasuredApart) {
   const QualityTable t = measure(s);
   ASSERT_EQ(t.groups.size(), 2u);
   EXPECT_EQ(t.groups[1].group, PlaneGroup::kNormal);
-  EXPECT_EQ(t.groups[0].sizes[0].coded, measure(sample_sheet(true)).groups[0].sizes[0].coded)
-      << "a flat normal map changes no colours";
+  const std::vector<float> alone = measure(sample_sheet(true)).groups[0].sizes[0].coded.flip;
+  ASSERT_EQ(t.groups[0].sizes[0].coded.size(), alone.size());
+  for (std::size_t k = 0; k < alone.size(); ++k)
+    EXPECT_NEAR(t.groups[0].sizes[0].coded.flip[k], alone[k], 0.01f) << "a flat normal map changes no colours";
   EXPECT_LT(t.groups[1].sizes[0].coded.flip[0], 0.01f);
-  EXPECT_EQ(t.groups[1].sizes[0].coarser.flip.back(), 0) << "flat stays flat";
+  EXPECT_LT(t.groups[1].sizes[0].coarser.flip.back(), 1e-4f) << "flat stays flat";
 }
 
 TEST(Quality, PlanesThatDoNotShowLoseNothing) {
