@@ -71,9 +71,11 @@ std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
 }  // namespace
 
 ViewChoice choose_views(int views, int large_views) {
-  ViewChoice out{views, std::vector<std::uint8_t>(static_cast<std::size_t>(views))};
+  ViewChoice out{views, std::vector<ViewPart>(static_cast<std::size_t>(views), ViewPart::kAll)};
   const int wanted = std::min(views, large_views);
-  for (int i = 0; i < wanted; ++i) out.large[static_cast<std::size_t>((2 * i + 1) * views / (2 * wanted))] = 1;
+  for (int i = 0; i < wanted; ++i)
+    out.part[static_cast<std::size_t>((2 * i + 1) * views / (2 * wanted))] =
+        i % 2 == 0 ? ViewPart::kLargest : ViewPart::kLarge;
   return out;
 }
 

@@ -16,10 +16,13 @@ struct Frame {
   double extent = 0;
 };
 
-/// Which views a model is seen from. A part of them serves where pictures are dear.
+/// Which views a model is seen from: all, a part of them where pictures are dear, and a half of that part for
+/// textures in the largest pictures.
+enum class ViewPart : std::uint8_t { kAll, kLarge, kLargest };
 struct ViewChoice {
   int views = 1;
-  std::vector<std::uint8_t> large;  // [views]: 1 = among those of large pictures
+  std::vector<ViewPart> part;  // [views]: the smallest part that has the view
+  bool has(std::size_t view, ViewPart in) const { return part[view] >= in; }
 };
 ViewChoice choose_views(int views, int large_views);
 

@@ -89,18 +89,25 @@ class SwitchSizes {
   std::vector<float> display_px_;
 };
 
-/// The scales that the table needs of a size beside those that still pass.
-std::vector<std::uint8_t> rendered_scales(std::vector<std::uint8_t> alive, std::optional<std::size_t> rank) {
+/// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
+std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint8_t>& alive,
+                                                     const Height& height, double largest_px) {
   const std::size_t n = alive.size();
-  for (std::size_t k = 1; rank && k < n; ++k)
-    if (*rank == 0 || k + 1 == n || (*rank == 1 && (n - 1 - k) % 2 == 0)) alive[k] = 1;
-  return alive;
+  const bool small = height.displayed_px < largest_px / 4 * 1.001;
+  std::vector<std::optional<ViewPart>> out(n);
+  for (std::size_t k = 1; k < n; ++k) {
+    if (alive[k]) out[k] = small ? ViewPart::kAll : ViewPart::kLarge;
+    if (alive[k] || !height.rank) continue;
+    if (*height.rank == 0) out[k] = ViewPart::kAll;
+    if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
+    if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
+  }
+  return out;
 }
 
 std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,
                                       Studio& studio, SwitchSizes& sizes, const RunContext& context) {
   const std::vector<Height> heights = heights_below(options.largest_px);
-  const double quarter = heights.back().displayed_px / 4;
   std::vector<SizeCells> table_cells;
   for (std::size_t i = 0; i < heights.size(); ++i) {
     context.check_cancelled();
@@ -108,8 +115,8 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
     const double px = heights[i].displayed_px;
     SizeCells cells{px, {}, {}, {}};
     render_size(sampler,
-                {rendered_scales(sizes.alive(), heights[i].rank), px > quarter * 1.001, heights[i].rank},
-                studio, cells, context);
+                {rendered_scales(sizes.alive(), heights[i], options.largest_px), heights[i].rank}, studio,
+                cells, context);
     if (px >= kLeastSwitchPx) sizes.judge(cells.geometry, px);
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }
@@ -121,20 +128,25 @@ struct RawLosses {
   PictureLosses geometry;
   std::vector<PictureLosses> coded, coarser;  // per group
 };
-std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes, const ViewChoice& views) {
+std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller) {
+      if (!smaller_cells) return losses_of(cells, nullptr);
+      const SmallerSize below{*smaller_cells, std::move(smaller)};
+      return losses_of(cells, &below);
+    };
     const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
     RawLosses raw;
-    const RawLosses* smaller = i > 0 ? &out.back() : nullptr;
-    raw.geometry = losses_of(sizes[i].geometry, views, below ? &below->geometry : nullptr,
-                             smaller ? &smaller->geometry : nullptr);
+    raw.geometry = losses(sizes[i].geometry, below ? &below->geometry : nullptr,
+                          below ? out[i - 1].geometry : PictureLosses{});
     for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
       const GroupCells& group = sizes[i].groups[g];
-      raw.coded.push_back(losses_of(group.coded, views, below ? &below->groups[g].coded : nullptr,
-                                    smaller ? &smaller->coded[g] : nullptr));
-      raw.coarser.push_back(losses_of(group.coarser, views, below ? &below->groups[g].coarser : nullptr,
-                                      smaller ? &smaller->coarser[g] : nullptr));
+      raw.coded.push_back(losses(group.coded, below ? &below->groups[g].coded : nullptr,
+                                 below ? along_curve(group.knots, below->groups[g].knots, out[i - 1].coded[g])
+                                       : PictureLosses{}));
+      raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
+                                   below ? out[i - 1].coarser[g] : PictureLosses{}));
     }
     out.push_back(std::move(raw));
   }
@@ -142,8 +154,8 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes, const Vie
 }
 
 void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfGroup>& groups,
-                const ViewChoice& views, QualityTable& table) {
-  const std::vector<RawLosses> raw = raw_losses(sizes, views);
+                QualityTable& table) {
+  const std::vector<RawLosses> raw = raw_losses(sizes);
   for (const PlanesOfGroup& group : groups) table.groups.push_back({group.group, {}});
   std::vector<TogetherLoss> together;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
@@ -151,14 +163,18 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
     table.geometry.push_back(raw[i].geometry);
     for (std::size_t g = 0; g < groups.size(); ++g)
       table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g].knots, raw[i].coded[g],
-                                                     raw[i].coarser[g], groups[g].group,
-                                                     sizes[i].displayed_px));
+                                                     raw[i].coarser[g]));
     for (const TogetherCell& cell : sizes[i].together) {
       TogetherLoss& sample = together.emplace_back();
       sample.measured = pooled(cell.losses).flip.mean();
-      sample.parts.push_back(static_cast<double>(raw[i].geometry.flip[cell.scale]));
+      // In the same views, where the part was rendered in them.
+      const auto add = [&](const Losses& alone, float otherwise) {
+        sample.parts.push_back(alone.empty() ? static_cast<double>(otherwise)
+                                             : pooled(alone, cell.losses).flip.mean());
+      };
+      add(sizes[i].geometry[cell.scale], raw[i].geometry.flip[cell.scale]);
       for (std::size_t g = 0; g < groups.size(); ++g)
-        sample.parts.push_back(static_cast<double>(raw[i].coded[g].flip[cell.knots[g]]));
+        add(sizes[i].groups[g].coded[cell.knots[g]], raw[i].coded[g].flip[cell.knots[g]]);
     }
   }
   fit_exponent(together, table);
@@ -200,7 +216,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   const std::vector<SizeCells> cells = render_heights(sampler, options, studio, switch_sizes, context);
   result.table.views = static_cast<std::uint32_t>(options.views);
   result.table.scales = kept.numbers;
-  fill_table(cells, groups, studio.views, result.table);
+  fill_table(cells, groups, result.table);
   result.display_px_flip = switch_sizes.display_px();
   return result;
 }

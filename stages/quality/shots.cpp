@@ -73,7 +73,7 @@ std::vector<Losses> take_shots(const Studio& studio, const Materials& source, do
     const auto view = static_cast<std::size_t>(v);
     std::vector<std::size_t> taken;
     for (std::size_t i = 0; i < shots.size(); ++i)
-      if (studio.views.large[view] || !shots[i].large_views) taken.push_back(i);
+      if (studio.views.has(view, shots[i].views)) taken.push_back(i);
     if (taken.empty()) continue;
     const PicturePlace place = place_picture(studio.frame, v, studio.views.views, displayed_px);
     const Reference reference = task.reference(place, context);
@@ -91,10 +91,10 @@ Loss pooled(const Losses& losses) {
   return sum;
 }
 
-Loss pooled(const Losses& losses, const ViewChoice& large) {
+Loss pooled(const Losses& losses, const Losses& like) {
   Loss sum;
   for (std::size_t v = 0; v < losses.size(); ++v)
-    if (large.large[v]) sum.add(losses[v]);
+    if (like[v].flip.pixels > 0) sum.add(losses[v]);
   return sum;
 }
 

@@ -32,7 +32,7 @@ struct Loss {
 struct Shot {
   std::size_t scale = 0;  // index into Studio::scenes
   const Materials* materials = nullptr;
-  bool large_views = true;  // those of ViewChoice::large alone
+  ViewPart views = ViewPart::kAll;
 };
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;
@@ -42,8 +42,8 @@ using Losses = std::vector<Loss>;
 std::vector<Losses> take_shots(const Studio& studio, const Materials& source, double displayed_px,
                                const std::vector<Shot>& shots, bool with_ssim, const RunContext& context);
 
-/// Of all views together, or of the large ones.
+/// Of all views together, or of those in which `like` shows anything.
 Loss pooled(const Losses& losses);
-Loss pooled(const Losses& losses, const ViewChoice& large);
+Loss pooled(const Losses& losses, const Losses& like);
 
 }  // namespace texmesh::quality

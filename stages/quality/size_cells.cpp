@@ -51,14 +51,14 @@ class SizeShots {
 
   Replaced none() const { return Replaced(source_, -1); }
 
-  void take(std::size_t scale, const Replaced& replaced, Losses& to, bool large_views = true) {
+  void take(std::size_t scale, const Replaced& replaced, Losses& to, ViewPart views) {
     const bool changes = scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
     if (!changes) {
       to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
       return;
     }
     materials_.push_back(materials_with(sampler_.shown.materials, replaced));
-    shots_.push_back({scale, &materials_.back(), large_views});
+    shots_.push_back({scale, &materials_.back(), views});
     to_.push_back(&to);
   }
 
@@ -83,6 +83,13 @@ class SizeShots {
   std::vector<Shot> shots_;
   std::vector<Losses*> to_;
 };
+
+/// Short ladders have no other rung.
+bool repeats(const Knot& knot, const Knot& before) {
+  return knot.previews == before.previews &&
+         std::ranges::equal(knot.rungs, before.rungs,
+                            [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
+}
 
 /// The knots that are rendered: all, the ends, or the ends of the rungs.
 bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
@@ -131,6 +138,8 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
   return (1 - part) * *values[below] + part * *values[above];
 }
 
+ViewPart texture_views(std::size_t rank) { return rank < 2 ? ViewPart::kLarge : ViewPart::kLargest; }
+
 void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
                const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded, SizeShots& shots) {
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
@@ -139,12 +148,17 @@ void add_group(const TextureSampler& sampler, std::size_t rank, const Display& d
   coded.assign(knots, shots.none());
   group.coarser.resize(kCoarserLevels);
   for (std::size_t k = 0; k < knots; ++k) {
+    if (k > 0 && repeats(group.knots[k], group.knots[k - 1])) {
+      coded[k] = coded[k - 1];
+      continue;
+    }
     if (!is_sampled(k, knots, rank)) continue;
     coded[k] = shots.coded(group, k);
-    shots.take(0, coded[k], group.coded[k]);
+    shots.take(0, coded[k], group.coded[k], texture_views(rank));
   }
   for (std::size_t l = 0; l < coarser_samples(rank); ++l)
-    shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l]);
+    shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l],
+               texture_views(rank));
 }
 
 void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
@@ -165,7 +179,7 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
       cell.knots.push_back(samples[i].lowest ? lowest : lowest / 2);
       all = both(std::move(all), coded[g][cell.knots[g]]);
     }
-    shots.take(cell.scale, all, cell.losses);
+    shots.take(cell.scale, all, cell.losses, texture_views(rank));
   }
 }
 
@@ -176,28 +190,33 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
   SizeShots shots(sampler, studio, context);
   cells.geometry.resize(studio.scenes.size());
   for (std::size_t k = 1; k < task.scales.size(); ++k)
-    if (task.scales[k]) shots.take(k, shots.none(), cells.geometry[k], task.large_views);
+    if (task.scales[k]) shots.take(k, shots.none(), cells.geometry[k], *task.scales[k]);
   if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
   shots.render(cells.displayed_px, task.rank.has_value());
+  for (GroupCells& group : cells.groups)
+    for (std::size_t k = 1; k < group.knots.size(); ++k)
+      if (repeats(group.knots[k], group.knots[k - 1])) group.coded[k] = group.coded[k - 1];
 }
 
-PictureLosses losses_of(const Cells& cells, const ViewChoice& views, const Cells* smaller_cells,
-                        const PictureLosses* smaller) {
+PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
+  constexpr double kNothing = 1e-6;
   PictureLosses out;
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
-    const auto below = [&](std::size_t i) { return static_cast<double>((smaller->*kLists[kind])[i]); };
-    std::vector<std::optional<double>> ratio(cells.size());
-    for (std::size_t i = 0; smaller && i < cells.size(); ++i) {
+    const auto below = [&](std::size_t i) { return static_cast<double>((smaller->losses.*kLists[kind])[i]); };
+    std::vector<std::optional<double>> found(cells.size()), ratio(cells.size());
+    for (std::size_t i = 0; i < cells.size(); ++i) {
       if (cells[i].empty()) continue;
-      constexpr double kNothing = 1e-6;
-      const Losses& there = (*smaller_cells)[i];
-      const double from = there.empty() ? below(i) : value_of(pooled(there, views), kind);
-      if (from > kNothing) ratio[i] = value_of(pooled(cells[i], views), kind) / from;
+      found[i] = value_of(pooled(cells[i]), kind);
+      if (!smaller) continue;
+      // Fewer views than at the size below: as far as these were like all of them there.
+      if (const Losses& there = smaller->cells[i]; !there.empty()) {
+        const double same = value_of(pooled(there, cells[i]), kind);
+        if (same > kNothing) *found[i] *= value_of(pooled(there), kind) / same;
+      }
+      if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      const double value = !cells[i].empty() ? value_of(pooled(cells[i]), kind)
-                           : smaller         ? below(i) * interpolated(ratio, i)
-                                             : 0;
+      const double value = found[i] ? *found[i] : smaller ? below(i) * interpolated(ratio, i) : 0;
       (out.*kLists[kind]).push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
     }
   }

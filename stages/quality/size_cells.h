@@ -44,17 +44,21 @@ struct TextureSampler {
 
 /// What is asked of one displayed height.
 struct SizeTask {
-  std::vector<std::uint8_t> scales;  // per kept scale: 1 = rendered with the source's texels; S_0 is not
-  bool large_views = false;          // large views alone show these
+  /// Per kept scale: the views in which it is rendered with the source's texels. S_0 is not.
+  std::vector<std::optional<ViewPart>> scales;
   std::optional<std::size_t> rank;   // of the table's sizes, 0 = the least: textures are rendered as quality.h says
 };
 /// Fills `cells`, whose height is given. The studio's textures are the source's, before and behind.
 void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& studio, SizeCells& cells,
                  const RunContext& context);
 
-/// Losses of a list of cells. Those that were not rendered follow from `smaller`, the losses at the size
-/// below, by the ratio of rendered neighbours, of the large views alone.
-PictureLosses losses_of(const Cells& cells, const ViewChoice& views, const Cells* smaller_cells,
-                        const PictureLosses* smaller);
+/// Losses of a list of cells at the size below, and what they say of cells that were not rendered.
+struct SmallerSize {
+  const Cells& cells;
+  PictureLosses losses;  // per cell of the larger size: what the smaller one would have
+};
+/// Losses of a list of cells. Those with fewer views than at the size below are corrected by what these views
+/// were among all there. Those that were not rendered follow by the ratio of rendered neighbours.
+PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller);
 
 }  // namespace texmesh::quality

@@ -40,10 +40,35 @@ std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
   return out;
 }
 
+/// A table of one size and one group.
+GroupCurve curve_of(TextureLosses losses) {
+  QualityTable table;
+  table.sizes_px = {1};
+  table.groups = {{PlaneGroup::kColour, {std::move(losses)}}};
+  return {table, PlaneGroup::kColour, 1};
+}
+
 }  // namespace
 
-TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded, PictureLosses coarser,
-                             PlaneGroup group, double displayed_px) {
+PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
+                          const PictureLosses& smaller) {
+  const std::vector<std::size_t> kept = rising_knots(smaller_knots);
+  PictureLosses out;
+  if (kept.empty()) return smaller;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
+    TextureLosses losses;
+    for (const std::size_t k : kept) {
+      losses.texel_dssim.push_back(static_cast<float>(smaller_knots[k].mean_dssim));
+      losses.coded.flip.push_back((smaller.*list)[k]);
+    }
+    const GroupCurve curve = curve_of(std::move(losses));
+    for (const Knot& knot : knots) (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim)));
+  }
+  return out;
+}
+
+TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
+                             PictureLosses coarser) {
   TextureLosses out;
   out.coarser = std::move(coarser);
   make_rising(out.coarser.flip);
@@ -59,10 +84,7 @@ TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses
   make_rising(out.coded.flip);
   const std::vector<float> measured = out.coded.flip;
   for (int step = 0; step < 3 && !nothing; ++step) {
-    QualityTable table;
-    table.sizes_px = {static_cast<std::uint32_t>(std::lround(displayed_px))};
-    table.groups = {{group, {out}}};
-    const GroupCurve curve(table, group, displayed_px);
+    const GroupCurve curve = curve_of(out);
     for (std::size_t i = 0; i < kept.size(); ++i) {
       const double predicted = predicted_flip(curve, knots[kept[i]]);
       if (predicted > 0)

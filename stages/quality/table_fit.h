@@ -4,11 +4,16 @@
 
 namespace texmesh::quality {
 
+/// What `smaller`, the losses per knot at the size below, would be for the texels of other knots: along the
+/// curve that clients read.
+PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
+                          const PictureLosses& smaller);
+
 /// `coded` per knot of the group, `coarser` per level. Knots by rising 1 - SSIM, those that repeat one are left
 /// out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes as
 /// near as three steps of iteration bring it.
-TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded, PictureLosses coarser,
-                             PlaneGroup group, double displayed_px);
+TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
+                             PictureLosses coarser);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

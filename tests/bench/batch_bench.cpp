@@ -70,7 +70,7 @@ struct Settings {
 std::string write_cheap_profile(const std::string& folder) {
   const std::string file = folder + "/profile.json";
   std::ofstream(file) << R"({"version":1,"skeletonization":{"alpha_divisor":5,"offset_divisor":50,
-    "max_wrap_faces":100},"ssf":{"scales":2},"quality":{"views":1,"size_px":32,"rung_samples":1},
+    "max_wrap_faces":100},"ssf":{"scales":2},"quality":{"views":1,"largest_px":128,"rung_samples":1},
     "ladder":{"rungs":[30]},"perceptual_values":{"samples":100},"scales":{"stream":false}})";
   return file;
 }

@@ -16,7 +16,7 @@ namespace texmesh::testing {
 /// The cheapest options, as a profile.
 inline constexpr const char* kCheapProfile = R"({"version":1,
   "skeletonization":{"alpha_divisor":5,"offset_divisor":50,"max_wrap_faces":100},"ssf":{"scales":2},
-  "quality":{"views":1,"size_px":32,"rung_samples":1},"ladder":{"rungs":[30]},
+  "quality":{"views":1,"largest_px":128,"rung_samples":1},"ladder":{"rungs":[30]},
   "perceptual_values":{"samples":100},"scales":{"stream":false}})";
 
 /// Long sweeps were asked for.

@@ -148,7 +148,7 @@ TEST_F(CliInspect, CompileEventsFollowTheirSchema) {
   write_text(folder / "broken.glb", "glTF");
   const CommandResult r =
       texmesh({"compile", folder / "scan.glb", folder / "broken.glb", "-o", folder / "out", "--no-cache",
-               "--json", "--quality.views", "1", "--quality.size_px", "32"});
+               "--json", "--quality.views", "1", "--quality.largest_px", "128"});
   EXPECT_EQ(r.exit_code, 1);
   std::istringstream lines(r.output);
   std::map<std::string, int> events;

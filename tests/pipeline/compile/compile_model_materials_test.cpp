@@ -4,11 +4,10 @@
 
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "delivery/cpp/client/delivery_plan.h"
 #include "delivery/cpp/package/package_reader.h"
 #include "format/container/container.h"
+#include "format/documents/picture_prediction.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
@@ -206,7 +205,7 @@ CompileOptions cheap_options() {
   o.skeletonization.max_wrap_faces = 100;
   o.ssf.scales = 3;
   o.quality.views = 2;
-  o.quality.size_px = 48;
+  o.quality.largest_px = 128;
   o.perceptual_values.samples = 100;
   return o;
 }
@@ -238,16 +237,14 @@ TEST_P(Materials, CompileIntoSoundPackages) {
   EXPECT_EQ(findings, "");
 
   const QualityTable& q = package.quality();
-  std::set<int> rungs;
-  for (const PlaneTables& t : package.tables().planes)
-    rungs.insert(t.rung_quality.begin(), t.rung_quality.end());
-  if (rungs.empty()) {
-    EXPECT_EQ(q.rungs, std::vector<int>{100});
-  }
-  for (const int rung : q.rungs) EXPECT_TRUE(rungs.empty() || rungs.contains(rung)) << rung;
+  EXPECT_EQ(q.groups.empty(), package.tables().planes.empty());
+  EXPECT_EQ(q.geometry[0].flip[0], 0);
   // At the best rung S_0 is nearly what the source is, whatever shows of it.
-  EXPECT_GT(q.ssim[q.rungs.size() - 1], 0.9f);
-  EXPECT_LT(q.difference[q.rungs.size() - 1], 0.1f);
+  for (const GroupLosses& group : q.groups)
+    for (const TextureLosses& losses : group.sizes) {
+      EXPECT_LT(losses.coded.flip.front(), 0.1f) << enum_name(group.group);
+      EXPECT_LT(losses.coded.dssim.front(), 0.1f) << enum_name(group.group);
+    }
 }
 
 TEST(Prediction, WithoutColoursFollowsTheOtherMaps) {
@@ -255,7 +252,8 @@ TEST(Prediction, WithoutColoursFollowsTheOtherMaps) {
     if (kind.name != "normal only" && kind.name != "emissive only") continue;
     const testing::TemporaryFolder folder;
     PackageReader package(open_store(compiled(kind, folder)));
-    EXPECT_LT(predicted_ssim(package, 1000, 0, 0.3), predicted_ssim(package, 1000, 0, 0)) << kind.name;
+    const GroupCurve curve(package.quality(), package.quality().groups.at(0).group, 100);
+    EXPECT_GT(curve.coded(0.3), 1.2 * curve.coded(0.1)) << kind.name;
   }
 }
 

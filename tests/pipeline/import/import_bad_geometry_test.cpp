@@ -57,7 +57,7 @@ class BadGeometry : public ::testing::Test {
       o.scales.mesh_codec = codec;
       o.scales.position_bits = position_bits_;
       o.skeletonization.alpha_divisor = 10, o.skeletonization.max_wrap_faces = 500;
-      o.quality.views = 1, o.quality.size_px = 32, o.quality.rung_samples = 1;
+      o.quality.views = 1, o.quality.largest_px = 128, o.quality.rung_samples = 1;
       NullStore store;
       RunContext context;
       context.threads = 2;
