@@ -30,6 +30,7 @@ figure{margin:1rem 0 1.75rem}
 .row>div{min-width:0}
 .row p{margin:.25rem 0 0}
 .row img,.map{display:block;max-width:100%;height:auto;border-radius:.3rem}
+.heat image{filter:grayscale(1)}
 .enlarged{image-rendering:pixelated}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums}

@@ -177,7 +177,9 @@ std::string fragment_section(PackageReader& package, Report& report) {
         "<figure>\n<figcaption><h3>Texture {}: {}</h3>{} x {} px in {} x {} fragments</figcaption>\n"
         "<div class=\"row\">\n",
         p, html_escaped(t.role), t.width_px, t.height_px, t.columns, t.rows);
-    for (const FragmentHeat& heat : fragment_heats(package, p))
+    std::vector<FragmentHeat> heats = fragment_heats(package, p);
+    heats.insert(heats.begin(), FragmentHeat{"the preview and its grid", {}});
+    for (const FragmentHeat& heat : heats)
       body += "<div><p class=\"quiet\">" + html_escaped(heat.name) + "</p>" +
               fragment_map(package, p, heat, preview) + "</div>\n";
     body += "</div>\n</figure>\n";
