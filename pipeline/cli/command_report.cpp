@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -25,7 +26,7 @@ int run_report(const ReportArguments& args) {
   if (args.json)
     std::cout << report_json(report) << '\n';
   else
-    std::cout << report.verdict << '\n' << args.folder << "/index.html\n";
+    std::cout << report.verdict << '\n' << (std::filesystem::path(args.folder) / "index.html").string() << '\n';
   return report.holds ? kExitOk : kExitDifferent;
 }
 

@@ -43,16 +43,17 @@ std::string fragment_map(PackageReader& package, std::uint32_t plane, const Frag
   const double shrink = kLongerSide / std::max(t.width_px, t.height_px);
   const double width = t.width_px * shrink, height = t.height_px * shrink;
   std::string out = fmt::format(
-      "<svg class=\"map\" role=\"img\" aria-label=\"{}\" width=\"{:.0f}\" height=\"{:.0f}\" "
+      "<svg class=\"map{}\" role=\"img\" aria-label=\"{}\" width=\"{:.0f}\" height=\"{:.0f}\" "
       "viewBox=\"0 0 {:.1f} {:.1f}\"><image href=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" "
       "preserveAspectRatio=\"none\"/>\n",
+      heat.value.empty() ? "" : " heat",
       html_escaped("Map of texture " + std::to_string(plane) + ": " + heat.name), width, height, width,
       height, html_escaped(preview), width, height);
   const double w = t.fragment_width_px * shrink, h = t.fragment_height_px * shrink;
-  for (std::size_t f = 0; f < heat.value.size(); ++f) {
+  for (std::size_t f = 0; f < std::size_t{t.columns} * t.rows; ++f) {
     const std::size_t column = f % t.columns, row = f / t.columns;
     const double x = static_cast<double>(column) * w, y = static_cast<double>(row) * h;
-    if (heat.value[f] < 0)
+    if (heat.value.empty() || heat.value[f] < 0)
       out += fmt::format(
           "<path d=\"M{:.1f} {:.1f}h{:.1f}v{:.1f}h-{:.1f}z\" fill=\"none\" stroke=\"#888\" "
           "stroke-width=\".4\"/>\n",

@@ -8,7 +8,7 @@ namespace texmesh {
 /// What stands on the fragments of a plane: 0..1, -1 = not stored.
 struct FragmentHeat {
   std::string name;           // plain text: what the colours mean
-  std::vector<double> value;  // per fragment
+  std::vector<double> value;  // per fragment; empty = the grid alone
 };
 /// Bytes per covered texel at the best rung, and feature density eta of S_0; each over its largest value.
 std::vector<FragmentHeat> fragment_heats(PackageReader& package, std::uint32_t plane);

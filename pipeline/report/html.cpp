@@ -14,7 +14,7 @@ font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
 h1{font-size:1.9rem;line-height:1.2;margin:0 0 .5rem;overflow-wrap:anywhere}
 h2{font-size:1.35rem;margin:2.75rem 0 .5rem;padding-top:.75rem;border-top:1px solid var(--line)}
 h3{font-size:1.05rem;margin:1.75rem 0 .5rem}
-p{margin:.5rem 0;max-width:46rem}
+p{margin:.5rem 0;max-width:46rem;overflow-wrap:anywhere}
 .quiet,figcaption,caption{color:var(--quiet);font-size:.9rem}
 header{display:flex;gap:1.5rem;align-items:flex-start;flex-wrap:wrap}
 header>div{flex:1 1 24rem}
@@ -26,9 +26,11 @@ nav ul{display:flex;flex-wrap:wrap;gap:.25rem 1.25rem;list-style:none;padding:0;
 a{color:var(--a)}
 figure{margin:1rem 0 1.75rem}
 .row{display:grid;grid-template-columns:repeat(auto-fit,minmax(12rem,1fr));gap:.6rem}
+.row+.row{margin-top:1rem}
 .row>div{min-width:0}
 .row p{margin:.25rem 0 0}
 .row img,.map{display:block;max-width:100%;height:auto;border-radius:.3rem}
+.heat image{filter:grayscale(1)}
 .enlarged{image-rendering:pixelated}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums}
@@ -41,6 +43,8 @@ svg{display:block;max-width:100%;height:auto}
 svg text{fill:var(--text);font:12px system-ui,-apple-system,"Segoe UI",sans-serif}
 svg .quiet{fill:var(--quiet)}
 svg .end{text-anchor:end}svg .mid{text-anchor:middle}
+svg.swatch{display:inline-block;margin-right:.5em;vertical-align:-1px}
+svg .half{opacity:.5}
 svg .grid{stroke:var(--line);fill:none}
 svg .line{fill:none;stroke-width:1.6;stroke-linejoin:round}
 svg .strong{stroke-width:2.6}svg .dash{stroke-dasharray:6 4}

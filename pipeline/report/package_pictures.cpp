@@ -16,6 +16,12 @@ PackageChoice finest_choice(PackageChoice choice) {
   return choice;
 }
 
+/// As the quality stage renders: with mips, whatever the sampler says.
+void read_with_mips(RenderedModel& model) {
+  for (RenderMaterial& m : model.materials)
+    for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
+}
+
 /// Side of a picture per px of displayed height.
 double side_per_px(const RenderedModel& model, double object_height) {
   const RenderCamera c = perspective_camera(camera_of(0, 1, model.bounds.centre, model.bounds.radius));
@@ -36,6 +42,7 @@ PackagePictures::PackagePictures(PackageReader& package, const PackageChoice& te
       finest_(package_model(package, finest_choice(textures), context)),
       environment_(studio_environment(context)) {
   context_.progress = nullptr;
+  read_with_mips(finest_);
 }
 
 std::uint32_t PackagePictures::side_for(double displayed_px) const {
@@ -62,6 +69,7 @@ Picture PackagePictures::picture_of(const RenderedModel& model, Vec3d offset, Vi
 Picture PackagePictures::picture(int scale, ViewNumber view, std::uint32_t side_px) {
   if (scale != 0 && scale != coarser_number_) {
     coarser_ = package_scale(package_, scale, finest_, context_);
+    read_with_mips(coarser_);
     coarser_number_ = scale;
   }
   return picture_of(scale == 0 ? finest_ : coarser_, {}, view, side_px);

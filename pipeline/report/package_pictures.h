@@ -15,8 +15,9 @@ struct ViewNumber {
 };
 
 /// Lit pictures of a package's scales, all with the same textures and by the same cameras: S_0's bounding
-/// sphere fills 0.96 of the side. The displayed height is the length on screen of the object's largest extent
-/// at the sphere's centre. Same pictures for any thread count.
+/// sphere fills 0.96 of the side. Textures of the package are read with mips, as the quality stage reads
+/// them, whatever the samplers say. The displayed height is the length on screen of the object's largest
+/// extent at the sphere's centre. Same pictures for any thread count.
 class PackagePictures {
  public:
   /// `package` must outlive this object.

@@ -11,7 +11,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kWidth = 760, kHeight = 340, kLeft = 58, kRight = 16, kTop = 14, kBottom = 46;
+constexpr double kWidth = 760, kHeight = 356, kLeft = 58, kRight = 16, kTop = 30, kBottom = 46;
 constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - kTop - kBottom;
 constexpr double kLegendLine = 18;
 
@@ -125,7 +125,7 @@ std::string Plot::svg() const {
       fmt::format("<svg role=\"img\" aria-label=\"{}\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {} {}\">\n",
                   html_escaped(title), kWidth, height, kWidth, height);
   out += canvas.axes(x_name.find("bytes") != std::string::npos);
-  out += fmt::format("<text class=\"quiet\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft + 6, kTop + 12,
+  out += fmt::format("<text class=\"quiet\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft, kTop - 12,
                      html_escaped(y_name));
   for (const PlotSeries& s : series) {
     if (!s.dots)

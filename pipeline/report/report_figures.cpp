@@ -58,10 +58,15 @@ HtmlTable budget_table(const std::vector<QualityCurves>& curves) {
   return table;
 }
 
+/// Fill of the kind with that number.
+std::string kind_class(std::size_t kind) {
+  constexpr const char* kColours[] = {"fa", "fb", "fc", "fd", "fe"};
+  return std::string(kColours[kind % 5]) + (kind % 10 >= 5 ? " half" : "");
+}
+
 /// One bar of all bytes, in the order of the table.
 std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
   constexpr double kWidth = 760, kHeight = 28;
-  constexpr const char* kColours[] = {"fa", "fb", "fc", "fd", "fe"};
   std::string out = fmt::format(
       "<svg role=\"img\" aria-label=\"Bytes by kind, as the table lists them\" width=\"{0}\" height=\"{1}\" "
       "viewBox=\"0 0 {0} {1}\">\n",
@@ -71,7 +76,7 @@ std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
     const double width = kWidth * static_cast<double>(kinds[k].bytes) / sum;
     out += fmt::format(
         "<rect class=\"{}\" x=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\"><title>{}: {}</title></rect>\n",
-        kColours[k % 5], x, width, kHeight, html_escaped(kinds[k].kind),
+        kind_class(k), x, width, kHeight, html_escaped(kinds[k].kind),
         short_bytes(static_cast<double>(kinds[k].bytes)));
     x += width;
   }
@@ -147,9 +152,12 @@ std::string bytes_section(PackageReader& package) {
   HtmlTable table;
   table.caption = "Bytes of the package's entries.";
   table.header = {"Kind", "Entries", "Bytes", "Share"};
-  for (const KindBytes& k : kinds)
-    table.rows.push_back({html_escaped(k.kind), std::to_string(k.entries), thin_grouped(k.bytes),
-                          fmt::format("{:.1f} %", 100 * static_cast<double>(k.bytes) / sum)});
+  for (std::size_t i = 0; i < kinds.size(); ++i)
+    table.rows.push_back(
+        {"<svg class=\"swatch\" aria-hidden=\"true\" width=\"12\" height=\"12\"><rect class=\"" +
+             kind_class(i) + "\" width=\"12\" height=\"12\"/></svg>" + html_escaped(kinds[i].kind),
+         std::to_string(kinds[i].entries), thin_grouped(kinds[i].bytes),
+         fmt::format("{:.1f} %", 100 * static_cast<double>(kinds[i].bytes) / sum)});
   std::string body = kinds_bar(kinds, sum) + table.html();
   if (!package.textures().empty()) body += plane_table(package).html();
   return html_section("bytes", "Bytes by kind", body);
@@ -169,7 +177,9 @@ std::string fragment_section(PackageReader& package, Report& report) {
         "<figure>\n<figcaption><h3>Texture {}: {}</h3>{} x {} px in {} x {} fragments</figcaption>\n"
         "<div class=\"row\">\n",
         p, html_escaped(t.role), t.width_px, t.height_px, t.columns, t.rows);
-    for (const FragmentHeat& heat : fragment_heats(package, p))
+    std::vector<FragmentHeat> heats = fragment_heats(package, p);
+    heats.insert(heats.begin(), FragmentHeat{"the preview and its grid", {}});
+    for (const FragmentHeat& heat : heats)
       body += "<div><p class=\"quiet\">" + html_escaped(heat.name) + "</p>" +
               fragment_map(package, p, heat, preview) + "</div>\n";
     body += "</div>\n</figure>\n";

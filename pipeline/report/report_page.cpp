@@ -141,7 +141,7 @@ std::string source_section(PackagePictures& pictures, const RenderedModel& sourc
 std::string method_section(PackageReader& package, const Report& report) {
   std::string body = fmt::format(
       "<p>All pictures come from texmesh's reference renderer: glTF's metallic-roughness materials with their "
-      "maps, one studio light made by code, perspective, 16 samples a pixel. FLIP (Andersson et al. 2020) "
+      "maps, read with mips, one studio light made by code, perspective, 16 samples a pixel. FLIP (Andersson et al. 2020) "
       "says how different two pictures look when they are flipped, from 0 to 1, at 67 pixels per degree, "
       "over the pixels that either picture covers. The {} views are spread evenly over the sphere. The limits "
       "are texmesh's own.</p>\n"

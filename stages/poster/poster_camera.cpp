@@ -20,12 +20,12 @@ struct Direction {
 // Front and right first, as photographs of catalogues; the others must show much more to be taken.
 constexpr std::array<Direction, 8> kDirections{{{30, 15, 1},
                                                 {-30, 15, 1},
-                                                {30, 40, 0.75},
-                                                {-30, 40, 0.75},
-                                                {30, 75, 0.55},
-                                                {150, 15, 0.6},
-                                                {-150, 15, 0.6},
-                                                {30, -50, 0.4}}};
+                                                {30, 40, 0.7},
+                                                {-30, 40, 0.7},
+                                                {30, 75, 0.35},
+                                                {150, 15, 0.5},
+                                                {-150, 15, 0.5},
+                                                {30, -50, 0.3}}};
 
 double radians(double degrees) { return degrees * portable::kPi / 180; }
 

@@ -122,6 +122,23 @@ TEST(Manifest, UnknownFieldsAreIgnored) {
             "");
 }
 
+TEST(Manifest, APosterMayStandInIt) {
+  Manifest m = make_manifest(3, 2);
+  EXPECT_FALSE(m.poster);
+  m.poster = PosterRef{{kPosterPath, 640, 39000, m.quality.digest}, 512, 384};
+  EXPECT_EQ(read(write_manifest(m)), m);
+  const auto refused = [&](auto change) {
+    Manifest bad = m;
+    change(*bad.poster);
+    EXPECT_THROW(write_manifest(bad), FormatError);
+  };
+  refused([](PosterRef& p) { p.width_px = 0; });
+  refused([](PosterRef& p) { p.height_px = kMaxPosterSide + 1; });
+  refused([](PosterRef& p) { p.bytes = kMaxPosterBytes + 1; });
+  refused([](PosterRef& p) { p.bytes = 0; });
+  refused([](PosterRef& p) { p.offset = 63; });
+}
+
 TEST(Manifest, EveryFieldIsRequired) {
   const Json whole = Json::parse(write_manifest(make_manifest(3, 2)));
   for (const auto& [name, value] : whole.items()) {

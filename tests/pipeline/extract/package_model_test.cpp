@@ -51,6 +51,21 @@ TEST(PackageModel, PreviewsAreSmallAndSourcesFallBackToTheBestRung) {
             model_of(small_package(), {}).textures.at(0).levels.front().data);
 }
 
+TEST(PackageModel, AnotherScaleForTheSameTextures) {
+  PackageReader reader(open_container(memory_source(small_package())));
+  const RenderedModel fine = package_model(reader, {}, {}), coarse = package_scale(reader, 5, fine, {}),
+                      whole = package_model(reader, {5}, {});
+  EXPECT_EQ(coarse.mesh.positions, whole.mesh.positions);
+  EXPECT_TRUE(coarse.textures.empty());
+  EXPECT_EQ(coarse.texture_images, fine.texture_images);
+  EXPECT_EQ(coarse.materials.at(0).slot(TextureUse::kBaseColour).texture, 0);
+  EXPECT_EQ(coarse.bounds.radius, fine.bounds.radius);
+  EXPECT_THROW(package_scale(reader, 3, fine, {}), InputError);
+  RenderedModel bare = fine;
+  bare.texture_images.clear();
+  EXPECT_EQ(package_scale(reader, 5, bare, {}).materials.at(0).slot(TextureUse::kBaseColour).texture, -1);
+}
+
 TEST(PackageModel, WhatIsNotThereIsNamed) {
   EXPECT_THROW(model_of(small_package(), {3}), InputError);
   EXPECT_THROW(model_of(small_package(), {0, PackageTextures::kRung, 2}), InputError);

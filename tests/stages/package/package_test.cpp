@@ -97,9 +97,11 @@ struct Inputs {
     tables.planes.push_back(std::move(t));
   }
 
+  Poster poster;  // none
+
   Bytes assemble() const {
     return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                            0.1, "{\"texmesh\":\"test\"}", options, {});
+                            poster, 0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
@@ -113,6 +115,22 @@ Manifest manifest_of(const Bytes& package) {
 
 Bytes part(const Bytes& package, const EntryRef& ref) {
   return memory_source(package)->read(ref.offset, ref.bytes);
+}
+
+TEST(Package, ThePosterStandsBehindTheFirstPicture) {
+  Inputs inputs(1);
+  EXPECT_FALSE(manifest_of(inputs.assemble()).poster);
+  inputs.poster = {fake_jpeg(900, 'x'), 512, 512};
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  ASSERT_TRUE(m.poster);
+  EXPECT_EQ(part(package, *m.poster), inputs.poster.file);
+  EXPECT_EQ(m.poster->width_px, 512u);
+  const std::vector<EntryRef> index = read_index(part(package, m.index));
+  const auto poster = std::ranges::find(index, std::string(kPosterPath), &EntryRef::path);
+  ASSERT_NE(poster, index.end());
+  EXPECT_EQ(std::prev(poster)->path, table_streams_path(0));
+  EXPECT_GE(poster->offset, m.first_picture_offset + m.first_picture_bytes);
 }
 
 TEST(Package, EveryReferenceLeadsToItsBytes) {
