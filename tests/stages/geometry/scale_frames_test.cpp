@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
@@ -11,59 +10,62 @@
 namespace texmesh {
 namespace {
 
-/// A bumpy sphere, and as scale 1 one of a third of its rings and segments.
+/// A wavy sheet, and as scale 1 every fourth of its points: a wave is about four edges of the scale long.
 struct Nest {
   NestedScales scales;
   Nest() {
-    constexpr std::uint32_t kRings = 48, kSegments = 72, kStep = 3;
-    Mesh& m = scales.mesh = testing::bumpy_sphere(kRings, kSegments, 0.06f);
+    constexpr std::uint32_t kCells = 48, kStep = 4, kRow = kCells + 1;
+    Mesh& m = scales.mesh = testing::sheet(kCells, 0);
+    for (Vec3f& p : m.positions) {
+      const double a = 20 * static_cast<double>(p.x), b = 17 * static_cast<double>(p.y);
+      p.z = static_cast<float>(0.03 * std::sin(a) * std::cos(b));
+      const Vec3d up{-0.6 * std::cos(a) * std::cos(b), 0.51 * std::sin(a) * std::sin(b), 1};
+      m.normals.push_back(to_float(normalized(up)));
+    }
     NestedScale fine, coarse;
     fine.triangles = m.triangles;
     for (std::uint32_t t = 0; t < m.triangles.size(); ++t) fine.triangle_source.push_back(t);
-    // Positions of the sphere are found by where they are: the next kept one takes each of the others.
-    std::vector<std::uint32_t> kept;
-    for (std::uint32_t p = 0; p < m.positions.size(); p += kStep * kStep) kept.push_back(p);
-    std::vector<std::uint32_t> to(m.positions.size());
-    for (std::uint32_t p = 0; p < to.size(); ++p) {
-      float least = std::numeric_limits<float>::infinity();
-      for (const std::uint32_t k : kept) {
-        const Vec3f d = m.positions[p] - m.positions[k];
-        if (const float far = dot(d, d); far < least) least = far, to[p] = k;
+    for (std::uint32_t p = 0; p < m.positions.size(); ++p) {
+      const std::uint32_t i = p % kRow, j = p / kRow;
+      const auto kept = [](std::uint32_t x) { return (x + kStep / 2) / kStep * kStep; };
+      if (const std::uint32_t to = kept(j) * kRow + kept(i); to != p) scales.collapses.push_back({p, to, 0});
+    }
+    for (std::uint32_t j = 0; j < kCells; j += kStep)
+      for (std::uint32_t i = 0; i < kCells; i += kStep) {
+        const std::uint32_t a = j * kRow + i, b = a + kStep, c = a + kStep * kRow, d = c + kStep;
+        for (const Triangle& t : {Triangle{a, b, d}, Triangle{a, d, c}}) {
+          coarse.triangle_source.push_back(static_cast<std::uint32_t>(coarse.triangles.size()));
+          coarse.triangles.push_back(t);
+        }
       }
-      if (to[p] != p) scales.collapses.push_back({p, to[p], 0});
-    }
-    std::vector<std::uint32_t> wedge(m.positions.size(), 0);
-    for (std::uint32_t w = 0; w < m.wedge_count(); ++w) wedge[m.wedge_position[w]] = w;
-    for (std::uint32_t t = 0; t < m.triangles.size(); ++t) {
-      Triangle moved;
-      for (std::size_t k = 0; k < 3; ++k) moved[k] = wedge[to[m.wedge_position[m.triangles[t][k]]]];
-      if (moved[0] == moved[1] || moved[1] == moved[2] || moved[2] == moved[0]) continue;
-      coarse.triangles.push_back(moved);
-      coarse.triangle_source.push_back(t);
-    }
     coarse.scale = 1;
     coarse.collapse_count = static_cast<std::uint32_t>(scales.collapses.size());
     scales.scales = {fine, coarse};
   }
 };
 
-/// Mean square difference between S_0's normals and those of the scale where it is nearest.
+/// Mean square difference, over the area, between S_0's normals and those of the scale where it is nearest.
 double normal_error(const NestedScales& scales, const std::vector<Vec3f>& normals) {
   const Mesh& m = scales.mesh;
   std::vector<Vec3d> points;
   for (const std::uint32_t p : m.wedge_position) points.push_back(to_double(m.positions[p]));
   const std::vector<Triangle>& triangles = scales.scales[1].triangles;
   const TriangleTree tree(points, triangles);
-  double sum = 0;
+  std::vector<double> area(m.wedge_count(), 0);
+  for (const Triangle& t : m.triangles)
+    for (const std::uint32_t w : t)
+      area[w] += length(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
+  double sum = 0, total = 0;
   for (std::size_t w = 0; w < m.wedge_count(); ++w) {
     const TriangleTree::Nearest found = tree.nearest(points[w]);
     Vec3d n;
     for (std::size_t k = 0; k < 3; ++k)
       n = n + to_double(normals[triangles[found.triangle][k]]) * found.weight[k];
     const Vec3d d = normalized(n) - to_double(m.normals[w]);
-    sum += dot(d, d);
+    sum += area[w] * dot(d, d);
+    total += area[w];
   }
-  return sum / static_cast<double>(m.wedge_count());
+  return sum / total;
 }
 
 TEST(ScaleFrames, TheFinestScaleKeepsItsOwn) {
