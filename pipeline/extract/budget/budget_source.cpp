@@ -49,6 +49,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
   extent = longest_side(source.mesh);
   cameras = cameras_around(sphere, kViews, side_px);
   find_textures();
+  find_groups();
   finest = lit_mesh(source);
   {
     const LitViews views(finest, cameras, context);
@@ -81,6 +82,21 @@ void BudgetSource::find_textures() {
           shown.push_back({i, is_srgb(use)});
       return -1;
     });
+}
+
+/// Images of one material are of one group.
+void BudgetSource::find_groups() {
+  for (std::size_t i = 0; i < image_count(); ++i) groups.push_back(i);
+  for (const Material& m : source.materials) {
+    std::vector<std::size_t> together;
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      const std::int32_t t = shown_texture(source, reference, use);
+      if (t >= 0) together.push_back(groups[shown[static_cast<std::size_t>(t)].image]);
+      return -1;
+    });
+    for (std::size_t& g : groups)
+      if (std::find(together.begin(), together.end(), g) != together.end()) g = together.front();
+  }
 }
 
 LitMesh BudgetSource::lit_mesh(Model& model) const {
