@@ -5,9 +5,10 @@
 //   extract_bench SOURCE --score A.glb,B.glb
 //
 // Renders SOURCE and each file lit (texmesh render, the studio's light; --unlit: base colours alone) from the
-// same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the best file of the next finer and the next coarser
-// scale. DIR holds files that tests/bench/extract_peers has made of SOURCE; the best one within the bytes
-// counts. The views are others than those that extract itself compares.
+// same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the
+// best file of the next finer and the next coarser scale. DIR holds files that tests/bench/extract_peers has
+// made of SOURCE; the best one within the bytes counts. The views are others than those that extract itself
+// compares.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -237,8 +238,8 @@ int main(int argc, char** argv) {
     for (const std::string& file : a.score) {
       const Bytes bytes = read_bytes(file);
       const Score found = scorer.score(bytes, file);
-      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}, mean level {:.1f}\n", file, bytes.size(), found.flip,
-                               found.level);
+      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}, mean level {:.1f}\n", file, bytes.size(),
+                               found.flip, found.level);
     }
     if (!a.package.empty()) print_table(a, scorer, context);
   } catch (const std::exception& e) {

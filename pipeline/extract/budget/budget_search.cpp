@@ -1,8 +1,6 @@
 #include "pipeline/extract/budget/budget_search.h"
 
 #include <algorithm>
-#include <cmath>
-#include <ctime>
 #include <map>
 #include <set>
 
@@ -17,7 +15,7 @@ constexpr int kFirstCoding = 2;
 constexpr double kNothing = 1e9;
 constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
 constexpr int kMeshTries = 12;
-constexpr double kSurely = 0.9;  // of a loss that others tell
+constexpr double kSurely = 0.9;                         // of a loss that others tell
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
 
 /// Scale, coding of the mesh and textures, chosen together by what files look like.
@@ -97,8 +95,8 @@ class BudgetSearch {
            static_cast<double>(source_.request.bytes);
   }
 
-  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of both
-  /// kinds lose less.
+  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of
+  /// both kinds lose less.
   double least_loss(const MeshKey& key) const {
     double least = 0;
     for (const auto& [known, geometry] : geometry_) {
@@ -124,7 +122,6 @@ class BudgetSearch {
     const MeshCandidate& mesh = meshes_.at(key);
     geometry_[key] = mesh.geometry;
     const Allocation images = curves_.allocate(bytes_left(mesh));
-    if (getenv("TXL")) fprintf(stderr, "%.2f mesh S_%d c%d fixed %lu geometry %.5f images %.5f bytes %.0f\n", clock()*1e-6, mesh.scale, key.coding, mesh.fixed_bytes, mesh.geometry, std::sqrt(images.loss), images.bytes);
     if (images.bytes > bytes_left(mesh)) return kNothing;
     return joined(mesh.geometry) + images.loss;
   }
@@ -167,7 +164,6 @@ class BudgetSearch {
   }
 
   Extracted finish(const MeshCandidate& mesh, BudgetFile file) {
-    if (getenv("TXL")) fprintf(stderr, "%.2f filled %d\n", clock()*1e-6, (int)filler_.fills(file));
     Extracted out;
     out.scale = mesh.scale;
     out.levels = mesh.levels;
@@ -185,8 +181,6 @@ class BudgetSearch {
     const LitViews views(mesh.mesh, source_.cameras, source_.context);
     out.mesh_difference = meter.difference(views, source_.best_textures, source_.context);
     out.difference = meter.difference(views, textures, source_.context);
-    if (getenv("TXL")) fprintf(stderr, "windows: predicted %.5f found %.5f\n", std::sqrt(least_), source_.window_meter->difference(*mesh.windows, textures, source_.context));
-    if (getenv("TXL")) fprintf(stderr, "%.2f end\n", clock()*1e-6);
     out.glb = std::move(file.glb);
     return out;
   }

@@ -130,15 +130,15 @@ void BudgetSource::read_best_textures() {
     double share = 1;  // halves, not sharpened: the source's own smaller copies
     while (texels_per_pixel[t.image] * share * share > kFinestShown) share /= 2;
     best_textures.push_back(render_texture(
-        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0), t.srgb,
-        0, context));
+        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0),
+        t.srgb, 0, context));
   }
 }
 
 const LitMeter& BudgetSource::whole_pictures() {
   if (!meter_)
-    meter_ = std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment,
-                                        context);
+    meter_ =
+        std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment, context);
   return *meter_;
 }
 
@@ -154,7 +154,8 @@ std::vector<std::uint8_t> shown_texels(const BudgetSource& source, std::size_t i
   const Model& model = source.source;
   for (std::size_t k = 0; k < model.images.size(); ++k)
     if (model.images[k].name == image_name(source.image(image).image))
-      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px, height_px);
+      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px,
+                         height_px);
   return std::vector<std::uint8_t>(coverage_size_bytes(width_px, height_px));
 }
 

@@ -12,9 +12,9 @@ namespace {
 constexpr double kUsualQuality = 65;
 constexpr double kTypicalTexelsPerByte = 6;  // at the usual quality
 constexpr std::uint32_t kTiny = 8;
-constexpr double kFewBytes = 16000;    // of an image: other codings are worth a look
+constexpr double kFewBytes = 16000;                    // of an image: other codings are worth a look
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
-constexpr double kMuch = 0.15;         // of all images' losses
+constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
 
 /// Files that lie on the lower convex border, by rising bytes.
@@ -141,6 +141,8 @@ std::vector<LossCurves::Trial> LossCurves::first_trials(double bytes) const {
 
 /// Sizes and qualities around the likely one. Halves: smaller copies of other sizes lie beside their place.
 std::vector<LossCurves::Trial> LossCurves::trials_around_first(double bytes) const {
+  double sum = 0;
+  for (const std::vector<CodedImage>& files : seen_) sum += files.front().loss;
   std::vector<Trial> out;
   for (std::size_t i = 0; i < source_.image_count(); ++i) {
     Trials trials(*this, i, bytes);
@@ -148,8 +150,11 @@ std::vector<LossCurves::Trial> LossCurves::trials_around_first(double bytes) con
     int middle = 0;
     while (middle < trials.last() && trials.likely(middle, kUsualQuality) > wanted * 1.4) middle += 2;
     const TextureCoding coding = coder_.codings(i).front();
-    for (const double quality : {20.0, 50.0}) trials.add(middle - 2, coding, quality);
-    for (const double quality : {20.0, 40.0, kUsualQuality, 85.0}) trials.add(middle, coding, quality);
+    trials.add(middle, coding, 20);
+    if (seen_[i].front().loss > kLittle * sum) {
+      for (const double quality : {20.0, 45.0, kUsualQuality}) trials.add(middle - 2, coding, quality);
+      for (const double quality : {40.0, kUsualQuality, 85.0}) trials.add(middle, coding, quality);
+    }
     for (const double quality : {40.0, 75.0}) trials.add(middle + 2, coding, quality);
     trials.add(middle + 4, coding, kUsualQuality);
     trials.append_to(out);

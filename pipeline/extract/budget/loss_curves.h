@@ -26,8 +26,8 @@ struct Allocation {
   std::size_t last = 0;  // the image that got the last bytes
 };
 
-/// For each image the files that give most for their bytes, found by rendering S_0 with one image changed at a
-/// time.
+/// For each image the files that give most for their bytes, found by rendering S_0 with one image changed at
+/// a time.
 class LossCurves {
  public:
   LossCurves(BudgetSource& source, ImageCoder& coder) : source_(source), coder_(coder) {}

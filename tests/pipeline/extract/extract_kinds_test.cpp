@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 using testing::GltfBuilder;
 
-constexpr int kCells = 20, kTexels = 96;
+constexpr int kCells = 12, kTexels = 64;
 
 /// What a model is made of.
 struct Kind {
@@ -81,8 +81,8 @@ GltfBuilder model_of(const Kind& kind) {
       for (int x = 0; x <= kCells; ++x) {
         const double u = static_cast<double>(x) / kCells, v = static_cast<double>(y) / kCells;
         const double h = 0.1 * std::sin(9 * u + m) * std::cos(7 * v) + 0.02 * std::sin(40 * u * v);
-        positions.insert(positions.end(), {static_cast<float>(u + 1.1 * m), static_cast<float>(v),
-                                           static_cast<float>(h)});
+        positions.insert(positions.end(),
+                         {static_cast<float>(u + 1.1 * m), static_cast<float>(v), static_cast<float>(h)});
         uvs.insert(uvs.end(), {static_cast<float>(u), static_cast<float>(v)});
         colours.insert(colours.end(), {static_cast<float>(u), static_cast<float>(0.5 + 0.4 * std::sin(9 * v)),
                                        static_cast<float>(1 - v)});
@@ -92,9 +92,8 @@ GltfBuilder model_of(const Kind& kind) {
         const int a = y * (kCells + 1) + x, c = a + kCells + 1;
         for (int i : {a, a + 1, c + 1, a, c + 1, c}) indices.push_back(static_cast<std::uint16_t>(i));
       }
-    Json attributes{
-        {"POSITION", b.attribute(positions, "VEC3", {{"min", {0, 0, -1}}, {"max", {3, 1, 1}}})},
-        {"TEXCOORD_0", b.attribute(uvs, "VEC2")}};
+    Json attributes{{"POSITION", b.attribute(positions, "VEC3", {{"min", {0, 0, -1}}, {"max", {3, 1, 1}}})},
+                    {"TEXCOORD_0", b.attribute(uvs, "VEC2")}};
     if (kind.colours) attributes["COLOR_0"] = b.attribute(colours, "VEC3");
     add_material(b, kind, 3 * m);
     b.mesh(attributes, {{"indices", b.attribute(indices, "SCALAR")}, {"material", m}});
@@ -119,7 +118,7 @@ class ExtractKinds : public ::testing::TestWithParam<Kind> {
     PackageReader package(open_store(folder_ / "a.texmesh"));
     ExtractRequest request;
     request.bytes = bytes;
-    request.display_px = 96;
+    request.display_px = 64;  // small pictures, quick tests
     RunContext context;
     context.threads = threads;
     const Extracted e = extract_model(package, request, context);
@@ -138,19 +137,16 @@ TEST_P(ExtractKinds, AnyNumberOfBytesIsReachedAndDifferencesAreSeen) {
   ASSERT_LT(least.glb.size(), most.glb.size());
   EXPECT_LT(most.difference, least.difference);
   const double ratio = static_cast<double>(most.glb.size()) / static_cast<double>(least.glb.size());
-  for (const double part : {0.05, 0.3, 0.55, 0.8, 0.97}) {
-    const auto bytes = static_cast<std::uint64_t>(static_cast<double>(least.glb.size()) *
-                                                  std::pow(ratio, part));
+  for (const double part : {0.05, 0.4, 0.7, 0.97}) {
+    const auto bytes =
+        static_cast<std::uint64_t>(static_cast<double>(least.glb.size()) * std::pow(ratio, part));
     const Extracted e = extract(bytes);
     EXPECT_TRUE(e.within) << GetParam().name << ", of " << bytes << ": " << e.glb.size() << ", S_" << e.scale;
     EXPECT_LE(e.glb.size(), bytes);
     if (part < 0.9) EXPECT_GT(e.difference, 0) << GetParam().name << " " << bytes;
     EXPECT_LE(e.difference, least.difference + 0.01);
   }
-}
-
-TEST_P(ExtractKinds, ThreadsDoNotChangeAByte) {
-  const std::uint64_t bytes = extract(1).glb.size() * 3 / 2;
+  const std::uint64_t bytes = least.glb.size() * 5 / 4;
   EXPECT_EQ(extract(bytes, 1).glb, extract(bytes, 8).glb);
 }
 
