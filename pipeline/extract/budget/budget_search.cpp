@@ -1,7 +1,6 @@
 #include "pipeline/extract/budget/budget_search.h"
 
 #include <algorithm>
-#include <ctime>
 #include <map>
 #include <set>
 
@@ -14,7 +13,9 @@ namespace {
 
 constexpr int kFirstCoding = 2;
 constexpr double kNothing = 1e9;
-constexpr double kSurely = 0.9;  // of a loss that others tell
+constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
+constexpr int kMeshTries = 12;
+constexpr double kSurely = 0.9;                         // of a loss that others tell
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
 
 /// Scale, coding of the mesh and textures, chosen together by what files look like.
@@ -28,11 +29,12 @@ class BudgetSearch {
         filler_(source_, coder_) {}
 
   Extracted run() {
-    if (getenv("TXL")) fprintf(stderr, "%.2f source\n", clock()*1e-6);
     curves_.measure(static_cast<double>(source_.request.bytes) -
                     kUsualBytes * static_cast<double>(scales()[start().scale].triangles));
     const MeshKey best = choose_mesh();
-    return finish(meshes_.at(best));
+    BudgetFile file = filler_.fill(meshes_.at(best), curves_.allocate(bytes_left(meshes_.at(best))));
+    const MeshKey filled = filler_.fits(file) && !filler_.fills(file) ? fill_by_mesh(best, file) : best;
+    return finish(meshes_.at(filled), std::move(file));
   }
 
  private:
@@ -93,8 +95,8 @@ class BudgetSearch {
            static_cast<double>(source_.request.bytes);
   }
 
-  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of both
-  /// kinds lose less.
+  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of
+  /// both kinds lose less.
   double least_loss(const MeshKey& key) const {
     double least = 0;
     for (const auto& [known, geometry] : geometry_) {
@@ -120,7 +122,6 @@ class BudgetSearch {
     const MeshCandidate& mesh = meshes_.at(key);
     geometry_[key] = mesh.geometry;
     const Allocation images = curves_.allocate(bytes_left(mesh));
-    if (getenv("TXL")) fprintf(stderr, "%.2f mesh S_%d c%d fixed %lu geometry %.5f images %.5f bytes %.0f\n", clock()*1e-6, mesh.scale, key.coding, mesh.fixed_bytes, mesh.geometry, unjoined(images.loss), images.bytes);
     if (images.bytes > bytes_left(mesh)) return kNothing;
     return joined(mesh.geometry) + images.loss;
   }
@@ -135,11 +136,34 @@ class BudgetSearch {
     return scales().size() - 1;
   }
 
-  Extracted finish(const MeshCandidate& mesh) {
-    const Allocation images = curves_.allocate(bytes_left(mesh));
-    if (getenv("TXL")) fprintf(stderr, "%.2f chosen\n", clock()*1e-6);
-    BudgetFile file = filler_.fill(mesh, images);
-    if (getenv("TXL")) fprintf(stderr, "%.2f filled\n", clock()*1e-6);
+  /// Where textures cannot take the bytes that are left: the same mesh coded finer by parts of a bit, or a
+  /// finer scale.
+  MeshKey fill_by_mesh(const MeshKey& from, BudgetFile& best) {
+    MeshKey chosen = from;
+    const auto measure = [&](const MeshKey& key) {
+      BudgetFile file = best;
+      file.glb = meshes_.at(key).file_with(best.images);
+      const bool fits = filler_.fits(file), better = fits && file.glb.size() > best.glb.size();
+      if (better) best = std::move(file);
+      meshes_.forget(better ? chosen : key);
+      if (better) chosen = key;
+      return fits;
+    };
+    for (MeshKey key = from;; --key.scale) {
+      double low = key.scale == from.scale ? 0 : kFewestExtraBits, high = kMostExtraBits;
+      for (int i = 0; i < kMeshTries && !filler_.fills(best); ++i) {
+        key.extra_bits = (low + high) / 2;
+        (measure(key) ? low : high) = key.extra_bits;
+      }
+      key.extra_bits = 0;
+      for (key.coding = from.coding + 1; key.coding < kMeshCodings && !filler_.fills(best); ++key.coding)
+        measure(key);
+      key.coding = from.coding;
+      if (key.scale == 0 || filler_.fills(best) || source_.request.scale) return chosen;
+    }
+  }
+
+  Extracted finish(const MeshCandidate& mesh, BudgetFile file) {
     Extracted out;
     out.scale = mesh.scale;
     out.levels = mesh.levels;
@@ -157,8 +181,6 @@ class BudgetSearch {
     const LitViews views(mesh.mesh, source_.cameras, source_.context);
     out.mesh_difference = meter.difference(views, source_.best_textures, source_.context);
     out.difference = meter.difference(views, textures, source_.context);
-    if (getenv("TXL")) fprintf(stderr, "windows: predicted %.5f found %.5f\n", unjoined(least_), source_.window_meter->difference(*mesh.windows, textures, source_.context));
-    if (getenv("TXL")) fprintf(stderr, "%.2f end\n", clock()*1e-6);
     out.glb = std::move(file.glb);
     return out;
   }

@@ -49,6 +49,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
   extent = longest_side(source.mesh);
   cameras = cameras_around(sphere, kViews, side_px);
   find_textures();
+  find_groups();
   finest = lit_mesh(source);
   {
     const LitViews views(finest, cameras, context);
@@ -83,6 +84,21 @@ void BudgetSource::find_textures() {
     });
 }
 
+/// Images of one material are of one group.
+void BudgetSource::find_groups() {
+  for (std::size_t i = 0; i < image_count(); ++i) groups.push_back(i);
+  for (const Material& m : source.materials) {
+    std::vector<std::size_t> together;
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      const std::int32_t t = shown_texture(source, reference, use);
+      if (t >= 0) together.push_back(groups[shown[static_cast<std::size_t>(t)].image]);
+      return -1;
+    });
+    for (std::size_t& g : groups)
+      if (std::find(together.begin(), together.end(), g) != together.end()) g = together.front();
+  }
+}
+
 LitMesh BudgetSource::lit_mesh(Model& model) const {
   LitMesh out;
   out.texture_count = shown.size();
@@ -114,15 +130,15 @@ void BudgetSource::read_best_textures() {
     double share = 1;  // halves, not sharpened: the source's own smaller copies
     while (texels_per_pixel[t.image] * share * share > kFinestShown) share /= 2;
     best_textures.push_back(render_texture(
-        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0), t.srgb,
-        0, context));
+        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0),
+        t.srgb, 0, context));
   }
 }
 
 const LitMeter& BudgetSource::whole_pictures() {
   if (!meter_)
-    meter_ = std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment,
-                                        context);
+    meter_ =
+        std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment, context);
   return *meter_;
 }
 
@@ -138,7 +154,8 @@ std::vector<std::uint8_t> shown_texels(const BudgetSource& source, std::size_t i
   const Model& model = source.source;
   for (std::size_t k = 0; k < model.images.size(); ++k)
     if (model.images[k].name == image_name(source.image(image).image))
-      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px, height_px);
+      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px,
+                         height_px);
   return std::vector<std::uint8_t>(coverage_size_bytes(width_px, height_px));
 }
 

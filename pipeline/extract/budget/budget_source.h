@@ -33,13 +33,14 @@ struct BudgetSource {
   ExtractRequest request;
   RunContext context;
   double display_px = 0;
-  std::uint32_t side_px = 0;                // of the pictures
-  TextureSource textures;                   // of the package's best rungs
-  Model source;                             // S_0, without its mesh, which `finest` has
-  double extent = 1;                        // longest side of its box
-  NormalSamples light;                      // of S_0, which coarser scales are lit as
-  std::vector<double> texels_per_pixel;     // of the displayed surface, by image at full size
-  std::vector<ShownTexture> shown;          // the textures of all pictures
+  std::uint32_t side_px = 0;                 // of the pictures
+  TextureSource textures;                    // of the package's best rungs
+  Model source;                              // S_0, without its mesh, which `finest` has
+  double extent = 1;                         // longest side of its box
+  NormalSamples light;                       // of S_0, which coarser scales are lit as
+  std::vector<double> texels_per_pixel;      // of the displayed surface, by image at full size
+  std::vector<std::size_t> groups;           // by image: alike for images that show in the same pixels
+  std::vector<ShownTexture> shown;           // the textures of all pictures
   std::vector<RenderTexture> best_textures;  // by `shown`
   RenderEnvironment environment;
   LitMesh finest;
@@ -50,6 +51,7 @@ struct BudgetSource {
  private:
   std::int32_t shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const;
   void find_textures();
+  void find_groups();
   void measure_surface(const LitViews& views);
   void read_best_textures();
   std::unique_ptr<LitMeter> meter_;

@@ -72,7 +72,8 @@ std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint
     for (int k = 0; k < per_view; ++k) {
       const double rank = (k + 0.25 + 0.5 * static_cast<double>(v) / static_cast<double>(views.count())) /
                           per_view * static_cast<double>(shown.size());
-      out.push_back(window_at(view, shown[std::min(static_cast<std::size_t>(rank), shown.size() - 1)], side_px));
+      out.push_back(
+          window_at(view, shown[std::min(static_cast<std::size_t>(rank), shown.size() - 1)], side_px));
     }
   }
   return out;
@@ -87,8 +88,8 @@ LitMeter::LitMeter(const LitViews& views, const std::vector<RenderTexture>& text
   });
   double sum = 0;
   for (std::size_t v = 0; v < views.count(); ++v)
-    sum += weights_[v] = static_cast<double>(
-               std::count(reference_[v].covered.begin(), reference_[v].covered.end(), 1));
+    sum += weights_[v] =
+        static_cast<double>(std::count(reference_[v].covered.begin(), reference_[v].covered.end(), 1));
   for (double& w : weights_) w = sum > 0 ? w / sum : 0;
 }
 
@@ -97,8 +98,8 @@ double LitMeter::difference(const LitViews& views, const std::vector<RenderTextu
   std::vector<double> parts(reference_.size());
   parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v)
-      parts[v] = flip_of(reference_[v],
-                         prepare_flip(views.picture(v, textures, environment_, serial(context))));
+      parts[v] =
+          flip_of(reference_[v], prepare_flip(views.picture(v, textures, environment_, serial(context))));
   });
   double sum = 0;
   for (std::size_t v = 0; v < parts.size(); ++v) sum += weights_[v] * parts[v];

@@ -16,6 +16,7 @@ namespace texmesh {
 namespace {
 
 constexpr int kTangentBits = 8, kMostBits = 24;
+constexpr double kRounding = 1e-5;  // of ranges as floats
 
 /// Smallest and largest component values over all primitives.
 struct Extent {
@@ -45,21 +46,25 @@ std::string exact(float x) {
   return {text, end};
 }
 
+double places(int bits) { return static_cast<double>((1u << bits) - 1); }
+
 int bits_for(double range, double step) {
   int bits = 1;
-  while (bits < kMostBits && range / static_cast<double>((1u << bits) - 1) > step) ++bits;
+  while (bits < kMostBits && range / places(bits) > step * (1 + kRounding)) ++bits;
   return bits;
 }
 
 void use_grid(draco::ExpertEncoder& encoder, int id, const Extent& extent, int dimensions, double step) {
-  const float range = extent.range(dimensions);
+  const double range = static_cast<double>(extent.range(dimensions));
+  const int bits = bits_for(range, step);
+  const double whole = std::max(range, step * places(bits));  // the step asked for, not a finer one
   std::string origin;
   for (int k = 0; k < dimensions; ++k)
     origin += exact(std::isfinite(extent.low[k]) ? extent.low[k] : 0) + " ";
   draco::Options options;
-  options.SetInt("quantization_bits", bits_for(range, step));
+  options.SetInt("quantization_bits", bits);
   options.SetString("quantization_origin", origin);
-  options.SetString("quantization_range", exact(range));
+  options.SetString("quantization_range", exact(static_cast<float>(whole)));
   encoder.options().SetAttributeOptions(id, options);
 }
 
