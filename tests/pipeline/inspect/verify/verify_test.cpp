@@ -310,13 +310,9 @@ TEST(Verify, Quality) {
                              p.quality.scales = {0, 6};
                            }),
                            "quality", kQualityPath));
-  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
-                             p.quality.groups.clear();
-                           }),
-                           "quality", kQualityPath));
-  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
-                             p.quality.geometry[0].flip[0] = 0.1f;
-                           }),
+  EXPECT_TRUE(
+      catches_only(built_with([](PackageParts& p) { p.quality.groups.clear(); }), "quality", kQualityPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.quality.geometry[0].flip[0] = 0.1f; }),
                            "quality", kQualityPath));
   EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_flip = 400; }), "scale",
                            kManifestPath));
