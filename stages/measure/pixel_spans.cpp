@@ -34,7 +34,11 @@ float filtered_plain(float plain, const Kernel& kernel) {
 class FilteredRows {
  public:
   FilteredRows(const SpanImage& image, const PixelSpans& spans, const Kernel& kernel, std::size_t kept)
-      : image_(image), spans_(spans), kernel_(kernel), kept_(kept), plain_(filtered_plain(image.plain, kernel)) {
+      : image_(image),
+        spans_(spans),
+        kernel_(kernel),
+        kept_(kept),
+        plain_(filtered_plain(image.plain, kernel)) {
     width_ = rounded_up(spans.side_px) + kBlock;
     padded_.resize(width_ + 2 * kFilterReach + kBlock);
     lines_.assign(kept * width_, plain_);
@@ -58,7 +62,8 @@ class FilteredRows {
     std::copy_n(values, count, padded_.begin() + static_cast<std::ptrdiff_t>(radius));
     std::fill_n(padded_.begin() + static_cast<std::ptrdiff_t>(radius + count), radius + kBlock, behind);
     result_.resize(rounded_up(count));
-    add_lines(kernel_, [&](std::size_t k) { return padded_.data() + k; }, count, result_.data());
+    add_lines(
+        kernel_, [&](std::size_t k) { return padded_.data() + k; }, count, result_.data());
     std::copy_n(result_.begin(), count, out + row.first);
   }
 
@@ -149,7 +154,8 @@ SpanImage filtered(const SpanImage& image, const PixelSpans& spans, const Kernel
       return lines.line(at) + row.first;
     };
     add_lines(along_y, line_at, row.last - row.first, result.data());
-    std::copy_n(result.begin(), row.last - row.first, out.values.begin() + static_cast<std::ptrdiff_t>(row.offset));
+    std::copy_n(result.begin(), row.last - row.first,
+                out.values.begin() + static_cast<std::ptrdiff_t>(row.offset));
   }
   return out;
 }

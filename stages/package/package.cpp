@@ -139,8 +139,8 @@ double surface_area(const Mesh& mesh, const NestedScale& scale) {
 }
 
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
-                        const ScaleFiles& files, const Fragments& fragments,
-                        const MeasuredQuality& quality, double jnd, const std::string& title) {
+                        const ScaleFiles& files, const Fragments& fragments, const MeasuredQuality& quality,
+                        double jnd, const std::string& title) {
   Manifest m;
   m.title = title;
   m.origin = scales.mesh.origin;

@@ -66,9 +66,8 @@ std::vector<PlanesOfGroup> find_groups(const ShownTextures& shown, const Fragmen
       const TexturePlane& plane = fragments.planes[p];
       if (plane.mip > 0 || group_of(enum_name(plane.role)) != group) continue;
       all.planes.push_back(p);
-      const bool shows = std::any_of(shown.textures.begin(), shown.textures.end(), [&](const ShownTexture& t) {
-        return t.plane == p || t.alpha == p;
-      });
+      const bool shows = std::any_of(shown.textures.begin(), shown.textures.end(),
+                                     [&](const ShownTexture& t) { return t.plane == p || t.alpha == p; });
       if (shows) seen.planes.push_back(p);
     }
     if (!all.planes.empty()) out.push_back(seen.planes.empty() ? all : seen);

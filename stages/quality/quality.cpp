@@ -114,9 +114,8 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
     context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
     const double px = heights[i].displayed_px;
     SizeCells cells{px, {}, {}, {}};
-    render_size(sampler,
-                {rendered_scales(sizes.alive(), heights[i], options.largest_px), heights[i].rank}, studio,
-                cells, context);
+    render_size(sampler, {rendered_scales(sizes.alive(), heights[i], options.largest_px), heights[i].rank},
+                studio, cells, context);
     if (px >= kLeastSwitchPx) sizes.judge(cells.geometry, px);
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }
@@ -142,9 +141,9 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
                           below ? out[i - 1].geometry : PictureLosses{});
     for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
       const GroupCells& group = sizes[i].groups[g];
-      raw.coded.push_back(losses(group.coded, below ? &below->groups[g].coded : nullptr,
-                                 below ? along_curve(group.knots, below->groups[g].knots, out[i - 1].coded[g])
-                                       : PictureLosses{}));
+      raw.coded.push_back(losses(
+          group.coded, below ? &below->groups[g].coded : nullptr,
+          below ? along_curve(group.knots, below->groups[g].knots, out[i - 1].coded[g]) : PictureLosses{}));
       raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
                                    below ? out[i - 1].coarser[g] : PictureLosses{}));
     }
@@ -162,8 +161,8 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
     table.sizes_px.push_back(static_cast<std::uint32_t>(std::lround(sizes[i].displayed_px)));
     table.geometry.push_back(raw[i].geometry);
     for (std::size_t g = 0; g < groups.size(); ++g)
-      table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g].knots, raw[i].coded[g],
-                                                     raw[i].coarser[g]));
+      table.groups[g].sizes.push_back(
+          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].coarser[g]));
     for (const TogetherCell& cell : sizes[i].together) {
       TogetherLoss& sample = together.emplace_back();
       sample.measured = pooled(cell.losses).flip.mean();

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 4;
+inline constexpr int kQualityVersion = 5;
 
 struct QualityOptions {
   int views = 4;
@@ -26,7 +26,8 @@ struct QualityOptions {
       "directions from which scales are rendered at displayed heights up to a quarter of the largest");
     v("large_views", s.large_views, Range{1, 64},
       "as many of the views show scales at larger heights, and textures at all heights");
-    v("largest_px", s.largest_px, Range{128, 2048}, "largest displayed height of the object that is rendered");
+    v("largest_px", s.largest_px, Range{128, 2048},
+      "largest displayed height of the object that is rendered");
     v("rung_samples", s.rung_samples, Range{1, 16}, "rungs that are rendered, spread over the ladder");
     v("flip_mean", s.flip_mean, Range{0, 1},
       "mean FLIP of a view up to which a scale counts as equal to S_0");
@@ -49,7 +50,8 @@ struct QualityOptions {
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
 ///   and all lower ones; 0 = it passes nowhere. FLIP publishes no thresholds: these are our own. S_0 has
 ///   kAnyDisplayPx.
-/// - Views: all at heights up to a quarter of the largest; `large_views` of them above, and for textures at the
+/// - Views: all at heights up to a quarter of the largest; `large_views` of them above, and for textures at
+/// the
 ///   least and the middle size; every second one of these for textures at the largest size. Losses of fewer
 ///   views than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
@@ -57,12 +59,12 @@ struct QualityOptions {
 ///   the ratio to the size below, linear between the neighbours in the list of scales.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
 ///   `rung_samples` of the ladder are rendered, first and last among them, the previews, and mips that are 1
-///   to 3 levels coarser; at the half the first and the last rung, the previews, and one coarser level; at the
-///   largest the first and the last rung. The others follow along the curve of the size below, by the ratio to
-///   it where both were rendered. Planes are those
-///   that a client shows at the size (format/documents/mip_choice.h). Planes of one group have the rung whose
-///   quality is nearest to that of the group's first plane. FLIP of knots is scaled so that the mean over
-///   fragments of GroupCurve::coded() is what was measured for whole planes.
+///   to 3 levels coarser; at the half the first and the last rung, the previews, and one coarser level; at
+///   the largest the first and the last rung. The others follow along the curve of the size below, by the
+///   ratio to it where both were rendered. Planes are those that a client shows at the size
+///   (format/documents/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of
+///   the group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded()
+///   is what was measured for whole planes.
 /// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size, 2 at
 ///   the half, 1 at the largest, the exponent that predicts best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size

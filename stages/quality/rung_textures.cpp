@@ -77,8 +77,7 @@ RenderTexture empty_texture(const TexturePlane& full_size, const ShownTexture& s
   texture.height_px = full_size.height_px;
   texture.srgb = shown.srgb;
   texture.first_level = first_level;
-  while (std::min(full_size.width_px, full_size.height_px) >> texture.first_level == 0)
-    --texture.first_level;
+  while (std::min(full_size.width_px, full_size.height_px) >> texture.first_level == 0) --texture.first_level;
   Pixels& level = texture.levels.emplace_back();
   level.width_px = full_size.width_px >> texture.first_level;
   level.height_px = full_size.height_px >> texture.first_level;

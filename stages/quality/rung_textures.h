@@ -37,8 +37,8 @@ struct PlaneRung {
   std::uint32_t plane = 0;
   std::size_t rung = 0;
 };
-/// The texels of that plane, which is a mip of the texture's or the texture's own, with that alpha. Mips finer
-/// than `first_level` are not kept. Fragments that no rung stores look as in the source.
+/// The texels of that plane, which is a mip of the texture's or the texture's own, with that alpha. Mips
+/// finer than `first_level` are not kept. Fragments that no rung stores look as in the source.
 RenderTexture coded_texture(const TextureData& data, const ShownTexture& shown, const PlaneRung& colour,
                             const std::optional<PlaneRung>& alpha, std::uint32_t first_level,
                             const RunContext& context);

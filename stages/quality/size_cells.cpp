@@ -52,7 +52,8 @@ class SizeShots {
   Replaced none() const { return Replaced(source_, -1); }
 
   void take(std::size_t scale, const Replaced& replaced, Losses& to, ViewPart views) {
-    const bool changes = scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
+    const bool changes =
+        scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
     if (!changes) {
       to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
       return;
@@ -123,7 +124,7 @@ constexpr std::size_t kKinds = 3;  // of losses
 double value_of(const Loss& loss, std::size_t kind) {
   return kind == 0 ? loss.flip.mean() : kind == 1 ? loss.flip.percentile(kHigh) : loss.mean_dssim();
 }
-constexpr std::vector<float> PictureLosses::* kLists[kKinds] = {&PictureLosses::flip, &PictureLosses::flip_p95,
+constexpr std::vector<float> PictureLosses::*kLists[kKinds] = {&PictureLosses::flip, &PictureLosses::flip_p95,
                                                                &PictureLosses::dssim};
 
 /// Linear in the index between the neighbours that have a value; beyond them theirs. Some must have one.
@@ -141,7 +142,8 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
 ViewPart texture_views(std::size_t rank) { return rank < 2 ? ViewPart::kLarge : ViewPart::kLargest; }
 
 void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
-               const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded, SizeShots& shots) {
+               const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded,
+               SizeShots& shots) {
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   const std::size_t knots = group.knots.size();
   group.coded.resize(knots);
@@ -199,7 +201,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
 }
 
 PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
-  constexpr double kNothing = 1e-6;
+  constexpr double kNothing = 1e-5;  // curves of logarithms do not reach 0
   PictureLosses out;
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
     const auto below = [&](std::size_t i) { return static_cast<double>((smaller->losses.*kLists[kind])[i]); };
@@ -216,7 +218,8 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
       if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      const double value = found[i] ? *found[i] : smaller ? below(i) * interpolated(ratio, i) : 0;
+      const double rest = smaller && below(i) > kNothing ? below(i) * interpolated(ratio, i) : 0;
+      const double value = found[i].value_or(rest);
       (out.*kLists[kind]).push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
     }
   }

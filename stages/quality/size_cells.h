@@ -46,7 +46,8 @@ struct TextureSampler {
 struct SizeTask {
   /// Per kept scale: the views in which it is rendered with the source's texels. S_0 is not.
   std::vector<std::optional<ViewPart>> scales;
-  std::optional<std::size_t> rank;   // of the table's sizes, 0 = the least: textures are rendered as quality.h says
+  std::optional<std::size_t>
+      rank;  // of the table's sizes, 0 = the least: textures are rendered as quality.h says
 };
 /// Fills `cells`, whose height is given. The studio's textures are the source's, before and behind.
 void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& studio, SizeCells& cells,

@@ -97,8 +97,8 @@ TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses
 }
 
 void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table) {
-  constexpr int kSteps = 64;           // of the exponent in a unit
-  constexpr double kUnseen = 1e-4;     // samples that lose less say nothing
+  constexpr int kSteps = 64;        // of the exponent in a unit
+  constexpr double kUnseen = 1e-4;  // samples that lose less say nothing
   table.exponent = 1;
   table.error = 0;
   QualityTable tried;

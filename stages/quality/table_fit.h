@@ -9,9 +9,9 @@ namespace texmesh::quality {
 PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
                           const PictureLosses& smaller);
 
-/// `coded` per knot of the group, `coarser` per level. Knots by rising 1 - SSIM, those that repeat one are left
-/// out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes as
-/// near as three steps of iteration bring it.
+/// `coded` per knot of the group, `coarser` per level. Knots by rising 1 - SSIM, those that repeat one are
+/// left out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes
+/// as near as three steps of iteration bring it.
 TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
                              PictureLosses coarser);
 

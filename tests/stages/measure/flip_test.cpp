@@ -12,7 +12,8 @@ Picture striped(std::uint32_t side, std::uint32_t left, float value) {
   for (std::uint32_t y = 0; y < side; ++y)
     for (std::uint32_t x = 0; x < side; ++x) {
       const bool object = x >= left && x < left + 20 && y >= 30 && y < 66;
-      p.linear.push_back(object ? Vec3f{value, (x - left) / 3 % 2 ? 0.5f : 0.2f, value} : Vec3f{0.2f, 0.2f, 0.2f});
+      p.linear.push_back(object ? Vec3f{value, (x - left) / 3 % 2 ? 0.5f : 0.2f, value}
+                                : Vec3f{0.2f, 0.2f, 0.2f});
       p.covered.push_back(object);
     }
   return p;

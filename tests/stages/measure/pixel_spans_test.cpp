@@ -10,7 +10,8 @@ namespace texmesh::measure {
 namespace {
 
 /// An object of grain in a box of a grey picture.
-Picture object_in(std::uint32_t side, std::uint32_t x0, std::uint32_t x1, std::uint32_t y0, std::uint32_t y1) {
+Picture object_in(std::uint32_t side, std::uint32_t x0, std::uint32_t x1, std::uint32_t y0,
+                  std::uint32_t y1) {
   Picture p;
   p.side_px = side;
   testing::Random random{5};
@@ -39,8 +40,9 @@ float by_definition(const Picture& picture, int x, int y, const Kernel& along_x,
   for (int j = -ry; j <= ry; ++j) {
     float line = 0;
     for (int i = -rx; i <= rx; ++i)
-      line += picture.linear[static_cast<std::size_t>(std::clamp(y + j, 0, side - 1)) * picture.side_px +
-                             static_cast<std::size_t>(std::clamp(x + i, 0, side - 1))]
+      line += picture
+                  .linear[static_cast<std::size_t>(std::clamp(y + j, 0, side - 1)) * picture.side_px +
+                          static_cast<std::size_t>(std::clamp(x + i, 0, side - 1))]
                   .x *
               along_x[static_cast<std::size_t>(i + rx)];
     sum += line * along_y[static_cast<std::size_t>(j + ry)];
@@ -74,8 +76,8 @@ TEST(PixelSpans, CostByWhatIsShown) {
 }
 
 TEST(PixelSpans, UnionHoldsBoth) {
-  const PixelSpans a = shown_spans(object_in(90, 10, 20, 10, 20)), b = shown_spans(object_in(90, 60, 70, 15, 50)),
-                   both = union_of(a, b);
+  const PixelSpans a = shown_spans(object_in(90, 10, 20, 10, 20)),
+                   b = shown_spans(object_in(90, 60, 70, 15, 50)), both = union_of(a, b);
   std::size_t count = 0;
   for (std::size_t y = 0; y < 90; ++y) {
     for (const PixelSpans::Row& row : {a.rows[y], b.rows[y]}) {

@@ -50,8 +50,8 @@ void encode(Sample& s) {
   const RunContext context;
   s.previews = make_previews(s.fragments, s.pixels, {}, context);
   s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, LadderOptions{}, context);
-  s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context), s.ladder,
-                          s.previews, {}, context);
+  s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context),
+                          s.ladder, s.previews, {}, context);
 }
 
 Sample sample_sheet(bool textured) {
@@ -246,7 +246,8 @@ TEST(Quality, GroupsAreMeasuredApart) {
   const std::vector<float> alone = measure(sample_sheet(true)).groups[0].sizes[0].coded.flip;
   ASSERT_EQ(t.groups[0].sizes[0].coded.size(), alone.size());
   for (std::size_t k = 0; k < alone.size(); ++k)
-    EXPECT_NEAR(t.groups[0].sizes[0].coded.flip[k], alone[k], 0.01f) << "a flat normal map changes no colours";
+    EXPECT_NEAR(t.groups[0].sizes[0].coded.flip[k], alone[k], 0.01f)
+        << "a flat normal map changes no colours";
   EXPECT_LT(t.groups[1].sizes[0].coded.flip[0], 0.01f);
   EXPECT_LT(t.groups[1].sizes[0].coarser.flip.back(), 1e-4f) << "flat stays flat";
 }
