@@ -8,8 +8,8 @@
 namespace texmesh {
 namespace {
 
-constexpr int kMostCoarser = 4;                // levels below the display's that are tried
-constexpr int kReweightings = 2;               // a third changes no budget of the sample scans by 0.1 %
+constexpr int kMostCoarser = 4;  // levels below the display's that are tried
+constexpr int kReweightings = 2;
 constexpr double kLossUnit = 1099511627776.0;  // 2^40: losses as spend_bytes counts them
 constexpr double kLeastWeight = 1e-3;          // of a group beside the others
 

@@ -53,8 +53,8 @@ TEST(TextureBudget, BytesGoToWhatShows) {
     PackageReader unseen = open_pair(0.05f, exponent);
     const PerGroup colours = bytes_by_group(texture_for_budget(unseen, {}, half_of_all(unseen)));
     EXPECT_GT(colours[0], 2 * colours[1]) << exponent;
-    PackageReader loud = open_pair(1.5f, exponent);
-    const PerGroup normals = bytes_by_group(texture_for_budget(loud, {}, half_of_all(loud)));
+    PackageReader loud = open_pair(2, exponent);
+    const PerGroup normals = bytes_by_group(texture_for_budget(loud, {}, half_of_all(loud) / 2));
     EXPECT_GT(normals[1], normals[0]) << exponent;
   }
 }
