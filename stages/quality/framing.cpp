@@ -93,7 +93,9 @@ PicturePlace place_picture(const Frame& frame, int view, int views, double displ
 Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
                       double largest_px, Notes& notes, const RunContext& context) {
   Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}};
-  if (!(extent > 0)) out.frame.extent = 2 * out.frame.sphere.radius;
+  // A sphere around a box is at most so much wider than its longest side: O_V of other positions than these
+  // would ask for huge pictures.
+  out.frame.extent = std::max(extent, 1.15 * out.frame.sphere.radius);
   Seen seen = look_around(scene, out.frame, sizes, views, largest_px, context);
   if (static_cast<double>(seen.pixels) < kLeastCovered * static_cast<double>(seen.of)) {
     const BoundingSphere crowd = crowd_sphere(*scene.mesh, out.frame.sphere);

@@ -201,7 +201,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
 }
 
 PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
-  constexpr double kNothing = 1e-6;
+  constexpr double kNothing = 1e-5;  // curves of logarithms do not reach 0
   PictureLosses out;
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
     const auto below = [&](std::size_t i) { return static_cast<double>((smaller->losses.*kLists[kind])[i]); };
@@ -218,7 +218,8 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
       if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      const double value = found[i] ? *found[i] : smaller ? below(i) * interpolated(ratio, i) : 0;
+      const double rest = smaller && below(i) > kNothing ? below(i) * interpolated(ratio, i) : 0;
+      const double value = found[i].value_or(rest);
       (out.*kLists[kind]).push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
     }
   }

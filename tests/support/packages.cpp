@@ -257,7 +257,7 @@ PackageParts make_package_parts() {
   const PictureLosses scales{{0, 0.1f}, {0, 0.2f}, {0, 0.05f}};
   const TextureLosses colours{
       {0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{0.1f}, {0.2f}, {0.05f}}};
-  p.quality = {2, {64}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
+  p.quality = {2, {256}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
   p.provenance = make_provenance();
   return p;
 }

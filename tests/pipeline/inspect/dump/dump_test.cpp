@@ -157,7 +157,7 @@ TEST(DumpUntextured, SaysSo) {
   testing::PackageParts p = testing::make_package_parts();
   p.textures.clear(), p.streams.clear(), p.tables.planes.clear();
   p.manifest.plane_count = 0;
-  p.quality = {{0, 5}, {100}, {1, 0.9f}, {0, 0.1f}, 2, 64};
+  p.quality.groups.clear();
   const Bytes bytes = p.build();
   PackageReader package(open_container(memory_source(bytes)));
   EXPECT_NE(dump_text(package, DumpPart::kSummary).find("textures: none\n"), std::string::npos);

@@ -82,7 +82,7 @@ TEST(Verify, UntexturedPackage) {
     p.textures.clear();
     p.streams.clear();
     p.tables.planes.clear();
-    p.quality = {{0, 5}, {100}, {1, 0.9f}, {0, 0.1f}, 2, 64};
+    p.quality.groups.clear();
     p.manifest.plane_count = 0;
     p.meshes[0] = testing::make_glb(testing::fine_mesh(), {}).glb();
     p.meshes[5] = testing::make_glb(testing::coarse_mesh(), {}).glb();
@@ -248,7 +248,7 @@ TEST(Verify, ScalesAndSteps) {
       catches_only(sealed_with([](Manifest& m) { m.scales[1].error_rms = 0.5; }), "scale", kManifestPath));
   EXPECT_TRUE(
       catches_only(sealed_with([](Manifest& m) { m.steps[0].up_to_px = 201; }), "step", kManifestPath));
-  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_jnd = 150; }), "step",
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_flip = 150; }), "step",
                            kManifestPath));
 }
 
@@ -310,10 +310,12 @@ TEST(Verify, Quality) {
                              p.quality.scales = {0, 6};
                            }),
                            "quality", kQualityPath));
-  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) {
-                             p.quality.rungs = {20, 71};
-                           }),
+  EXPECT_TRUE(
+      catches_only(built_with([](PackageParts& p) { p.quality.groups.clear(); }), "quality", kQualityPath));
+  EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.quality.geometry[0].flip[0] = 0.1f; }),
                            "quality", kQualityPath));
+  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.scales[1].display_px_flip = 400; }), "scale",
+                           kManifestPath));
   EXPECT_TRUE(catches_only(PackagePatcher(make_package_parts().build())
                                .edit(kQualityPath, [](Bytes& b) { b[b.size() - 1] = ' '; })
                                .seal()
