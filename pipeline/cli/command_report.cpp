@@ -26,7 +26,8 @@ int run_report(const ReportArguments& args) {
   if (args.json)
     std::cout << report_json(report) << '\n';
   else
-    std::cout << report.verdict << '\n' << (std::filesystem::path(args.folder) / "index.html").string() << '\n';
+    std::cout << report.verdict << '\n'
+              << (std::filesystem::path(args.folder) / "index.html").string() << '\n';
   return report.holds ? kExitOk : kExitDifferent;
 }
 

@@ -1,4 +1,4 @@
-#include "pipeline/cli/check_gate.h"
+#include "pipeline/cli/check/check_gate.h"
 
 #include <fmt/format.h>
 
