@@ -252,7 +252,7 @@ TEST(Quality, WhatNoPictureShowsCountsAsEqual) {
   specks.perceptual.kept.resize(2);
   for (NestedScale& scale : specks.scales.scales) scale.triangles.clear(), scale.triangle_source.clear();
   specks.scales.mesh = Mesh{};
-  specks.scales.mesh.triangle_material = {0};
+  specks.scales.mesh.triangle_material = {0}, specks.scales.mesh.triangle_part = {0};
   add_stray(specks, 1000, 0.01f);
   add_stray(specks, -1000, 0.01f);
   for (const Sample* s : {&thread, &specks}) {
