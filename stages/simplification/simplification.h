@@ -25,7 +25,7 @@ struct SimplificationOptions {
   // vertices.
   double persistence_weight = 0.035;
   // Weights of texture and normals are set by lit pictures of a turtle, a saxophone, an apple and a bust (see
-  // tests/bench/lit_simplify_bench.cpp): mean FLIP falls by 1 % against 0.06 and 0.01, on the bust by 8 %.
+  // tests/bench/lit_simplify_bench.cpp): mean FLIP falls by 1 % against 0.06 and 0.01, on the bust by 5 %.
   // Normals at 0.2 and over cost a smooth apple 10 %.
   double uv_weight = 0.15;
   double normal_weight = 0.05;  // one radian counts as a mean edge
