@@ -11,7 +11,34 @@
 namespace texmesh {
 namespace {
 
-using namespace quality;  // NOLINT: the room's own parts
+using quality::Cells;
+using quality::Coverage;
+using quality::GroupCells;
+using quality::Loss;
+using quality::Losses;
+using quality::PlanesOfGroup;
+using quality::ShownTexture;
+using quality::ShownTextures;
+using quality::SizeCells;
+using quality::SmallerSize;
+using quality::Studio;
+using quality::TextureData;
+using quality::TextureSampler;
+using quality::TextureSizes;
+using quality::TogetherCell;
+using quality::TogetherLoss;
+using quality::along_curve;
+using quality::choose_views;
+using quality::find_groups;
+using quality::find_shown;
+using quality::fit_exponent;
+using quality::frame_object;
+using quality::losses_of;
+using quality::pooled;
+using quality::render_size;
+using quality::source_texture;
+using quality::texture_data;
+using quality::texture_losses;
 
 constexpr std::size_t kSizes = 3;  // of the table
 

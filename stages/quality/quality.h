@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 5;
+inline constexpr int kQualityVersion = 6;
 
 struct QualityOptions {
   int views = 4;
