@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 4;
+inline constexpr int kQualityVersion = 5;
 
 struct QualityOptions {
   int views = 4;

@@ -168,7 +168,7 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
   TextureLoss loss(package, request.displayed_px);
   std::optional<DeliveryPlan> best;
   for (const ManifestScale& s : m.scales) {
-    if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;
+    if (request.scale >= 0 && s.scale != wanted) continue;
     DeliveryPlan plan;
     plan.scale = s.scale;
     count_fixed_bytes(m, s.scale, plan);

@@ -48,9 +48,9 @@ struct DeliveryPlan {
 /// its place where the rule's mesh comes too late, or where simulations of both scales show that the coarser
 /// one gives the better picture in the time. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
-/// The scale and the textures that look best in so many bytes, whatever the time: no scale finer than the
-/// display needs, mesh first, then texture. Where nothing fits: the least that the package has, with a
-/// warning.
+/// The scale and the textures that look best in so many bytes, whatever the time and the rule: a scale that
+/// passes for S_0 still differs from it, and bytes that are left may go into a finer one. Mesh first, then
+/// texture. Where nothing fits: the least that the package has, with a warning.
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
 /// The scale that the request asks for: DeliveryRequest::scale, or the rule's.
