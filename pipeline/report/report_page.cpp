@@ -24,7 +24,7 @@ std::string px(double height) { return height >= kAnyDisplayPx ? "any" : fmt::fo
 std::string heat_legend() {
   std::string out =
       "<svg role=\"img\" aria-label=\"Colours of FLIP maps, from 0 to 0.4 and more\" width=\"340\" "
-      "height=\"38\" viewBox=\"0 0 340 38\">\n";
+      "height=\"38\" viewBox=\"-6 0 346 38\">\n";
   constexpr int kCells = 40;
   for (int i = 0; i < kCells; ++i)
     out += fmt::format("<rect x=\"{}\" y=\"2\" width=\"8.5\" height=\"14\" fill=\"{}\"/>\n", 8 * i + 10,
