@@ -20,7 +20,7 @@ inline constexpr double kAnyDisplayPx = 1e9;
 /// Longest title in bytes of UTF-8; control characters are not allowed in it.
 inline constexpr std::size_t kMaxTitleBytes = 200;
 /// Most previews whose place the manifest itself tells; those of further planes stand in the index only.
-inline constexpr std::size_t kMaxManifestPreviews = 256;
+inline constexpr std::size_t kMaxManifestPreviews = 224;
 
 /// The measured figures (errors, p95, p99, display_px_*) are written with six significant digits.
 struct ManifestScale {

@@ -11,34 +11,35 @@
 namespace texmesh {
 namespace {
 
+using quality::along_curve;
 using quality::Cells;
+using quality::choose_views;
 using quality::Coverage;
+using quality::find_groups;
+using quality::find_shown;
+using quality::fit_exponent;
+using quality::frame_object;
 using quality::GroupCells;
 using quality::Loss;
 using quality::Losses;
+using quality::losses_of;
 using quality::PlanesOfGroup;
+using quality::pooled;
+using quality::render_size;
 using quality::ShownTexture;
 using quality::ShownTextures;
 using quality::SizeCells;
 using quality::SmallerSize;
+using quality::source_texture;
 using quality::Studio;
+using quality::texture_data;
+using quality::texture_losses;
 using quality::TextureData;
 using quality::TextureSampler;
 using quality::TextureSizes;
 using quality::TogetherCell;
 using quality::TogetherLoss;
-using quality::along_curve;
-using quality::choose_views;
-using quality::find_groups;
-using quality::find_shown;
-using quality::fit_exponent;
-using quality::frame_object;
-using quality::losses_of;
-using quality::pooled;
-using quality::render_size;
-using quality::source_texture;
-using quality::texture_data;
-using quality::texture_losses;
+using quality::ViewPart;
 
 constexpr std::size_t kSizes = 3;  // of the table
 
@@ -86,12 +87,24 @@ KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perce
   return out;
 }
 
-/// Whether nobody can tell the scale from S_0 in any view.
-bool passes(const Losses& losses, const QualityOptions& options) {
+/// Whether nobody can tell the scale from S_0 in any view. `share` of the thresholds counts.
+bool passes(const Losses& losses, const QualityOptions& options, double share) {
   constexpr double kPart = 0.95;
   return std::all_of(losses.begin(), losses.end(), [&](const Loss& loss) {
-    return loss.flip.mean() <= options.flip_mean && loss.flip.percentile(kPart) <= options.flip_p95;
+    return loss.flip.mean() <= share * options.flip_mean &&
+           loss.flip.percentile(kPart) <= share * options.flip_p95;
   });
+}
+
+/// Up to here all views count.
+bool is_small(double displayed_px, const QualityOptions& options) {
+  return displayed_px < options.largest_px / 4.0 * 1.001;
+}
+
+/// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
+double threshold_share(double displayed_px, const QualityOptions& options) {
+  constexpr double kFewViews = 0.8;
+  return is_small(displayed_px, options) || options.large_views >= options.views ? 1 : kFewViews;
 }
 
 /// The switch sizes, found from small heights to large ones.
@@ -108,7 +121,7 @@ class SwitchSizes {
   void judge(const Cells& geometry, double displayed_px) {
     for (std::size_t k = 1; k < alive_.size(); ++k) {
       if (!alive_[k]) continue;
-      alive_[k] = passes(geometry[k], options_);
+      alive_[k] = passes(geometry[k], options_, threshold_share(displayed_px, options_));
       if (alive_[k]) display_px_[k] = static_cast<float>(displayed_px);
     }
   }
@@ -121,14 +134,13 @@ class SwitchSizes {
 
 /// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
 std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint8_t>& alive,
-                                                     const Height& height, double largest_px) {
+                                                     const Height& height, const QualityOptions& options) {
   const std::size_t n = alive.size();
-  const bool small = height.displayed_px < largest_px / 4 * 1.001;
   std::vector<std::optional<ViewPart>> out(n);
   for (std::size_t k = 1; k < n; ++k) {
-    if (alive[k]) out[k] = small ? ViewPart::kAll : ViewPart::kLarge;
+    if (alive[k]) out[k] = is_small(height.displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
     if (alive[k] || !height.rank) continue;
-    if (*height.rank == 0) out[k] = ViewPart::kAll;
+    if (*height.rank == 0) out[k] = ViewPart::kLarge;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
     if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
   }
@@ -144,8 +156,8 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
     context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
     const double px = heights[i].displayed_px;
     SizeCells cells{px, {}, {}, {}};
-    render_size(sampler, {rendered_scales(sizes.alive(), heights[i], options.largest_px), heights[i].rank},
-                studio, cells, context);
+    render_size(sampler, {rendered_scales(sizes.alive(), heights[i], options), heights[i].rank}, studio,
+                cells, context);
     if (px >= kLeastSwitchPx) sizes.judge(cells.geometry, px);
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }

@@ -14,7 +14,7 @@ namespace texmesh {
 inline constexpr int kQualityVersion = 6;
 
 struct QualityOptions {
-  int views = 4;
+  int views = 12;
   int large_views = 2;
   int largest_px = 1024;
   int rung_samples = 4;
@@ -23,9 +23,9 @@ struct QualityOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("views", s.views, Range{1, 64},
-      "directions from which scales are rendered at displayed heights up to a quarter of the largest");
+      "directions in which a scale must pass at displayed heights up to a quarter of the largest");
     v("large_views", s.large_views, Range{1, 64},
-      "as many of the views show scales at larger heights, and textures at all heights");
+      "as many of the views show scales at larger heights, and all else");
     v("largest_px", s.largest_px, Range{128, 2048},
       "largest displayed height of the object that is rendered");
     v("rung_samples", s.rung_samples, Range{1, 16}, "rungs that are rendered, spread over the ladder");
@@ -50,9 +50,9 @@ struct QualityOptions {
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
 ///   and all lower ones; 0 = it passes nowhere. FLIP publishes no thresholds: these are our own. S_0 has
 ///   kAnyDisplayPx.
-/// - Views: all at heights up to a quarter of the largest; `large_views` of them above, and for textures at
-/// the
-///   least and the middle size; every second one of these for textures at the largest size. Losses of fewer
+/// - Views: all for scales that still pass, at heights up to a quarter of the largest. `large_views` of them
+///   for all else, where 0.8 of both thresholds count, since the worst of 12 views is up to 1.24 times the
+///   worse of two; every second one of these for textures at the largest size. Losses of fewer
 ///   views than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
 ///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
@@ -73,9 +73,6 @@ struct QualityOptions {
 /// - What shows in no picture at all (a thread thinner than a sample, specks, an alpha of 0 everywhere) has
 ///   no measured difference: all losses are 0, all scales pass everywhere, and a warning says so.
 /// StageError when S_0 has no extent. Same bytes for any thread count and machine.
-///
-/// Fewer views at large heights cost little: beyond a quarter of the largest height few scales are left, and
-/// a scale that fails does so in most views.
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const Fragments& fragments,
                                 const std::vector<Pixels>& pixels, const Ladder& ladder,

@@ -10,7 +10,7 @@ export const formatMinor = 1;
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp', 'mips'];
 /** Most previews whose places the manifest tells. */
-export const mostManifestPreviews = 256;
+export const mostManifestPreviews = 224;
 
 /** Where an entry's data stands in the container, and its digest. */
 export interface EntryRef {
