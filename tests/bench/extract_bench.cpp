@@ -1,13 +1,14 @@
 // How good the files of `texmesh extract --bytes` look beside those that other tools make of the same bytes.
 //
 //   extract_bench SOURCE PACKAGE --bytes 100,250,500,1000 [--peers DIR] [--views 6] [--size 512] [--keep DIR]
-//                 [--neighbours]
+//                 [--neighbours] [--unlit]
 //   extract_bench SOURCE --score A.glb,B.glb
 //
-// Renders SOURCE and each file with one renderer from the same views and prints mean LDR-FLIP over the pixels
-// of the object (0 = equal). --neighbours also makes the best file of the next finer and the next coarser
-// scale. DIR holds files that tests/bench/extract_peers has made of SOURCE; the best one within the bytes
-// counts. The views are others than those that extract itself compares.
+// Renders SOURCE and each file lit (texmesh render, the studio's light; --unlit: base colours alone) from the
+// same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the
+// best file of the next finer and the next coarser scale. DIR holds files that tests/bench/extract_peers has
+// made of SOURCE; the best one within the bytes counts. The views are others than those that extract itself
+// compares.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -20,11 +21,13 @@
 #include <iterator>
 
 #include "format/base/bytes.h"
-#include "pipeline/extract/budget/picture_meter.h"
+#include "format/base/srgb.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/import/import.h"
-#include "pipeline/io/file_resolver.h"
-#include "stages/image/decode_image.h"
+#include "pipeline/render/picture_sheet.h"
+#include "pipeline/render/rendered_model.h"
+#include "stages/measure/flip.h"
+#include "stages/render/shade.h"
 
 namespace texmesh {
 namespace {
@@ -39,51 +42,67 @@ class NoFiles : public Resolver {
   std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
 };
 
-struct Views {
-  std::vector<ViewCamera> cameras;
-  std::uint32_t side_px = 512;
-};
-
-std::vector<Picture> pictures(const Model& model, const Views& views, const RunContext& context) {
-  ShownModel shown{&model.mesh, &model.materials, {}};
-  std::map<std::string, MipTexture> textures;
-  std::vector<bool> seen(model.images.size());
-  for (const Material& m : model.materials)
-    for (const TextureRef* ref : {&m.base_colour_texture, &m.emissive_texture})
-      if (ref->used()) seen[static_cast<std::size_t>(ref->image)] = true;
-  for (std::size_t k = 0; k < model.images.size(); ++k) {
-    shown.image_names.push_back(std::to_string(k));
-    if (seen[k]) textures[shown.image_names.back()] = mip_texture(decode_image(model.images[k]));
+double mean_level(const Picture& picture) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < picture.covered.size(); ++i) {
+    if (!picture.covered[i]) continue;
+    for (int k = 0; k < 3; ++k) sum += 255 * srgb_of_light(static_cast<double>(picture.linear[i][k]));
+    count += 3;
   }
-  return ModelViews(shown, views.cameras, views.side_px, context).draw(textures, context);
+  return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-Model read_source(const fs::path& path, const RunContext& context) {
-  FileResolver resolver(path.parent_path());
-  return import_model(path.filename().string(), read_bytes(path), resolver, {}, context).model;
-}
+/// How near a file's pictures come to the source's.
+struct Score {
+  double flip = 1e9;
+  double level = 0;  // mean sRGB code of the object's pixels, 0 .. 255
+};
 
 class Scorer {
  public:
-  Scorer(const fs::path& source, int views, std::uint32_t side_px, const RunContext& context)
-      : context_(context) {
-    const Model model = read_source(source, context);
-    views_ = {cameras_around(model.mesh, views), side_px};
+  Scorer(const fs::path& source, int views, std::uint32_t side_px, bool unlit, const RunContext& context)
+      : context_(context), side_px_(side_px), unlit_(unlit) {
+    RenderedModel model = load_rendered_model(source.string(), {}, context);
+    if (unlit_) make_unlit(model);
     origin_ = model.mesh.origin;
-    meter_ = std::make_unique<PictureMeter>(pictures(model, views_, context), context);
+    for (int v = 0; v < views; ++v)
+      cameras_.push_back(perspective_camera(camera_of(v, views, model.bounds.centre, model.bounds.radius)));
+    environment_ = environment_of(RenderLight::kStudio, context);
+    for (const RenderCamera& camera : cameras_) {
+      const Picture picture = picture_of(model, camera);
+      level_ += mean_level(picture) / views;
+      reference_.push_back(prepare_flip(picture));
+    }
   }
-  double score(const Bytes& glb, const std::string& name) const {
+  double level() const { return level_; }
+  Score score(const Bytes& glb, const std::string& name) const {
     NoFiles none;
-    Model model = import_model(name, glb, none, {}, context_).model;
+    RenderedModel model = rendered_model(import_model(name, glb, none, {}, context_), context_);
+    if (unlit_) make_unlit(model);
     for (Vec3f& p : model.mesh.positions) p = to_float(to_double(p) + model.mesh.origin - origin_);
-    return meter_->difference(pictures(model, views_, context_), context_);
+    Score out{0, 0};
+    for (std::size_t v = 0; v < cameras_.size(); ++v) {
+      const Picture picture = picture_of(model, cameras_[v]);
+      out.flip += flip_of(reference_[v], prepare_flip(picture)) / static_cast<double>(cameras_.size());
+      out.level += mean_level(picture) / static_cast<double>(cameras_.size());
+    }
+    return out;
   }
 
  private:
+  Picture picture_of(const RenderedModel& model, const RenderCamera& camera) const {
+    return shade(model.scene(), look(model.scene(), camera, side_px_, context_), model.textures, environment_,
+                 context_);
+  }
   RunContext context_;
-  Views views_;
+  std::uint32_t side_px_;
+  bool unlit_;
   Vec3d origin_;
-  std::unique_ptr<PictureMeter> meter_;
+  double level_ = 0;
+  std::vector<RenderCamera> cameras_;
+  RenderEnvironment environment_;
+  std::vector<FlipPicture> reference_;
 };
 
 struct Scored {
@@ -103,7 +122,7 @@ std::vector<Scored> files_of(const fs::path& folder) {
 
 void score(const Scorer& scorer, const fs::path& folder, Scored& s) {
   try {
-    s.flip = scorer.score(read_bytes(folder / s.name), s.name);
+    s.flip = scorer.score(read_bytes(folder / s.name), s.name).flip;
   } catch (const Error& e) {
     std::cerr << s.name << ": " << e.what() << '\n';
   }
@@ -131,7 +150,7 @@ struct Arguments {
   std::vector<double> bytes{100, 250, 500, 1000};
   std::vector<std::string> score;
   int views = 6, size = 512;
-  bool neighbours = false;
+  bool neighbours = false, unlit = false;
 };
 
 /// What the search chose, and what it would have made of the scales beside that, in its own views.
@@ -155,7 +174,7 @@ void print_neighbours(const Arguments& a, std::uint64_t limit, const Extracted& 
 
 void print_table(const Arguments& a, const Scorer& scorer, const RunContext& context) {
   std::vector<Scored> peers = a.peers.empty() ? std::vector<Scored>{} : files_of(a.peers);
-  const Scorer rough(a.source, 3, 256, context);
+  const Scorer rough(a.source, 3, 256, a.unlit, context);
   for (Scored& s : peers) score(rough, a.peers, s);
   std::cout << "     kB   extract     bytes  scale  FLIP    s   best other    bytes  FLIP    ratio\n";
   double logs = 0;
@@ -172,7 +191,7 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
       std::ofstream out(fs::path(a.keep) / fmt::format("{}kB.glb", kilobytes), std::ios::binary);
       out.write(reinterpret_cast<const char*>(e.glb.data()), static_cast<std::streamsize>(e.glb.size()));
     }
-    const double ours = scorer.score(e.glb, "extract.glb");
+    const double ours = scorer.score(e.glb, "extract.glb").flip;
     const Scored best = best_of(peers, scorer, a.peers, limit);
     std::cout << fmt::format("{:7}  {:>9}{:>10}  S_{:<4}{:.4f}{:5.1f}", kilobytes, e.within ? "" : "outside",
                              e.glb.size(), e.scale, ours, seconds);
@@ -208,15 +227,19 @@ int main(int argc, char** argv) {
   app.add_option("--score", a.score, "Only rate these files")->delimiter(',');
   app.add_option("--views", a.views)->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
+  app.add_flag("--unlit", a.unlit, "Compare base colours alone");
   app.add_flag("--neighbours", a.neighbours, "Also the best files of the scales beside the chosen one");
   CLI11_PARSE(app, argc, argv);
   RunContext context;
   context.threads = 2;
   try {
-    const Scorer scorer(a.source, a.views, static_cast<std::uint32_t>(a.size), context);
+    const Scorer scorer(a.source, a.views, static_cast<std::uint32_t>(a.size), a.unlit, context);
+    if (!a.score.empty()) std::cout << fmt::format("{}: mean level {:.1f}\n", a.source, scorer.level());
     for (const std::string& file : a.score) {
       const Bytes bytes = read_bytes(file);
-      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}\n", file, bytes.size(), scorer.score(bytes, file));
+      const Score found = scorer.score(bytes, file);
+      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}, mean level {:.1f}\n", file, bytes.size(),
+                               found.flip, found.level);
     }
     if (!a.package.empty()) print_table(a, scorer, context);
   } catch (const std::exception& e) {

@@ -3,7 +3,7 @@
 //
 //   node make-peers.mjs SOURCE.glb OUTPUT-FOLDER 100,250,500,1000
 //
-// Textures of normals and of roughness get a quarter of the base colour's sides: the comparison does not show them.
+// Textures of normals and of roughness get the base colour's sides, a half or a quarter of them.
 // The numbers of bits are lean, so that the other side is no straw man.
 import { spawnSync } from 'node:child_process';
 import { mkdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -20,6 +20,7 @@ const budgets = (budgetText ?? '100,250,500,1000').split(',').map((x) => Number(
 const gltfpack = join(dirname(fileURLToPath(import.meta.url)), 'node_modules/gltfpack/cli.js');
 const ratios = [1, 0.6, 0.35, 0.2, 0.12, 0.07, 0.04, 0.02, 0.01];
 const modes = [['plain', []], ['permissive', ['-sp']]];
+const parts = [1, 2, 4];
 const sizes = [2048, 1448, 1024, 724, 512, 362, 256, 128];
 const qualities = [96, 92, 88, 82, 75, 65, 55, 45, 35, 25, 15, 8, 3];
 
@@ -75,9 +76,10 @@ for (const [mode, flags] of modes) {
     seen.add(`${mode} ${fixed}`);
     for (const budget of budgets) {
       if (fixed >= budget) continue;
-      for (const size of textures.length ? sizes : [1]) {
+      const shapes = sizes.flatMap((size) => parts.map((part) => [size, part]));
+      for (const [size, part] of textures.some((t) => !t.colours) ? shapes : textures.length ? sizes.map((s) => [s, 1]) : [[1, 1]]) {
         const files = async (quality) =>
-          Promise.all(textures.map(({ image, colours }, k) => webp(k, image, colours ? size : Math.ceil(size / 4), quality)));
+          Promise.all(textures.map(({ image, colours }, k) => webp(k, image, colours ? size : Math.ceil(size / part), quality)));
         let low = 0, high = qualities.length; // the first quality of the list that fits
         const fits = async (i) => fixed + (await files(qualities[i])).reduce((sum, f) => sum + f.length, 0) <= budget;
         while (low < high) {
@@ -92,7 +94,7 @@ for (const [mode, flags] of modes) {
         if (bytes.length > budget) continue;
         // Far below the budget at the best quality: a larger texture or a smaller budget has its place.
         if (low === 0 && size !== sizes[0] && bytes.length < 0.7 * budget) continue;
-        writeFileSync(join(folder, `${budget / 1000}kB-${mode}-${ratio}-${size}px-q${qualities[low]}.glb`), bytes);
+        writeFileSync(join(folder, `${budget / 1000}kB-${mode}-${ratio}-${size}px-${part}-q${qualities[low]}.glb`), bytes);
       }
     }
   }
