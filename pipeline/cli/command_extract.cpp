@@ -104,9 +104,10 @@ void add_extract_command(Command& app) {
       "  texmesh extract https://host/bust.texmesh --display 800 -o bust.glb\n"
       "  texmesh extract bust.texmesh --lods --bytes 2MB -o bust.glb");
   c.notes(
-      "--bytes chooses scale, size of the textures and their quality together: candidates are rendered and "
-      "compared with the package's best (FLIP), and the file is filled up to the last 2 %. Many triangles "
-      "with a small texture nearly always look better than the reverse.\n"
+      "--bytes chooses scale, size of the textures and their quality together: candidates are rendered lit, "
+      "as texmesh render does, and compared with the package's best (FLIP). Colours, normals, roughness and "
+      "the other maps get bytes for what they change in the picture, and the file is filled up to the last "
+      "2 %. Many triangles with a small texture nearly always look better than the reverse.\n"
       "Meshes stay Draco coded (KHR_draco_mesh_compression), and WebP needs EXT_texture_webp. For viewers "
       "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "

@@ -58,7 +58,8 @@ std::string extract_text(const Extracted& e, const ExtractRequest& request, cons
   }
   if (request.bytes > 0)
     text += fmt::format(
-        "difference to the package's best (FLIP, {} views of {} px): {:.4f}; of the mesh alone {:.4f}\n",
+        "difference to the package's best (FLIP of lit pictures, {} views of {} px): {:.4f}; of the mesh alone "
+        "{:.4f}\n",
         e.views, e.side_px, e.difference, e.mesh_difference);
   if (!e.within)
     text += fmt::format(

@@ -1,141 +1,163 @@
 #include "pipeline/extract/budget/budget_file.h"
 
 #include <algorithm>
-#include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "pipeline/extract/budget/quality_search.h"
+#include "stages/base/parallel.h"
 
 namespace texmesh {
 namespace {
 
 constexpr double kLeastShare = 0.98;  // of the bytes asked for
 constexpr double kNear = 0.99;        // where the search for a quality may stop
-constexpr double kNormalQuality = 75, kDataQuality = 60;
-constexpr double kNormalShare = 0.12, kDataShare = 0.05, kMostDataShare = 0.25;  // of all textures
-constexpr double kMostTexelsPerByte = 40;                                        // nothing is coded in less
-constexpr int kDataSteps = 120;  // of sizes, each 0.84 of the one before
-constexpr std::uint32_t kTiny = 4;
+constexpr double kMiddle = 50;        // the level at which qualities stay
 
-double weight_of(const PackageImage& image) { return image.role == "normal" ? kNormalShare : kDataShare; }
+bool is_lossy(const ImagePlan& plan) { return plan.coding.format != FileImage::kPng; }
 
-double data_share(const BudgetSource& source) {
-  if (source.colours.empty()) return 1;
-  double share = 0;
-  for (const std::size_t i : source.data) share += weight_of(source.image(i));
-  return std::min(share, kMostDataShare);
-}
-
-double bytes_left(const BudgetSource& source, const MeshCandidate& mesh) {
-  return static_cast<double>(source.request.bytes) - static_cast<double>(mesh.fixed_bytes);
+std::vector<std::size_t> all_of(std::size_t count) {
+  std::vector<std::size_t> out(count);
+  std::iota(out.begin(), out.end(), std::size_t{0});
+  return out;
 }
 
 }  // namespace
-
-double colour_bytes(const BudgetSource& source, const MeshCandidate& mesh) {
-  return source.colours.empty() ? 0 : bytes_left(source, mesh) * (1 - data_share(source));
-}
 
 bool BudgetFiller::fills(const BudgetFile& file) const {
   return fits(file) &&
          static_cast<double>(file.glb.size()) >= kLeastShare * static_cast<double>(source_.request.bytes);
 }
 
-void BudgetFiller::add(BudgetFile& file, std::size_t index, const Pixels& pixels, FileImageData data,
-                       double quality) const {
-  const PackageImage& image = source_.image(index);
-  const double q = data.format == FileImage::kPng ? 100 : quality;
-  file.rows.push_back(
-      {image.image, image.role, data.format, pixels.width_px, pixels.height_px, q, data.bytes.size()});
-  file.images[image.image] = std::move(data);
-}
-
-/// Textures of data at the largest size that their share allows.
-void BudgetFiller::add_data(double bytes, BudgetFile& file) {
-  double weights = 0;
-  for (const std::size_t i : source_.data) weights += weight_of(source_.image(i));
-  for (const std::size_t i : source_.data) {
-    const PackageImage& image = source_.image(i);
-    const double quality = image.role == "normal" ? kNormalQuality : kDataQuality;
-    const double most = bytes * weight_of(image) / weights;
-    for (int k = 0; k < kDataSteps; ++k) {
-      const double share = size_step(k / 2) * (k % 2 ? std::sqrt(std::sqrt(0.5)) : 1.0);
-      const bool last = side_of(std::max(image.width_px, image.height_px), share) <= kTiny;
-      const double texels = static_cast<double>(image.width_px) * image.height_px * share * share;
-      if (texels > kMostTexelsPerByte * most && !last) continue;
-      const std::vector<Pixels> pixels = colours_.texels({i}, share);
-      FileImageData data{colours_.format_for(pixels[0], colours_.format()), {}};
-      data.bytes = encode_image(pixels[0], {data.format, quality, true, false, false});
-      if (static_cast<double>(data.bytes.size()) > most && !last) continue;
-      add(file, i, pixels[0], std::move(data), quality);
-      break;
-    }
-  }
-}
-
-BudgetFile BudgetFiller::with_colours(const MeshCandidate& mesh, const BudgetFile& data,
-                                      const std::vector<Pixels>& pixels, const ColourCoding& coding,
-                                      double quality) const {
-  BudgetFile file = data;
-  std::vector<FileImageData> images = colours_.encoded(pixels, coding, quality, false);
-  for (std::size_t k = 0; k < images.size(); ++k)
-    add(file, source_.colours[k], pixels[k], std::move(images[k]), quality);
-  std::sort(file.rows.begin(), file.rows.end(),
-            [](const auto& a, const auto& b) { return a.image < b.image; });
-  file.glb = mesh.file_with(file.images);
-  return file;
-}
-
 void BudgetFiller::replace_if_larger(BudgetFile&& file, BudgetFile& best) const {
   if (fits(file) && (!fits(best) || file.glb.size() > best.glb.size())) best = std::move(file);
 }
 
-void BudgetFiller::by_quality(const MeshCandidate& mesh, const BudgetFile& data,
-                              const std::vector<Pixels>& pixels, const ColourCoding& coding, double start,
-                              int tries, BudgetFile& best, double& quality) {
-  quality = quality_for(static_cast<double>(source_.request.bytes), start, kNear, tries, [&](double q) {
-    BudgetFile file = with_colours(mesh, data, pixels, coding, q);
+void BudgetFiller::encode(Draft& draft, const std::vector<std::size_t>& images) const {
+  draft.files.resize(draft.plans.size());
+  parallel_for(source_.context, images.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const ImagePlan& plan = draft.plans[images[k]];
+      draft.files[images[k]] =
+          coder_.encoded(images[k], draft.pixels[images[k]], plan.coding, plan.quality, false);
+    }
+  });
+}
+
+BudgetFiller::Draft BudgetFiller::draft_of(const std::vector<ImagePlan>& plans) {
+  Draft draft;
+  resize(draft, plans, 1);
+  return draft;
+}
+
+/// The plans with sides so many times as long, at most whole.
+void BudgetFiller::resize(Draft& draft, const std::vector<ImagePlan>& plans, double times) {
+  draft.plans = plans;
+  draft.pixels.resize(plans.size());
+  for (std::size_t i = 0; i < plans.size(); ++i) {
+    draft.plans[i].share = std::min(plans[i].share * times, 1.0);
+    draft.pixels[i] = coder_.texels_of_share(i, draft.plans[i].share);
+  }
+  encode(draft, all_of(plans.size()));
+}
+
+BudgetFile BudgetFiller::file_of(const MeshCandidate& mesh, const Draft& draft) const {
+  BudgetFile file;
+  for (std::size_t i = 0; i < draft.plans.size(); ++i) {
+    const PackageImage& image = source_.image(i);
+    file.rows.push_back({image.image, image.role, draft.files[i].format, draft.pixels[i].width_px,
+                         draft.pixels[i].height_px, is_lossy(draft.plans[i]) ? draft.plans[i].quality : 100,
+                         draft.files[i].bytes.size()});
+    file.images[image.image] = draft.files[i];
+  }
+  file.glb = mesh.file_with(file.images);
+  return file;
+}
+
+void BudgetFiller::by_level(double start, int tries, const std::function<BudgetFile(double level)>& at,
+                            BudgetFile& best) {
+  quality_for(static_cast<double>(source_.request.bytes), start, kNear, tries, [&](double level) {
+    BudgetFile file = at(level);
     const std::size_t bytes = file.glb.size();
     replace_if_larger(std::move(file), best);
     return bytes;
   });
 }
 
-void BudgetFiller::by_size(const MeshCandidate& mesh, const BudgetFile& data, const ColourCoding& coding,
-                           double quality, double& share, BudgetFile& best) {
-  double low = fits(best) ? share : 0, high = fits(best) ? 1 : share;
+/// The image that got the last bytes takes up what the prediction missed.
+void BudgetFiller::by_last_image(const MeshCandidate& mesh, std::size_t last, Draft& draft,
+                                 BudgetFile& best) {
+  if (!is_lossy(draft.plans[last])) return;
+  by_level(
+      draft.plans[last].quality, 10,
+      [&](double quality) {
+        draft.plans[last].quality = quality;
+        encode(draft, {last});
+        return file_of(mesh, draft);
+      },
+      best);
+}
+
+void BudgetFiller::by_all_qualities(const MeshCandidate& mesh, Draft& draft, BudgetFile& best) {
+  const std::vector<ImagePlan> plans = draft.plans;
+  by_level(
+      kMiddle, 12,
+      [&](double level) {
+        for (std::size_t i = 0; i < plans.size(); ++i)
+          draft.plans[i].quality =
+              std::clamp(plans[i].quality + 2 * (level - kMiddle), kLowestQuality, kHighestQuality);
+        encode(draft, all_of(plans.size()));
+        return file_of(mesh, draft);
+      },
+      best);
+}
+
+void BudgetFiller::by_sizes(const MeshCandidate& mesh, Draft& draft, BudgetFile& best) {
+  const std::vector<ImagePlan> plans = draft.plans;
+  double least = 1;
+  for (const ImagePlan& p : plans) least = std::min(least, p.share);
+  double low = fits(best) ? 1 : 0, high = fits(best) ? 1 / std::max(least, 1e-6) : 1;
   for (int i = 0; i < 16 && !fills(best); ++i) {
-    share = i == 0 && low > 0 ? 1 : (low + high) / 2;
-    BudgetFile file = with_colours(mesh, data, colours_.texels(source_.colours, share), coding, quality);
-    (fits(file) ? low : high) = share;
-    const bool whole = share >= 1 && fits(file);
+    const double times = i == 0 && low > 0 ? high : (low + high) / 2;
+    resize(draft, plans, times);
+    BudgetFile file = file_of(mesh, draft);
+    const bool whole = i == 0 && low > 0 && fits(file);
+    (fits(file) ? low : high) = times;
     replace_if_larger(std::move(file), best);
-    if (whole) break;
+    if (whole) return;
   }
 }
 
-BudgetFile BudgetFiller::fill(const MeshCandidate& mesh, const TexturePoint& point) {
-  const bool lossy = colours_.format() != FileImage::kPng;
-  BudgetFile data;
-  add_data(std::max(bytes_left(source_, mesh), 0.0) * data_share(source_), data);
-  double share = size_step(point.step), quality = point.quality;
-  const std::vector<Pixels> pixels = colours_.texels(source_.colours, share);
-  BudgetFile best = with_colours(mesh, data, pixels, point.coding, kLowestQuality);
-  if (!source_.colours.empty() && lossy)
-    by_quality(mesh, data, pixels, point.coding, point.quality, 14, best, quality);
-  if (fills(best) || source_.colours.empty()) return best;
-  // The quality alone does not do it: its ends, or a lossless format, or a tiny image. Sizes do the rest.
-  by_size(mesh, data, point.coding, quality, share, best);
-  for (const ColourCoding& coding : colours_.codings())  // near the largest file another may reach further
-    if (fits(best) && !fills(best) && lossy) {
-      double end = kHighestQuality;
-      by_quality(mesh, data, colours_.texels(source_.colours, share), coding, end, 8, best, end);
+/// Near the largest file another coding may reach further.
+void BudgetFiller::by_codings(const MeshCandidate& mesh, Draft& draft, BudgetFile& best) {
+  for (std::size_t i = 0; i < draft.plans.size(); ++i)
+    for (const TextureCoding& coding : coder_.codings(i)) {
+      if (fills(best) || !is_lossy(draft.plans[i])) break;
+      draft.plans[i].coding = coding;
+      draft.plans[i].quality = kHighestQuality;
+      by_last_image(mesh, i, draft, best);
     }
-  if (fits(best)) return best;
-  BudgetFile least;
-  add_data(0, least);
-  return with_colours(mesh, least, colours_.texels(source_.colours, 0), {colours_.format(), false},
-                      kLowestQuality);
+}
+
+BudgetFile BudgetFiller::smallest(const MeshCandidate& mesh) {
+  std::vector<ImagePlan> plans;
+  for (std::size_t i = 0; i < source_.image_count(); ++i)
+    plans.push_back({coder_.codings(i).back(), 0, kLowestQuality});
+  return file_of(mesh, draft_of(plans));
+}
+
+BudgetFile BudgetFiller::fill(const MeshCandidate& mesh, const Allocation& allocation) {
+  std::vector<ImagePlan> plans;
+  for (const CodedImage& image : allocation.images) plans.push_back(image.plan);
+  Draft draft = draft_of(plans);
+  BudgetFile best = file_of(mesh, draft);
+  if (plans.empty() || fills(best)) return best;
+  by_last_image(mesh, allocation.last, draft, best);
+  if (fills(best)) return best;
+  by_all_qualities(mesh, draft, best);
+  if (!fills(best)) by_sizes(mesh, draft, best);
+  if (fits(best) && !fills(best)) by_codings(mesh, draft, best);
+  return fits(best) ? best : smallest(mesh);
 }
 
 }  // namespace texmesh

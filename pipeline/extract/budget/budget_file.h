@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <vector>
 
-#include "pipeline/extract/budget/colour_textures.h"
+#include "pipeline/extract/budget/loss_curves.h"
+#include "pipeline/extract/budget/mesh_candidates.h"
 
 namespace texmesh {
 
@@ -14,33 +16,36 @@ struct BudgetFile {
   std::vector<std::uint8_t> glb;
 };
 
-/// Bytes of a file that are left for textures of colours, once those of data (normals, roughness), which the
-/// pictures do not show, have a fixed share.
-double colour_bytes(const BudgetSource& source, const MeshCandidate& mesh);
-
 /// Fills the bytes asked for: the largest file within them by quality, then by size of the textures.
 class BudgetFiller {
  public:
-  BudgetFiller(const BudgetSource& source, ColourTextures& colours) : source_(source), colours_(colours) {}
+  BudgetFiller(const BudgetSource& source, ImageCoder& coder) : source_(source), coder_(coder) {}
   /// Where nothing fits: the smallest file.
-  BudgetFile fill(const MeshCandidate& mesh, const TexturePoint& point);
+  BudgetFile fill(const MeshCandidate& mesh, const Allocation& allocation);
   bool fits(const BudgetFile& file) const { return file.glb.size() <= source_.request.bytes; }
   bool fills(const BudgetFile& file) const;  // to 98 %
 
  private:
-  void add(BudgetFile& file, std::size_t index, const Pixels& pixels, FileImageData data,
-           double quality) const;
-  void add_data(double bytes, BudgetFile& file);
-  BudgetFile with_colours(const MeshCandidate& mesh, const BudgetFile& data,
-                          const std::vector<Pixels>& pixels, const ColourCoding& coding,
-                          double quality) const;
-  void by_quality(const MeshCandidate& mesh, const BudgetFile& data, const std::vector<Pixels>& pixels,
-                  const ColourCoding& coding, double start, int tries, BudgetFile& best, double& quality);
-  void by_size(const MeshCandidate& mesh, const BudgetFile& data, const ColourCoding& coding, double quality,
-               double& share, BudgetFile& best);
+  /// Images while a file is looked for.
+  struct Draft {
+    std::vector<ImagePlan> plans;
+    std::vector<Pixels> pixels;
+    std::vector<FileImageData> files;
+  };
+  Draft draft_of(const std::vector<ImagePlan>& plans);
+  void encode(Draft& draft, const std::vector<std::size_t>& images) const;
+  void resize(Draft& draft, const std::vector<ImagePlan>& plans, double times);
+  BudgetFile file_of(const MeshCandidate& mesh, const Draft& draft) const;
+  /// Makes the file that fills best of those with level 1 .. 100 of `at`, which grow with it.
+  void by_level(double start, int tries, const std::function<BudgetFile(double level)>& at, BudgetFile& best);
+  void by_last_image(const MeshCandidate& mesh, std::size_t last, Draft& draft, BudgetFile& best);
+  void by_all_qualities(const MeshCandidate& mesh, Draft& draft, BudgetFile& best);
+  void by_sizes(const MeshCandidate& mesh, Draft& draft, BudgetFile& best);
+  void by_codings(const MeshCandidate& mesh, Draft& draft, BudgetFile& best);
   void replace_if_larger(BudgetFile&& file, BudgetFile& best) const;
+  BudgetFile smallest(const MeshCandidate& mesh);
   const BudgetSource& source_;
-  ColourTextures& colours_;
+  ImageCoder& coder_;
 };
 
 }  // namespace texmesh

@@ -6,15 +6,17 @@
 
 #include "pipeline/extract/budget/budget_file.h"
 #include "pipeline/extract/budget/budget_source.h"
-#include "pipeline/extract/budget/colour_textures.h"
 #include "pipeline/extract/budget/mesh_candidates.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {
 
 constexpr int kFirstCoding = 2;
-constexpr double kWorthALook = 1.1;  // times the least difference, by the textures of the best file so far
 constexpr double kNothing = 1e9;
+constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
+constexpr int kMeshTries = 12;
+constexpr double kSurely = 0.9;                         // of a loss that others tell
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
 
 /// Scale, coding of the mesh and textures, chosen together by what files look like.
@@ -23,34 +25,38 @@ class BudgetSearch {
   BudgetSearch(PackageReader& package, const ExtractRequest& request, const RunContext& context)
       : source_(package, request, context),
         meshes_(source_),
-        colours_(source_, request),
-        filler_(source_, colours_) {}
+        coder_(source_),
+        curves_(source_, coder_),
+        filler_(source_, coder_) {}
 
   Extracted run() {
+    curves_.measure(static_cast<double>(source_.request.bytes) -
+                    kUsualBytes * static_cast<double>(scales()[start().scale].triangles));
     const MeshKey best = choose_mesh();
-    if (!points_.count(best)) look_closely(best);
-    const MeshCandidate& mesh = meshes_.at(best);
-    const TexturePoint& point = points_.at(best);
-    return finish(mesh, source_.colours.empty()
-                            ? point
-                            : colours_.best_of_other_codings(mesh, colour_bytes(source_, mesh), point));
+    BudgetFile file = filler_.fill(meshes_.at(best), curves_.allocate(bytes_left(meshes_.at(best))));
+    const MeshKey filled = filler_.fits(file) && !filler_.fills(file) ? fill_by_mesh(best, file) : best;
+    return finish(meshes_.at(filled), std::move(file));
   }
 
  private:
   const std::vector<ManifestScale>& scales() const { return source_.package.manifest().scales; }
 
+  MeshKey start() {
+    return {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
+            kFirstCoding};
+  }
+
   /// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
   /// coded leaner or the other way round, as long as the picture gets better; one that does not is
   /// passed over once.
   MeshKey choose_mesh() {
-    best_ = {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
-             kFirstCoding};
-    least_ = look_closely(best_);
+    best_ = start();
+    least_ = loss_of(best_);
     for (bool again = true; again;) {
       const MeshKey before = best_;
       if (!source_.request.scale) {
-        follow_direction(1, 0);
         follow_direction(-1, 0);
+        follow_direction(1, 0);
       }
       follow_direction(0, 1);
       follow_direction(0, -1);
@@ -77,7 +83,7 @@ class BudgetSearch {
 
   bool better(const MeshKey& key) {
     if (!seen_.insert(key).second) return key == best_;
-    const double found = promising(key) ? look_closely(key) : kNothing;
+    const double found = too_large(key) || least_loss(key) > least_ ? kNothing : loss_of(key);
     meshes_.forget(found < least_ ? best_ : key);
     if (!(found < least_)) return false;
     least_ = found;
@@ -85,34 +91,40 @@ class BudgetSearch {
     return true;
   }
 
-  /// Its mesh alone is less different than the best file so far, and with that one's kind of textures it
-  /// is hardly worse.
-  bool promising(const MeshKey& key) {
-    if (kLeastBytes * static_cast<double>(scales()[key.scale].triangles) >
-        static_cast<double>(source_.request.bytes))
-      return false;
-    const MeshCandidate& mesh = meshes_.at(key);
-    if (mesh.fixed_bytes > source_.request.bytes || mesh.geometry >= least_) return false;
-    const auto known = points_.find(best_);
-    if (source_.colours.empty() || known == points_.end() || known->second.difference >= kNothing)
-      return true;
-    const TexturePoint alike = colours_.same_size(mesh, colour_bytes(source_, mesh), known->second);
-    return alike.difference < kWorthALook * least_;
+  bool too_large(const MeshKey& key) const {
+    return kLeastBytes * static_cast<double>(scales()[key.scale].triangles) >
+           static_cast<double>(source_.request.bytes);
   }
 
-  double look_closely(const MeshKey& key) {
+  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of
+  /// both kinds lose less.
+  double least_loss(const MeshKey& key) const {
+    double least = 0;
+    for (const auto& [known, geometry] : geometry_) {
+      if (known.scale > key.scale) continue;
+      double loss = joined(geometry);
+      if (known.coding < key.coding) {
+        const auto coded = geometry_.find({0, known.coding});
+        if (known.scale == 0 || coded == geometry_.end()) continue;
+        loss -= joined(coded->second);
+      }
+      least = std::max(least, kSurely * loss);
+    }
+    return least;
+  }
+
+  double bytes_left(const MeshCandidate& mesh) const {
+    return static_cast<double>(source_.request.bytes) - static_cast<double>(mesh.fixed_bytes);
+  }
+
+  /// What a file of this mesh is expected to lose.
+  double loss_of(const MeshKey& key) {
     seen_.insert(key);
     const MeshCandidate& mesh = meshes_.at(key);
-    TexturePoint& point = points_[key];
-    if (source_.colours.empty()) {
-      point = {0, {colours_.format(), false}, 100, mesh.geometry};
-      return mesh.fixed_bytes > source_.request.bytes ? kNothing : mesh.geometry;
-    }
-    const auto near = points_.find(best_);
-    const bool known = near != points_.end() && near->second.difference < kNothing;
-    const TexturePoint start = known ? near->second : TexturePoint{};
-    point = colours_.best_size(mesh, colour_bytes(source_, mesh), known ? &start : nullptr);
-    return point.difference;
+    geometry_[key] = mesh.geometry;
+    const Allocation images = curves_.allocate(bytes_left(mesh));
+    if (images.bytes > bytes_left(mesh)) return kNothing;
+    return joined(mesh.geometry) + images.loss;
   }
 
   /// The finest that is likely to leave half of the bytes to textures.
@@ -125,8 +137,36 @@ class BudgetSearch {
     return scales().size() - 1;
   }
 
-  Extracted finish(const MeshCandidate& mesh, const TexturePoint& point) {
-    BudgetFile file = filler_.fill(mesh, point);
+  /// Where textures cannot take the bytes that are left: the same mesh coded finer by parts of a bit, or a
+  /// finer scale.
+  MeshKey fill_by_mesh(const MeshKey& from, BudgetFile& best) {
+    MeshKey chosen = from;
+    const bool stored = from.scale == 0 && from.coding + 1 == kMeshCodings;  // there is no finer one
+    if (stored || !meshes_.at(from).file->has_draco()) return from;
+    const auto measure = [&](const MeshKey& key) {
+      BudgetFile file = best;
+      file.glb = meshes_.at(key).file_with(best.images);
+      const bool fits = filler_.fits(file), better = fits && file.glb.size() > best.glb.size();
+      if (better) best = std::move(file);
+      meshes_.forget(better ? chosen : key);
+      if (better) chosen = key;
+      return fits;
+    };
+    for (MeshKey key = from;; --key.scale) {
+      for (key.coding = from.coding; key.coding < kMeshCodings; ++key.coding) {
+        const bool same = key.scale == from.scale && key.coding == from.coding;
+        double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
+        for (int i = 0; i < kMeshTries && !filler_.fills(best); ++i) {
+          key.extra_bits = (low + high) / 2;
+          (measure(key) ? low : high) = key.extra_bits;
+        }
+      }
+      key.coding = from.coding;
+      if (key.scale == 0 || filler_.fills(best) || source_.request.scale) return chosen;
+    }
+  }
+
+  Extracted finish(const MeshCandidate& mesh, BudgetFile file) {
     Extracted out;
     out.scale = mesh.scale;
     out.levels = mesh.levels;
@@ -134,26 +174,27 @@ class BudgetSearch {
     out.within = filler_.fills(file);
     out.views = static_cast<int>(source_.cameras.size());
     out.side_px = source_.side_px;
-    out.mesh_difference = mesh.geometry;
     out.images = file.rows;
     out.mesh_bytes = file.glb.size();
     for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
-    ImageTextures textures;
-    for (const std::size_t i : source_.colours) {
-      const std::uint32_t image = source_.image(i).image;
-      textures[image_name(image)] = decoded_texture(file.images.at(image).bytes);
-    }
-    out.difference = source_.difference(*mesh.views, textures);
+    std::vector<RenderTexture> textures = source_.best_textures;
+    for (std::size_t i = 0; i < source_.image_count(); ++i)
+      coder_.show(i, file.images.at(source_.image(i).image), textures, source_.context);
+    const LitMeter& meter = source_.whole_pictures();
+    const LitViews views(mesh.mesh, source_.cameras, source_.context);
+    out.mesh_difference = meter.difference(views, source_.best_textures, source_.context);
+    out.difference = meter.difference(views, textures, source_.context);
     out.glb = std::move(file.glb);
     return out;
   }
 
   BudgetSource source_;
   MeshCandidates meshes_;
-  ColourTextures colours_;
+  ImageCoder coder_;
+  LossCurves curves_;
   BudgetFiller filler_;
-  std::map<MeshKey, TexturePoint> points_;
   std::set<MeshKey> seen_;
+  std::map<MeshKey, double> geometry_;  // of meshes looked at: MeshCandidate::geometry
   MeshKey best_;
   double least_ = kNothing;
 };

@@ -10,10 +10,11 @@ std::vector<int> levels_of(const Manifest& manifest, int finest);
 double screen_coverage_of(const Manifest& manifest, int scale);
 
 /// The file of at most request.bytes with the least FLIP against the package's best: scale, coding of the
-/// mesh, size of textures and their quality are chosen together. Candidates are rendered and compared,
-/// not guessed: the quality table of a package knows pictures of 192 px and full-size textures only.
-/// Textures of data (normals, roughness) get a fixed share of the bytes for textures, because the
-/// renderer does not show them.
+/// mesh, size and quality of every texture are chosen together, by lit pictures (stages/render, the studio's
+/// light), so that each map gets bytes for what it changes in them. Small windows of the pictures, one
+/// texture changed at a time, tell what bytes are worth; the mesh is chosen by what it and its textures lose
+/// together; the whole pictures of the file give the difference that is reported. InputError for a scale that
+/// is not there. Same bytes for any number of threads.
 Extracted extract_bytes(PackageReader& package, const ExtractRequest& request, const RunContext& context);
 
 }  // namespace texmesh

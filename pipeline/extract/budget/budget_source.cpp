@@ -1,27 +1,36 @@
 #include "pipeline/extract/budget/budget_source.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
-#include "format/base/box.h"
-#include "format/base/bytes.h"
+#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/standalone_glb.h"
-#include "stages/image/decode_image.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
 
 constexpr int kViews = 5;
 constexpr double kDefaultDisplayPx = 512;
-constexpr double kReferenceTexels = 8e6;  // of all colours together: finer ones cost memory and show nothing
-constexpr double kTexelsPerByte = 40;     // more texels than that are never worth a byte
+constexpr double kTexelsPerByte = 40;  // more texels than that are never worth a byte
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;
+constexpr int kWindowsPerView = 1;
+constexpr std::uint32_t kWindowPx = 96;
+constexpr double kFinestShown = 12;  // texels per pixel: pictures hardly read finer ones
 
 double longest_side(const Mesh& mesh) {
   const double side = to_double(bounding_box(mesh.positions)).longest_side();
   return side > 0 ? side : 1;
+}
+
+BoundingSphere sphere_of(const Mesh& mesh) {
+  if (mesh.positions.empty()) throw StageError("extract", "S_0", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("extract", "S_0", "an extent above 0", "one point");
+  return sphere;
 }
 
 }  // namespace
@@ -34,30 +43,103 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
       side_px(static_cast<std::uint32_t>(std::clamp(display_px, 64.0, 768.0))),
       textures(from, std::max(kTexelsPerByte * static_cast<double>(wishes.bytes), 65536.0), run) {
   context.progress = nullptr;
-  for (std::size_t i = 0; i < textures.images().size(); ++i)
-    (textures.images()[i].colours ? colours : data).push_back(i);
   source = read_model({package.scale_glb(0), mesh_path(0)}, mesh_path(0), context);
+  const BoundingSphere sphere = sphere_of(source.mesh);
   light = normal_samples(source.mesh);
-  cameras = cameras_around(source.mesh, kViews);
   extent = longest_side(source.mesh);
-  double texels = 0;
-  for (const std::size_t i : colours) texels += static_cast<double>(image(i).width_px) * image(i).height_px;
-  double share = 1;  // halves, not sharpened: exactly the source's own smaller copies
-  while (texels * share * share > kReferenceTexels) share /= 2;
-  for (const std::size_t i : colours)
-    best_textures[image_name(image(i).image)] = mip_texture(
-        textures.texels(i, side_of(image(i).width_px, share), side_of(image(i).height_px, share), {}, 0));
-  const ModelViews views(shown(source), cameras, side_px, context);
-  const std::vector<Picture> pictures = views.draw(best_textures, context);
-  for (const Picture& p : pictures)
-    covered_px += static_cast<double>(std::count(p.covered.begin(), p.covered.end(), 1)) / kViews;
-  meter = std::make_unique<PictureMeter>(pictures, context);
+  cameras = cameras_around(sphere, kViews, side_px);
+  find_textures();
+  find_groups();
+  finest = lit_mesh(source);
+  {
+    const LitViews views(finest, cameras, context);
+    measure_surface(views);
+    windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
+  }
+  read_best_textures();
+  environment = studio_environment(context);
+  finest_windows = std::make_unique<LitViews>(finest, windows, context);
+  window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
 }
 
-ShownModel shown(const Model& model) {
-  ShownModel out{&model.mesh, &model.materials, {}};
-  for (const Image& i : model.images) out.image_names.push_back(i.name);
+std::int32_t BudgetSource::shown_texture(const Model& model, const TextureRef& reference,
+                                         TextureUse use) const {
+  const std::vector<Vec2f>& uv = reference.texcoord == 0 ? model.mesh.uv0 : model.mesh.uv1;
+  if (!reference.used() || reference.texcoord > 1 || uv.empty()) return -1;
+  const std::string& name = model.images.at(static_cast<std::size_t>(reference.image)).name;
+  for (std::size_t t = 0; t < shown.size(); ++t)
+    if (shown[t].srgb == is_srgb(use) && image_name(image(shown[t].image).image) == name)
+      return static_cast<std::int32_t>(t);
+  return -1;
+}
+
+void BudgetSource::find_textures() {
+  for (const Material& m : source.materials)
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      if (reference.texcoord > 1 || shown_texture(source, reference, use) >= 0) return -1;
+      for (std::size_t i = 0; i < image_count(); ++i)
+        if (image_name(image(i).image) == source.images.at(static_cast<std::size_t>(reference.image)).name)
+          shown.push_back({i, is_srgb(use)});
+      return -1;
+    });
+}
+
+/// Images of one material are of one group.
+void BudgetSource::find_groups() {
+  for (std::size_t i = 0; i < image_count(); ++i) groups.push_back(i);
+  for (const Material& m : source.materials) {
+    std::vector<std::size_t> together;
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      const std::int32_t t = shown_texture(source, reference, use);
+      if (t >= 0) together.push_back(groups[shown[static_cast<std::size_t>(t)].image]);
+      return -1;
+    });
+    for (std::size_t& g : groups)
+      if (std::find(together.begin(), together.end(), g) != together.end()) g = together.front();
+  }
+}
+
+LitMesh BudgetSource::lit_mesh(Model& model) const {
+  LitMesh out;
+  out.texture_count = shown.size();
+  for (const Material& m : model.materials)
+    out.materials.push_back(render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      return shown_texture(model, reference, use);
+    }));
+  out.mesh = std::move(model.mesh);
   return out;
+}
+
+/// Texels that S_0 shows over the pixels that its whole surface has on the screen: four times its mean
+/// outline, as if it were convex.
+void BudgetSource::measure_surface(const LitViews& views) {
+  constexpr std::uint32_t kSide = 256;
+  double pixels = 0;
+  for (std::size_t v = 0; v < views.count(); ++v) pixels += static_cast<double>(views.covered_px(v));
+  pixels = std::max(4 * pixels / kViews, 1.0);
+  for (std::size_t i = 0; i < image_count(); ++i) {
+    double covered = 0;
+    for (const std::uint8_t bits : shown_texels(*this, i, kSide, kSide)) covered += std::popcount(bits);
+    texels_per_pixel.push_back(covered / (kSide * kSide) * image(i).width_px * image(i).height_px / pixels);
+  }
+}
+
+void BudgetSource::read_best_textures() {
+  for (const ShownTexture& t : shown) {
+    const PackageImage& from = image(t.image);
+    double share = 1;  // halves, not sharpened: the source's own smaller copies
+    while (texels_per_pixel[t.image] * share * share > kFinestShown) share /= 2;
+    best_textures.push_back(render_texture(
+        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0),
+        t.srgb, 0, context));
+  }
+}
+
+const LitMeter& BudgetSource::whole_pictures() {
+  if (!meter_)
+    meter_ =
+        std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment, context);
+  return *meter_;
 }
 
 std::uint32_t side_of(std::uint32_t full, double share) {
@@ -67,8 +149,14 @@ std::uint32_t side_of(std::uint32_t full, double share) {
       std::clamp(side, std::min<double>(kLeastSide, full), static_cast<double>(full)));
 }
 
-MipTexture decoded_texture(const Bytes& file) {
-  return mip_texture(decode_image(probe_image("texture", file, {})));
+std::vector<std::uint8_t> shown_texels(const BudgetSource& source, std::size_t image, std::uint32_t width_px,
+                                       std::uint32_t height_px) {
+  const Model& model = source.source;
+  for (std::size_t k = 0; k < model.images.size(); ++k)
+    if (model.images[k].name == image_name(source.image(image).image))
+      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px,
+                         height_px);
+  return std::vector<std::uint8_t>(coverage_size_bytes(width_px, height_px));
 }
 
 }  // namespace texmesh

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "format/base/portable_math.h"
 #include "format/container/layout.h"
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/glb/standalone_glb.h"
@@ -29,19 +30,21 @@ std::vector<std::uint8_t> MeshCandidate::file_with(
   return out.finish();
 }
 
-DracoSteps MeshCandidates::steps_of(int coding) const {
-  const Coding& c = kCodings[coding];
+DracoSteps MeshCandidates::steps_of(const MeshKey& key) const {
+  const Coding& c = kCodings[key.coding];
   int finer = 0;  // a picture twice as high shows one bit more
   for (double px = 512 * 1.5; px < source_.display_px && finer < 4; px *= 2) ++finer;
-  const auto places = [finer](int bits) { return static_cast<double>(1u << (bits + finer)); };
-  return {source_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour};
+  const auto places = [&](int bits) {
+    return portable::exp(portable::log(2) * (bits + finer + key.extra_bits));
+  };
+  return {source_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour, key.extra_bits != 0};
 }
 
-std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, int coding) const {
+std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, const MeshKey& key) const {
   auto file = std::make_unique<StandaloneGlb>(source_.package.scale_glb(scale), mesh_path(scale));
   const bool lit_anew = scale > 0 && !source_.light.places.empty();
-  if (file->has_draco() && (lit_anew || coding + 1 < kMeshCodings))
-    file->recode(steps_of(coding), lit_anew ? &source_.light : nullptr, source_.context);
+  if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
+    file->recode(steps_of(key), lit_anew ? &source_.light : nullptr, source_.context);
   return file;
 }
 
@@ -53,16 +56,17 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   c.scale = m.scales[key.scale].scale;
   c.triangles = m.scales[key.scale].triangles;
   c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
-  std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key.coding);
-  c.model = read_model(*file, mesh_path(c.scale), source_.context);
+  std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
+  Model model = read_model(*file, mesh_path(c.scale), source_.context);
+  c.mesh = source_.lit_mesh(model);
   if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
-    file->add_level(*recoded_scale(c.levels[l], key.coding), screen_coverage_of(m, c.levels[l]));
+    file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   if (!source_.request.recentre) file->move_to(m.origin);
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
-  c.views = std::make_unique<ModelViews>(shown(c.model), source_.cameras, source_.side_px, source_.context);
-  c.geometry = source_.difference(*c.views, source_.best_textures);
+  c.windows = std::make_unique<LitViews>(c.mesh, source_.windows, source_.context);
+  c.geometry = source_.window_meter->difference(*c.windows, source_.best_textures, source_.context);
   return c;
 }
 

@@ -45,21 +45,26 @@ std::string exact(float x) {
   return {text, end};
 }
 
+double places(int bits) { return static_cast<double>((1u << bits) - 1); }
+
 int bits_for(double range, double step) {
   int bits = 1;
-  while (bits < kMostBits && range / static_cast<double>((1u << bits) - 1) > step) ++bits;
+  while (bits < kMostBits && range / places(bits) > step) ++bits;
   return bits;
 }
 
-void use_grid(draco::ExpertEncoder& encoder, int id, const Extent& extent, int dimensions, double step) {
-  const float range = extent.range(dimensions);
+void use_grid(draco::ExpertEncoder& encoder, int id, const Extent& extent, int dimensions, double step,
+              bool exact_step) {
+  const double range = static_cast<double>(extent.range(dimensions));
+  const int bits = bits_for(range, step);
+  const double whole = exact_step ? std::max(range, step * places(bits)) : range;
   std::string origin;
   for (int k = 0; k < dimensions; ++k)
     origin += exact(std::isfinite(extent.low[k]) ? extent.low[k] : 0) + " ";
   draco::Options options;
-  options.SetInt("quantization_bits", bits_for(range, step));
+  options.SetInt("quantization_bits", bits);
   options.SetString("quantization_origin", origin);
-  options.SetString("quantization_range", exact(range));
+  options.SetString("quantization_range", exact(static_cast<float>(whole)));
   encoder.options().SetAttributeOptions(id, options);
 }
 
@@ -104,8 +109,8 @@ void set_up(draco::ExpertEncoder& encoder, const Work& work, const Extent& posit
   encoder.SetSpeedOptions(0, 0);
   for (const auto& [name, id] : work.ids) {
     if (work.mesh->attribute(id)->data_type() != draco::DT_FLOAT32) continue;
-    if (name == "POSITION") use_grid(encoder, id, positions, 3, steps.position);
-    if (name.starts_with("TEXCOORD_")) use_grid(encoder, id, uvs, 2, steps.uv);
+    if (name == "POSITION") use_grid(encoder, id, positions, 3, steps.position, steps.exact);
+    if (name.starts_with("TEXCOORD_")) use_grid(encoder, id, uvs, 2, steps.uv, steps.exact);
     if (name == "NORMAL") encoder.SetAttributeQuantization(id, steps.normal_bits);
     if (name == "TANGENT") {
       draco::Options options;

@@ -9,8 +9,8 @@
 
 namespace texmesh {
 
-/// What kind of image a standalone file gets. kAuto: for a number of bytes what looks best for colours and
-/// WebP for data, otherwise JPEG; images with alpha become PNG where JPEG would be taken.
+/// What kind of image a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
+/// images with alpha become PNG where JPEG would be taken.
 enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
 
 /// A standalone file's wishes: a number of bytes, or a scale and a rung, or what suits a displayed height.
@@ -39,8 +39,8 @@ struct Extracted {
   std::vector<int> levels;                      // with lods: all, finest first
   std::uint64_t triangles = 0, mesh_bytes = 0;  // mesh_bytes: everything but images
   std::vector<ExtractedImage> images;
-  /// With `bytes`: FLIP of the file against the package's best, 0 = equal, measured from `views` directions
-  /// at `side_px`; -1 without.
+  /// With `bytes`: FLIP of the file's lit pictures against those of the package's best, 0 = equal, measured
+  /// from `views` directions at `side_px`; -1 without.
   double difference = -1;
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
   int views = 0;

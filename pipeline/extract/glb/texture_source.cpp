@@ -93,24 +93,11 @@ const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colou
   return levels;
 }
 
-/// Colours come from the full-size plane: its best rung is better than any mip's. For data a mip that is
-/// large enough will do and saves most of the reading.
-std::uint32_t TextureSource::plane_for(std::size_t index, std::uint32_t base, std::uint32_t width_px) const {
-  if (images_[index].colours) return base;
-  const std::vector<TextureInfo>& textures = package_.textures();
-  std::uint32_t best = base;
-  for (std::uint32_t p = 0; p < textures.size(); ++p)
-    if (textures[p].mip > 0 && textures[p].base == base && textures[p].width_px >= width_px &&
-        textures[p].width_px < textures[best].width_px)
-      best = p;
-  return best;
-}
-
 Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px,
                                    std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
                                    float sharpening) {
   const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
-  const std::vector<Pixels>& from = levels(plane_for(index, base, width_px), images_[index].colours, kind);
+  const std::vector<Pixels>& from = levels(base, images_[index].colours, kind);
   std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
   while (level + 1 < from.size() && from[level + 1].width_px >= 2 * width_px &&
          from[level + 1].height_px >= 2 * height_px)

@@ -45,7 +45,6 @@ class TextureSource {
 
  private:
   const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
-  std::uint32_t plane_for(std::size_t index, std::uint32_t base, std::uint32_t width_px) const;
   Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
                       const std::vector<std::uint8_t>& coverage, float sharpening);
   PackageReader& package_;

@@ -1,0 +1,66 @@
+#include "pipeline/extract/budget/image_coder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/portable_math.h"
+#include "stages/image/decode_image.h"
+
+namespace texmesh {
+
+double size_step(int step) {
+  double share = 1;
+  for (; step >= 2; step -= 2) share /= 2;
+  return step == 1 ? share / std::sqrt(2.0) : share;
+}
+
+ImageCoder::ImageCoder(BudgetSource& source) : source_(source) {}
+
+std::vector<TextureCoding> ImageCoder::codings(std::size_t image) const {
+  const ExtractImages wanted = source_.request.images;
+  const bool alpha = source_.image(image).alpha_plane.has_value();  // which no JPEG holds
+  if (wanted == ExtractImages::kPng || (alpha && wanted == ExtractImages::kJpeg)) return {{FileImage::kPng}};
+  if (wanted == ExtractImages::kWebp || alpha) return {{FileImage::kWebp}};
+  std::vector<TextureCoding> out{{FileImage::kJpeg, true}};
+  if (source_.image(image).colours) out.push_back({FileImage::kJpeg, false});
+  if (wanted == ExtractImages::kAuto) out.push_back({FileImage::kWebp});
+  return out;
+}
+
+/// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes
+/// allow: measured on lossless textures the best is .12 at half a texel per pixel, more with fewer.
+float ImageCoder::sharpening(std::size_t image, double share) const {
+  const double texels = std::max(source_.texels_per_pixel[image] * share * share, 1e-6);
+  return static_cast<float>(std::clamp(0.06 - 0.05 * portable::log(texels) / portable::log(2), 0.0, 0.16));
+}
+
+Pixels ImageCoder::texels_of_share(std::size_t image, double share) {
+  const PackageImage& from = source_.image(image);
+  const double most = std::min(share, source_.textures.largest_share(image));
+  const std::uint32_t width = side_of(from.width_px, most), height = side_of(from.height_px, most);
+  std::vector<std::uint8_t> coverage;
+  if (source_.request.images != ExtractImages::kPng) coverage = shown_texels(source_, image, width, height);
+  return source_.textures.texels(image, width, height, coverage, sharpening(image, share));
+}
+
+const Pixels& ImageCoder::texels(std::size_t image, int step) {
+  const auto [it, fresh] = by_step_.try_emplace({image, step});
+  if (fresh) it->second = texels_of_share(image, size_step(step));
+  return it->second;
+}
+
+FileImageData ImageCoder::encoded(std::size_t image, const Pixels& pixels, const TextureCoding& coding,
+                                  double quality, bool quick) const {
+  return {coding.format, encode_image(pixels, {coding.format, quality, !source_.image(image).colours, quick,
+                                               coding.full_chroma})};
+}
+
+void ImageCoder::show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
+                      const RunContext& context) const {
+  for (std::size_t t = 0; t < source_.shown.size(); ++t)
+    if (source_.shown[t].image == image)
+      textures[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})),
+                                   source_.shown[t].srgb, 0, context);
+}
+
+}  // namespace texmesh

@@ -1,0 +1,55 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "pipeline/extract/budget/budget_source.h"
+
+namespace texmesh {
+
+/// A way to code an image. JPEGs with full chroma nearly always look best; in very few bytes WebP may look
+/// better. WebP's 8-bit YCbCr of limited range and halved chroma never comes nearer than FLIP 0.01 to 0.02 on
+/// a photograph.
+struct TextureCoding {
+  FileImage format = FileImage::kWebp;
+  bool full_chroma = false;
+  friend bool operator==(const TextureCoding&, const TextureCoding&) = default;
+};
+
+/// What becomes of an image.
+struct ImagePlan {
+  TextureCoding coding;
+  double share = 1;  // of the image's sides
+  double quality = 0;
+};
+
+double size_step(int step);  // share of an image's sides, each 1 / sqrt 2 of the one before
+inline constexpr int kSizeSteps = 30;
+
+/// Texels of a package's images at any size, and files of them.
+class ImageCoder {
+ public:
+  explicit ImageCoder(BudgetSource& source);
+
+  /// The codings that compete for an image, the usual one first.
+  std::vector<TextureCoding> codings(std::size_t image) const;
+  /// An image at a share of its sides. Texels that S_0 does not show continue the texels that S_0 shows. Such
+  /// texels are cheap to code, and right for coarser meshes that overlap a seam a little. Images of a size
+  /// step stay in memory.
+  const Pixels& texels(std::size_t image, int step);
+  Pixels texels_of_share(std::size_t image, double share);
+  /// `quick`: for comparisons (see ImageCoding).
+  FileImageData encoded(std::size_t image, const Pixels& pixels, const TextureCoding& coding, double quality,
+                        bool quick) const;
+  /// Puts what a file shows into textures that BudgetSource::shown counts.
+  void show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
+            const RunContext& context) const;
+
+ private:
+  float sharpening(std::size_t image, double share) const;
+  BudgetSource& source_;
+  std::map<std::pair<std::size_t, int>, Pixels> by_step_;
+};
+
+}  // namespace texmesh
