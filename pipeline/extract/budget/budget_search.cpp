@@ -7,6 +7,7 @@
 #include "pipeline/extract/budget/budget_file.h"
 #include "pipeline/extract/budget/budget_source.h"
 #include "pipeline/extract/budget/mesh_candidates.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {
@@ -140,6 +141,8 @@ class BudgetSearch {
   /// finer scale.
   MeshKey fill_by_mesh(const MeshKey& from, BudgetFile& best) {
     MeshKey chosen = from;
+    const bool stored = from.scale == 0 && from.coding + 1 == kMeshCodings;  // there is no finer one
+    if (stored || !meshes_.at(from).file->has_draco()) return from;
     const auto measure = [&](const MeshKey& key) {
       BudgetFile file = best;
       file.glb = meshes_.at(key).file_with(best.images);
@@ -150,14 +153,14 @@ class BudgetSearch {
       return fits;
     };
     for (MeshKey key = from;; --key.scale) {
-      double low = key.scale == from.scale ? 0 : kFewestExtraBits, high = kMostExtraBits;
-      for (int i = 0; i < kMeshTries && !filler_.fills(best); ++i) {
-        key.extra_bits = (low + high) / 2;
-        (measure(key) ? low : high) = key.extra_bits;
+      for (key.coding = from.coding; key.coding < kMeshCodings; ++key.coding) {
+        const bool same = key.scale == from.scale && key.coding == from.coding;
+        double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
+        for (int i = 0; i < kMeshTries && !filler_.fills(best); ++i) {
+          key.extra_bits = (low + high) / 2;
+          (measure(key) ? low : high) = key.extra_bits;
+        }
       }
-      key.extra_bits = 0;
-      for (key.coding = from.coding + 1; key.coding < kMeshCodings && !filler_.fills(best); ++key.coding)
-        measure(key);
       key.coding = from.coding;
       if (key.scale == 0 || filler_.fills(best) || source_.request.scale) return chosen;
     }

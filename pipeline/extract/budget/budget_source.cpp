@@ -18,7 +18,7 @@ constexpr double kTexelsPerByte = 40;  // more texels than that are never worth 
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;
 constexpr int kWindowsPerView = 1;
-constexpr std::uint32_t kWindowPx = 96;
+constexpr std::uint32_t kWindowPx = 80;
 constexpr double kFinestShown = 12;  // texels per pixel: pictures hardly read finer ones
 
 double longest_side(const Mesh& mesh) {

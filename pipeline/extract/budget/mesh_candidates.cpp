@@ -13,11 +13,10 @@ namespace {
 /// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
 /// normals and vertex colours; for pictures 512 px high.
 struct Coding {
-  double position, uv;
-  int normal, colour;
+  int position, uv, normal, colour;
 };
 constexpr Coding kCodings[kMeshCodings] = {
-    {11, 10, 7, 5}, {12, 11, 7, 6}, {13, 12, 8, 7}, {14, 13, 8, 8}, {15, 14, 9, 8}};
+    {10, 10, 7, 5}, {11, 11, 7, 6}, {12, 12, 8, 7}, {13, 13, 8, 8}, {14, 14, 9, 8}};
 
 }  // namespace
 
@@ -35,11 +34,10 @@ DracoSteps MeshCandidates::steps_of(const MeshKey& key) const {
   const Coding& c = kCodings[key.coding];
   int finer = 0;  // a picture twice as high shows one bit more
   for (double px = 512 * 1.5; px < source_.display_px && finer < 4; px *= 2) ++finer;
-  const auto places = [&](double bits) {
+  const auto places = [&](int bits) {
     return portable::exp(portable::log(2) * (bits + finer + key.extra_bits));
   };
-  // The places of a grid: that of the stored positions among them.
-  return {source_.extent / (places(c.position) - 1), 1 / places(c.uv), c.normal, c.colour};
+  return {source_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour, key.extra_bits != 0};
 }
 
 std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, const MeshKey& key) const {

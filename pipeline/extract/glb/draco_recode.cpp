@@ -16,7 +16,6 @@ namespace texmesh {
 namespace {
 
 constexpr int kTangentBits = 8, kMostBits = 24;
-constexpr double kRounding = 1e-5;  // of ranges as floats
 
 /// Smallest and largest component values over all primitives.
 struct Extent {
@@ -50,14 +49,15 @@ double places(int bits) { return static_cast<double>((1u << bits) - 1); }
 
 int bits_for(double range, double step) {
   int bits = 1;
-  while (bits < kMostBits && range / places(bits) > step * (1 + kRounding)) ++bits;
+  while (bits < kMostBits && range / places(bits) > step) ++bits;
   return bits;
 }
 
-void use_grid(draco::ExpertEncoder& encoder, int id, const Extent& extent, int dimensions, double step) {
+void use_grid(draco::ExpertEncoder& encoder, int id, const Extent& extent, int dimensions, double step,
+              bool exact_step) {
   const double range = static_cast<double>(extent.range(dimensions));
   const int bits = bits_for(range, step);
-  const double whole = std::max(range, step * places(bits));  // the step asked for, not a finer one
+  const double whole = exact_step ? std::max(range, step * places(bits)) : range;
   std::string origin;
   for (int k = 0; k < dimensions; ++k)
     origin += exact(std::isfinite(extent.low[k]) ? extent.low[k] : 0) + " ";
@@ -109,8 +109,8 @@ void set_up_draco(draco::ExpertEncoder& encoder, const Work& work, const Extent&
   encoder.SetSpeedOptions(0, 0);
   for (const auto& [name, id] : work.ids) {
     if (work.mesh->attribute(id)->data_type() != draco::DT_FLOAT32) continue;
-    if (name == "POSITION") use_grid(encoder, id, positions, 3, steps.position);
-    if (name.starts_with("TEXCOORD_")) use_grid(encoder, id, uvs, 2, steps.uv);
+    if (name == "POSITION") use_grid(encoder, id, positions, 3, steps.position, steps.exact);
+    if (name.starts_with("TEXCOORD_")) use_grid(encoder, id, uvs, 2, steps.uv, steps.exact);
     if (name == "NORMAL") encoder.SetAttributeQuantization(id, steps.normal_bits);
     if (name == "TANGENT") {
       draco::Options options;

@@ -16,6 +16,9 @@ struct DracoSteps {
   double uv = 0;        // texture coordinates, > 0
   int normal_bits = 8;
   int colour_bits = 8;  // of the 8 that vertex colours have
+  /// Steps exactly so long. Otherwise a grid's last place is the end of what it holds, and its steps may be
+  /// half as long.
+  bool exact = false;
 };
 
 /// One primitive of a file: its Draco stream, and the stream's id of every glTF attribute.

@@ -9,7 +9,8 @@
 
 namespace texmesh {
 
-/// What kind of image a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG; images with alpha become PNG where JPEG would be taken.
+/// What kind of image a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
+/// images with alpha become PNG where JPEG would be taken.
 enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
 
 /// A standalone file's wishes: a number of bytes, or a scale and a rung, or what suits a displayed height.

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 using testing::GltfBuilder;
 
-constexpr int kCells = 12, kTexels = 64;
+constexpr int kCells = 20, kTexels = 64;
 
 /// What a model is made of.
 struct Kind {
