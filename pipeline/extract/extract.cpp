@@ -5,7 +5,7 @@
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"

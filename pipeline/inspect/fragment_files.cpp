@@ -9,7 +9,7 @@
 #include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

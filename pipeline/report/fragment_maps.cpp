@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 #include "pipeline/report/flip_colours.h"
 #include "pipeline/report/html.h"
 

@@ -1,6 +1,6 @@
 #include "stages/ladder/size_knots.h"
 
-#include "format/documents/size_curve.h"
+#include "format/rules/size_curve.h"
 #include "stages/jpeg/jpeg_bits.h"
 
 namespace texmesh {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "format/base/sha256.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"
 #include "stages/lut/size_model.h"

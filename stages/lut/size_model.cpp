@@ -7,7 +7,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

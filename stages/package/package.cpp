@@ -7,7 +7,7 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
 #include "stages/image/decode_image.h"
 

@@ -4,8 +4,8 @@
 #include <bit>
 #include <cstdlib>
 
-#include "format/documents/mip_choice.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/mip_choice.h"
+#include "format/rules/rate_distortion.h"
 
 namespace texmesh::quality {
 namespace {

@@ -29,7 +29,7 @@ struct Display {
   double displayed_px = 0;
 };
 
-/// The mip of a full-size plane that a client shows (format/documents/mip_choice.h), at most the last one
+/// The mip of a full-size plane that a client shows (format/rules/mip_choice.h), at most the last one
 /// with whole texels along both axes.
 std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
 

@@ -62,7 +62,7 @@ struct QualityOptions {
 ///   to 3 levels coarser; at the half the first and the last rung, the previews, and one coarser level; at
 ///   the largest the first and the last rung. The others follow along the curve of the size below, by the
 ///   ratio to it where both were rendered. Planes are those that a client shows at the size
-///   (format/documents/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of
+///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of
 ///   the group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded()
 ///   is what was measured for whole planes.
 /// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size, 2 at

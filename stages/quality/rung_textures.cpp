@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "format/documents/mip_choice.h"
+#include "format/rules/mip_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/documents/picture_prediction.h"
+#include "format/rules/picture_prediction.h"
 
 namespace texmesh::quality {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "format/base/box.h"
 #include "format/base/srgb.h"
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"

@@ -13,7 +13,7 @@
 #include <iostream>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/documents/size_curve.h"
+#include "format/rules/size_curve.h"
 #include "stages/fill/fill.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"

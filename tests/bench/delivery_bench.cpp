@@ -9,7 +9,7 @@
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "delivery/cpp/simulate/simulation.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/rate_distortion.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

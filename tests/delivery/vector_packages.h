@@ -10,7 +10,7 @@
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
 #include "format/documents/quality_table.h"
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "delivery/cpp/decide/harmonic_time.h"
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 

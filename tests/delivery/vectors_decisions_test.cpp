@@ -8,7 +8,7 @@
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

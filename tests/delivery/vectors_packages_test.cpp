@@ -5,9 +5,9 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/container/layout.h"
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
-#include "format/documents/size_curve.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
+#include "format/rules/size_curve.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 
 namespace texmesh::testing {
 

@@ -12,10 +12,10 @@
 #include <valijson/schema_parser.hpp>
 #include <valijson/validator.hpp>
 
-#include "format/documents/allocation.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
+#include "format/rules/allocation.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"

@@ -6,7 +6,7 @@
 #include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 

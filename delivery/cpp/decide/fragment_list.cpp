@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "format/documents/allocation.h"
-#include "format/documents/size_curve.h"
+#include "format/rules/allocation.h"
+#include "format/rules/size_curve.h"
 
 namespace texmesh {
 namespace {

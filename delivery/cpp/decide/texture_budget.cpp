@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "format/base/portable_math.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
-#include "format/documents/mip_choice.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/mip_choice.h"
+#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/documents/picture_prediction.h"
+#include "format/rules/picture_prediction.h"
 
 namespace texmesh {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "format/container/layout.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 #include "pipeline/import/import.h"
 #include "pipeline/inspect/debug/debug_view.h"
 #include "stages/image/decode_image.h"

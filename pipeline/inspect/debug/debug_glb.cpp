@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 #include "pipeline/inspect/debug/debug_view.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 #include "pipeline/inspect/dump/dump_cells.h"
 #include "pipeline/inspect/dump/option_changes.h"
 #include "pipeline/inspect/dump/package_figures.h"

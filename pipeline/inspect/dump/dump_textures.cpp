@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
 #include "pipeline/inspect/dump/dump_cells.h"
 #include "pipeline/inspect/dump/package_figures.h"
 #include "pipeline/io/text_table.h"

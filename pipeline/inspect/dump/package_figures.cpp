@@ -4,8 +4,8 @@
 #include <array>
 
 #include "format/container/layout.h"
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 namespace {

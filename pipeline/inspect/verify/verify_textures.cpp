@@ -5,8 +5,8 @@
 
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
-#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/base/parallel.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/rate_distortion.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {

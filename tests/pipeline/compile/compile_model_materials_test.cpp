@@ -7,7 +7,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/container/container.h"
-#include "format/documents/picture_prediction.h"
+#include "format/rules/picture_prediction.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/documents/size_curve.h"
 #include "format/documents/tables.h"
+#include "format/rules/size_curve.h"
 #include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/ladder/ladder.h"

@@ -8,8 +8,8 @@
 
 #include "format/base/archive.h"
 #include "format/base/sha256.h"
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/distortion.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "format/documents/manifest.h"
-#include "format/documents/picture_prediction.h"
+#include "format/rules/picture_prediction.h"
 #include "stages/base/run_context.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"

@@ -3,7 +3,7 @@ import { clamp, positive, sumOf } from './numbers';
 import { exp, log } from './portable_math';
 import { allocateRd } from './rate_distortion';
 
-// From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3): format/documents/allocation.cpp, bit for bit.
+// From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3): format/rules/allocation.cpp, bit for bit.
 
 /** g(Q) = -ln(IJG's scale of the quantisers): grows with quality, by ln 2 where the quantisers halve. */
 export function logQuantiser(quality: number): number {

@@ -3,7 +3,7 @@ import { clamp } from './numbers';
 import { exp, log, pow } from './portable_math';
 
 // FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a quality table:
-// format/documents/picture_prediction.cpp, bit for bit.
+// format/rules/picture_prediction.cpp, bit for bit.
 
 const leastFlip = 1e-6; // what logarithms take for 0
 const leastDssim = 1e-9;

@@ -1,7 +1,7 @@
 import { PlaneTables, bytesToShow, fragmentCount, rungCount } from '../format/tables';
 import { positive, sumOf } from './numbers';
 
-// How a budget of bytes is best spent: format/documents/rate_distortion.cpp, bit for bit.
+// How a budget of bytes is best spent: format/rules/rate_distortion.cpp, bit for bit.
 
 /**
  * Weight of a fragment's quality: its surface fraction, with the area per texel capped at the 99th percentile of

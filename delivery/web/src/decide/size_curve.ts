@@ -2,7 +2,7 @@ import { PlaneTables, bytesToShow } from '../format/tables';
 import { clamp, sumOf } from './numbers';
 import { exp, log } from './portable_math';
 
-// The bytes of a fragment at a quality that no rung has: format/documents/size_curve.cpp, bit for bit.
+// The bytes of a fragment at a quality that no rung has: format/rules/size_curve.cpp, bit for bit.
 
 // ISO/IEC 10918-1, table K.1: what IJG's scale multiplies; the order does not matter here.
 const lumaQuantisers = [

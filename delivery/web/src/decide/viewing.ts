@@ -2,7 +2,7 @@ import { anyDisplayPx } from '../format/layout';
 import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
 import { cos, pi, sin } from './portable_math';
 
-// From how an object is looked at to the scale that is enough: format/documents/viewing.h. Lengths on screen are device px;
+// From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are device px;
 // "displayed height" is the length on screen of the object's largest extent.
 
 /** A perspective camera: vertical field of view, and the picture's height in device px. */

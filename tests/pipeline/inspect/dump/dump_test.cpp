@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/inspect/dump/dump.h"

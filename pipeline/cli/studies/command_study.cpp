@@ -1,6 +1,6 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
-#include "pipeline/cli/studies.h"
+#include "pipeline/cli/studies/studies.h"
 
 namespace texmesh {
 

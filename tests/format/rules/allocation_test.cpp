@@ -1,4 +1,4 @@
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 #include "format/documents/tables.h"
 

@@ -13,7 +13,7 @@
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/units.h"
-#include "pipeline/cli/studies.h"
+#include "pipeline/cli/studies/studies.h"
 #include "pipeline/extract/plan_pictures.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"

@@ -8,7 +8,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
-#include "pipeline/cli/studies.h"
+#include "pipeline/cli/studies/studies.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/graph/make_stage.h"

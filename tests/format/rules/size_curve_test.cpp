@@ -1,4 +1,4 @@
-#include "format/documents/size_curve.h"
+#include "format/rules/size_curve.h"
 
 #include <gtest/gtest.h>
 

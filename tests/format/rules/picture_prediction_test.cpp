@@ -1,4 +1,4 @@
-#include "format/documents/picture_prediction.h"
+#include "format/rules/picture_prediction.h"
 
 #include <gtest/gtest.h>
 

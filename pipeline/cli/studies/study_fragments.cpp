@@ -7,7 +7,7 @@
 
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
-#include "pipeline/cli/studies.h"
+#include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"

@@ -1,12 +1,12 @@
-#include "format/documents/allocation.h"
+#include "format/rules/allocation.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"
-#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
+#include "format/rules/rate_distortion.h"
 
 // Thesis 3.2-3.3: from feature counts to the quality that a fragment is asked to have.
 

@@ -1,4 +1,4 @@
-#include "format/documents/viewing.h"
+#include "format/rules/viewing.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "format/documents/rate_distortion.h"
+#include "format/rules/rate_distortion.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "format/base/half.h"
-#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
 
 // Which rung of which fragment a budget is best spent on (facts: surface-weighted 1 - SSIM; convex hulls and
 // one price for all, Everett 1963, Shoham and Gersho 1988).

@@ -1,12 +1,12 @@
-#include "format/documents/size_curve.h"
+#include "format/rules/size_curve.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "format/base/portable_math.h"
-#include "format/documents/allocation.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

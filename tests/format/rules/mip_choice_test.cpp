@@ -1,4 +1,4 @@
-#include "format/documents/mip_choice.h"
+#include "format/rules/mip_choice.h"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "format/documents/allocation.h"
-#include "format/documents/rate_distortion.h"
 #include "format/documents/tables.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
 #include "tests/format/documents/tables_fixture.h"
 
 namespace texmesh {
