@@ -73,7 +73,7 @@ inline std::vector<std::uint8_t> vector_package(const std::string& golden, float
     const bool coarsest = i + 1 == scales["scale"].size();
     scales["displayPxFlip"].push_back(i == 0                         ? kAnyDisplayPx
                                       : coarsest && !coarsest_passes ? 0.0
-                                                                     : 0.75 * error);
+                                                                     : std::clamp(0.75 * error, 32.0, 1024.0));
   }
   const std::string text = json.dump();
   Manifest manifest =
