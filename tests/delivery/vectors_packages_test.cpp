@@ -1,4 +1,3 @@
-#include "tests/delivery/vector_packages.h"
 #include "tests/delivery/vectors.h"
 
 #include <cmath>
@@ -250,26 +249,11 @@ Json split_stream(PackageReader& package) {
   return out;
 }
 
-/// Writes the packages with TEXMESH_WRITE_VECTORS, or says whether they are as they would be written.
-void expect_package(const std::string& path, const std::vector<std::uint8_t>& bytes) {
-  if (std::getenv("TEXMESH_WRITE_VECTORS")) {
-    std::ofstream(path, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    return;
-  }
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream there;
-  there << in.rdbuf();
-  EXPECT_TRUE(there.str() == std::string(bytes.begin(), bytes.end())) << path;
-}
-
 Json packages() {
   Json cases = Json::array();
   for (const bool second : {false, true}) {
     const char* name = second ? "v1.1-scan" : "v1.0-scan";
-    const std::string path = std::string("delivery/vectors/") + name + ".texmesh";
-    expect_package(kRoot + "/" + path, vector_package(kRoot + "/tests/golden/" + name + ".texmesh",
-                                                      second ? 1.5f : 1.0f, second));
+    const std::string path = std::string("tests/golden/") + name + ".texmesh";
     PackageReader package(open_store(kRoot + "/" + path));
     Json planes = Json::array();
     for (std::uint32_t p = 0; p < package.tables().planes.size(); ++p)

@@ -70,7 +70,7 @@ std::string steps_text(const Manifest& m) {
   return fmt::format(
              "step function: displayed height in px up to which a scale is shown, and the distance in object "
              "heights from\nwhich on that is (field of view {:.0f} degrees, {:.0f} px high); the package's "
-             "own (finer of JND and 1 px error), then\nby single rules\n",
+             "own (by lit pictures), then\nby single rules\n",
              Camera{}.fov_degrees, Camera{}.viewport_px) +
          table.text();
 }

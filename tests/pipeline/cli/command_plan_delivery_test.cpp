@@ -15,7 +15,7 @@ namespace texmesh::testing {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/delivery/vectors/v1.0-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.0-scan.texmesh";
 
 CommandResult texmesh(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
@@ -174,7 +174,7 @@ TEST(CliPlan, SaysTheRungOfEveryFragment) {
 }
 
 TEST(CliPlan, ABudgetIsKeptAndMoreBytesLookBetter) {
-  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/delivery/vectors/v1.1-scan.texmesh";
+  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
   double before = 1;
   for (const int kb : {30, 50, 60, 100, 200}) {
     const bool fits = kb > 30;  // the least there is takes 39 kB

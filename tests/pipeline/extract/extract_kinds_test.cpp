@@ -150,8 +150,8 @@ TEST_P(ExtractKinds, AnyNumberOfBytesIsReachedAndDifferencesAreSeen) {
   EXPECT_EQ(extract(bytes, 1).glb, extract(bytes, 8).glb);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, ExtractKinds, ::testing::ValuesIn(kKinds), [](const auto& info) {
-  std::string name = info.param.name;
+INSTANTIATE_TEST_SUITE_P(Kinds, ExtractKinds, ::testing::ValuesIn(kKinds), [](const auto& kind) {
+  std::string name = kind.param.name;
   std::replace(name.begin(), name.end(), ' ', '_');
   return name;
 });

@@ -11,8 +11,8 @@ export function readBytes(path: string): Uint8Array {
 export function readText(path: string): string {
   return readFileSync(join(root, path), 'utf8');
 }
-/** A golden package with what it lacks (delivery/vectors). */
-export const golden = (name: string): Uint8Array => readBytes(`delivery/vectors/${name}.texmesh`);
+/** A golden package (tests/golden). */
+export const golden = (name: string): Uint8Array => readBytes(`tests/golden/${name}.texmesh`);
 export const goldenNames = ['v1.0-scan', 'v1.1-scan'] as const;
 
 /** Doubles with the same bits, NaN and signed zeros told apart. */
