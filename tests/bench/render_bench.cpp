@@ -151,7 +151,7 @@ struct Settings {
   std::string folder;
 };
 
-void measure(const BenchScene& scene, const Settings& settings) {
+void measure_scene(const BenchScene& scene, const Settings& settings) {
   RenderEnvironment environment;
   const double environment_ms = least_ms([&] { environment = studio_environment(settings.context); });
   std::vector<RenderTexture> textures(scene.images.size());
@@ -206,7 +206,7 @@ int main(int argc, char** argv) {
   fmt::print("{:20} {:>9} {:>3} {:>8} {:>9} {:>6} {:>6} {:>6} {:>6}\n", "model", "triangles", "view",
              "pixels", "fragments", "light", "mips", "look", "shade");
   for (const std::string& model : models)
-    measure(model == "made"    ? made_scene()
+    measure_scene(model == "made"    ? made_scene()
             : model == "balls" ? ball_scene()
                                : read_scene(model, settings.context),
             settings);
