@@ -207,7 +207,7 @@ int main(int argc, char** argv) {
              "pixels", "fragments", "light", "mips", "look", "shade");
   for (const std::string& model : models)
     measure_scene(model == "made"    ? made_scene()
-            : model == "balls" ? ball_scene()
-                               : read_scene(model, settings.context),
-            settings);
+                  : model == "balls" ? ball_scene()
+                                     : read_scene(model, settings.context),
+                  settings);
 }

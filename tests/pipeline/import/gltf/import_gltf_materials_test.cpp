@@ -223,7 +223,7 @@ TEST(ImportGltfMaterials, SpecularGlossinessBecomesMetallicRoughness) {
   EXPECT_EQ(with_texture.images.size(), 2u);  // the source's own are not needed any more
   EXPECT_EQ(with_texture.notes.size(), 1u);
 
-  e["specularGlossinessTexture"] = {{"index", 1}, {"texCoord", 1}};
+  e["specularGlossinessTexture"] = {{"index", 0}, {"texCoord", 1}};
   const Model elsewhere = read();
   EXPECT_TRUE(has_note(elsewhere, "specular-glossiness-mean", Severity::kWarning));
   EXPECT_TRUE(elsewhere.materials.at(0).base_colour_texture.used());
