@@ -31,7 +31,7 @@ test('a scale changes when the display has changed by more than a tenth', async 
   const steps = await lab(page, async (u) => { const p = await window.lab.open(u); p.dispose(); return p.manifest.steps; }, `${b.url}/packages/large.texmesh`);
   const at = steps[Math.floor((steps.length - 1) / 2)];
   const id = await lab(page, ([u, o]) => window.lab.load(u, o),
-    [`${b.url}/packages/large.texmesh`, {px: 0.98 * at.upToPx, load: {time: 2, rule: 'default', rung: 0, meshes: 'glb'}}]);
+    [`${b.url}/packages/large.texmesh`, {px: 0.98 * at.upToPx, load: {time: 2, rule: 'flip', rung: 0, meshes: 'glb'}}]);
   await lab(page, (i) => window.lab.finished(i), id);
   await phaseIs(page, id);
   const wanted = async (factor) => lab(page, ([i, px]) => {
