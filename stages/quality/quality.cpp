@@ -96,15 +96,16 @@ bool passes(const Losses& losses, const QualityOptions& options, double share) {
   });
 }
 
-/// Up to here all views count.
+/// Below a quarter of the largest height all views count.
 bool is_small(double displayed_px, const QualityOptions& options) {
-  return displayed_px < options.largest_px / 4.0 * 1.001;
+  return displayed_px < options.largest_px / 4.0 * 0.999;
 }
 
 /// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
 double threshold_share(double displayed_px, const QualityOptions& options) {
-  constexpr double kFewViews = 0.8;
-  return is_small(displayed_px, options) || options.large_views >= options.views ? 1 : kFewViews;
+  const int views =
+      is_small(displayed_px, options) ? options.views : std::min(options.views, options.large_views);
+  return views >= 12 ? 1 : views >= 6 ? 0.9 : 0.8;
 }
 
 /// The switch sizes, found from small heights to large ones.

@@ -92,10 +92,10 @@ bool repeats(const Knot& knot, const Knot& before) {
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, the ends, or the ends of the rungs.
+/// The knots that are rendered: all, the ends of the rungs, or the lowest rung.
 bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
-  const std::size_t previews = knots - 1, lowest = previews - 1;
-  return rank == 0 || knot == 0 || knot == lowest || (rank == 1 && knot == previews);
+  const std::size_t lowest = knots - 2;  // before the previews
+  return rank == 0 || knot == lowest || (rank == 1 && knot == 0);
 }
 
 std::size_t coarser_samples(std::size_t rank) { return rank == 0 ? kCoarserLevels : rank == 1 ? 1 : 0; }
@@ -110,8 +110,8 @@ std::vector<TogetherSample> together_samples(std::size_t scales, std::size_t ran
   if (scales < 2) return {};
   const std::size_t near = 1 + (scales - 1) / 3, far = std::min(scales - 1, 1 + 2 * (scales - 1) / 3);
   if (rank == 0) return {{near, true}, {near, false}, {far, true}, {far, false}};
-  if (rank == 1) return {{near, true}, {far, true}};
-  return {{near, true}};
+  if (rank == 1) return {{near, true}};
+  return {};
 }
 
 Replaced both(Replaced a, const Replaced& b) {
@@ -139,7 +139,7 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
   return (1 - part) * *values[below] + part * *values[above];
 }
 
-ViewPart texture_views(std::size_t rank) { return rank < 2 ? ViewPart::kLarge : ViewPart::kLargest; }
+ViewPart texture_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
 
 void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
                const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded,
