@@ -8,7 +8,7 @@ import { WorkerPool } from '../../src/worker/pool';
 import { fakeServer, Fault } from '../support/fake_server';
 import { golden } from '../support/files';
 
-const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
 const { manifest } = reader;
 
 describe('scales out of the vertex-split stream', () => {
@@ -23,7 +23,7 @@ describe('scales out of the vertex-split stream', () => {
     },
   };
   async function shapes() {
-    const fromMemory = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+    const fromMemory = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
     const { signal } = new AbortController();
     const splits = await openSplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
     return { splits, signal };
@@ -50,7 +50,7 @@ describe('scales out of the vertex-split stream', () => {
       let damaged = 0;
       const fault: Fault = ({ url, range }) =>
         url.startsWith('http://host') && range?.[0] === stream!.offset && (mirrors.length > 0 || damaged === 0) && ++damaged > 0 && 'flip-last';
-      const server = fakeServer({ '/a.texmesh': golden('v1.1-scan') }, { fault });
+      const server = fakeServer({ '/a.texmesh': golden('v2.0-scan') }, { fault });
       const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
       const { signal } = new AbortController();
       const splits = await openSplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, signal);
