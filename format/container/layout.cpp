@@ -44,12 +44,15 @@ EntryName parse_texture_path(std::string_view text) {
 }
 
 EntryName parse_any_spelling(std::string_view path) {
-  constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},       {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},           {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},         {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream}, {kPosterPath, EntryKind::kPoster},
-      {kThesisPath, EntryKind::kThesis}};
+  constexpr std::pair<const char*, EntryKind> kSingle[] = {{kManifestPath, EntryKind::kManifest},
+                                                           {kIndexPath, EntryKind::kIndex},
+                                                           {kTablesPath, EntryKind::kTables},
+                                                           {kTexturesPath, EntryKind::kTextures},
+                                                           {kQualityPath, EntryKind::kQuality},
+                                                           {kProvenancePath, EntryKind::kProvenance},
+                                                           {kSplitStreamPath, EntryKind::kSplitStream},
+                                                           {kPosterPath, EntryKind::kPoster},
+                                                           {kThesisPath, EntryKind::kThesis}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;

@@ -198,9 +198,9 @@ void read_shape(const JsonAt& at, Manifest& m) {
 
 void read_scales(const JsonAt& at, Manifest& m) {
   const std::size_t n = at["scale"].array(1, kMaxScales);
-  for (const char* column : {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
-                             "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge",
-                             "displayPxFlip", "floor"})
+  for (const char* column :
+       {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95", "p99",
+        "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
     at[column].array(n, n);
   for (std::size_t i = 0; i < n; ++i) {
     ManifestScale s;

@@ -62,7 +62,7 @@ struct Manifest {
   Vec3d origin;                                // local frame -> source coordinates
   Vec3d bounds_min, bounds_max;                // local frame, object units
   double object_height = 0;                    // O_V
-  double surface_area = 0;  // of S_0, object units squared, six digits
+  double surface_area = 0;                     // of S_0, object units squared, six digits
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // by the default rule, see viewing.h

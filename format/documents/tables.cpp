@@ -89,8 +89,8 @@ void check_parameters(const PlaneTables& t, const std::string& place) {
   require_range({t.quality_min}, 1, t.quality_max, place + "/quality_min");
 }
 
-/// Each stored fragment stands in the order once and has bytes at every rung; others have none, and no covered
-/// texels.
+/// Each stored fragment stands in the order once and has bytes at every rung; others have none, and no
+/// covered texels.
 void check_fragment_order(const PlaneTables& t, const std::string& place) {
   const std::size_t fragments = t.fragment_count();
   std::vector<bool> listed(fragments, false);

@@ -9,8 +9,8 @@
 namespace texmesh {
 
 /// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising
-/// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N feature scales: in a package those
-/// that its manifest has, in its order; from stage `lut` all of the chain, by scale number.
+/// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N feature scales: in a package
+/// those that its manifest has, in its order; from stage `lut` all of the chain, by scale number.
 struct PlaneTables {
   std::uint32_t columns = 0, rows = 0;
   bool incremental = false;  // a rung's streams continue those of the rungs below (CodecTraits::incremental)
@@ -29,8 +29,8 @@ struct PlaneTables {
   std::vector<std::uint32_t> covered_texels;
   std::vector<float> surface_fraction;  // of the object's surface
   // Where sizes between two rungs are (empty: not measured): whole qualities that lie between rungs, strictly
-  // rising, and the part of the way from the rung below to the one above that the bytes have gone there, 0..1,
-  // not falling between two rungs, stored as multiples of 1 / 65535
+  // rising, and the part of the way from the rung below to the one above that the bytes have gone there,
+  // 0..1, not falling between two rungs, stored as multiples of 1 / 65535
   std::vector<std::uint8_t> knot_quality;
   std::vector<float> knot_position;
   // [N * F], index row * F + fragment:
@@ -47,8 +47,8 @@ struct PlaneTables {
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.columns, s.rows, s.incremental, s.rung_quality, s.table_bytes, s.order, s.size_bytes, s.digest, s.mse,
-      s.dssim, s.skip_dssim, s.covered_texels, s.surface_fraction, s.knot_quality, s.knot_position, s.features,
-      s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max);
+      s.dssim, s.skip_dssim, s.covered_texels, s.surface_fraction, s.knot_quality, s.knot_position,
+      s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max);
   }
 };
 

@@ -114,8 +114,7 @@ void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
   const int width = in.u8();
   if (in.u16() != 0 && minor <= kFormatMinor) in.fail("2 zero bytes", "others");
   if (scales == 0 || scales > kMostChainScales || width < 1 || width > 8)
-    in.fail("1 to 100 scales and a width of 1 to 8",
-            std::to_string(scales) + ", " + std::to_string(width));
+    in.fail("1 to 100 scales and a width of 1 to 8", std::to_string(scales) + ", " + std::to_string(width));
   for (std::uint32_t s = 0; s < scales; ++s) t.quality.push_back(in.f32());
   for (std::size_t k = 0; k < scales * kGammaSteps; ++k) t.total_bytes.push_back(in.number(width));
   if (width != bytes_width(t.total_bytes)) in.fail("the least width that holds the values", "another");
@@ -166,7 +165,8 @@ ThesisFile read_thesis(std::span<const std::uint8_t> bytes) {
   file.minor = read_entry_start(in, kThesisMagic);
   const std::uint64_t count = in.u32();
   if (in.u32() != 0 && file.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
-  if (count > in.left() / kSectionRecord) in.fail("a section count that fits the file", std::to_string(count));
+  if (count > in.left() / kSectionRecord)
+    in.fail("a section count that fits the file", std::to_string(count));
   BytesIn data(bytes, kThesisFile);
   data.raw(in.at() + count * kSectionRecord);
   std::tuple<std::uint32_t, std::uint32_t> last;

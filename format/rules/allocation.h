@@ -22,8 +22,8 @@ double log_quantiser(double quality);
 /// Index of the rung whose quality is nearest in log-quantiser space (ties: the lower).
 std::uint32_t nearest_rung(const PlaneTables& tables, double quality);
 
-/// D_i(Gamma): bytes of the stored fragments, each at the rung nearest to its q_i(x, y). Table streams are not
-/// counted.
+/// D_i(Gamma): bytes of the stored fragments, each at the rung nearest to its q_i(x, y). Table streams are
+/// not counted.
 std::uint64_t bytes_asked_for(const PlaneTables& tables, std::size_t row, double gamma);
 
 /// A fragment that shows the preview instead of a rung of its own.

@@ -13,7 +13,6 @@
 namespace texmesh {
 namespace {
 
-
 /// As the file has it, so that tables fresh from the compiler and read back ones give the same choice.
 double half_of(float dssim) { return static_cast<double>(from_half(to_half(std::clamp(dssim, 0.0f, 2.0f)))); }
 

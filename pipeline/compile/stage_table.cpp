@@ -134,7 +134,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes, kPreviews, kImages), outputs(kLadder), read_of(o, o.ladder),
             {"libjpeg-turbo", "libwebp"}, encode_ladder),
       stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
-            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews), 
+            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
       stage({"scales", kScalesVersion, "kept scales -> standalone GLB files"},

@@ -108,8 +108,7 @@ SizeModel fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std:
   SizeModel model;
   model.a = static_cast<float>(portable::exp(line.offset));
   model.r = static_cast<float>(portable::exp(line.slope));
-  model.b =
-      static_cast<float>(line.slope / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
+  model.b = static_cast<float>(line.slope / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
   model.correlation = static_cast<float>(line.correlation);
   model.error = static_cast<float>(error / static_cast<double>(size.size()));
   return model;

@@ -73,7 +73,8 @@ inline void fuzz_tables(Input input) {
 
 inline void fuzz_thesis(Input input) {
   const Bytes once = write_thesis(read_thesis(input).tables);
-  require(write_thesis(read_thesis(once).tables) == once, "the thesis's tables changed by being written twice");
+  require(write_thesis(read_thesis(once).tables) == once,
+          "the thesis's tables changed by being written twice");
 }
 
 inline void fuzz_quality(Input input) {
@@ -159,8 +160,8 @@ inline Bytes tagged(std::uint8_t kind, Input bytes) {
 
 /// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
 /// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables. Anything but an answer or a FormatError is a fault: it aborts.
-/// What is read must also be written again, unchanged where the format has one form only.
+/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables. Anything but an answer or a FormatError is
+/// a fault: it aborts. What is read must also be written again, unchanged where the format has one form only.
 inline void read_format(std::span<const std::uint8_t> input) {
   using namespace detail;
   constexpr void (*kReaders[])(Input) = {fuzz_container,

@@ -50,8 +50,7 @@ void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& op
   const PlaneTables& t = loss.package().tables().planes[entry.plane];
   const std::size_t row = loss.package().scale_index(options.scale);
   const std::vector<float> eta = eta_of(t, row);
-  const std::vector<float> quality =
-      quality_of(t, row, options.gamma < 0 ? mean_eta(t, row) : options.gamma);
+  const std::vector<float> quality = quality_of(t, row, options.gamma < 0 ? mean_eta(t, row) : options.gamma);
   const std::uint16_t low = limit_rung(t, options.quality_low, true),
                       high = limit_rung(t, options.quality_high, false);
   for (const std::uint16_t f : t.order) {

@@ -58,7 +58,8 @@ Bytes PackageReader::read_paged(const PagedRef& ref) {
 
 void PackageReader::require_minor(const std::string& path, int minor) const {
   if (minor != manifest_.minor)
-    throw FormatError(store_->name(), path, "the manifest's minor version, " + std::to_string(manifest_.minor),
+    throw FormatError(store_->name(), path,
+                      "the manifest's minor version, " + std::to_string(manifest_.minor),
                       std::to_string(minor));
 }
 
@@ -89,8 +90,7 @@ const std::vector<EntryRef>& PackageReader::index() {
   if (manifest_.poster) require_entry(*manifest_.poster);
   if (manifest_.stream) {
     const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
-    if (it == entries.end() || it->offset != manifest_.stream->offset ||
-        it->bytes != manifest_.stream->bytes)
+    if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
       throw FormatError(store_->name(), std::string("index entry ") + kSplitStreamPath,
                         "what the manifest says of it", it == entries.end() ? "none" : "another place");
   }

@@ -63,7 +63,8 @@ class PackageReader {
   const std::vector<TextureInfo>& textures();     // refs resolved
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()
   const QualityTable& quality();                  // of the manifest's scales and the planes' groups
-  /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of it.
+  /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of
+  /// it.
   const PlaneThesis* plane_thesis(std::size_t plane);
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);

@@ -131,13 +131,13 @@ Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t 
   for (std::size_t row = 0; row < t.scale_count(); ++row)
     features.push_back(t.features[row * t.fragment_count() + i]);
   Json j{{"fragment", i},
-          {"column", i % t.columns},
-          {"row", i / t.columns},
-          {"covered_texels", t.covered_texels[i]},
-          {"surface_fraction", t.surface_fraction[i]},
-          {"eta", eta[i]},
-          {"features", features},
-          {"bytes", bytes}};
+         {"column", i % t.columns},
+         {"row", i / t.columns},
+         {"covered_texels", t.covered_texels[i]},
+         {"surface_fraction", t.surface_fraction[i]},
+         {"eta", eta[i]},
+         {"features", features},
+         {"bytes", bytes}};
   if (thesis && i < thesis->vqp.size())
     j.update(Json{{"vqp", thesis->vqp[i]},
                   {"z", thesis->z[i]},
@@ -215,11 +215,10 @@ Json thesis_json(const PlaneThesis& thesis) {
   Json scales = Json::array();
   for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
     const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
-    scales.push_back(
-        {{"scale", s},
-         {"quality", thesis.quality[s]},
-         {"total_bytes",
-          std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
+    scales.push_back({{"scale", s},
+                      {"quality", thesis.quality[s]},
+                      {"total_bytes",
+                       std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
   }
   return {{"size_model",
            {{"a", model.a},

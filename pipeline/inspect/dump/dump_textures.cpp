@@ -146,18 +146,17 @@ std::string fragments_text(PackageReader& p) {
     const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
     for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
       const std::size_t i = t.order[rank];
-      std::vector<std::string> row{std::to_string(rank),
-                                   std::to_string(i),
-                                   std::to_string(i % t.columns),
-                                   std::to_string(i / t.columns),
-                                   percent(t.covered_texels[i] / texels),
-                                   percent(static_cast<double>(t.surface_fraction[i]), 2),
-                                   fixed(static_cast<double>(eta[i]), 3),
-                                   thesis && i < thesis->vqp.size()
-                                       ? fixed(static_cast<double>(thesis->vqp[i]), 3)
-                                       : std::string(),
-                                   fixed(static_cast<double>(finest.fragment_quality[i]), 1),
-                                   std::to_string(finest.fragment_bytes[i])};
+      std::vector<std::string> row{
+          std::to_string(rank),
+          std::to_string(i),
+          std::to_string(i % t.columns),
+          std::to_string(i / t.columns),
+          percent(t.covered_texels[i] / texels),
+          percent(static_cast<double>(t.surface_fraction[i]), 2),
+          fixed(static_cast<double>(eta[i]), 3),
+          thesis && i < thesis->vqp.size() ? fixed(static_cast<double>(thesis->vqp[i]), 3) : std::string(),
+          fixed(static_cast<double>(finest.fragment_quality[i]), 1),
+          std::to_string(finest.fragment_bytes[i])};
       for (std::size_t r = 0; r < t.rung_count(); ++r)
         row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
       table.row(std::move(row));

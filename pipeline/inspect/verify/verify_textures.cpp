@@ -25,12 +25,13 @@ std::uint64_t sum(const std::vector<std::uint32_t>& v) {
   return std::accumulate(v.begin(), v.end(), std::uint64_t{0});
 }
 
-/// Stored fragments are covered, and stand by falling importance. (Readers check that covered ones are stored.)
+/// Stored fragments are covered, and stand by falling importance. (Readers check that covered ones are
+/// stored.)
 void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
   for (const std::uint16_t f : t.order)
     findings.require(t.covered_texels[f] > 0, "tables-coverage", kTablesPath,
-                     plane_field(plane, "fragment " + std::to_string(f)),
-                     "covered texels, as it is stored", "none");
+                     plane_field(plane, "fragment " + std::to_string(f)), "covered texels, as it is stored",
+                     "none");
   const std::vector<float> eta = eta_of(t, 0);
   for (std::size_t k = 1; k < t.order.size(); ++k) {
     const std::size_t a = t.order[k - 1], b = t.order[k];

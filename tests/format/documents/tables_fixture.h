@@ -5,8 +5,8 @@
 
 namespace texmesh::testing {
 
-/// Tables of a plane that follow every rule, of so many scales; with more than one fragment the last one is not
-/// stored.
+/// Tables of a plane that follow every rule, of so many scales; with more than one fragment the last one is
+/// not stored.
 inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::uint32_t rungs,
                                std::uint32_t scales) {
   PlaneTables t;

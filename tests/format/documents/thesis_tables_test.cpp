@@ -49,7 +49,8 @@ TEST(ThesisTables, EveryTruncationAndEveryLongerFileIsRefused) {
   EXPECT_THROW(read_thesis(longer), FormatError);
 }
 
-/// The manifest's digest catches accidents. What is flipped on purpose is refused or is another canonical file.
+/// The manifest's digest catches accidents. What is flipped on purpose is refused or is another canonical
+/// file.
 TEST(ThesisTables, FlippedBitsAreRefusedOrInRange) {
   const Bytes bytes = write_thesis(small_thesis());
   std::size_t accepted = 0;

@@ -322,10 +322,9 @@ TEST(Verify, ThesisTables) {
   }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.planes.push_back(p.thesis.planes[0]); }));
   // Sizes of a scale that is not stored are the writer's; so is whether there is such an entry.
-  EXPECT_EQ(all_of(verify(built_with([](PackageParts& p) {
-              p.thesis.planes[0].total_bytes[kGammaSteps] += 1;
-            }))),
-            "");
+  EXPECT_EQ(
+      all_of(verify(built_with([](PackageParts& p) { p.thesis.planes[0].total_bytes[kGammaSteps] += 1; }))),
+      "");
   EXPECT_EQ(all_of(verify(built_with([](PackageParts& p) { p.thesis.planes.clear(); }))), "");
 }
 

@@ -17,8 +17,8 @@ namespace {
 using testing::PackageParts;
 using testing::PackagePatcher;
 
-/// Documents that do not fit each other, by the number of the rule in SPEC.md. Digests are right throughout: whoever
-/// makes such a package on purpose writes them, too.
+/// Documents that do not fit each other, by the number of the rule in SPEC.md. Digests are right throughout:
+/// whoever makes such a package on purpose writes them, too.
 struct Refusal {
   const char* rule;
   const char* says;  // part of the error's text
@@ -79,8 +79,7 @@ std::vector<Refusal> refusals() {
       {"R3", "index entry mesh/s00.glb", sealed([](Manifest& m) { m.scales[0].glb.bytes += 1; })},
       {"R3", "index entry mesh/stream.bin", sealed([](Manifest& m) { m.stream->offset += 64; })},
       {"R4", "textures.json", sealed([](Manifest& m) { m.plane_count = 2; })},
-      {"R4", "tables.bin",
-       built([](PackageParts& p) { p.tables.planes.push_back(p.tables.planes[0]); })},
+      {"R4", "tables.bin", built([](PackageParts& p) { p.tables.planes.push_back(p.tables.planes[0]); })},
       {"R5", "codec-webp", built([](PackageParts& p) { p.textures[0].codec = Codec::kWebp; })},
       {"R6", "preview", sealed([](Manifest& m) { m.previews[0].bytes -= 1; })},
       {"R6", "previews of the full-size planes",
@@ -100,13 +99,16 @@ std::vector<Refusal> refusals() {
          p.textures[0].fragment_height_px = 48;
          p.textures[0].rows = 1;
        })},
-      {"R9", "grid and rungs", built([](PackageParts& p) { p.textures[0].rung_quality = {20, 71}; })},
-      {"R10", "tables of the codec",
-       built([](PackageParts& p) { p.tables.planes[0].incremental = true; })},
+      {"R9", "grid and rungs", built([](PackageParts& p) {
+         p.textures[0].rung_quality = {20, 71};
+       })},
+      {"R10", "tables of the codec", built([](PackageParts& p) { p.tables.planes[0].incremental = true; })},
       {"R11", "manifest's 2 scales", built([](PackageParts& p) { p.tables = select_scales(p.tables, {0}); })},
       {"R12", "tables.pack", built([](PackageParts& p) { p.tables.planes[0].table_bytes[1] += 1; })},
       {"R13", "r00.pack", built([](PackageParts& p) { p.tables.planes[0].size_bytes[0] += 1; })},
-      {"R14", "manifest's scales", built([](PackageParts& p) { p.quality.scales = {0, 6}; })},
+      {"R14", "manifest's scales", built([](PackageParts& p) {
+         p.quality.scales = {0, 6};
+       })},
       {"R15", "groups of the planes", built([](PackageParts& p) { p.quality.groups.clear(); })},
       {"R15", "groups of the planes",
        built([](PackageParts& p) { p.quality.groups[0].group = PlaneGroup::kNormal; })},
