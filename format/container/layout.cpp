@@ -44,11 +44,15 @@ EntryName parse_texture_path(std::string_view text) {
 }
 
 EntryName parse_any_spelling(std::string_view path) {
-  constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},       {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},           {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},         {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream}, {kPosterPath, EntryKind::kPoster}};
+  constexpr std::pair<const char*, EntryKind> kSingle[] = {{kManifestPath, EntryKind::kManifest},
+                                                           {kIndexPath, EntryKind::kIndex},
+                                                           {kTablesPath, EntryKind::kTables},
+                                                           {kTexturesPath, EntryKind::kTextures},
+                                                           {kQualityPath, EntryKind::kQuality},
+                                                           {kProvenancePath, EntryKind::kProvenance},
+                                                           {kSplitStreamPath, EntryKind::kSplitStream},
+                                                           {kPosterPath, EntryKind::kPoster},
+                                                           {kThesisPath, EntryKind::kThesis}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -127,8 +131,9 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
     case EntryKind::kProvenance:
       return kLast;
     case EntryKind::kFragmentFile:
-    case EntryKind::kSource:  // readers of 1.0 know neither this nor the next and expect them there
+    case EntryKind::kSource:
     case EntryKind::kSplitStream:
+    case EntryKind::kThesis:
     case EntryKind::kOther:
       return kOthers;
   }

@@ -70,9 +70,7 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
   for (const EntryRef& e : entries) (plane_of(e) == kNoPlane ? general : planes[plane_of(e)]).push_back(e);
 
   BytesOut head, pages;
-  head.text(kIndexMagic);
-  head.u16(kFormatMajor);
-  head.u16(kFormatMinor);
+  write_entry_start(head, kIndexMagic);
   head.u32(planes.size() + 1);
   head.u32(entries.size());
   const auto add_page = [&](std::uint32_t plane, const std::vector<EntryRef>& page_entries) {
@@ -91,11 +89,8 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
 
 IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
   BytesIn in(bytes, kIndexFile);
-  in.expect("the magic TXMX", kIndexMagic);
-  if (const auto major = in.u16(); major != kFormatMajor)
-    in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
   IndexHead head;
-  head.minor = in.u16();
+  head.minor = read_entry_start(in, kIndexMagic);
   const std::uint64_t page_count = in.u32(), entry_count = in.u32();
   if (page_count == 0 || page_count > in.left() / kPageFixed)
     in.fail("a page count that fits the file", std::to_string(page_count));

@@ -35,7 +35,7 @@ struct ManifestScale {
   // The same by lit pictures: from the table's least height up to this one no view of the scale can be told
   // from S_0's (stages/quality); 0 = at no height.
   double display_px_flip = 0;
-  // Why it has more vertices than its scale asks for, or why no scale is coarser; else "" (since 1.1).
+  // Why it has more vertices than its scale asks for, or why no scale is coarser; else "".
   std::string floor;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
@@ -54,7 +54,7 @@ struct ManifestStep {
   friend bool operator==(const ManifestStep&, const ManifestStep&) = default;
 };
 
-/// manifest.json (SPEC.md, section Manifest; schemas/manifest.v1.schema.json).
+/// manifest.json (SPEC.md, section Manifest; schemas/manifest.v2.schema.json).
 struct Manifest {
   int major = kFormatMajor, minor = kFormatMinor;
   std::vector<std::string> required_features;  // a reader must know every one of them
@@ -62,7 +62,7 @@ struct Manifest {
   Vec3d origin;                                // local frame -> source coordinates
   Vec3d bounds_min, bounds_max;                // local frame, object units
   double object_height = 0;                    // O_V
-  double surface_area = 0;  // of S_0, object units squared, six digits; 0 = not said (since 1.1)
+  double surface_area = 0;                     // of S_0, object units squared, six digits
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // by the default rule, see viewing.h
@@ -75,7 +75,8 @@ struct Manifest {
   std::vector<ByteRange> previews;
   PagedRef index, tables;
   EntryRef textures, quality, provenance;
-  std::optional<StreamRef> stream;  // vertex splits (since 1.1)
+  std::optional<StreamRef> stream;  // vertex splits
+  std::optional<EntryRef> thesis;   // thesis_tables.h
   std::optional<PosterRef> poster;
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };

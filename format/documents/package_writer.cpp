@@ -52,6 +52,8 @@ class ManifestFiller {
     for (ManifestScale& s : manifest_.scales) set(s.glb, mesh_path(s.scale));
     fill_first_picture();
     fill_stream();
+    manifest_.thesis.reset();
+    if (by_path_.contains(kThesisPath)) set(manifest_.thesis.emplace(), kThesisPath);
     if (manifest_.poster) set(*manifest_.poster, kPosterPath);
   }
 
@@ -143,9 +145,6 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
                                         const std::vector<PackageEntry>& entries) {
   check_entries(manifest, textures, entries);
   const std::size_t full = full_size_planes(textures);
-  if (full < textures.size() &&
-      std::ranges::find(manifest.required_features, kMipsFeature) == manifest.required_features.end())
-    manifest.required_features.emplace_back(kMipsFeature);
   const Bytes textures_json = to_bytes(write_textures(textures));
   Bytes index;
   std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};

@@ -6,6 +6,9 @@
 
 namespace texmesh {
 
+/// The stream's own version, which may stay while that of packages moves.
+inline constexpr int kSplitStreamMajor = 2, kSplitStreamMinor = 0;
+
 // mesh/stream.bin: the model from its coarsest kept scale to S_0 as vertex splits (SPEC.md, section Split
 // stream; after Hoppe's progressive meshes and thesis 10). A head says what the stream holds and where each
 // block of some hundred splits stands; every block has one part for connectivity, one for positions and one

@@ -5,6 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
 #include "pipeline/graph/artefact.h"
 #include "pipeline/import/import.h"
@@ -61,7 +62,8 @@ inline constexpr Artefact<std::vector<Pixels>> kFilledPlanes{"fill"};
 inline constexpr Artefact<Predictors> kPredictors{"zim"};
 inline constexpr Artefact<Previews> kPreviews{"previews"};
 inline constexpr Artefact<Ladder> kLadder{"ladder"};
-inline constexpr Artefact<PackageTables> kTables{"lut"};
+inline constexpr Artefact<PackageTables> kTables{"lut.tables"};
+inline constexpr Artefact<ThesisTables> kThesisTables{"lut.thesis"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
 inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
 inline constexpr Artefact<Poster> kPoster{"poster"};

@@ -53,6 +53,14 @@ Previews preview_fragments(const Fragments& fragments, const Planes& planes, int
   return make_previews(fragments, planes, {quality, subsampling}, context);
 }
 
+Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragments, const Planes& planes,
+                                                       const Predictors& predictors, const Ladder& ladder,
+                                                       const Previews& previews, const LutOptions& options,
+                                                       const RunContext& context) {
+  LutTables made = build_tables(fragments, planes, predictors, ladder, previews, options, context);
+  return {{std::move(made.tables), std::move(made.thesis)}, {}};
+}
+
 Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const PerceptualValues& perceptual,
                                           const Materials& materials, const Fragments& fragments,
                                           const Planes& planes, const Ladder& ladder,
@@ -66,11 +74,11 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
 
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
-                  const PackageTables& tables, const ScaleFiles& files, const MeasuredQuality& quality,
-                  const Poster& poster, const std::string& provenance, const PackageOptions& options,
-                  double jnd, const RunContext& context) {
-  return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                          poster, jnd, provenance, options, context);
+                  const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
+                  const MeasuredQuality& quality, const Poster& poster, const std::string& provenance,
+                  const PackageOptions& options, double jnd, const RunContext& context) {
+  return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
+                          quality, poster, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -126,8 +134,9 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes, kPreviews, kImages), outputs(kLadder), read_of(o, o.ladder),
             {"libjpeg-turbo", "libwebp"}, encode_ladder),
       stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
-            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews), outputs(kTables),
-            read_of(o, o.lut), {"libjpeg-turbo", "libwebp"}, build_tables),
+            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
+            outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
+            measure_fragments),
       stage({"scales", kScalesVersion, "kept scales -> standalone GLB files"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
@@ -141,7 +150,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kScaleFiles, kQuality, kPoster, kProvenance),
+                   kThesisTables, kScaleFiles, kQuality, kPoster, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

@@ -212,6 +212,19 @@ Bytes pack_rung(const LadderRung& rung, const PlaneTables& tables, std::size_t r
   return pack;
 }
 
+/// Rows of the manifest's scales in tables that have one for every scale of the chain.
+std::vector<std::size_t> stored_rows(const Manifest& manifest, const PackageTables& tables) {
+  std::vector<std::size_t> rows;
+  for (const ManifestScale& s : manifest.scales) {
+    rows.push_back(static_cast<std::size_t>(s.scale));
+    for (std::size_t p = 0; p < tables.planes.size(); ++p)
+      if (tables.planes[p].scale_count() <= rows.back())
+        fail(plane_place(p), "tables of scale " + std::to_string(s.scale),
+             std::to_string(tables.planes[p].scale_count()) + " scales");
+  }
+  return rows;
+}
+
 void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview, const PlaneTables& tables,
                          std::size_t plane, std::vector<PackageEntry>& entries) {
   const auto p = static_cast<std::uint32_t>(plane);
@@ -233,8 +246,9 @@ void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview,
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
-                                           const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
+                                           const PackageTables& tables, const ThesisTables& thesis,
+                                           const ScaleFiles& files, const MeasuredQuality& quality,
+                                           const Poster& poster, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
@@ -242,7 +256,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
-  entries.push_back({kTablesPath, write_tables(tables)});
+  entries.push_back({kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)))});
+  if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
   for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});

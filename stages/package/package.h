@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/measured_quality.h"
@@ -16,7 +17,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 3;
+inline constexpr int kPackageVersion = 4;
 
 struct PackageOptions {
   std::string title;
@@ -28,15 +29,13 @@ struct PackageOptions {
 
 /// Describes the model in a manifest, packs every rung's fragments by importance, and lays out the container
 /// (format/documents/package_writer.h). Throws StageError when the stages' results do not belong together,
-/// FormatError when the title or a value breaks a rule of the format. A pure function of its inputs: nothing
-/// runs in parallel here. `provenance_json` is made by the pipeline (options, input digests, stage versions;
-/// no dates, hosts or paths).
-std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
-                                           const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const Previews& previews,
-                                           const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
-                                           const std::string& provenance_json, const PackageOptions& options,
-                                           const RunContext& context);
+/// FormatError when the title or a value breaks a rule of the format. `tables` and `thesis` have a row for
+/// every scale of the chain. A pure function of its inputs: nothing runs in parallel here. `provenance_json`
+/// is made by the pipeline (options, input digests, stage versions; no dates, hosts or paths).
+std::vector<std::uint8_t> assemble_package(
+    const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Image>& images,
+    const Fragments& fragments, const Ladder& ladder, const Previews& previews, const PackageTables& tables,
+    const ThesisTables& thesis, const ScaleFiles& files, const MeasuredQuality& quality, const Poster& poster,
+    double jnd, const std::string& provenance_json, const PackageOptions& options, const RunContext& context);
 
 }  // namespace texmesh

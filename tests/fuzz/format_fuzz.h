@@ -68,7 +68,13 @@ inline void fuzz_tables(Input input) {
   const Bytes once = write_tables(read_tables(input));
   require(write_tables(read_tables(once)) == once, "tables changed by being written twice");
   if (input[6] == 0 && input[7] == 0)
-    require(std::ranges::equal(once, input), "tables of 1.0 have a second form");
+    require(std::ranges::equal(once, input), "tables of this version have a second form");
+}
+
+inline void fuzz_thesis(Input input) {
+  const Bytes once = write_thesis(read_thesis(input).tables);
+  require(write_thesis(read_thesis(once).tables) == once,
+          "the thesis's tables changed by being written twice");
 }
 
 inline void fuzz_quality(Input input) {
@@ -87,7 +93,8 @@ inline void fuzz_package(Input input) {
     for (std::uint32_t r = 0; r < t.rung_count(); ++r)
       for (std::uint32_t f = 0; f < t.fragment_count(); ++f)
         if (reader.fragment_range(p, r, f).bytes > 0) reader.complete_fragment(p, r, f);
-    for (std::uint32_t k = 0; k <= t.scales; ++k)
+    reader.plane_thesis(p);
+    for (std::size_t k = 0; k < t.scale_count(); ++k)
       for (const float q : quality_of(t, k, mean_eta(t, k)))
         require(nearest_rung(t, q) < t.rung_count(), "no such rung");
   }
@@ -153,8 +160,8 @@ inline Bytes tagged(std::uint8_t kind, Input bytes) {
 
 /// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
 /// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader, 9 a vertex-split stream. Anything but an answer or a FormatError is a fault: it aborts.
-/// What is read must also be written again, unchanged where the format has one form only.
+/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables. Anything but an answer or a FormatError is
+/// a fault: it aborts. What is read must also be written again, unchanged where the format has one form only.
 inline void read_format(std::span<const std::uint8_t> input) {
   using namespace detail;
   constexpr void (*kReaders[])(Input) = {fuzz_container,
@@ -166,7 +173,8 @@ inline void read_format(std::span<const std::uint8_t> input) {
                                          fuzz_package,
                                          fuzz_index_with_digests,
                                          fuzz_tables_with_digests,
-                                         fuzz_split_stream};
+                                         fuzz_split_stream,
+                                         fuzz_thesis};
   if (input.empty()) return;
   try {
     kReaders[input[0] % std::size(kReaders)](input.subspan(1));

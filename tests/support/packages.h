@@ -10,6 +10,7 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
 
 namespace texmesh::testing {
@@ -34,6 +35,7 @@ struct PackageParts {
   Manifest manifest;
   std::vector<TextureInfo> textures;
   PackageTables tables;
+  ThesisTables thesis;  // of the chain S_0 to S_5; no planes: the package has none
   QualityTable quality;
   nlohmann::json provenance;
   std::map<int, Bytes> meshes;

@@ -45,9 +45,9 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 using Reader = std::function<void(const std::string& document)>;
 const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> map{
-      {"manifest.v1", [](const std::string& s) { read_manifest(bytes_of(s)); }},
-      {"textures.v1", [](const std::string& s) { read_textures(bytes_of(s)); }},
-      {"quality.v1", [](const std::string& s) { read_quality(bytes_of(s)); }},
+      {"manifest.v2", [](const std::string& s) { read_manifest(bytes_of(s)); }},
+      {"textures.v2", [](const std::string& s) { read_textures(bytes_of(s)); }},
+      {"quality.v2", [](const std::string& s) { read_quality(bytes_of(s)); }},
       {"provenance.v1", [](const std::string& s) { read_provenance(bytes_of(s)); }},
       {"fragments.v1", [](const std::string& s) { read_fragment_index(bytes_of(s)); }},
       {"collection.v1", [](const std::string& s) { read_collection(s, "collection.json", {}); }},

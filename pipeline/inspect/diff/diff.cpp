@@ -63,6 +63,7 @@ std::string maker(const std::string& path) {
     case EntryKind::kPoster:
       return "poster";
     case EntryKind::kTables:
+    case EntryKind::kThesis:
       return "lut";
     case EntryKind::kQuality:
       return "quality";

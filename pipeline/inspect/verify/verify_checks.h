@@ -9,6 +9,7 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -30,9 +31,13 @@ void check_references(const Manifest& manifest, const std::vector<EntryRef>& ind
 void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                     const PackageTables& tables, Findings& findings);
 
-/// One plane's tables in themselves: stored fragments, order, surface, D_i(Gamma) against a recomputation.
+/// One plane's tables in themselves: order, surface, covered texels.
 void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
                         Findings& findings);
+
+/// thesis.bin against what tables.bin says of the scales that are stored: fragments, Q_i, D_i(Gamma).
+void check_thesis(const Manifest& manifest, const PackageTables& tables, const ThesisTables& thesis,
+                  Findings& findings);
 
 /// Scales and groups are those of the package, S_0 loses nothing, and the manifest's switch sizes lie between
 /// the heights that were rendered.

@@ -120,6 +120,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
                        "reference", kManifestPath, "/stream", text_of(*it->second) + " as in the index",
                        std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
   }
+  if (m.thesis) check(*m.thesis, "/thesis");
   if (m.poster) check(*m.poster, "/poster");
   for (std::size_t k = 0; k < m.scales.size(); ++k) check(m.scales[k].glb, at("scales/offset", k));
   check_previews(m, entries, findings);

@@ -23,6 +23,9 @@ void EntryVerifier::check_entry(const EntryRef& e) {
             [&] { check_split_stream(package_.manifest, store_.read(e), context_, findings_); });
   } else if (name.kind == EntryKind::kPoster) {
     guarded(findings_, "poster", e.path, [&] { check_poster_entry(e); });
+  } else if (name.kind == EntryKind::kThesis) {
+    findings_.require(package_.manifest.thesis.has_value(), "entry-set", e.path, "",
+                      "to be named by the manifest", "not there");
   } else if (name.kind == EntryKind::kSource) {
     guarded(findings_, "source", e.path, [&] { check_source_entry(e, name); });
   } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {

@@ -33,6 +33,7 @@ struct Inputs {
   Ladder ladder;
   Previews previews;
   PackageTables tables;
+  ThesisTables thesis;
   ScaleFiles files;
   MeasuredQuality quality;
   PackageOptions options;
@@ -64,7 +65,7 @@ struct Inputs {
   }
 
   void add_plane(std::size_t p) {
-    PlaneTables t = testing::make_tables(3, 2, 2, 1);
+    PlaneTables t = testing::make_tables(3, 2, 2, 10);
     PlaneLadder rungs;
     for (std::size_t r = 0; r < 2; ++r) {
       LadderRung rung;
@@ -94,14 +95,17 @@ struct Inputs {
     images.push_back(image);
     fragments.planes.push_back(plane);
     ladder.planes.push_back(std::move(rungs));
+    PlaneThesis& said = thesis.planes.emplace_back();
+    said.quality = t.quality;
+    said.total_bytes.assign(10 * kGammaSteps, 1000);
     tables.planes.push_back(std::move(t));
   }
 
   Poster poster;  // none
 
   Bytes assemble() const {
-    return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                            poster, 0.1, "{\"texmesh\":\"test\"}", options, {});
+    return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
+                            quality, poster, 0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
@@ -270,10 +274,27 @@ Inputs inputs_with_mips(std::size_t full) {
   return inputs;
 }
 
-TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
+TEST(Package, TablesHaveTheRowsOfTheStoredScales) {
+  const Inputs inputs(2);
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  const PackageTables tables = read_tables(part(package, m.tables));
+  const std::vector<float>& all = inputs.tables.planes[1].quality;
+  EXPECT_EQ(tables.planes[1].quality, (std::vector<float>{all[0], all[4], all[9]}));
+  ASSERT_TRUE(m.thesis.has_value());
+  EXPECT_EQ(read_thesis(part(package, *m.thesis)).tables.planes[1].quality, all);
+  EXPECT_GT(m.thesis->offset, m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_FALSE(manifest_of(Inputs(0).assemble()).thesis.has_value());
+
+  Inputs few(1);
+  few.tables.planes[0] = select_scales(few.tables, {0, 1, 2, 3}).planes[0];
+  EXPECT_THROW(few.assemble(), StageError);
+}
+
+TEST(Package, MipsShareTheirBasesPreview) {
   const Bytes package = inputs_with_mips(2).assemble();
   const Manifest m = manifest_of(package);
-  EXPECT_EQ(m.required_features, std::vector<std::string>{"mips"});
+  EXPECT_TRUE(m.required_features.empty());
   EXPECT_EQ(m.plane_count, 4u);
   EXPECT_EQ(m.previews.size(), 2u);
   std::vector<TextureInfo> textures = read_textures(part(package, m.textures));
@@ -284,7 +305,6 @@ TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
   EXPECT_TRUE(std::ranges::none_of(index, [](const EntryRef& e) { return e.path == preview_path(2); }));
   EXPECT_LE(textures[3].tables.offset + textures[3].tables.bytes,
             m.first_picture_offset + m.first_picture_bytes);
-  EXPECT_TRUE(manifest_of(Inputs(2).assemble()).required_features.empty());
 
   Inputs wrong = inputs_with_mips(1);
   wrong.fragments.planes[1].base = 1;

@@ -5,7 +5,7 @@ import { FormatError, InputError, isAbort } from '../format/errors';
 import type { FragmentFiles } from '../format/fragment_files';
 import type { ByteRange, EntryRef, Manifest, PagedRef, StreamRef } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
-import type { QualityTable } from '../format/quality_table';
+import { type QualityTable, requireGroups } from '../format/quality_table';
 import { requireDigest } from '../format/sha256';
 import type { PlaneTables } from '../format/tables';
 import type { TextureInfo } from '../format/textures';
@@ -163,8 +163,11 @@ export class PackageDocuments {
     return this.document_('textures', signal, (m) => this.readChecked(m.textures, { kind: 'textures', signal }));
   }
   /** Measured quality of scales and rungs. */
-  quality(signal?: AbortSignal): Promise<QualityTable> {
-    return this.document_('quality', signal, (m) => this.readChecked(m.quality, { kind: 'quality', signal }));
+  async quality(signal?: AbortSignal): Promise<QualityTable> {
+    const read = (m: Manifest): Promise<Uint8Array> => this.readChecked(m.quality, { kind: 'quality', signal });
+    const [table, textures] = await Promise.all([this.document_('quality', signal, read), this.textures(signal)]);
+    requireGroups(table, textures);
+    return table;
   }
   /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {

@@ -10,7 +10,7 @@ vi.mock('../../src/http/without_ranges', () => {
   throw new Error('not there');
 });
 
-const container = golden('v1.1-scan');
+const container = golden('v2.0-scan');
 const url = 'http://host/a/scan.texmesh';
 const open = (fault?: FaultKind, from = 0, ranges = true): Promise<PackageReader> => {
   const server = fakeServer({ '/a/scan.texmesh': container }, { ranges, fault: ({ number }) => (number >= from && fault) || false });

@@ -4,7 +4,7 @@ import { golden } from './files';
 
 // The golden scan on a server in memory, and what tests do with promises.
 
-export const container = golden('v1.1-scan');
+export const container = golden('v2.0-scan');
 export const url = 'http://host/a/scan.texmesh';
 export const files = { '/a/scan.texmesh': container };
 /** Options of a client that gives up soon. */
