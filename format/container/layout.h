@@ -14,7 +14,7 @@ inline constexpr const char* kTablesPath = "tables.bin";
 inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
-inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
+inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // not every package has it
 inline constexpr const char* kPosterPath = "poster.jpg";            // not every package has it
 
 /// Most texture planes of a package, mips included, and most rungs of a plane.
@@ -60,9 +60,9 @@ struct EntryName {
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
 
-/// The one order that SPEC.md prescribes for a set of entries: what the first picture needs first, then
-/// meshes from coarse to fine between texture rungs from low to high, provenance last. Depends on the set
-/// only, not on its order.
+/// The one order that SPEC.md prescribes for a set of entries: the first picture, what a first plan needs,
+/// then the other meshes (the stream, GLBs from coarse to fine) between texture rungs from low to high,
+/// provenance last. Depends on the set only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

@@ -100,7 +100,7 @@ Json summary_json(PackageReader& p) {
           {"poster", poster_json(m)},
           {"textures", textures},
           {"bytes", kinds},
-          {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};
+          {"start", {{"bytes", start_bytes(m)}, {"in_one_request", start_bytes(m) <= kStartBytes}}}};
 }
 
 Json scales_json(PackageReader& p) {
@@ -110,6 +110,7 @@ Json scales_json(PackageReader& p) {
                     {"triangles", s.triangles},
                     {"vertices", s.vertices},
                     {"bytes", s.glb.bytes},
+                    {"path", s.glb.path},
                     {"major", s.major},
                     {"error_max", s.error_max},
                     {"error_rms", s.error_rms},

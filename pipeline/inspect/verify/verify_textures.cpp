@@ -100,8 +100,6 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
   findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), "tables", kTablesPath, "planes");
   const std::size_t full = full_size_planes(textures);
   const bool mips = std::count(m.required_features.begin(), m.required_features.end(), kMipsFeature) > 0;
-  findings.require_equal<std::uint64_t>(std::min(full, kMaxManifestPreviews), m.previews.size(), "reference",
-                                        kManifestPath, "/previews");
   findings.require(mips == (full < textures.size()), "textures", kManifestPath, "/requiredFeatures",
                    mips ? "mips in textures.json" : "mips, as textures.json has some", "none");
   std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
