@@ -3,7 +3,7 @@ import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
 import { fullSizePlanes } from './layout';
-import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
+import { EntryRef, Manifest, hasGlb, manifestOfContainer, readManifest } from './manifest';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { sha256 } from './sha256';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
@@ -48,7 +48,7 @@ export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
-  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.filter(hasGlb).map((s) => s.glb)]) {
     const e = entries.get(ref.path);
     const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
     require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
@@ -57,7 +57,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
 }
 
 /** The planes of textures.json. */
-export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
+export function textures(bytes: Uint8Array, { planeCount, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
   require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
   const feature = missingFeature(planes, requiredFeatures);
@@ -66,8 +66,6 @@ export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeat
   const mips = requiredFeatures.includes('mips');
   const mipCount = planes.length - full;
   require(mips === mipCount > 0, paths.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
-  const said = previews.length === Math.min(full, mostManifestPreviews);
-  require(said, paths.manifestPath, '', 'previews of the full-size planes', previews.length);
   return planes;
 }
 
