@@ -66,6 +66,14 @@ void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
 }
 
+/// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that one.
+double shown_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_s) {
+  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+  if (moved == 0) return static_cast<double>(plan.bootstrap_bytes) / std::max(1e-9, manifest_s - rtt_s);
+  const double moved_s = std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - rtt_s : moved;
+  return moved / std::max(1e-9, moved_s);
+}
+
 ListOptions list_options(const DeliveryRequest& request, int scale) {
   ListOptions options;
   options.scale = scale;
@@ -87,11 +95,8 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   HtcOptions htc = request.htc;
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
   htc.rtt_s = request.network.rtt_s;
-  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
-  const double moved_s =
-      std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - request.network.rtt_s : moved;
   htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved / std::max(1e-9, moved_s);
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
   const TextureBudget budget = texture_for_budget(
       loss, list_options(request, scale),
       static_cast<std::uint64_t>(std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s));

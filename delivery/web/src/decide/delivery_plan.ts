@@ -72,7 +72,9 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
     displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
     afterMesh: (scale) => {
       const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
-      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : moved / Math.max(1e-9, meshS - manifestS - link.rttS);
+      // Where the first request has brought all, that request shows the throughput.
+      const [shown, shownS] = moved > 0 ? [moved, meshS - manifestS] : [firstBytes(manifest), manifestS];
+      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
       const throughput = { ...request.htc.throughput, initialBytesS };
       const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
       return { plan: planOptions(htc), linkBytesS: link.bytesS };

@@ -1,6 +1,6 @@
 import { concat } from '../format/bytes';
 import { FormatError, InputError } from '../format/errors';
-import { bootstrapBytes, startBytes } from '../format/layout';
+import { bootstrapBytes } from '../format/layout';
 import { type ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors } from './mirrors';
@@ -44,7 +44,8 @@ export class RangeStore implements PackageStore {
   }
 
   async manifest(signal?: AbortSignal): Promise<Uint8Array> {
-    const start = await this.readRange_({ offset: 0, bytes: startBytes }, { kind: 'manifest', signal });
+    const bytes = Math.max(bootstrapBytes, this.mirrors_.client.options.startBytes);
+    const start = await this.readRange_({ offset: 0, bytes }, { kind: 'manifest', signal });
     return start.subarray(0, bootstrapBytes);
   }
 
@@ -56,7 +57,10 @@ export class RangeStore implements PackageStore {
       if (!(error instanceof RangesEnded) || !this.openTree_) throw error;
       this.tree_ ??= this.openTree_(manifestOfContainer(await this.manifest(), this.name), how.signal);
       this.tree_.then(() => (this.form_ = 'files'), () => (this.tree_ = undefined));
-      return (await this.tree_).read(place, range, how);
+      const tree = await this.tree_.catch((failure: unknown) => {
+        throw failure instanceof FormatError ? failure : error; // replaced; or no tree, or no part that reads trees
+      });
+      return tree.read(place, range, how);
     }
   }
   private async readRange_({ offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {

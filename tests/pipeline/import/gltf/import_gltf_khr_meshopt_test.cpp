@@ -1,5 +1,5 @@
 // KHR_meshopt_compression: the structure of EXT_meshopt_compression, version 1 of attribute streams, and the
-// filter of colours. The streams here were written by meshoptimizer 0.25 (encodeVertexBufferLevel) from values
+// filter of colours. The streams here were written by meshoptimizer 1.3 (encodeVertexBufferLevel) from values
 // that the tests make by the same formulas.
 #include <gtest/gtest.h>
 #include <meshoptimizer.h>
