@@ -110,7 +110,6 @@ Json scales_json(PackageReader& p) {
                     {"triangles", s.triangles},
                     {"vertices", s.vertices},
                     {"bytes", s.glb.bytes},
-                    {"path", s.glb.path},
                     {"major", s.major},
                     {"error_max", s.error_max},
                     {"error_rms", s.error_rms},
