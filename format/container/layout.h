@@ -62,9 +62,9 @@ struct EntryName {
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
 
-/// The one order that SPEC.md prescribes for a set of entries: what the first picture needs first, then
-/// meshes from coarse to fine between texture rungs from low to high, provenance last. Depends on the set
-/// only, not on its order.
+/// The one order that SPEC.md prescribes for a set of entries: the first picture, what a first plan needs,
+/// then the other meshes (the stream, GLBs from coarse to fine) between texture rungs from low to high,
+/// provenance last. Depends on the set only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

@@ -107,11 +107,6 @@ Json manifest_json(const Manifest& m) {
   j["steps"] = Json::array();
   for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
   j["planeCount"] = m.plane_count;
-  j["firstPicture"]["offset"] = m.first_picture_offset;
-  j["firstPicture"]["bytes"] = m.first_picture_bytes;
-  j["firstPicture"]["sha256"] = to_hex(m.first_picture_digest);
-  j["previews"] = Json::array();
-  for (const ByteRange& r : m.previews) j["previews"].push_back(Json::array({r.offset, r.bytes}));
   j["index"] = ref_json(m.index);
   j["tables"] = ref_json(m.tables);
   j["textures"] = ref_json(m.textures);
@@ -242,31 +237,28 @@ void read_steps(const JsonAt& at, Manifest& m) {
   if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
 }
 
-void read_first_picture(const JsonAt& at, Manifest& m) {
-  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
-  const JsonAt first = at["firstPicture"];
-  const EntryRef& coarsest = m.scales.back().glb;
-  m.first_picture_offset = read_offset(first["offset"]);
-  if (m.first_picture_offset != coarsest.offset)
-    first["offset"].fail("the offset of the coarsest mesh, " + std::to_string(coarsest.offset),
-                         std::to_string(m.first_picture_offset));
-  m.first_picture_bytes = first["bytes"].integer(coarsest.bytes);
-  m.first_picture_digest = first["sha256"].digest();
-  const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
-  const JsonAt previews = at["previews"];
-  const std::size_t most = std::min<std::size_t>(m.plane_count, kMaxManifestPreviews);
-  // Only textures.json tells how many of the planes are mips, which have none.
-  const std::size_t n = previews.array(std::min<std::size_t>(most, 1), most);
-  for (std::size_t i = 0; i < n; ++i) {
-    previews[i].array(2, 2);
-    const ByteRange r{read_offset(previews[i][0]), previews[i][1].integer(1)};
-    if (r.offset < m.first_picture_offset + coarsest.bytes || r.offset + r.bytes > end)
-      previews[i].fail("a range within the first picture, after the mesh", std::to_string(r.offset));
-    m.previews.push_back(r);
+/// Scales whose column says the stream's offset are prefixes of it.
+void resolve_stream_scales(const JsonAt& at, Manifest& m) {
+  std::uint64_t before = m.stream->head_bytes;
+  for (std::size_t i = m.scales.size(); i-- > 0;) {
+    EntryRef& ref = m.scales[i].glb;
+    if (ref.offset != m.stream->offset) continue;
+    if (i == 0 || i + 1 == m.scales.size())
+      at["offset"][i].fail("a GLB of the finest and of the coarsest scale", "the stream");
+    if (ref.bytes <= before || ref.bytes > m.stream->bytes)
+      at["bytes"][i].fail("more than " + std::to_string(before) + " bytes, at most the stream's",
+                          std::to_string(ref.bytes));
+    before = ref.bytes;
+    ref.path = kSplitStreamPath;
   }
 }
 
 }  // namespace
+
+std::uint64_t start_bytes(const Manifest& manifest) {
+  const EntryRef& coarsest = manifest.scales.back().glb;
+  return coarsest.offset + coarsest.bytes;
+}
 
 std::string write_manifest(const Manifest& manifest) {
   const std::string json = dump_json(manifest_json(manifest), kManifestFile);
@@ -286,13 +278,16 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_shape(at, m);
   read_scales(at["scales"], m);
   read_steps(at["steps"], m);
-  read_first_picture(at, m);
+  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   read_paged_ref(at["index"], kIndexPath, m.index);
   read_paged_ref(at["tables"], kTablesPath, m.tables);
   read_ref(at["textures"], kTexturesPath, m.textures);
   read_ref(at["quality"], kQualityPath, m.quality);
   read_ref(at["provenance"], kProvenancePath, m.provenance);
-  if (document.contains("stream")) m.stream = read_stream(at["stream"]);
+  if (document.contains("stream")) {
+    m.stream = read_stream(at["stream"]);
+    resolve_stream_scales(at["scales"], m);
+  }
   if (document.contains("thesis")) read_ref(at["thesis"], kThesisPath, m.thesis.emplace());
   if (document.contains("poster")) m.poster = read_poster(at["poster"]);
   return m;

@@ -1,5 +1,6 @@
 #include "format/split/split_stream.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -187,6 +188,14 @@ SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
     at += b.bytes();
   }
   return head;
+}
+
+std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale) {
+  const auto found = std::ranges::find(head.scales, scale, &SplitScale::scale);
+  if (found == head.scales.end())
+    throw FormatError(kSplitStreamName, "scales", "scale " + std::to_string(scale), "none");
+  const SplitBlock& last = head.blocks.at(found->blocks - 1);
+  return last.offset + last.bytes();
 }
 
 std::array<float, 3> octahedral_normal(std::int32_t u, std::int32_t v, int bits) {

@@ -78,6 +78,10 @@ std::array<std::int32_t, 2> octahedral_code(std::array<float, 3> normal, int bit
 /// The head, from a stream or the first bytes of it. Everything is checked that can be without the blocks.
 SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes);
 
+/// Bytes of the stream up to and including a scale's last block, the head among them. FormatError when the
+/// stream does not pass the scale.
+std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale);
+
 /// What a reader is willing to hold; a stream that goes beyond is refused.
 struct SplitLimits {
   std::uint32_t points = 1u << 27, faces = 1u << 28;

@@ -7,7 +7,7 @@
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/extract/budget/budget_search.h"
-#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
@@ -95,11 +95,10 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   require_rung(package, request.rung);
   out.triangles = scale_entry(package, out.scale).triangles;
   out.levels = request.lods ? levels_of(m, out.scale) : std::vector<int>{out.scale};
-  StandaloneGlb file(package.scale_glb(out.scale), mesh_path(out.scale));
+  StandaloneGlb file = scale_file(package, out.scale, context);
   if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
   for (std::size_t l = 1; l < out.levels.size(); ++l)
-    file.add_level(StandaloneGlb(package.scale_glb(out.levels[l]), mesh_path(out.levels[l])),
-                   screen_coverage_of(m, out.levels[l]));
+    file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
   if (!request.recentre) file.move_to(m.origin);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();

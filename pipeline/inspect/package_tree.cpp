@@ -107,15 +107,6 @@ void check_offset(const ContainerEntry& written, const EntryRef& stated) {
                       std::to_string(written.offset));
 }
 
-void check_first_picture_place(const Manifest& m, const Bytes& container) {
-  const bool inside = m.first_picture_offset <= container.size() &&
-                      m.first_picture_bytes <= container.size() - m.first_picture_offset;
-  if (!inside || sha256(std::span(container).subspan(static_cast<std::size_t>(m.first_picture_offset),
-                                                     static_cast<std::size_t>(m.first_picture_bytes))) !=
-                     m.first_picture_digest)
-    throw FormatError(kManifestPath, "/firstPicture", "a range of the container with that digest", "another");
-}
-
 }  // namespace
 
 void unpack_package(const std::string& package_path, const std::string& folder,
@@ -148,7 +139,6 @@ void pack_folder(const std::string& folder, const std::string& package_path) {
     check_offset(writer.entries().back(), e);
   }
   writer.finish();
-  check_first_picture_place(package.manifest(), container);
   write_output_file(package_path, container);
 }
 

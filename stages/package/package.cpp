@@ -111,7 +111,7 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
     s.scale = file.scale;
     s.triangles = file.triangles;
     s.vertices = file.vertices;
-    s.glb.path = mesh_path(file.scale);
+    s.glb.path = file.glb.empty() ? kSplitStreamPath : mesh_path(file.scale);
     s.major = perceptual.major[k] != 0;
     s.error_max = static_cast<double>(nested.error_max);
     s.error_rms = static_cast<double>(nested.error_rms);
@@ -260,7 +260,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
-  for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  for (const ScaleFile& file : files.files)
+    if (!file.glb.empty()) entries.push_back({mesh_path(file.scale), file.glb});
   if (!poster.file.empty()) {
     manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
     entries.push_back({kPosterPath, poster.file});

@@ -85,7 +85,8 @@ inline void fuzz_quality(Input input) {
 inline void fuzz_package(Input input) {
   PackageReader reader(open_container(memory_source(input)));
   for (const EntryRef& e : reader.index()) reader.entry(e);
-  for (const ManifestScale& s : reader.manifest().scales) reader.scale_glb(s.scale);
+  for (const ManifestScale& s : reader.manifest().scales)
+    s.has_glb() ? reader.scale_glb(s.scale) : reader.split_prefix(s.scale);
   reader.quality();
   for (std::uint32_t p = 0; p < reader.textures().size(); ++p) {
     reader.preview(p);

@@ -158,7 +158,9 @@ void add_texture(PackageParts& p) {
 }
 
 void add_scale(PackageParts& p, int scale, const Mesh& mesh) {
-  p.meshes[scale] = make_glb(mesh, p.streams[preview_path(0)]).glb();
+  GlbParts glb = make_glb(mesh, p.streams[preview_path(0)]);
+  if (scale == 0) name_previews(glb);  // the coarsest scale alone has them
+  p.meshes[scale] = glb.glb();
   ManifestScale s;
   s.scale = scale;
   s.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
@@ -239,6 +241,13 @@ GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg) {
   return g;
 }
 
+void name_previews(GlbParts& g) {
+  for (json& image : g.json["images"]) {
+    image.erase("bufferView");
+    image["uri"] = "../" + preview_path(0);
+  }
+}
+
 Mesh fine_mesh() { return sphere(6, 8); }
 
 Mesh coarse_mesh() {
@@ -311,11 +320,6 @@ PackagePatcher& PackagePatcher::edit(const std::string& path, const std::functio
 }
 
 void PackagePatcher::write_manifest_entry(Manifest m) {
-  const auto slice = [&](std::uint64_t offset, std::uint64_t bytes) {
-    return std::span<const std::uint8_t>(package_).subspan(static_cast<std::size_t>(offset),
-                                                           static_cast<std::size_t>(bytes));
-  };
-  m.first_picture_digest = sha256(slice(m.first_picture_offset, m.first_picture_bytes));
   std::string json = write_manifest(m);
   const std::size_t room = entry(kManifestPath).size();
   if (json.size() > room) throw std::runtime_error("the manifest grew");
@@ -329,7 +333,8 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
   for (EntryRef& e : index) e.digest = sha256(entry(e.path));
   for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables})
     ref->digest = sha256(entry(ref->path));
-  for (ManifestScale& s : m.scales) s.glb.digest = sha256(entry(s.glb.path));
+  for (ManifestScale& s : m.scales)
+    if (s.has_glb()) s.glb.digest = sha256(entry(s.glb.path));
   if (m.thesis) m.thesis->digest = sha256(entry(kThesisPath));
   if (change) change(index);
   Bytes written = write_index(index);

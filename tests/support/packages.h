@@ -24,6 +24,8 @@ struct GlbParts {
 /// A valid GLB of a mesh without compression: positions, UVs, indices; `jpeg` as image "texture/0" unless
 /// empty.
 GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg);
+/// Gives the images the place of plane 0's preview in a package's tree.
+void name_previews(GlbParts& glb);
 
 /// The meshes of make_package_parts(): the coarser one has half of the finer one's triangles.
 Mesh fine_mesh();

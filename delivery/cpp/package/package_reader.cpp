@@ -85,7 +85,8 @@ const std::vector<EntryRef>& PackageReader::index() {
   for (const EntryRef& ref :
        {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality, manifest_.provenance})
     require_entry(ref);
-  for (const ManifestScale& scale : manifest_.scales) require_entry(scale.glb);
+  for (const ManifestScale& scale : manifest_.scales)
+    if (scale.has_glb()) require_entry(scale.glb);
   if (manifest_.thesis) require_entry(*manifest_.thesis);
   if (manifest_.poster) require_entry(*manifest_.poster);
   if (manifest_.stream) {
@@ -117,14 +118,7 @@ const std::vector<TextureInfo>& PackageReader::textures() {
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
       throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
   const std::size_t full = full_size_planes(textures);
-  if (manifest_.previews.size() != std::min(full, kMaxManifestPreviews))
-    throw FormatError(store_->name(), kManifestPath, "previews of the full-size planes",
-                      std::to_string(manifest_.previews.size()));
   resolve_textures(textures, index());
-  for (std::size_t p = 0; p < manifest_.previews.size(); ++p)
-    if (manifest_.previews[p] != ByteRange{textures[p].preview.offset, textures[p].preview.bytes})
-      throw FormatError(store_->name(), textures[p].preview.path, "the range that the manifest says",
-                        "another");
   textures_ = std::move(textures);
   return *textures_;
 }
@@ -231,7 +225,26 @@ const QualityTable& PackageReader::quality() {
 
 Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
 
-Bytes PackageReader::scale_glb(int scale) { return read_all(scale_entry(scale)); }
+Bytes PackageReader::scale_glb(int scale) {
+  const ManifestScale& s = manifest_.scales[scale_index(scale)];
+  if (!s.has_glb())
+    throw InputError(store_->name(), mesh_path(scale), "a scale with a file of its own",
+                     "one that the stream alone has");
+  return read_all(s.glb);
+}
+
+Bytes PackageReader::split_prefix(int scale) {
+  const ManifestScale& s = manifest_.scales[scale_index(scale)];
+  if (s.has_glb() || !manifest_.stream)
+    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file", "scale " + std::to_string(scale));
+  Bytes bytes = store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0,
+                             s.glb.bytes);
+  const Sha256 digest = sha256(bytes);
+  if (digest != s.glb.digest)
+    throw FormatError(store_->name(), std::string("prefix of ") + kSplitStreamPath,
+                      "SHA-256 " + to_hex(s.glb.digest), to_hex(digest));
+  return bytes;
+}
 
 std::size_t PackageReader::scale_index(int scale) const {
   std::string known;

@@ -69,7 +69,11 @@ class PackageReader {
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
-  std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
+  /// The GLB of a scale, as it is stored; needs no index. InputError where the scale has none: then
+  /// split_prefix() has it. Images of all but the coarsest scale's may be relative URIs of previews.
+  std::vector<std::uint8_t> scale_glb(int scale);
+  /// The bytes of the vertex-split stream that hold a scale without a GLB: head and blocks, digest checked.
+  std::vector<std::uint8_t> split_prefix(int scale);
   /// Index into manifest().scales. Without such a scale: InputError that names the scales there are.
   std::size_t scale_index(int scale) const;
   const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }

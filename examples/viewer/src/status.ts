@@ -25,11 +25,11 @@ function shortName(url: string): string {
   return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
 }
 
-function showTitle({ manifest, packageBytes }: Live, name: string): void {
+function showTitle({ manifest, textures: planes, packageBytes }: Live, name: string): void {
   byId('name').textContent = name;
   if (!manifest) return;
   const finest = manifest.scales[0];
-  const textures = manifest.previews.length;
+  const textures = planes.filter((p) => p.mip === 0).length;
   byId('subtitle').textContent = [
     finest ? `${format.count(finest.triangles)} triangles` : '', textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
     format.bytes(packageBytes)].filter(Boolean).join(' · ');

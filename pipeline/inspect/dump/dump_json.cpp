@@ -100,7 +100,7 @@ Json summary_json(PackageReader& p) {
           {"poster", poster_json(m)},
           {"textures", textures},
           {"bytes", kinds},
-          {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};
+          {"start", {{"bytes", start_bytes(m)}, {"in_one_request", start_bytes(m) <= kStartBytes}}}};
 }
 
 Json scales_json(PackageReader& p) {

@@ -23,8 +23,7 @@ struct Provenance;
 /// the step function.
 void check_manifest(const Manifest& manifest, Findings& findings);
 
-/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews
-/// and first picture.
+/// Every place that the manifest names (offset, bytes, digest) is where the index has it.
 void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
 
 /// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
@@ -46,7 +45,8 @@ void check_quality(const Manifest& manifest, const std::vector<TextureInfo>& tex
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 
-/// A GLB and what the manifest says about it. Returns its positions, sorted; none when the GLB is broken.
+/// A GLB and what manifest and index say about it and about the previews that it shows. Returns its positions,
+/// sorted; none when the GLB is broken. Textures without refs have not been found in the index.
 std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
                               Findings& findings);

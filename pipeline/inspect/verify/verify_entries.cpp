@@ -41,8 +41,8 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
   const Bytes bytes = store_.read(e);
   const auto scale = std::find_if(package_.manifest.scales.begin(), package_.manifest.scales.end(),
                                   [&](const ManifestScale& s) { return s.scale == number; });
-  if (!findings_.require(scale != package_.manifest.scales.end(), "entry-set", e.path, "",
-                         "a scale of the manifest", "none"))
+  if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), "entry-set", e.path, "",
+                         "a file of a scale of the manifest", "none"))
     return;
   ++report_.meshes;
   std::vector<Vec3d> positions = check_mesh(

@@ -132,7 +132,7 @@ TEST(PackageReader, OneReadBootstrapsAndNothingIsReadUnasked) {
   EXPECT_EQ(reads[0], std::pair(std::uint64_t{0}, kBootstrapBytes));
   reader.scale_glb(9);
   ASSERT_EQ(reads.size(), 2u);
-  EXPECT_EQ(reads[1].first, reader.manifest().first_picture_offset);
+  EXPECT_EQ(reads[1].first, reader.manifest().scales.back().glb.offset);
   reader.textures();
   reader.tables();
   reader.table_stream(0, 0);

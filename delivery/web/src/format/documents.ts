@@ -3,7 +3,7 @@ import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
 import { fullSizePlanes } from './layout';
-import { ByteRange, EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
+import { ByteRange, EntryRef, Manifest, hasGlb, manifestOfContainer, readManifest } from './manifest';
 import { QualityTable, readQuality } from './quality_table';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { sha256 } from './sha256';
@@ -55,9 +55,8 @@ export function indexPages(bytes: Uint8Array, m: Manifest): PageRef[] {
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
-  const previews = m.previews.map((range, plane) => ({ path: layout.previewPath(plane), ...range }));
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
-    m.tables, m.textures, m.quality, m.provenance, m.stream, m.thesis, m.poster, ...m.scales.map((s) => s.glb), ...previews,
+    m.tables, m.textures, m.quality, m.provenance, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
   ];
   for (const ref of refs) {
     if (!ref) continue;
@@ -69,13 +68,11 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
 }
 
 /** The planes of textures.json. */
-export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
+export function textures(bytes: Uint8Array, { planeCount, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
   require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
   const feature = missingFeature(planes, requiredFeatures);
   require(feature === '', paths.manifestPath, '/requiredFeatures', feature, 'a codec without it');
-  const said = previews.length === Math.min(fullSizePlanes(planes), mostManifestPreviews);
-  require(said, paths.manifestPath, '', 'previews of the full-size planes', previews.length);
   return planes;
 }
 

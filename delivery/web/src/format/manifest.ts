@@ -9,8 +9,6 @@ export const formatMajor = 2;
 export const formatMinor = 0;
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp'];
-/** Most previews whose places the manifest tells. */
-export const mostManifestPreviews = 224;
 
 /** Where an entry's data stands in the container, and its digest. */
 export interface EntryRef {
@@ -51,6 +49,7 @@ export interface ManifestScale {
   scale: number;
   triangles: number;
   vertices: number;
+  /** What is read for the scale: its file, or a prefix of the vertex-split stream; see hasGlb. */
   glb: EntryRef;
   /** The last scale of a tier whose members cannot be told apart. */
   major: boolean;
@@ -66,6 +65,8 @@ export interface ManifestScale {
   /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". */
   floor: string;
 }
+/** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */
+export const hasGlb = ({ glb }: ManifestScale): boolean => glb.path !== layout.splitStreamPath;
 /** One step of the step function from displayed height to scale. */
 export interface ManifestStep {
   upToPx: number;
@@ -91,8 +92,6 @@ export interface Manifest {
   steps: ManifestStep[];
   /** Number of texture planes, mips included. */
   planeCount: number;
-  firstPicture: ByteRange & { sha256: Uint8Array };
-  previews: ByteRange[];
   index: PagedRef;
   tables: PagedRef;
   textures: EntryRef;
@@ -207,26 +206,18 @@ function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   return steps;
 }
 
-function readFirstPicture(
-  at: JsonAt,
-  coarsest: EntryRef,
-): Pick<Manifest, 'planeCount' | 'firstPicture' | 'previews'> {
-  const planeCount = at.at('planeCount').integer(0, 10000);
-  const first = at.at('firstPicture');
-  const { path: _, ...firstPicture } = readRef(first, '');
-  const { offset, bytes } = firstPicture;
-  if (offset !== coarsest.offset) first.at('offset').fail(`the offset of the coarsest mesh, ${coarsest.offset}`, `${offset}`);
-  if (bytes < coarsest.bytes) first.at('bytes').fail(`a number from ${coarsest.bytes}`, `${bytes}`);
-  const most = Math.min(planeCount, mostManifestPreviews);
-  // Only textures.json tells how many of the planes are mips, which have none.
-  const previews = at.at('previews').each(Math.min(most, 1), most, (pair) => {
-    pair.array(2, 2);
-    const range = { offset: readOffset(pair.at(0)), bytes: pair.at(1).integer(1) };
-    if (range.offset < offset + coarsest.bytes || range.offset + range.bytes > offset + bytes)
-      pair.fail('a range within the first picture, after the mesh', `${range.offset}`);
-    return range;
-  });
-  return { planeCount, firstPicture, previews };
+/** Gives the stream's path to scales whose place is that of the stream: they are prefixes of it. */
+function resolveStreamScales(at: JsonAt, scales: ManifestScale[], stream: StreamRef): void {
+  let before = stream.headBytes;
+  for (let i = scales.length - 1; i >= 0; --i) {
+    const { glb } = scales[i];
+    if (glb.offset !== stream.offset) continue;
+    if (i === 0 || i === scales.length - 1) at.at('offset').at(i).fail('a GLB of the finest and of the coarsest scale', 'the stream');
+    if (glb.bytes <= before || glb.bytes > stream.bytes)
+      at.at('bytes').at(i).fail(`more than ${before} bytes, at most the stream's`, `${glb.bytes}`);
+    before = glb.bytes;
+    glb.path = layout.splitStreamPath;
+  }
 }
 
 /**
@@ -242,6 +233,8 @@ export function readManifest(json: Uint8Array): Manifest {
     if (boundsMin[i] > most) bounds.at('max').at(i).fail('at least the minimum', 'less');
   });
   const scales = readScales(at.at('scales'));
+  const stream = at.has('stream') ? readStream(at.at('stream')) : undefined;
+  if (stream) resolveStreamScales(at.at('scales'), scales, stream);
   return {
     ...version,
     title: at.at('title').text(200),
@@ -253,13 +246,13 @@ export function readManifest(json: Uint8Array): Manifest {
     jnd: at.at('jnd').number(0, 1),
     scales,
     steps: readSteps(at.at('steps'), scales),
-    ...readFirstPicture(at, scales[scales.length - 1].glb),
+    planeCount: at.at('planeCount').integer(0, 10000),
     index: readPagedRef(at.at('index'), paths.indexPath),
     tables: readPagedRef(at.at('tables'), paths.tablesPath),
     textures: readRef(at.at('textures'), paths.texturesPath),
     quality: readRef(at.at('quality'), paths.qualityPath),
     provenance: readRef(at.at('provenance'), paths.provenancePath),
-    ...(at.has('stream') ? { stream: readStream(at.at('stream')) } : {}),
+    ...(stream ? { stream } : {}),
     ...(at.has('thesis') ? { thesis: readRef(at.at('thesis'), paths.thesisPath) } : {}),
     ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),
   };

@@ -173,11 +173,15 @@ export class PackageDocuments {
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
   }
-  /** Reads index, tables, textures.json and quality.json by one request where these documents are small; false where not. */
+  /**
+   * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,
+   * quality.json, table streams, tables. False where not even the documents before the tables are small.
+   */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
-    const { index, quality } = this.manifest;
-    const bytes = quality.offset + quality.bytes - index.offset;
-    if (bytes > wholeDocumentBytes || bytes <= 0) return false;
+    const { index, tables } = this.manifest;
+    const ends = [tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
+    const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
+    if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.
     if (this.form === 'range') await this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
     return true;

@@ -235,10 +235,6 @@ TEST(Verify, References) {
       catches(sealed_with([](Manifest& m) { m.tables.head_digest[0] ^= 1; }), "reference", kManifestPath));
   EXPECT_TRUE(
       catches_only(sealed_with([](Manifest& m) { m.scales[0].glb.bytes -= 1; }), "reference", kManifestPath));
-  EXPECT_TRUE(
-      catches_only(sealed_with([](Manifest& m) { m.previews[0].bytes -= 1; }), "reference", kManifestPath));
-  EXPECT_TRUE(catches_only(sealed_with([](Manifest& m) { m.first_picture_bytes -= 100; }), "first-picture",
-                           kManifestPath));
 }
 
 // Figures of the manifest
@@ -255,11 +251,7 @@ TEST(Verify, ScalesAndSteps) {
 // Documents
 
 TEST(Verify, Textures) {
-  EXPECT_TRUE(catches(sealed_with([](Manifest& m) {
-                        m.plane_count = 0;
-                        m.previews.clear();
-                      }),
-                      "textures", kTexturesPath));
+  EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.plane_count = 0; }), "textures", kTexturesPath));
   EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
                           .edit(kTexturesPath, [](Bytes& b) { b[2] = 'x'; })
                           .seal()
@@ -379,6 +371,24 @@ TEST(Verify, MeshesAgainstManifest) {
                            "mesh-images", mesh_path(5)));
   EXPECT_TRUE(catches_only(built_with([](PackageParts& p) { p.meshes[5].back() ^= 1, p.meshes[5][8] ^= 4; }),
                            "glb-container", mesh_path(5)));
+}
+
+TEST(Verify, PreviewsInMeshes) {
+  const auto with_meshes = [](bool finest_names, bool coarsest_names, std::uint8_t change) {
+    return built_with([&](PackageParts& p) {
+      Bytes preview = p.streams[preview_path(0)];
+      GlbParts fine = testing::make_glb(testing::fine_mesh(), preview);
+      preview[preview.size() / 2] ^= change;
+      GlbParts coarse = testing::make_glb(testing::coarse_mesh(), preview);
+      if (finest_names) testing::name_previews(fine);
+      if (coarsest_names) testing::name_previews(coarse);
+      p.meshes[0] = fine.glb(), p.meshes[5] = coarse.glb();
+    });
+  };
+  EXPECT_EQ(all_of(verify(with_meshes(true, false, 0))), "");
+  EXPECT_TRUE(catches_only(with_meshes(false, false, 0), "mesh-images", mesh_path(0)));
+  EXPECT_TRUE(catches_only(with_meshes(true, true, 0), "mesh-images", mesh_path(5)));
+  EXPECT_TRUE(catches_only(with_meshes(true, false, 1), "mesh-images", mesh_path(5)));
 }
 
 TEST(Verify, NestedMeshes) {
