@@ -45,10 +45,16 @@ EntryName parse_texture_path(std::string_view text) {
 
 EntryName parse_any_spelling(std::string_view path) {
   constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},       {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},           {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},         {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream}, {kPosterPath, EntryKind::kPoster}};
+      {kManifestPath, EntryKind::kManifest},
+      {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},
+      {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},
+      {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream},
+      {kPosterPath, EntryKind::kPoster},
+      {kAboutPath, EntryKind::kAbout},
+      {kContentCredentialPath, EntryKind::kContentCredential}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -97,9 +103,11 @@ enum Place : int {
   kPreviews,
   kTableStreamsPlace,
   kPosterPlace,
+  kAboutPlace,
   kInterleaved,
   kOthers,
-  kLast
+  kLast,
+  kBehindAll
 };
 
 Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
@@ -122,10 +130,14 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
       return kTableStreamsPlace;
     case EntryKind::kPoster:
       return kPosterPlace;
+    case EntryKind::kAbout:
+      return kAboutPlace;
     case EntryKind::kRung:
       return kInterleaved;
     case EntryKind::kProvenance:
       return kLast;
+    case EntryKind::kContentCredential:
+      return kBehindAll;
     case EntryKind::kFragmentFile:
     case EntryKind::kSource:  // readers of 1.0 know neither this nor the next and expect them there
     case EntryKind::kSplitStream:

@@ -74,7 +74,7 @@ struct Manifest {
   // Of the full-size planes 0.., at most kMaxManifestPreviews; inside the first picture.
   std::vector<ByteRange> previews;
   PagedRef index, tables;
-  EntryRef textures, quality, provenance;
+  EntryRef textures, quality, provenance, about;
   std::optional<StreamRef> stream;  // vertex splits (since 1.1)
   std::optional<PosterRef> poster;
   friend bool operator==(const Manifest&, const Manifest&) = default;

@@ -10,6 +10,7 @@
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
+#include "stages/gltf/glb_copyright.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -202,24 +203,36 @@ void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview,
   entries.push_back({table_streams_path(p), std::move(streams)});
 }
 
+/// What the source says, what the publisher says over it, and the title over both.
+About describe_object(const About& source, const PackageOptions& options) {
+  About over;
+  if (!options.meta.empty()) over = read_about(to_bytes(options.meta));
+  if (!options.title.empty()) over.title = options.title;
+  return merge_about(source, over);
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
+                                           const MeasuredQuality& quality, const Poster& poster,
+                                           const About& source, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
-  Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, options.title);
+  const About about = describe_object(source, options);
+  Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, about.title);
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
-  for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  entries.push_back({kAboutPath, to_bytes(write_about(about))});
+  for (const ScaleFile& file : files.files)
+    entries.push_back({mesh_path(file.scale), with_copyright(file.glb, copyright_line(source))});
   if (!poster.file.empty()) {
     manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
     entries.push_back({kPosterPath, poster.file});

@@ -72,8 +72,8 @@ const std::vector<EntryRef>& PackageReader::index() {
       throw FormatError(store_->name(), "index entry " + ref.path, "what the manifest says of it",
                         it == entries.end() ? "none" : "another offset, size or digest");
   };
-  for (const EntryRef& ref :
-       {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality, manifest_.provenance})
+  for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
+                              manifest_.provenance, manifest_.about})
     require_entry(ref);
   for (const ManifestScale& scale : manifest_.scales) require_entry(scale.glb);
   index_ = std::move(entries);
@@ -173,6 +173,11 @@ const PackageTables& PackageReader::tables() {
 const QualityTable& PackageReader::quality() {
   if (!quality_) quality_ = read_quality(read_all(manifest_.quality));
   return *quality_;
+}
+
+const About& PackageReader::about() {
+  if (!about_) about_ = read_about(read_all(manifest_.about));
+  return *about_;
 }
 
 Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "format/container/container.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -62,6 +63,7 @@ class PackageReader {
   const std::vector<TextureInfo>& textures();     // refs resolved
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()
   const QualityTable& quality();
+  const About& about();
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
@@ -97,6 +99,7 @@ class PackageReader {
   std::optional<std::vector<TextureInfo>> textures_;
   std::optional<PackageTables> tables_;
   std::optional<QualityTable> quality_;
+  std::optional<About> about_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
   std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane

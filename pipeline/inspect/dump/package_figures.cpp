@@ -25,7 +25,8 @@ const std::array<Kind, 9>& kinds() {
        {"poster", {EntryKind::kPoster}},
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"source images", {EntryKind::kSource}},
-       {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
+       {"about, provenance and others",
+        {EntryKind::kAbout, EntryKind::kProvenance, EntryKind::kOther, EntryKind::kContentCredential}}}};
   return list;
 }
 

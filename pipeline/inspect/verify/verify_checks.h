@@ -5,6 +5,7 @@
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/finding.h"
 #include "format/base/vec.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -38,6 +39,7 @@ void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const P
 /// the heights that were rendered.
 void check_quality(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                    const QualityTable& quality, Findings& findings);
+void check_about(const Manifest& manifest, const About& about, Findings& findings);
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 

@@ -110,6 +110,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   check(m.textures, "/textures");
   check(m.quality, "/quality");
   check(m.provenance, "/provenance");
+  check(m.about, "/about");
   if (m.stream) {
     const auto it = entries.find(kSplitStreamPath);
     if (it == entries.end())
@@ -124,6 +125,10 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   for (std::size_t k = 0; k < m.scales.size(); ++k) check(m.scales[k].glb, at("scales/offset", k));
   check_previews(m, entries, findings);
   check_first_picture(m, index, findings);
+}
+
+void check_about(const Manifest& m, const About& about, Findings& findings) {
+  findings.require_equal(about.title, m.title, "about", kManifestPath, "/title");
 }
 
 /// Switch sizes are heights that were rendered.
