@@ -155,7 +155,19 @@ About about_from_gltf(const Json& document, const std::string& format, Notes& no
   return about;
 }
 
+/// glTF has metres and y up, and no place for anything else.
+static void write_coordinates(const About& about, Ordered& root) {
+  Ordered said = Ordered::object();
+  if (about.metres_per_unit > 0 && about.metres_per_unit != 1)
+    said["unit"] = {{"name", about.unit}, {"metres", about.metres_per_unit}};
+  if (!about.up_axis.empty() && about.up_axis != "y") said["upAxis"] = about.up_axis;
+  if (!about.crs.empty()) said["coordinateReference"]["text"] = about.crs;
+  if (about.epsg > 0) said["coordinateReference"]["epsg"] = about.epsg;
+  if (!said.empty()) root["extras"]["texmesh"] = said;
+}
+
 void write_gltf_about(const About& about, Ordered& root) {
+  write_coordinates(about, root);
   const Ordered source = about.source.empty() ? Ordered::object() : Ordered::parse(about.source);
   const Ordered from = source.value("asset", Ordered::object());
   Ordered& asset = root["asset"];

@@ -109,7 +109,9 @@ std::string read_meta(const std::string& json, const std::string& file, const st
   try {
     return MetaReader(file, place).read(parse_bounded_json(bytes_of(json), file));
   } catch (const FormatError& e) {
-    throw InputError(file, place + (e.place() == "/" ? "" : e.place()), e.expected(), e.found());
+    const bool is_pointer = e.place().starts_with("/");  // otherwise a byte of the file
+    throw InputError(file, is_pointer ? place + (e.place() == "/" ? "" : e.place()) : e.place(), e.expected(),
+                     e.found());
   }
 }
 

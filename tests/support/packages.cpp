@@ -268,6 +268,9 @@ Bytes PackageParts::build() const {
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
   entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
+  About said = about;
+  said.title = manifest.title;
+  entries.push_back({kAboutPath, bytes_of(write_about(said))});
   for (const auto& [scale, glb] : meshes) entries.push_back({mesh_path(scale), glb});
   for (const auto& [path, bytes] : streams) entries.push_back({path, bytes});
   return write_package(manifest, textures, entries);
@@ -321,7 +324,8 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
   Manifest m = manifest_;
   std::vector<EntryRef> index = read_index(entry(kIndexPath));
   for (EntryRef& e : index) e.digest = sha256(entry(e.path));
-  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables})
+  for (EntryRef* ref :
+       std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.about, &m.tables})
     ref->digest = sha256(entry(ref->path));
   for (ManifestScale& s : m.scales) s.glb.digest = sha256(entry(s.glb.path));
   if (change) change(index);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -36,6 +37,7 @@ struct PackageParts {
   PackageTables tables;
   QualityTable quality;
   nlohmann::json provenance;
+  About about;  // but for the title, which is the manifest's
   std::map<int, Bytes> meshes;
   std::map<std::string, Bytes> streams;  // previews, table streams, rungs by path
   Bytes build() const;

@@ -187,7 +187,7 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     return (*section)[name];
   };
   const auto title = option("package", "title");
-  if (title.is_string() && title != m.title)
+  if (title.is_string() && title != "" && title != m.title)
     findings.add("provenance", kProvenancePath, "/options/package/title", m.title + ", as the manifest",
                  title.get<std::string>());
   const auto jnd = option("perceptual_values", "jnd");

@@ -48,7 +48,7 @@ export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
-  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+  for (const ref of [m.tables, m.textures, m.quality, m.provenance, m.about, ...m.scales.map((s) => s.glb)]) {
     const e = entries.get(ref.path);
     const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
     require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');

@@ -98,6 +98,7 @@ export interface Manifest {
   textures: EntryRef;
   quality: EntryRef;
   provenance: EntryRef;
+  about: EntryRef;
   stream?: StreamRef;
   poster?: PosterRef;
 }
@@ -254,6 +255,7 @@ export function readManifest(json: Uint8Array): Manifest {
     textures: readRef(at.at('textures'), paths.texturesPath),
     quality: readRef(at.at('quality'), paths.qualityPath),
     provenance: readRef(at.at('provenance'), paths.provenancePath),
+    about: readRef(at.at('about'), paths.aboutPath),
     ...(at.has('stream') ? { stream: readStream(at.at('stream')) } : {}),
     ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),
   };

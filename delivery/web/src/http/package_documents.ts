@@ -1,3 +1,4 @@
+import type { About } from '../format/about';
 import { decodeHere, type Documents } from '../format/document_decoder';
 import type { PlaneDocument } from '../format/documents';
 import { planeOfPath } from '../format/entry_paths';
@@ -169,6 +170,17 @@ export class PackageDocuments {
   /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
+  }
+  /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
+  about(signal?: AbortSignal): Promise<About> {
+    const read = async (): Promise<About> => {
+      const [{ readAbout }, bytes] = await Promise.all([
+        import('../format/about'),
+        this.readChecked(this.manifest.about, { kind: 'other', signal }),
+      ]);
+      return readAbout(bytes);
+    };
+    return this.readOnce_('about', read, signal);
   }
   /** Reads index, tables, textures.json and quality.json by one request where these documents are small; false where not. */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
