@@ -31,54 +31,39 @@ export interface About {
   extras?: unknown;
 }
 
-const mostBytes = 262144;
-const texts = { title: 200, description: 10000, creator: 2000, attribution: 2000, licence: 2000, capture: 2000 } as const;
-const urls = ['licenceUrl', 'sourceUrl'] as const;
+const texts = { title: 200, description: 10000, creator: 2000, attribution: 2000, licence: 2000, capture: 2000, licenceUrl: 2000, sourceUrl: 2000 };
+const lists = { identifiers: ['scheme', 'value'], dates: ['event', 'text'] };
 
 /** Whether a text is an absolute http or https URL: a link of anything else may run a script. */
-export const isWebUrl = (text: string): boolean => /^https?:\/\/[^/\s"<>\\^`{|}\u0000-\u0020\u007f][^\s"<>\\^`{|}\u0000-\u0020\u007f]*$/.test(text);
+export const isWebUrl = (text: string): boolean => /^https?:\/\/(?!\/)[^\s"<>\\^`{|}\u0000-\u0020\u007f]+$/.test(text);
 
-function readText(at: JsonAt, most: number): string {
-  const text = at.text(most);
-  if (text === '') at.fail('a text', 'an empty one');
-  return text;
-}
-
-function readUrl(at: JsonAt): string {
-  const url = readText(at, 2000);
-  if (!isWebUrl(url)) at.fail('an http or https URL', 'another text');
-  return url;
-}
-
-function readReference(at: JsonAt): About['coordinateReference'] {
-  if (!at.has('text') && !at.has('epsg')) at.fail('text or epsg', 'neither');
-  return {
-    ...(at.has('text') ? { text: readText(at.at('text'), 2000) } : {}),
-    ...(at.has('epsg') ? { epsg: at.at('epsg').integer(1, 999999) } : {}),
-  };
-}
-
-function readAxis(at: JsonAt): About['upAxis'] {
-  const axis = at.text(1);
-  if (axis !== 'x' && axis !== 'y' && axis !== 'z') at.fail('x, y or z', axis);
-  return axis;
-}
-
-/** Reads about.json: strict about fields of this version, ignores unknown ones. FormatError names the place in the document. */
+/**
+ * Reads about.json: strict about fields of this version; unknown ones are handed on as they are. FormatError names the place in the
+ * document.
+ */
 export function readAbout(json: Uint8Array): About {
-  const at = parseJson(json, aboutPath, mostBytes);
-  const about: About = {};
-  for (const [name, most] of Object.entries(texts) as [keyof typeof texts, number][])
-    if (at.has(name)) about[name] = readText(at.at(name), most);
-  for (const name of urls) if (at.has(name)) about[name] = readUrl(at.at(name));
-  const pairs = <A extends string, B extends string>(list: string, a: A, b: B): Record<A | B, string>[] =>
-    at.at(list).each(1, 32, (pair) => ({ [a]: readText(pair.at(a), 100), [b]: readText(pair.at(b), 500) }) as Record<A | B, string>);
-  if (at.has('identifiers')) about.identifiers = pairs('identifiers', 'scheme', 'value');
-  if (at.has('dates')) about.dates = pairs('dates', 'event', 'text');
-  if (at.has('unit')) about.unit = { name: readText(at.at('unit').at('name'), 50), metres: at.at('unit').at('metres').number(1e-12, 1e12) };
-  if (at.has('upAxis')) about.upAxis = readAxis(at.at('upAxis'));
-  if (at.has('coordinateReference')) about.coordinateReference = readReference(at.at('coordinateReference'));
-  if (at.has('source')) about.source = at.at('source').object();
-  if (at.has('extras')) about.extras = at.at('extras').any();
-  return about;
+  const about = parseJson(json, aboutPath, 262144);
+  const check = (within: JsonAt, name: string, read: (at: JsonAt) => unknown): void => {
+    if (within.has(name)) read(within.at(name));
+  };
+  const text = (most: number, good = /./s, expected = 'a text') => (at: JsonAt): void => {
+    const found = at.text(most);
+    if (!good.test(found)) at.fail(expected, found.slice(0, 40));
+  };
+  for (const [name, most] of Object.entries(texts))
+    check(about, name, (at) => {
+      text(most)(at);
+      if (name.endsWith('Url') && !isWebUrl(at.text(most))) at.fail('an http or https URL', 'another text');
+    });
+  for (const [name, [kind, value]] of Object.entries(lists))
+    check(about, name, (list) => list.each(1, 32, (pair) => { text(100)(pair.at(kind)); text(500)(pair.at(value)); }));
+  check(about, 'unit', (unit) => { text(50)(unit.at('name')); unit.at('metres').number(1e-12, 1e12); });
+  check(about, 'upAxis', text(1, /[xyz]/, 'x, y or z'));
+  check(about, 'coordinateReference', (at) => {
+    if (!at.has('text') && !at.has('epsg')) at.fail('text or epsg', 'neither');
+    check(at, 'text', text(2000));
+    check(at, 'epsg', (code) => code.integer(1, 999999));
+  });
+  check(about, 'source', (source) => source.has(''));
+  return about.value() as About;
 }

@@ -14,6 +14,7 @@ import * as layout from './layout';
 // Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
 // where there are none. Digests have been checked before.
 
+export { readAbout as about } from './about';
 export { readIndex } from './index_table';
 export { requireSelfContained } from './self_contained_glb';
 export { readQuality as quality } from './quality_table';

@@ -54,14 +54,8 @@ export class JsonAt {
     if (/[\u0000-\u001f\u007f]/.test(v)) this.fail('a text without control characters', 'one');
     return v;
   }
-  /** An object, as it is. */
-  object(): Record<string, unknown> {
-    const v = this.value_;
-    if (typeof v !== 'object' || !v || Array.isArray(v)) this.fail('an object', this.shown_());
-    return v as Record<string, unknown>;
-  }
   /** Whatever the value is. */
-  any(): unknown {
+  value(): unknown {
     return this.value_;
   }
   /** A SHA-256 (or its first bytes) as lower-case hexadecimal digits. */

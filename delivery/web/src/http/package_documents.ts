@@ -107,7 +107,7 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality' | 'about'>(
     name: K,
     signal: AbortSignal | undefined,
     read: (m: Manifest) => Promise<Uint8Array>,
@@ -173,14 +173,7 @@ export class PackageDocuments {
   }
   /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
   about(signal?: AbortSignal): Promise<About> {
-    const read = async (): Promise<About> => {
-      const [{ readAbout }, bytes] = await Promise.all([
-        import('../format/about'),
-        this.readChecked(this.manifest.about, { kind: 'other', signal }),
-      ]);
-      return readAbout(bytes);
-    };
-    return this.readOnce_('about', read, signal);
+    return this.document_('about', signal, (m) => this.readChecked(m.about, { kind: 'other', signal }));
   }
   /** Reads index, tables, textures.json and quality.json by one request where these documents are small; false where not. */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {

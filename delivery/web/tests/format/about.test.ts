@@ -1,21 +1,22 @@
 import { describe, expect, it } from 'vitest';
-import { readdirSync, readFileSync } from 'node:fs';
+import { readdirSync } from 'node:fs';
 import { FormatError, isWebUrl, readAbout } from '../../src/reader';
-import { container, openAt, problem, range } from '../support/scan';
+import { readBytes, root } from '../support/files';
+import { openAt, problem, range } from '../support/scan';
 
 const bytes = (text: string): Uint8Array => new TextEncoder().encode(text);
-const examples = `${process.env.TEXMESH_ROOT ?? '../..'}/schemas/examples/about.v2`;
+const examples = 'schemas/examples/about.v2';
 
 describe('about.json', () => {
-  it.each(readdirSync(examples))('%s', async (name) => {
-    const error = await problem(() => readAbout(readFileSync(`${examples}/${name}`)));
+  it.each(readdirSync(`${root}/${examples}`))('%s', async (name) => {
+    const error = await problem(() => readAbout(readBytes(`${examples}/${name}`)));
     if (name.startsWith('valid-')) expect(error).toBeUndefined();
     else expect(error).toBeInstanceOf(FormatError);
   });
 
   it('keeps what it knows and what strangers said', () => {
     const said = { title: 'A', licence: 'CC0-1.0', unit: { name: 'mm', metres: 0.001 }, source: { format: 'obj', x: '\u0007' }, extras: [1] };
-    expect(readAbout(bytes(JSON.stringify({ ...said, later: 1 })))).toEqual(said);
+    expect(readAbout(bytes(JSON.stringify({ ...said, later: 1 })))).toEqual({ ...said, later: 1 });
     expect(readAbout(bytes('{}'))).toEqual({});
   });
 
@@ -30,7 +31,6 @@ describe('about.json', () => {
   });
 
   it('is fetched when it is asked for, once', async () => {
-    expect(container.length).toBeGreaterThan(0);
     const server = range();
     const reader = await openAt(server);
     await reader.firstPicture();
