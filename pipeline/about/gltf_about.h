@@ -14,9 +14,10 @@ namespace texmesh {
 /// does not fit is named there and costs a note. `document` may hold anything.
 About about_from_gltf(const nlohmann::json& document, const std::string& format, Notes& notes);
 
-/// Writes what is known into the JSON of a GLB: asset.copyright; the source's asset.extras; as KHR_xmp_json_ld
-/// the source's packets and, where the fields say something else, one more, to which the asset refers; as
-/// extras.texmesh of the root unit, up axis and coordinate reference where they are not glTF's.
+/// Writes what is known into the JSON of a GLB: asset.copyright; the source's asset.extras; as
+/// KHR_xmp_json_ld the source's packets and, where the fields say something else, one more, to which the
+/// asset refers; as extras.texmesh of the root unit, up axis and coordinate reference where they are not
+/// glTF's.
 void write_gltf_about(const About& about, nlohmann::ordered_json& root);
 
 /// As much of `about` as write_gltf_about() puts into `bytes` bytes of JSON: all, else without what the

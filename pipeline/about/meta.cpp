@@ -14,7 +14,7 @@
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
@@ -24,7 +24,7 @@ class MetaReader {
  public:
   MetaReader(const std::string& file, const std::string& place) : file_(file), place_(place) {}
 
-  std::string read(Json json) const {
+  std::string read(Ordered json) const {
     check_names(
         json, "",
         {"$schema", "title", "description", "creator", "attribution", "licence", "licenceUrl", "sourceUrl",
@@ -34,7 +34,7 @@ class MetaReader {
     replace_unit(json);
     check_licence(json);
     check_epsg(json);
-    const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    const std::string text = json.dump(-1, ' ', false, Ordered::error_handler_t::replace);
     return json.empty() ? "" : write_about(read_about(bytes_of(text)));
   }
 
@@ -43,7 +43,7 @@ class MetaReader {
   }
 
  private:
-  void check_names(const Json& object, const std::string& at,
+  void check_names(const Ordered& object, const std::string& at,
                    std::initializer_list<std::string_view> known) const {
     if (!object.is_object()) fail(at, "an object", object.type_name());
     for (const auto& [name, value] : object.items())
@@ -51,13 +51,13 @@ class MetaReader {
         fail(at + "/" + name, "a known field", "\"" + name + "\"");
   }
 
-  void check_list(const Json& json, const char* name, const char* kind, const char* text) const {
+  void check_list(const Ordered& json, const char* name, const char* kind, const char* text) const {
     if (!json.contains(name) || !json[name].is_array()) return;  // read_about says what is wrong
     for (std::size_t i = 0; i < json[name].size(); ++i)
       check_names(json[name][i], "/" + std::string(name) + "/" + std::to_string(i), {kind, text});
   }
 
-  void check_nested(const Json& json) const {
+  void check_nested(const Ordered& json) const {
     check_list(json, "identifiers", "scheme", "value");
     check_list(json, "dates", "event", "text");
     if (json.contains("unit") && !json["unit"].is_string())
@@ -67,7 +67,7 @@ class MetaReader {
   }
 
   /// "mm" stands for {"name": "mm", "metres": 0.001}.
-  void replace_unit(Json& json) const {
+  void replace_unit(Ordered& json) const {
     if (!json.contains("unit") || !json["unit"].is_string()) return;
     About unit;
     if (!find_unit(json["unit"].get<std::string>(), unit))
@@ -75,7 +75,7 @@ class MetaReader {
     json["unit"] = {{"name", unit.unit}, {"metres", unit.metres_per_unit}};
   }
 
-  void check_licence(Json& json) const {
+  void check_licence(Ordered& json) const {
     if (!json.contains("licence") || !json["licence"].is_string()) return;
     const Licence licence = read_licence(json["licence"].get<std::string>());
     if (licence.kind == Licence::Kind::kOther)
@@ -87,7 +87,7 @@ class MetaReader {
     if (!json.contains("licenceUrl") && !licence.url.empty()) json["licenceUrl"] = licence.url;
   }
 
-  void check_epsg(const Json& json) const {
+  void check_epsg(const Ordered& json) const {
     if (!json.contains("coordinateReference")) return;
     const auto epsg = json["coordinateReference"].find("epsg");
     if (epsg == json["coordinateReference"].end() || !epsg->is_number_unsigned()) return;

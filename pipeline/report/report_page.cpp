@@ -76,9 +76,9 @@ std::string rights_line(const About& about) {
   if (!about.licence.empty()) {
     const std::string licence = html_escaped(about.licence);
     if (!out.empty()) out += ", ";
-    out += about.licence_url.empty()
-               ? licence
-               : fmt::format("<a rel=\"license\" href=\"{}\">{}</a>", html_escaped(about.licence_url), licence);
+    out += about.licence_url.empty() ? licence
+                                     : fmt::format("<a rel=\"license\" href=\"{}\">{}</a>",
+                                                   html_escaped(about.licence_url), licence);
   }
   return out.empty() ? out : "<p class=\"quiet\">" + out + "</p>\n";
 }
