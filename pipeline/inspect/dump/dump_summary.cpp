@@ -157,10 +157,10 @@ static std::string about_head(const About& about) {
   add("licence", about.licence.empty() ? "not given" : about.licence);
   for (const NamedText& line : about_lines(about))
     if (line.name == "coordinate reference") add("crs", line.text);
+  const std::string up = about.up_axis.empty() ? "up axis not known" : about.up_axis + " is up";
   add("unit", about.metres_per_unit > 0
-                  ? fmt::format("{}, {} m; {} up", about.unit, shortest(about.metres_per_unit, 7),
-                                about.up_axis.empty() ? "it is not known which axis is" : about.up_axis)
-                  : "not known");
+                  ? fmt::format("{}, {} m; {}", about.unit, shortest(about.metres_per_unit, 7), up)
+                  : "not known; " + up);
   return s;
 }
 

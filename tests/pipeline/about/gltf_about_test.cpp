@@ -16,21 +16,14 @@ About about_of(const json& document, Notes* notes = nullptr) {
 }
 
 json document() {
-  return json::parse(R"({
+  return json::parse(R"json({
     "asset":{"version":"2.0","copyright":"(c) the file","generator":"g",
-             "extras":{"author":"of extras","title":"of extras","license":"CC-BY-4.0 (https://a.b/by)","deep":{
-    "x" : [ 1, 2.5 ]}
-}
-}
-, "extras" : {"description" : "of the root", "unit" : "mm"},
-             "scene" : 1,
-             "scenes"
-    : [ {"extras" : {"title" : "of another scene"}}, {"extras" : {"capture" : "of the scene"}} ],
-      "nodes" : [ {"extras" : {"a" : "\u0007"}}, {} ],
-                "extensions" : {
-  "KHR_xmp_json_ld" : { "packets" : [ {"dc:title" : "of XMP"}, {"dc:title" : "of a node"} ] }
-}
-})");
+             "extras":{"author":"of extras","title":"of extras","license":"CC-BY-4.0 (https://a.b/by)",
+                       "deep":{"x":[1,2.5]}}},
+    "extras":{"description":"of the root","unit":"mm"},
+    "scene":1,"scenes":[{"extras":{"title":"of another scene"}},{"extras":{"capture":"of the scene"}}],
+    "nodes":[{"extras":{"a":"\u0007"}},{}],
+    "extensions":{"KHR_xmp_json_ld":{"packets":[{"dc:title":"of XMP"},{"dc:title":"of a node"}]}}})json");
 }
 
 TEST(GltfAbout, RisingPriority) {

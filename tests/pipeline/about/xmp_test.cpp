@@ -33,11 +33,11 @@ TEST(Xmp, EveryShapeOfAText) {
 TEST(Xmp, DublinCoreAndRights) {
   const About a = about_of(R"({
     "@context":{"d":"http://purl.org/dc/elements/1.1/","xmpRights":"http://ns.adobe.com/xap/1.0/rights/"},
-    "d:creator":{"@list":["A. Smith","B. Jones"]},"d:rights":"(c) Museum","d:identifier":["17",18],
+    "d:creator":{"@list":["A. Smith","B. Jones"]},"d:rights":"Museum, all rights","d:identifier":["17",18],
     "d:date":"1897","d:source":"https://museum.example/17","xmp:CreateDate":"2020-01-02",
     "xmpRights:UsageTerms":"CC-BY-4.0","xmpRights:WebStatement":"https://museum.example/terms"})");
   EXPECT_EQ(a.creator, "A. Smith; B. Jones");
-  EXPECT_EQ(a.attribution, "(c) Museum");
+  EXPECT_EQ(a.attribution, "Museum, all rights");
   EXPECT_EQ(a.licence, "CC-BY-4.0");
   EXPECT_EQ(a.licence_url, "https://museum.example/terms");
   EXPECT_EQ(a.source_url, "https://museum.example/17");
@@ -49,12 +49,11 @@ TEST(Xmp, RightsThatNameALicenceAreTheLicence) {
   EXPECT_EQ(about_of(R"({"dc:rights":"CC0-1.0"})").licence, "CC0-1.0");
   EXPECT_EQ(about_of(R"({"dc:rights":"CC0-1.0"})").attribution, "");
   EXPECT_EQ(about_of(R"({"xmpRights:WebStatement":"https://a.b/c"})").licence, "https://a.b/c");
-  EXPECT_EQ(about_of(R"({"xmpRights:WebStatement":"javascript:alert(1)"
-})"), About());
+  EXPECT_EQ(about_of(R"({"xmpRights:WebStatement":"javascript:alert"})"), About());
   Notes notes;
-EXPECT_EQ(about_of(R"({"xmpRights:UsageTerms":"ask"})", &notes).licence, "ask");
-ASSERT_EQ(notes.size(), 1u);
-EXPECT_EQ(notes[0].code, "unknown-licence");
+  EXPECT_EQ(about_of(R"({"xmpRights:UsageTerms":"ask"})", &notes).licence, "ask");
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].code, "unknown-licence");
 }
 
 TEST(Xmp, APacketSaysWhatItWasMadeOf) {

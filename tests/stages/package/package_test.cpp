@@ -163,11 +163,12 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
 TEST(Package, OrderIsStreamingOrder) {
   std::vector<std::string> paths;
   for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);
-  EXPECT_EQ(paths, (std::vector<std::string>{
-                       "manifest.json", "index.bin", "tables.bin", "textures.json", "quality.json",
-                       "mesh/s09.glb", "preview/000.jpg", "preview/001.jpg", "texture/0/tables.pack",
-                       "texture/1/tables.pack", "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
-                       "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb", "provenance.json"}));
+  EXPECT_EQ(paths,
+            (std::vector<std::string>{
+                "manifest.json", "index.bin", "tables.bin", "textures.json", "quality.json", "mesh/s09.glb",
+                "preview/000.jpg", "preview/001.jpg", "texture/0/tables.pack", "texture/1/tables.pack",
+                "about.json", "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
+                "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb", "provenance.json"}));
   EXPECT_EQ(streaming_order(paths), paths);
 }
 
@@ -250,6 +251,7 @@ About about_of(const Bytes& package) { return read_about(part(package, manifest_
 
 TEST(Package, AboutIsWhatTheSourceSaysWithThePublishersWordsOverIt) {
   Inputs inputs(1);
+  for (ScaleFile& file : inputs.files.files) file.glb = glb_container(R"({"asset":{}})", {});
   inputs.about.title = "of the source";
   inputs.about.licence = "CC0-1.0";
   inputs.about.metres_per_unit = 1;
