@@ -44,15 +44,18 @@ EntryName parse_texture_path(std::string_view text) {
 }
 
 EntryName parse_any_spelling(std::string_view path) {
-  constexpr std::pair<const char*, EntryKind> kSingle[] = {{kManifestPath, EntryKind::kManifest},
-                                                           {kIndexPath, EntryKind::kIndex},
-                                                           {kTablesPath, EntryKind::kTables},
-                                                           {kTexturesPath, EntryKind::kTextures},
-                                                           {kQualityPath, EntryKind::kQuality},
-                                                           {kProvenancePath, EntryKind::kProvenance},
-                                                           {kSplitStreamPath, EntryKind::kSplitStream},
-                                                           {kPosterPath, EntryKind::kPoster},
-                                                           {kThesisPath, EntryKind::kThesis}};
+  constexpr std::pair<const char*, EntryKind> kSingle[] = {
+      {kManifestPath, EntryKind::kManifest},
+      {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},
+      {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},
+      {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream},
+      {kPosterPath, EntryKind::kPoster},
+      {kThesisPath, EntryKind::kThesis},
+      {kAboutPath, EntryKind::kAbout},
+      {kContentCredentialPath, EntryKind::kContentCredential}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -100,10 +103,12 @@ enum Place : int {
   kTableStreamsPlace,
   kTablesPlace,
   kPosterPlace,
+  kAboutPlace,
   kPreviews,
   kInterleaved,
   kOthers,
-  kLast
+  kLast,
+  kBehindAll
 };
 
 /// Greater than any scale number: the stream stands before the GLBs.
@@ -137,11 +142,15 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
       return kTableStreamsPlace;
     case EntryKind::kPoster:
       return kPosterPlace;
+    case EntryKind::kAbout:
+      return kAboutPlace;
     case EntryKind::kRung:
     case EntryKind::kSplitStream:
       return kInterleaved;
     case EntryKind::kProvenance:
       return kLast;
+    case EntryKind::kContentCredential:
+      return kBehindAll;
     case EntryKind::kFragmentFile:
     case EntryKind::kSource:
     case EntryKind::kThesis:

@@ -14,10 +14,19 @@ inline constexpr const char* kTablesPath = "tables.bin";
 inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
+inline constexpr const char* kAboutPath = "about.json";
 // Not every package has these:
 inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";
 inline constexpr const char* kPosterPath = "poster.jpg";
 inline constexpr const char* kThesisPath = "thesis.bin";
+
+/// A C2PA manifest store over the container, where there is one: the last entry, named by neither manifest
+/// nor index, because it signs them; and its most bytes.
+inline constexpr const char* kContentCredentialPath = "META-INF/content_credential.c2pa";
+inline constexpr std::uint64_t kMaxContentCredentialBytes = std::uint64_t{64} << 20;
+
+/// Media type of a container.
+inline constexpr const char* kContainerMediaType = "application/vnd.texmesh+zip";
 
 /// Most texture planes of a package, mips included, and most rungs of a plane.
 inline constexpr std::uint32_t kMaxPackagePlanes = 10000, kMaxPackageRungs = 100;
@@ -51,7 +60,9 @@ enum class EntryKind : std::uint8_t {
   kPoster,
   kThesis,
   kOther,
-  kProvenance
+  kProvenance,
+  kAbout,
+  kContentCredential
 };
 struct EntryName {
   EntryKind kind = EntryKind::kOther;

@@ -27,8 +27,9 @@ std::uint32_t plane_of(const EntryRef& entry) {
 void check_entry(const EntryRef& e) {
   if (!is_valid_entry_path(e.path))
     throw FormatError(kIndexFile, "entry " + e.path, "a valid path", "another");
-  if (e.path == kManifestPath || e.path == kIndexPath)
-    throw FormatError(kIndexFile, "entry " + e.path, "an entry other than manifest and index", e.path);
+  if (e.path == kManifestPath || e.path == kIndexPath || e.path == kContentCredentialPath)
+    throw FormatError(kIndexFile, "entry " + e.path,
+                      "an entry other than manifest, index and content credential", e.path);
   if (e.offset % 64 != 0 || e.offset == 0)
     throw FormatError(kIndexFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
   if (e.offset > std::uint64_t{1} << 53 || e.bytes > std::uint64_t{1} << 53)

@@ -112,6 +112,7 @@ Json manifest_json(const Manifest& m) {
   j["textures"] = ref_json(m.textures);
   j["quality"] = ref_json(m.quality);
   j["provenance"] = ref_json(m.provenance);
+  j["about"] = ref_json(m.about);
   if (m.stream) j["stream"] = stream_json(*m.stream);
   if (m.thesis) j["thesis"] = ref_json(*m.thesis);
   if (m.poster) j["poster"] = poster_json(*m.poster);
@@ -284,6 +285,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_ref(at["textures"], kTexturesPath, m.textures);
   read_ref(at["quality"], kQualityPath, m.quality);
   read_ref(at["provenance"], kProvenancePath, m.provenance);
+  read_ref(at["about"], kAboutPath, m.about);
   if (document.contains("stream")) {
     m.stream = read_stream(at["stream"]);
     resolve_stream_scales(at["scales"], m);

@@ -73,7 +73,7 @@ struct Manifest {
   std::vector<ManifestStep> steps;    // by the default rule, see viewing.h
   std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
   PagedRef index, tables;
-  EntryRef textures, quality, provenance;
+  EntryRef textures, quality, provenance, about;
   std::optional<StreamRef> stream;  // vertex splits
   std::optional<EntryRef> thesis;   // thesis_tables.h
   std::optional<PosterRef> poster;

@@ -44,6 +44,7 @@ class ManifestFiller {
     set(manifest_.textures, kTexturesPath);
     set(manifest_.quality, kQualityPath);
     set(manifest_.provenance, kProvenancePath);
+    set(manifest_.about, kAboutPath);
     set(manifest_.index, kIndexPath);
     set_head(manifest_.index, read_index_head(*data_.at(kIndexPath)).bytes);
     set(manifest_.tables, kTablesPath);
@@ -89,11 +90,12 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
   std::set<std::string> paths;
   for (const PackageEntry& e : entries) {
     const EntryKind kind = parse_entry_path(e.path).kind;
-    if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures)
+    if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures ||
+        kind == EntryKind::kContentCredential)
       fail_package("entry " + e.path, "an entry that write_package does not make itself", e.path);
     if (!paths.insert(e.path).second) fail_package("entry " + e.path, "one entry of that path", "two");
   }
-  std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
+  std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath, kAboutPath};
   if (manifest.poster) needed.emplace_back(kPosterPath);
   for (const ManifestScale& s : manifest.scales)
     needed.push_back(s.has_glb() ? mesh_path(s.scale) : kSplitStreamPath);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/about.h"
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
@@ -52,6 +53,7 @@ inline constexpr Artefact<std::string> kProvenance{"provenance"};  // JSON
 inline constexpr Artefact<ImportedMesh> kImportedMesh{"import.mesh"};
 inline constexpr Artefact<std::vector<Material>> kMaterials{"import.materials"};
 inline constexpr Artefact<std::vector<Image>> kImages{"import.images"};
+inline constexpr Artefact<About> kSourceAbout{"import.about"};
 inline constexpr Artefact<ConditionedMesh> kConditionedMesh{"condition"};
 inline constexpr Artefact<Skeleton> kSkeleton{"skeletonization"};
 inline constexpr Artefact<ScaleMap> kScaleMap{"ssf"};

@@ -17,12 +17,13 @@ using Planes = std::vector<Pixels>;
 
 // Adapters, where a stage's function does not take its inputs and options as the graph gives them.
 
-Results<ImportedMesh, Materials, Images> import_source(const Source& source, const ImportOptions& options,
-                                                       const RunContext& context) {
+Results<ImportedMesh, Materials, Images, About> import_source(const Source& source,
+                                                              const ImportOptions& options,
+                                                              const RunContext& context) {
   ImportedModel m = source.import(options, context);
   ImportedMesh mesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification,
                     uv_sets_of(m.model.materials)};
-  return {{std::move(mesh), std::move(m.model.materials), std::move(m.model.images)},
+  return {{std::move(mesh), std::move(m.model.materials), std::move(m.model.images), std::move(m.about)},
           std::move(m.model.notes)};
 }
 
@@ -75,10 +76,11 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
                   const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
-                  const MeasuredQuality& quality, const Poster& poster, const std::string& provenance,
-                  const PackageOptions& options, double jnd, const RunContext& context) {
+                  const MeasuredQuality& quality, const Poster& poster, const About& source,
+                  const std::string& provenance, const PackageOptions& options, double jnd,
+                  const RunContext& context) {
   return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                          quality, poster, jnd, provenance, options, context);
+                          quality, poster, source, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -99,8 +101,8 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
   return {
-      stage({"import", kImportVersion, "file -> mesh, materials, images"},  //
-            inputs(kSource), outputs(kImportedMesh, kMaterials, kImages), read_of(o, o.import),
+      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself"},
+            inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "meshoptimizer", "openimageio", "tinygltf"}, import_source),
       stage({"condition", kConditionVersion,
              "mesh -> 2-manifold mesh: weld, drop degenerates, split, components"},
@@ -150,7 +152,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kThesisTables, kScaleFiles, kQuality, kPoster, kProvenance),
+                   kThesisTables, kScaleFiles, kQuality, kPoster, kSourceAbout, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

@@ -6,6 +6,7 @@
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
+#include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/texture_source.h"
@@ -109,6 +110,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
     context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
   }
   file.set_images(images);
+  file.set_about(package.about());
   out.glb = file.finish();
   out.mesh_bytes = out.glb.size();
   for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
@@ -118,8 +120,11 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
 }  // namespace
 
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  return request.bytes > 0 ? extract_bytes(package, request, context)
-                           : extract_whole(package, request, context);
+  if (request.bytes == 0) return extract_whole(package, request, context);
+  Extracted out = extract_bytes(package, request, context);
+  if (about_within(package.about(), request.bytes / kAboutShare) != package.about())
+    out.notes.emplace_back("the file is too small for all that is known of the object; see dump PKG about");
+  return out;
 }
 
 }  // namespace texmesh

@@ -9,6 +9,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/documents/about.h"
 #include "format/documents/index.h"
 #include "format/rules/allocation.h"
 #include "format/split/split_reader.h"
@@ -80,6 +81,11 @@ inline void fuzz_thesis(Input input) {
 inline void fuzz_quality(Input input) {
   const QualityTable table = read_quality(input);
   require(read_quality(as_bytes(write_quality(table))) == table, "a quality table changed by being written");
+}
+
+inline void fuzz_about(Input input) {
+  const std::string json = write_about(read_about(input));
+  require(write_about(read_about(as_bytes(json))) == json, "about.json changed by being written twice");
 }
 
 inline void fuzz_package(Input input) {
@@ -161,8 +167,9 @@ inline Bytes tagged(std::uint8_t kind, Input bytes) {
 
 /// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
 /// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables. Anything but an answer or a FormatError is
-/// a fault: it aborts. What is read must also be written again, unchanged where the format has one form only.
+/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables, 11 about.json. Anything but an answer or a
+/// FormatError is a fault: it aborts. What is read must also be written again, unchanged where the format has
+/// one form only.
 inline void read_format(std::span<const std::uint8_t> input) {
   using namespace detail;
   constexpr void (*kReaders[])(Input) = {fuzz_container,
@@ -175,7 +182,8 @@ inline void read_format(std::span<const std::uint8_t> input) {
                                          fuzz_index_with_digests,
                                          fuzz_tables_with_digests,
                                          fuzz_split_stream,
-                                         fuzz_thesis};
+                                         fuzz_thesis,
+                                         fuzz_about};
   if (input.empty()) return;
   try {
     kReaders[input[0] % std::size(kReaders)](input.subspan(1));
@@ -201,6 +209,9 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
     corpus.push_back(tagged(5, reader.entry(kQualityPath)));
   }
   corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  corpus.push_back(tagged(10, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
+    "identifiers":[{"scheme":"doi","value":"1"}],"unit":{"name":"m","metres":1},"upAxis":"y",
+    "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")));
   for (const std::uint32_t n : {3u, 9u})
     corpus.push_back(tagged(9, write_split_stream(texmesh::testing::split_fixture(n).source)));
   return corpus;

@@ -283,6 +283,9 @@ Bytes PackageParts::build() const {
   if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
   entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
+  About said = about;
+  said.title = manifest.title;
+  entries.push_back({kAboutPath, bytes_of(write_about(said))});
   for (const auto& [scale, glb] : meshes) entries.push_back({mesh_path(scale), glb});
   for (const auto& [path, bytes] : streams) entries.push_back({path, bytes});
   return write_package(manifest, textures, entries);
@@ -331,7 +334,8 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
   Manifest m = manifest_;
   std::vector<EntryRef> index = read_index(entry(kIndexPath));
   for (EntryRef& e : index) e.digest = sha256(entry(e.path));
-  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables})
+  for (EntryRef* ref :
+       std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.about, &m.tables})
     ref->digest = sha256(entry(ref->path));
   for (ManifestScale& s : m.scales)
     if (s.has_glb()) s.glb.digest = sha256(entry(s.glb.path));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -40,6 +41,7 @@ struct PackageParts {
   ThesisTables thesis;  // of the chain S_0 to S_5; no planes: the package has none
   QualityTable quality;
   nlohmann::json provenance;
+  About about;  // but for the title, which is the manifest's
   std::map<int, Bytes> meshes;
   std::map<std::string, Bytes> streams;  // previews, table streams, rungs by path
   Bytes build() const;

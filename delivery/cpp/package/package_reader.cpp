@@ -82,8 +82,8 @@ const std::vector<EntryRef>& PackageReader::index() {
       throw FormatError(store_->name(), "index entry " + ref.path, "what the manifest says of it",
                         it == entries.end() ? "none" : "another offset, size or digest");
   };
-  for (const EntryRef& ref :
-       {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality, manifest_.provenance})
+  for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
+                              manifest_.provenance, manifest_.about})
     require_entry(ref);
   for (const ManifestScale& scale : manifest_.scales)
     if (scale.has_glb()) require_entry(scale.glb);
@@ -221,6 +221,11 @@ const QualityTable& PackageReader::quality() {
     throw FormatError(store_->name(), kQualityPath, "the groups of the planes in textures.json", "others");
   quality_ = std::move(table);
   return *quality_;
+}
+
+const About& PackageReader::about() {
+  if (!about_) about_ = read_about(read_all(manifest_.about));
+  return *about_;
 }
 
 Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "format/container/container.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -63,6 +64,7 @@ class PackageReader {
   const std::vector<TextureInfo>& textures();     // refs resolved
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()
   const QualityTable& quality();                  // of the manifest's scales and the planes' groups
+  const About& about();
   /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of
   /// it.
   const PlaneThesis* plane_thesis(std::size_t plane);
@@ -108,6 +110,7 @@ class PackageReader {
   std::optional<PackageTables> tables_;
   std::optional<QualityTable> quality_;
   std::optional<ThesisTables> thesis_;
+  std::optional<About> about_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
   std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane

@@ -4,6 +4,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
+#include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/glb/scale_file.h"
 
@@ -64,6 +65,7 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   if (!source_.request.recentre) file->move_to(m.origin);
+  file->set_about(about_within(source_.package.about(), source_.request.bytes / kAboutShare));
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
   c.windows = std::make_unique<LitViews>(c.mesh, source_.windows, source_.context);

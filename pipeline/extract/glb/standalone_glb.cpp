@@ -8,6 +8,7 @@
 #include "format/base/bounded_json.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "pipeline/about/gltf_about.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"
@@ -91,6 +92,7 @@ struct StandaloneGlb::Document {
 
 StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
     : entry_(other.entry_),
+      about_(other.about_),
       document_(std::make_unique<Document>(*other.document_)),
       fallback_bytes_(other.fallback_bytes_),
       level_node_(other.level_node_) {}
@@ -331,6 +333,8 @@ void StandaloneGlb::move_to(Vec3d translation) {
   document_->root["nodes"].push_back(parent);
 }
 
+void StandaloneGlb::set_about(const About& about) { about_ = std::make_shared<const About>(about); }
+
 Bytes StandaloneGlb::finish() const {
   Json root = document_->root;
   root.erase("bufferViews");
@@ -360,6 +364,7 @@ Bytes StandaloneGlb::finish() const {
     root["buffers"].push_back(
         {{"byteLength", fallback_bytes_}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
 
+  if (about_) write_gltf_about(*about_, root);  // last: values of strangers must not be taken for indices
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
 }
 

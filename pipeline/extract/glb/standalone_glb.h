@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/about.h"
 #include "pipeline/extract/glb/draco_recode.h"
 #include "pipeline/extract/glb/image_codecs.h"
 #include "stages/scales/scales.h"
@@ -51,6 +52,9 @@ class StandaloneGlb {
   /// Positions stay as they are. Nothing happens for {0, 0, 0}. After all levels of detail.
   void move_to(Vec3d translation);
 
+  /// What finish() writes of the object: asset.copyright, asset.extras, KHR_xmp_json_ld (write_gltf_about()).
+  void set_about(const About& about);
+
   /// The file; views in their first order, those that nothing uses left out. Same input, same bytes.
   std::vector<std::uint8_t> finish() const;
 
@@ -62,6 +66,7 @@ class StandaloneGlb {
   void use_extension(const std::string& name, bool required);
   void forget_extension(const std::string& name);
   std::string entry_;
+  std::shared_ptr<const About> about_;
   std::unique_ptr<Document> document_;
   std::uint64_t fallback_bytes_ = 0;
   std::size_t level_node_ = 0;

@@ -263,6 +263,12 @@ Json entries_json(PackageReader& p) {
   return {{"entries", list}};
 }
 
+Json about_json(PackageReader& p) {
+  const auto bytes = p.entry(p.manifest().about);
+  read_about(bytes);
+  return {{"about", Json::parse(bytes.begin(), bytes.end())}};
+}
+
 Json provenance_json(PackageReader& p) {
   const auto bytes = p.entry(p.manifest().provenance);
   read_provenance(bytes);  // refuse what verify would refuse
@@ -283,6 +289,8 @@ Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
       return tables_json(p, gamma);
     case DumpPart::kEntries:
       return entries_json(p);
+    case DumpPart::kAbout:
+      return about_json(p);
     default:
       return provenance_json(p);
   }

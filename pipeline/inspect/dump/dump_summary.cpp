@@ -147,12 +147,29 @@ std::string scales_text(PackageReader& p) {
          table.text() + floors;
 }
 
+/// The first lines: what the object is and what may be done with it.
+static std::string about_head(const About& about) {
+  std::string s = about.title.empty() ? std::string() : printable(about.title) + "\n";
+  const auto add = [&s](const char* name, const std::string& text) {
+    if (!text.empty()) s += fmt::format("{:<10}{}\n", name, printable(text));
+  };
+  add("by", about.attribution.empty() ? about.creator : about.attribution);
+  add("licence", about.licence.empty() ? "not given" : about.licence);
+  for (const NamedText& line : about_lines(about))
+    if (line.name == "coordinate reference") add("crs", line.text);
+  const std::string up = about.up_axis.empty() ? "up axis not known" : about.up_axis + " is up";
+  add("unit", about.metres_per_unit > 0
+                  ? fmt::format("{}, {} m; {}", about.unit, shortest(about.metres_per_unit, 7), up)
+                  : "not known; " + up);
+  return s;
+}
+
 std::string summary_text(PackageReader& p) {
   const Manifest& m = p.manifest();
   const Provenance provenance = read_provenance(p.entry(m.provenance));
   const auto kinds = bytes_by_kind(m, p.store().read_manifest().size(), p.index());
   const Vec3d size = m.bounds_max - m.bounds_min;
-  std::string s = m.title.empty() ? std::string() : printable(m.title) + "\n";
+  std::string s = about_head(p.about());
   s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
                    printable(provenance.tool));
   s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n",

@@ -26,7 +26,8 @@ const std::array<Kind, 10>& kinds() {
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"source images", {EntryKind::kSource}},
        {"the thesis's tables", {EntryKind::kThesis}},
-       {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
+       {"about, provenance and others",
+        {EntryKind::kAbout, EntryKind::kProvenance, EntryKind::kOther, EntryKind::kContentCredential}}}};
   return list;
 }
 

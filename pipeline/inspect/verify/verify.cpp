@@ -84,6 +84,9 @@ class Verifier {
       const QualityTable quality = read_quality(store_.read(package_.manifest.quality));
       if (package_.textures) check_quality(package_.manifest, *package_.textures, quality, findings_);
     });
+    guarded(findings_, "about", kAboutPath, [&] {
+      check_about(package_.manifest, read_about(store_.read(package_.manifest.about)), findings_);
+    });
     guarded(findings_, "provenance", kProvenancePath, [&] {
       const Provenance provenance = read_provenance(store_.read(package_.manifest.provenance));
       check_provenance(package_.manifest, package_.textures.value_or(std::vector<TextureInfo>{}), provenance,

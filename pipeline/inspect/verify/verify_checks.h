@@ -5,6 +5,7 @@
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/finding.h"
 #include "format/base/vec.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -42,6 +43,7 @@ void check_thesis(const Manifest& manifest, const PackageTables& tables, const T
 /// the heights that were rendered.
 void check_quality(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                    const QualityTable& quality, Findings& findings);
+void check_about(const Manifest& manifest, const About& about, Findings& findings);
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 

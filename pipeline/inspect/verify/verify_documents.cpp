@@ -79,6 +79,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   check(m.textures, "/textures");
   check(m.quality, "/quality");
   check(m.provenance, "/provenance");
+  check(m.about, "/about");
   if (m.stream) {
     const auto it = entries.find(kSplitStreamPath);
     if (it == entries.end())
@@ -93,6 +94,10 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   if (m.poster) check(*m.poster, "/poster");
   for (std::size_t k = 0; k < m.scales.size(); ++k)
     if (m.scales[k].has_glb()) check(m.scales[k].glb, at("scales/offset", k));
+}
+
+void check_about(const Manifest& m, const About& about, Findings& findings) {
+  findings.require_equal(about.title, m.title, "about", kManifestPath, "/title");
 }
 
 /// Switch sizes are heights that were rendered.
@@ -151,7 +156,7 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     return (*section)[name];
   };
   const auto title = option("package", "title");
-  if (title.is_string() && title != m.title)
+  if (title.is_string() && title != "" && title != m.title)
     findings.add("provenance", kProvenancePath, "/options/package/title", m.title + ", as the manifest",
                  title.get<std::string>());
   const auto jnd = option("perceptual_values", "jnd");

@@ -93,6 +93,7 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, text(write_quality(quality))});
   entries.push_back({kProvenancePath, text("{}")});
+  entries.push_back({kAboutPath, text(R"({"title":"test"})")});
   return write_package(m, textures, entries);
 }
 

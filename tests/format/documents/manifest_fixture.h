@@ -54,6 +54,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   m.textures = {kTexturesPath, far, 4000, digest};
   m.quality = {kQualityPath, far, 4000, digest};
   m.provenance = {kProvenancePath, far, 4000, digest};
+  m.about = {kAboutPath, far, 4000, digest};
   if (long_numbers) m.poster = PosterRef{{kPosterPath, far, 1'000'000, digest}, 4096, 4096};
   if (long_numbers) m.stream = StreamRef{far, 4'000'000'000u, 400'000, digest};
   return m;

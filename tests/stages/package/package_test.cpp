@@ -11,6 +11,7 @@
 #include "format/documents/index.h"
 #include "format/documents/package_writer.h"
 #include "stages/base/run_context.h"
+#include "stages/gltf/glb_container.h"
 #include "tests/format/documents/tables_fixture.h"
 #include "tests/support/meshes.h"
 
@@ -102,10 +103,11 @@ struct Inputs {
   }
 
   Poster poster;  // none
+  About about;
 
   Bytes assemble() const {
     return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                            quality, poster, 0.1, "{\"texmesh\":\"test\"}", options, {});
+                            quality, poster, about, 0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
@@ -165,9 +167,10 @@ TEST(Package, OrderIsStreamingOrder) {
   for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);
   EXPECT_EQ(paths, (std::vector<std::string>{
                        "manifest.json", "mesh/s09.glb", "index.bin", "textures.json", "quality.json",
-                       "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin", "preview/000.jpg",
-                       "preview/001.jpg", "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
-                       "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb", "provenance.json"}));
+                       "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin", "about.json",
+                       "preview/000.jpg", "preview/001.jpg", "texture/0/r00.pack", "texture/1/r00.pack",
+                       "mesh/s04.glb", "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb",
+                       "provenance.json"}));
   EXPECT_EQ(streaming_order(paths), paths);
 }
 
@@ -243,6 +246,45 @@ TEST(Package, DeterministicAndReproducedFromItsOwnEntries) {
   });
   std::ranges::reverse(files);
   EXPECT_EQ(write_package(m, textures, files), package);
+}
+
+About about_of(const Bytes& package) { return read_about(part(package, manifest_of(package).about)); }
+
+TEST(Package, AboutIsWhatTheSourceSaysWithThePublishersWordsOverIt) {
+  Inputs inputs(1);
+  for (ScaleFile& file : inputs.files.files) file.glb = glb_container(R"({"asset":{}})", {});
+  inputs.about.title = "of the source";
+  inputs.about.licence = "CC0-1.0";
+  inputs.about.metres_per_unit = 1;
+  inputs.about.unit = "metre";
+  EXPECT_EQ(about_of(inputs.assemble()), inputs.about);
+  EXPECT_EQ(manifest_of(inputs.assemble()).title, "of the source");
+  inputs.options.meta = R"({"title":"of the museum","creator":"A. Smith"})";
+  EXPECT_EQ(about_of(inputs.assemble()).title, "of the museum");
+  EXPECT_EQ(about_of(inputs.assemble()).licence, "CC0-1.0");
+  inputs.options.title = "of the command line";
+  const Bytes package = inputs.assemble();
+  EXPECT_EQ(about_of(package).title, "of the command line");
+  EXPECT_EQ(about_of(package).creator, "A. Smith");
+  EXPECT_EQ(manifest_of(package).title, "of the command line");
+}
+
+TEST(Package, TheFilesOfScalesSayWhatTheSourceSaysWhateverThePublisherAdds) {
+  Inputs inputs(1);
+  const std::string json = R"({"asset":{"version":"2.0"}})";
+  for (ScaleFile& file : inputs.files.files) file.glb = glb_container(json, {});
+  const Bytes silent = inputs.assemble();
+  EXPECT_EQ(part(silent, manifest_of(silent).scales[0].glb), inputs.files.files[0].glb);
+  inputs.about.attribution = "A. Smith";
+  const auto first_glb = [&] {
+    const Bytes package = inputs.assemble();
+    return part(package, manifest_of(package).scales[0].glb);
+  };
+  const Bytes said = first_glb();
+  const std::string text(said.begin(), said.end());
+  EXPECT_NE(text.find(R"("copyright":"A. Smith")"), std::string::npos);
+  inputs.options.meta = R"({"attribution":"B. Jones","licence":"CC-BY-4.0"})";
+  EXPECT_EQ(first_glb(), said);
 }
 
 TEST(Package, HundredsOfPlanesStillBootstrapInOneRead) {

@@ -15,6 +15,7 @@ import * as layout from './layout';
 // Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
 // where there are none. Digests have been checked before.
 
+export { readAbout as about } from './about';
 export { readIndex } from './index_table';
 export { requireSelfContained } from './self_contained_glb';
 
@@ -56,7 +57,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
-    m.tables, m.textures, m.quality, m.provenance, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
+    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
   ];
   for (const ref of refs) {
     if (!ref) continue;

@@ -97,6 +97,7 @@ export interface Manifest {
   textures: EntryRef;
   quality: EntryRef;
   provenance: EntryRef;
+  about: EntryRef;
   stream?: StreamRef;
   /** thesis.bin, which this client does not read. */
   thesis?: EntryRef;
@@ -252,6 +253,7 @@ export function readManifest(json: Uint8Array): Manifest {
     textures: readRef(at.at('textures'), paths.texturesPath),
     quality: readRef(at.at('quality'), paths.qualityPath),
     provenance: readRef(at.at('provenance'), paths.provenancePath),
+    about: readRef(at.at('about'), paths.aboutPath),
     ...(stream ? { stream } : {}),
     ...(at.has('thesis') ? { thesis: readRef(at.at('thesis'), paths.thesisPath) } : {}),
     ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),

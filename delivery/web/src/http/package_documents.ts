@@ -1,3 +1,4 @@
+import type { About } from '../format/about';
 import { decodeHere, type Documents } from '../format/document_decoder';
 import type { PlaneDocument } from '../format/documents';
 import { planeOfPath } from '../format/entry_paths';
@@ -106,7 +107,7 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality' | 'about'>(
     name: K,
     signal: AbortSignal | undefined,
     read: (m: Manifest) => Promise<Uint8Array>,
@@ -172,6 +173,10 @@ export class PackageDocuments {
   /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
+  }
+  /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
+  about(signal?: AbortSignal): Promise<About> {
+    return this.document_('about', signal, (m) => this.readChecked(m.about, { kind: 'other', signal }));
   }
   /**
    * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,

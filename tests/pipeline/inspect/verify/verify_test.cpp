@@ -70,7 +70,7 @@ TEST(Verify, ASoundPackageHasNoFindings) {
   EXPECT_EQ(report.meshes, 2u);
   EXPECT_EQ(report.previews, 1u);
   EXPECT_EQ(report.fragments, 6u);
-  EXPECT_EQ(report.entries, 12u);
+  EXPECT_EQ(report.entries, 13u);
 }
 
 TEST(Verify, ThePatcherItselfKeepsAPackageSound) {
@@ -131,9 +131,10 @@ TEST(Verify, Index) {
 }
 
 TEST(Verify, EntryDigest) {
-  for (const std::string& path : {mesh_path(0), mesh_path(5), preview_path(0), rung_path(0, 1),
-                                  table_streams_path(0), std::string(kTablesPath), std::string(kTexturesPath),
-                                  std::string(kQualityPath), std::string(kProvenancePath)})
+  for (const std::string& path :
+       {mesh_path(0), mesh_path(5), preview_path(0), rung_path(0, 1), table_streams_path(0),
+        std::string(kTablesPath), std::string(kTexturesPath), std::string(kQualityPath),
+        std::string(kAboutPath), std::string(kProvenancePath)})
     EXPECT_TRUE(catches(PackagePatcher(make_package_parts().build())
                             .edit(path, [](Bytes& b) { b[b.size() / 2] ^= 4; })
                             .package(),
@@ -349,6 +350,27 @@ TEST(Verify, Provenance) {
            [](auto& j) { j["inputs"] = nlohmann::json::array(); }, [](auto& j) { j["version"] = 2; }})
     EXPECT_TRUE(catches_only(built_with([&](PackageParts& p) { change(p.provenance); }), "provenance",
                              kProvenancePath));
+}
+
+TEST(Verify, About) {
+  EXPECT_TRUE(
+      catches_only(sealed_with([](Manifest& m) { m.title = "Another one"; }), "about", kManifestPath));
+  const auto with_about = [](const std::string& json) {
+    return rearranged(
+        [&](auto& entries) {
+          for (auto& [path, bytes] : entries)
+            if (path == kAboutPath) bytes.assign(json.begin(), json.end());
+        },
+        false);
+  };
+  EXPECT_TRUE(catches(with_about("{]"), "about", kAboutPath));
+  EXPECT_TRUE(catches(sealed_with([](Manifest& m) { m.about.offset += 64; }), "reference", kManifestPath));
+  // The publisher's own members are nobody else's business.
+  EXPECT_TRUE(verify_package(*open_container(memory_source(built_with([](PackageParts& p) {
+                p.about.extras = R"({"shelf":[1,{"extensions":{"A_b":1}}]})";
+              }))),
+                             {})
+                  .findings.empty());
 }
 
 // Meshes
