@@ -117,7 +117,6 @@ const std::vector<TextureInfo>& PackageReader::textures() {
         !feature.empty() &&
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
       throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
-  const std::size_t full = full_size_planes(textures);
   resolve_textures(textures, index());
   textures_ = std::move(textures);
   return *textures_;
