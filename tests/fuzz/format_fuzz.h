@@ -10,6 +10,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/documents/index.h"
+#include "format/documents/thesis_tables.h"
 #include "format/rules/allocation.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_writer.h"
@@ -200,6 +201,13 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
     corpus.push_back(tagged(5, reader.entry(kQualityPath)));
   }
   corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  ThesisTables thesis;
+  PlaneThesis& said = thesis.planes.emplace_back();
+  said.z = said.i = said.zeta = said.m = said.vqp = {0.5f, 1};
+  said.model = {300, 0.5f, 1.02f, 0.98f, 0.05f};
+  said.quality = {80, 40};
+  said.total_bytes.assign(2 * kGammaSteps, 70000);
+  corpus.push_back(tagged(10, write_thesis(thesis)));
   for (const std::uint32_t n : {3u, 9u})
     corpus.push_back(tagged(9, write_split_stream(texmesh::testing::split_fixture(n).source)));
   return corpus;
