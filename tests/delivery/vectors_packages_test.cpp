@@ -70,8 +70,9 @@ Json viewing(PackageReader& package) {
           {"scale_error_p95_rms_max_at_700_px", errors}};
 }
 
-/// Sizes along knots between every two rungs, which the golden packages do not have.
+/// Sizes along knots between every two rungs, instead of the plane's own.
 Json sizes_along_knots(PlaneTables t) {
+  t.knot_quality.clear(), t.knot_position.clear();
   for (std::size_t r = 0; r + 1 < t.rung_count(); ++r)
     for (const int k : {1, 2})
       if (t.rung_quality[r] + k < t.rung_quality[r + 1]) {

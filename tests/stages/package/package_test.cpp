@@ -375,7 +375,7 @@ TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {
   EXPECT_EQ(part(package, textures[0].source), (Bytes{1, 2, 3}));
   EXPECT_EQ(index[index.size() - 2].path, "source/000.tif");
   EXPECT_EQ(index.back().path, kProvenancePath);
-  // Where readers of 1.0 look for what they do not know: on the page that belongs to no plane.
+  // On the page of the index that belongs to no plane.
   const Bytes bytes = part(package, m.index);
   const IndexHead head = read_index_head(bytes);
   const auto page = read_index_page(head, 0, std::span(bytes).subspan(head.bytes, head.pages[0].bytes));
