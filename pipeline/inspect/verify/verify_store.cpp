@@ -61,9 +61,10 @@ void CheckedStore::check_stored(const std::string& path, const Bytes& bytes, std
   findings_.require_equal<std::uint64_t>(it->second->bytes, bytes.size(), "entry-set", path, "bytes");
 }
 
-void CheckedStore::check_entry_set(const std::vector<EntryRef>& index) {
+void CheckedStore::check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry) {
   if (listed_.empty()) return;  // "container" says why
-  std::vector<std::string> named{kManifestPath, kIndexPath};
+  index.insert(std::ranges::upper_bound(index, index_entry.offset, {}, &EntryRef::offset), index_entry);
+  std::vector<std::string> named{kManifestPath};
   for (const EntryRef& e : index) named.push_back(e.path);
   for (const std::string& path : named)
     findings_.require(contains(path), "entry-set", path, "", "an entry of the package, as the index says",
