@@ -128,7 +128,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews), outputs(kTables),
             read_of(o, o.lut), {"libjpeg-turbo", "libwebp"}, build_tables),
-      stage({"scales", kScalesVersion, "kept scales -> standalone GLB files"},
+      stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),

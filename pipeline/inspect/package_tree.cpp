@@ -39,7 +39,8 @@ class NewTree {
   NewFolder folder_;
 };
 
-/// Everything behind the manifest that belongs into the container, in order: what the index names, and itself.
+/// Everything behind the manifest that belongs into the container, in order: what the index names, and
+/// itself.
 std::vector<EntryRef> container_order(PackageReader& package) {
   std::vector<EntryRef> entries = package.index();
   entries.push_back(package.manifest().index);

@@ -16,7 +16,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 3;
+inline constexpr int kPackageVersion = 4;
 
 struct PackageOptions {
   std::string title;
