@@ -25,6 +25,14 @@ const kPackages = {
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
 
+/** Every scale as a file of its own, scales/NAME-sNN.glb, wherever the package has the scale. */
+function extractScales(file, name) {
+  fs.mkdirSync(path.join(packages, 'scales'), {recursive: true});
+  const {scales} = JSON.parse(fs.readFileSync(path.join(packages, name, 'manifest.json')));
+  for (const scale of scales.scale)
+    run(env.texmesh, 'extract', file, '--scale', `${scale}`, '--recentre', '-o', path.join(packages, 'scales', `${name}-s${scale}.glb`));
+}
+
 export function makePackages() {
   fs.mkdirSync(packages, {recursive: true});
   const newest = Math.max(fs.statSync(env.texmesh).mtimeMs, fs.statSync(path.join(path.dirname(env.texmesh), 'texmesh-core')).mtimeMs);
@@ -37,6 +45,7 @@ export function makePackages() {
     run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
     if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');
+    if (name === 'maps') extractScales(file, name);
     // Elsewhere, so that a server without ranges finds each kind of tree alone.
     fs.mkdirSync(path.join(packages, 'files'), {recursive: true});
     fs.copyFileSync(file, path.join(packages, 'files', `${name}.texmesh`));

@@ -240,9 +240,10 @@ Bytes PackageReader::scale_glb(int scale) {
 Bytes PackageReader::split_prefix(int scale) {
   const ManifestScale& s = manifest_.scales[scale_index(scale)];
   if (s.has_glb() || !manifest_.stream)
-    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file", "scale " + std::to_string(scale));
-  Bytes bytes = store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0,
-                             s.glb.bytes);
+    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file",
+                     "scale " + std::to_string(scale));
+  Bytes bytes =
+      store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0, s.glb.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != s.glb.digest)
     throw FormatError(store_->name(), std::string("prefix of ") + kSplitStreamPath,

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "format/container/layout.h"
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
@@ -257,9 +259,10 @@ Json entries_json(PackageReader& p) {
   Json list = Json::array();
   for (const ContainerEntry& e : p.store().list())
     if (e.path == kManifestPath) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(p.id())));
+  std::vector<EntryRef> entries = p.index();
   const EntryRef& index = p.manifest().index;
-  list.push_back(entry_json(index.path, index.offset, index.bytes, to_hex(index.digest)));
-  for (const EntryRef& e : p.index()) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
+  entries.insert(std::ranges::upper_bound(entries, index.offset, {}, &EntryRef::offset), index);
+  for (const EntryRef& e : entries) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
   return {{"entries", list}};
 }
 

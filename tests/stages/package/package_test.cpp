@@ -145,7 +145,8 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
     const Manifest m = manifest_of(package);
     const std::vector<EntryRef> index = read_index(part(package, m.index));
     auto entries = read_container(*memory_source(package));
-    std::erase_if(entries, [](const ContainerEntry& e) { return e.path == kManifestPath || e.path == kIndexPath; });
+    std::erase_if(entries,
+                  [](const ContainerEntry& e) { return e.path == kManifestPath || e.path == kIndexPath; });
     ASSERT_EQ(index.size(), entries.size());
     for (std::size_t i = 0; i < index.size(); ++i) {
       EXPECT_EQ(index[i].path, entries[i].path);
