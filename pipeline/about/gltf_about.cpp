@@ -170,9 +170,9 @@ void write_gltf_about(const About& about, Ordered& root) {
   write_coordinates(about, root);
   const Ordered source = about.source.empty() ? Ordered::object() : Ordered::parse(about.source);
   const Ordered from = source.value("asset", Ordered::object());
-  Ordered& asset = root["asset"];
-  if (const std::string line = copyright_line(about); !line.empty()) asset["copyright"] = line;
-  if (from.is_object() && from.contains("extras")) asset["extras"] = from["extras"];
+  // An ordered_json moves its members when one is added: no reference to one is kept.
+  if (const std::string line = copyright_line(about); !line.empty()) root["asset"]["copyright"] = line;
+  if (from.is_object() && from.contains("extras")) root["asset"]["extras"] = from["extras"];
 
   Ordered packets = source.value("xmpPackets", Ordered::array());
   if (!packets.is_array()) packets = Ordered::array();
@@ -187,7 +187,7 @@ void write_gltf_about(const About& about, Ordered& root) {
   }
   if (packets.empty()) return;
   root["extensions"][kXmpExtension]["packets"] = packets;
-  if (shown < packets.size()) asset["extensions"][kXmpExtension]["packet"] = shown;
+  if (shown < packets.size()) root["asset"]["extensions"][kXmpExtension]["packet"] = shown;
   Ordered used = root.value("extensionsUsed", Ordered::array());
   if (std::find(used.begin(), used.end(), Ordered(kXmpExtension)) == used.end())
     used.push_back(kXmpExtension);

@@ -36,12 +36,12 @@ TEST(GltfAbout, RisingPriority) {
   EXPECT_EQ(a.licence_url, "https://a.b/by");
   EXPECT_EQ(a.description, "of the root");
   EXPECT_EQ(a.capture, "of the scene");
-  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0;
+  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0u;
   EXPECT_EQ(about_of(d).title, "of XMP");
   d["asset"].erase("extensions");
-  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 1;
+  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 1u;
   EXPECT_EQ(about_of(d).title, "of a node");
-  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 7;
+  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 7u;
   EXPECT_EQ(about_of(d).title, "of extras");
 }
 
@@ -97,7 +97,7 @@ TEST(GltfAbout, AnythingMayBeShapedWrongly) {
 
 TEST(GltfAbout, WrittenBackAndReadAgain) {
   json d = document();
-  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0;
+  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0u;
   About a = about_of(d);
   ordered_json root = ordered_json::parse(R"({"asset":{"version":"2.0","generator":"texmesh"}})");
   write_gltf_about(a, root);
