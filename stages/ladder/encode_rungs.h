@@ -15,6 +15,7 @@ namespace texmesh {
 
 /// A plane's codec after its training, and what the training gave.
 struct TrainedPlane {
+  PlaneCoding coding;
   std::unique_ptr<TextureCodec> codec;
   std::vector<CodecRung> rungs;
   SizeKnots knots;

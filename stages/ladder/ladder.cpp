@@ -1,9 +1,11 @@
 #include "stages/ladder/ladder.h"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 #include <utility>
 
+#include "stages/fragment_codec/coding_space.h"
 #include "stages/image/check_pixels.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
@@ -54,8 +56,8 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     if (plane.covered_texels.size() != plane.fragment_count())
       fail(place + ": covered texels", std::to_string(plane.fragment_count()) + " fragments",
            std::to_string(plane.covered_texels.size()));
-    if (plane.mip > 0 && options.hull_gain >= 0 &&
-        (plane.base >= previews.planes.size() || previews.planes[plane.base].file.empty()))
+    const std::size_t base = plane.mip > 0 ? plane.base : p;
+    if (options.prune && (base >= previews.planes.size() || previews.planes[base].file.empty()))
       fail(place, "a preview of the full size", "none");
     if (options.lossless_top && plane.image >= images.size())
       fail(place, "its source image", std::to_string(images.size()) + " images");
@@ -89,11 +91,22 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   coding.channels = plane.channels;
   coding.fragment_width_px = plane.fragment_width_px;
   coding.fragment_height_px = plane.fragment_height_px;
-  coding.colour = is_colour(plane.role);
-  coding.subsampling = options.subsampling;
+  coding.subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
   coding.qualities = rungs_of(plane.role, options);
-  if (codec == Codec::kJpegProgressive && coding.colour) coding.qualities = {options.progressive_quality};
+  if (codec == Codec::kJpegProgressive && is_colour(plane.role))
+    coding.qualities = {options.progressive_quality};
   return coding;
+}
+
+/// The space of three channels of data, by what a sample of their pixels shows.
+void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, PlaneCoding& coding,
+                  const RunContext& context) {
+  if (is_colour(plane.role) || plane.channels != 3) return;
+  const CodingSpace space =
+      measure_coding_space(plane.role == TextureRole::kNormal ? DataKind::kVectors : DataKind::kNumbers,
+                           size_sample(plane, pixels, uncovered), context);
+  coding.apart = space.apart;
+  coding.subsampling = space.subsampling;
 }
 
 /// The codecs of all planes, trained on samples of their pixels.
@@ -104,25 +117,47 @@ std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::ve
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     const Codec codec = codec_of(plane, p, options.mode, notes);
-    const PlaneCoding coding = coding_of(plane, codec, options);
     TrainedPlane& trained = out.emplace_back();
-    trained.codec = make_texture_codec(codec, coding);
+    trained.coding = coding_of(plane, codec, options);
+    choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
+    trained.codec = make_texture_codec(codec, trained.coding);
     trained.rungs = trained.codec->train(
         training_sample(plane, pixels[p], options.uncovered, options.training_fragments), context);
-    if (codec == Codec::kJpeg && is_colour(plane.role) && plane.mip == 0)
-      trained.knots = measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
     context.report(kTrained * static_cast<double>(p + 1) / static_cast<double>(fragments.planes.size()));
   }
   return out;
 }
 
-/// What choosing the rungs takes, at every rung: all of full-size planes, of mips a few fragments.
+std::vector<std::vector<std::size_t>> all_rungs(const std::vector<TrainedPlane>& trained) {
+  std::vector<std::vector<std::size_t>> out;
+  for (const TrainedPlane& plane : trained) {
+    std::vector<std::size_t>& rungs = out.emplace_back(plane.rungs.size());
+    std::iota(rungs.begin(), rungs.end(), std::size_t{0});
+  }
+  return out;
+}
+
+/// Knots of full-size colours, between the rungs that are kept.
+void measure_knots(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                   const LadderOptions& options, const std::vector<std::vector<std::size_t>>& kept,
+                   std::vector<TrainedPlane>& trained, const RunContext& context) {
+  for (std::size_t p = 0; p < trained.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    if (trained[p].codec->id() != Codec::kJpeg || !is_colour(plane.role) || plane.mip > 0) continue;
+    PlaneCoding coding = trained[p].coding;
+    coding.qualities.clear();
+    for (const std::size_t r : kept[p]) coding.qualities.push_back(trained[p].rungs[r].quality);
+    trained[p].knots = measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
+  }
+}
+
+/// What choosing the rungs takes, at every rung: a few fragments, or all where there is no choice.
 std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector<TrainedPlane>& trained,
-                                   double hull_gain) {
+                                   bool prune) {
   std::vector<PlaneWork> work(trained.size());
-  std::vector<std::vector<std::uint8_t>> sample = hull_sample(fragments);
+  std::vector<std::vector<std::uint8_t>> sample = choice_sample(fragments);
   for (std::size_t p = 0; p < work.size(); ++p) {
-    if (hull_gain < 0) sample[p].assign(sample[p].size(), 1);
+    if (!prune) sample[p].assign(sample[p].size(), 1);
     work[p].wanted = std::move(sample[p]);
     for (std::size_t r = 0; r < trained[p].rungs.size(); ++r) work[p].rungs.push_back(r);
   }
@@ -155,13 +190,14 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
                      const RunContext& context) {
   check(fragments, pixels, previews, images, options);
   Ladder ladder;
-  const std::vector<TrainedPlane> trained = train_planes(fragments, pixels, options, ladder.notes, context);
+  std::vector<TrainedPlane> trained = train_planes(fragments, pixels, options, ladder.notes, context);
   const auto encode = [&](std::vector<PlaneWork> work, ProgressPart progress) {
     return encode_rungs(fragments, pixels, options.uncovered, trained, std::move(work), progress, context);
   };
   std::vector<PlaneLadder> sample =
-      encode(sample_work(fragments, trained, options.hull_gain), {kTrained, kSampled});
-  auto kept = choose_rungs(fragments, pixels, sample, previews, options.hull_gain, context);
+      encode(sample_work(fragments, trained, options.prune), {kTrained, kSampled});
+  auto kept = options.prune ? choose_rungs(fragments, pixels, sample, previews, context) : all_rungs(trained);
+  measure_knots(fragments, pixels, options, kept, trained, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
   if (options.lossless_top)
     for (std::size_t p = 0; p < fragments.planes.size(); ++p) {

@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 11;
+inline constexpr int kLadderVersion = 12;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.
@@ -40,11 +40,11 @@ struct LadderOptions {
   std::vector<int> data_rungs{18, 30, 53, 75, 86, 93, 97};
   std::vector<int> alpha_rungs{18, 30, 53, 75, 86, 93, 97};
   int progressive_quality = 92;                 // of a colour plane's whole progressive files
-  Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
+  Subsampling subsampling = Subsampling::k420;  // of sRGB planes
   Uncovered uncovered = Uncovered::kFree;
   int training_fragments = 64;
   int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
-  double hull_gain = 0.05;
+  bool prune = true;
   bool lossless_top = false;
   template <class S, class V>
   static void fields(S& s, V&& v) {
@@ -65,10 +65,9 @@ struct LadderOptions {
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
-    v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
-      "a mip's rung is stored when the hull of 1 - SSIM over bytes, of all rungs and mips, would rise by "
-      "more than this share without the rung, or when displays of the mip's size need the rung; -1 = store "
-      "all rungs");
+    v("prune", s.prune,
+      "store only the rungs, of full size and mips, that simulated loads choose and that are worth their bytes; "
+      "false = store all of them");
     v("lossless_top", s.lossless_top,
       "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
   }
@@ -81,15 +80,16 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
 }
 
 /// Encodes every covered fragment at the rungs of its plane's role.
-/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
-///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
-///   such texels are free, so that only covered texels cost bytes.
+/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data in
+///   the space that has the least error for its bytes (stages/fragment_codec/coding_space.h). Fragments with
+///   uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only covered
+///   texels cost bytes.
 /// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
 ///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
-/// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
+/// - A few fragments are encoded at every rung. With `prune` they decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
 /// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).
-/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read where planes have mips; `images`
+/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read with `prune`; `images`
 /// are the model's and read with `lossless_top`. Beside the result it takes some fragments' streams per
 /// thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for inputs that do not fit
 /// each other. Same bytes for any thread count.

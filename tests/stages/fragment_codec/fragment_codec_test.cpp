@@ -64,12 +64,12 @@ struct Coded {
   }
 };
 
-Coded code(Codec codec, const Pixels& pixels, bool colour = true) {
+Coded code(Codec codec, const Pixels& pixels, bool apart = false) {
   PlaneCoding plane;
   plane.channels = pixels.channels;
   plane.fragment_width_px = pixels.width_px;
   plane.fragment_height_px = pixels.height_px;
-  plane.colour = colour;
+  plane.apart = apart;
   plane.qualities = {20, 60, 90};
   const auto coder = make_texture_codec(codec, plane);
   const PixelWindow window = window_of(pixels);
@@ -120,10 +120,10 @@ TEST(TextureCodec, JoiningAndSplittingAreInverse) {
 
 TEST(TextureCodec, AProgressiveFilesLastRungIsTheBaselineImage) {
   for (const std::uint32_t channels : {1u, 3u})
-    for (const bool colour : {true, false}) {
+    for (const bool apart : {false, true}) {
       const Pixels pixels = picture(48, 32, channels);
-      const Coded progressive = code(Codec::kJpegProgressive, pixels, colour);
-      const Coded baseline = code(Codec::kJpeg, pixels, colour);
+      const Coded progressive = code(Codec::kJpegProgressive, pixels, apart);
+      const Coded baseline = code(Codec::kJpeg, pixels, apart);
       const Pixels a = decode_fragment_file(Codec::kJpegProgressive,
                                             progressive.file(progressive.rungs.size() - 1), 48 * 32);
       const Pixels b = decode_fragment_file(Codec::kJpeg, baseline.file(baseline.rungs.size() - 1), 48 * 32);

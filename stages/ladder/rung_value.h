@@ -1,0 +1,46 @@
+#pragma once
+// Inside the ladder only: which ways of storing a texture are worth their bytes.
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace texmesh {
+
+/// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
+struct RungPair {
+  std::size_t level = 0, rung = 0;
+  std::uint64_t bytes = 0;   // of all the rung's streams and its tables
+  std::vector<double> loss;  // [level + 1]: surface-weighted 1 - SSIM where the display shows that level
+  bool fixed = false;        // is stored whatever it is worth
+};
+
+/// A texture as loads meet it.
+struct TextureWays {
+  double surface = 0;                // share of the object's surface that shows it
+  double texels_across = 0;          // of full size, along the height of an object that looks like a ball
+  std::vector<double> preview_loss;  // [levels], as RungPair::loss; the preview takes no bytes
+  std::vector<RungPair> pairs;       // by (level, rung)
+};
+
+/// A load of the object.
+struct SimulatedLoad {
+  double displayed_px = 0;  // height of the object, 200 .. 2,000
+  double bytes = 0;         // that textures may take
+};
+
+/// Loads on links of 2 to 50 Mbit/s in 1 to 10 s. All three numbers are drawn from a logarithmic scale, the
+/// same ones on every machine.
+std::vector<SimulatedLoad> simulated_loads(std::size_t count = 1000);
+
+/// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at the
+/// level of the display, and is shown in the way of least loss + price x bytes, by this level or a coarser
+/// one; one price for all textures, with which they take what the load has. First the pairs go that lose no
+/// less than the preview. Then, one by one, that pair goes whose removal raises the loss least for its bytes,
+/// while the removal raises the mean over loads by less than `gain` times the pair's share of the texture's
+/// most bytes, or while the pair is chosen in less than `least_share` of the loads. What loads choose stands
+/// on the lower hull of loss over bytes. Fixed pairs stay, and one of each level. Pure; same result anywhere.
+std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
+                                                           const std::vector<SimulatedLoad>& loads,
+                                                           double gain, double least_share);
+
+}  // namespace texmesh
