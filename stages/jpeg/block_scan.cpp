@@ -30,15 +30,20 @@ bool beside_coverage(const SamplePlane& weights, std::uint32_t left, std::uint32
 
 }  // namespace
 
+float bit_cost_of(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers) {
+  float square = 0;
+  for (std::size_t k = 1; k < 10; ++k) {
+    const float q = quantisers[k];
+    square += q * q / 9;
+  }
+  return (kind == BlockKind::kLuma ? kLumaBitCost : kOtherBitCost) * square;
+}
+
 BlockCoding block_coding(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers,
                          const HuffmanTable& dc, const HuffmanTable& ac) {
   BlockCoding coding;
-  float square = 0;
-  for (std::size_t k = 0; k < 64; ++k) {
-    const float q = coding.quantisers[kNaturalOfZigzag[k]] = quantisers[k];
-    if (k > 0 && k < 10) square += q * q / 9;
-  }
-  coding.bit_cost = (kind == BlockKind::kLuma ? kLumaBitCost : kOtherBitCost) * square;
+  for (std::size_t k = 0; k < 64; ++k) coding.quantisers[kNaturalOfZigzag[k]] = quantisers[k];
+  coding.bit_cost = bit_cost_of(kind, quantisers);
   coding.dc = symbol_codes(dc);
   coding.ac = symbol_codes(ac);
   return coding;

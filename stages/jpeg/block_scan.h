@@ -22,6 +22,9 @@ using MaskedRung = std::vector<BlockCoding>;
 /// What the block coder minds in a component: the luma of colours, or anything else.
 enum class BlockKind : std::uint8_t { kLuma, kOther };
 
+/// BlockCoding::bit_cost; `quantisers` in zigzag order.
+float bit_cost_of(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers);
+
 /// `quantisers` in zigzag order; `dc` and `ac` are the component's Huffman tables.
 BlockCoding block_coding(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers,
                          const HuffmanTable& dc, const HuffmanTable& ac);
