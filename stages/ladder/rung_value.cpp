@@ -38,38 +38,49 @@ class Draws {
   std::uint64_t state_ = 18;
 };
 
-/// Where a texture is wanted at one level and one price.
-struct Cell {
-  std::size_t level = 0;
-  double price = 0;
-  double loads = 0;  // how many
-};
-
+/// The preview, where pairs are numbered.
 constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
 
-/// The best way in a cell, and how much worse the second best is.
-struct Best {
+/// A vertex of a lower hull.
+struct Vertex {
   std::size_t pair = kPreview;
-  double loss = 0, cost = 0, rise = 0;
+  double bytes = 0, loss = 0;
 };
+using Hull = std::vector<Vertex>;
 
-Best best_way(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t level,
-              double price) {
-  Best best{kPreview, texture.preview_loss[level], texture.preview_loss[level], 0};
-  double second = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
-    const RungPair& pair = texture.pairs[k];
-    if (!keep[k] || pair.level < level) continue;
-    const double cost = pair.loss[level] + price * static_cast<double>(pair.bytes);
-    if (cost < best.cost) {
-      second = best.cost;
-      best.pair = k, best.loss = pair.loss[level], best.cost = cost;
-    } else {
-      second = std::min(second, cost);
+/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs.
+Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t level) {
+  Hull hull{{kPreview, 0, texture.preview_loss[level]}};
+  for (;;) {
+    const Vertex at = hull.back();
+    Vertex best;
+    double steepest = 0;
+    for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
+      const RungPair& pair = texture.pairs[k];
+      if (!keep[k] || pair.level < level) continue;
+      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[level]};
+      if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
+      const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
+      if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
     }
+    if (best.pair == kPreview) return hull;
+    hull.push_back(best);
   }
-  best.rise = second - best.cost;
-  return best;
+}
+
+/// The vertex at or behind which so many bytes end.
+std::size_t segment_of(const Hull& hull, double bytes) {
+  std::size_t k = 0;
+  while (k + 1 < hull.size() && hull[k + 1].bytes <= bytes) ++k;
+  return k;
+}
+
+/// Some fragments at one vertex and the others at the next one.
+double loss_at(const Hull& hull, double bytes) {
+  const std::size_t k = segment_of(hull, bytes);
+  if (k + 1 == hull.size()) return hull[k].loss;
+  const Vertex &a = hull[k], &b = hull[k + 1];
+  return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
 }
 
 std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
@@ -80,9 +91,6 @@ std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
   return level;
 }
 
-/// The price of a byte as it looks to one texture, whose loss counts by its surface.
-double own_price(const TextureWays& texture, int k) { return price(k) / std::max(texture.surface, 1e-9); }
-
 std::vector<std::uint8_t> better_than_the_preview(const TextureWays& texture) {
   std::vector<std::uint8_t> keep;
   for (const RungPair& pair : texture.pairs)
@@ -90,30 +98,53 @@ std::vector<std::uint8_t> better_than_the_preview(const TextureWays& texture) {
   return keep;
 }
 
-/// Bytes that textures take, by texture, wanted level and price.
+/// One pair of every level: of those that have none the best one.
+void keep_one_of_each_level(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
+  for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
+    std::size_t best = kPreview;
+    bool any = false;
+    for (std::size_t k = 0; k < keep.size(); ++k) {
+      const RungPair& pair = texture.pairs[k];
+      if (pair.level != level) continue;
+      any = any || keep[k];
+      if (best == kPreview || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
+    }
+    if (!any && best != kPreview) keep[best] = 1;
+  }
+}
+
+/// The bytes that a texture takes where a level is wanted, by price.
 using BytesByPrice = std::array<double, kPrices>;
-std::vector<std::vector<BytesByPrice>> bytes_by_price(const std::vector<TextureWays>& textures,
-                                                      const std::vector<std::vector<std::uint8_t>>& keep) {
-  std::vector<std::vector<BytesByPrice>> out;
-  for (std::size_t t = 0; t < textures.size(); ++t) {
-    auto& levels = out.emplace_back(textures[t].preview_loss.size());
-    for (std::size_t level = 0; level < levels.size(); ++level)
-      for (int k = 0; k < kPrices; ++k) {
-        const Best best = best_way(textures[t], keep[t], level, own_price(textures[t], k));
-        levels[level][static_cast<std::size_t>(k)] =
-            best.pair == kPreview ? 0 : static_cast<double>(textures[t].pairs[best.pair].bytes);
-      }
+
+BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                            std::size_t level) {
+  const Hull hull = hull_of(texture, keep, level);
+  BytesByPrice out{};
+  std::size_t at = 0;
+  for (std::size_t k = 0; k < kPrices; ++k) {
+    while (at + 1 < hull.size() && texture.surface * (hull[at].loss - hull[at + 1].loss) >=
+                                       price(static_cast<int>(k)) * (hull[at + 1].bytes - hull[at].bytes))
+      ++at;
+    out[k] = hull[at].bytes;
   }
   return out;
 }
 
-/// The cells of every texture, those with loads only.
-std::vector<std::vector<Cell>> cells_of(const std::vector<TextureWays>& textures,
-                                        const std::vector<std::vector<std::uint8_t>>& keep,
-                                        const std::vector<SimulatedLoad>& loads) {
-  const auto bytes = bytes_by_price(textures, keep);
-  std::vector<std::vector<BytesByPrice>> counts(bytes.size());
-  for (std::size_t t = 0; t < bytes.size(); ++t) counts[t].assign(bytes[t].size(), BytesByPrice{});
+/// What loads give a texture: bytes, by wanted level.
+using GivenBytes = std::vector<std::vector<double>>;
+
+/// By texture. Where one price takes less than a load has and the next one more, every texture goes the same
+/// part of its way between them.
+std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
+                                    const std::vector<std::vector<std::uint8_t>>& keep,
+                                    const std::vector<SimulatedLoad>& loads) {
+  std::vector<std::vector<BytesByPrice>> bytes(textures.size());
+  std::vector<GivenBytes> given(textures.size());
+  for (std::size_t t = 0; t < textures.size(); ++t) {
+    given[t].resize(textures[t].preview_loss.size());
+    for (std::size_t level = 0; level < given[t].size(); ++level)
+      bytes[t].push_back(bytes_by_price(textures[t], keep[t], level));
+  }
   std::vector<std::size_t> level(textures.size());
   for (const SimulatedLoad& load : loads) {
     for (std::size_t t = 0; t < level.size(); ++t) level[t] = wanted_level(textures[t], load.displayed_px);
@@ -123,16 +154,19 @@ std::vector<std::vector<Cell>> cells_of(const std::vector<TextureWays>& textures
       return sum;
     };
     std::size_t k = 0;
-    while (k + 1 < kPrices && taken(k + 1) <= load.bytes) ++k;
-    for (std::size_t t = 0; t < level.size(); ++t) ++counts[t][level[t]][k];
+    double now = taken(0), next = now;
+    for (; k + 1 < kPrices; ++k, now = next) {
+      next = taken(k + 1);
+      if (next > load.bytes) break;
+    }
+    const std::size_t to = std::min<std::size_t>(k + 1, kPrices - 1);
+    const double part = next > now ? std::max(0.0, load.bytes - now) / (next - now) : 0;
+    for (std::size_t t = 0; t < level.size(); ++t) {
+      const BytesByPrice& own = bytes[t][level[t]];
+      given[t][level[t]].push_back(own[k] + part * (own[to] - own[k]));
+    }
   }
-  std::vector<std::vector<Cell>> cells(textures.size());
-  for (std::size_t t = 0; t < textures.size(); ++t)
-    for (std::size_t l = 0; l < counts[t].size(); ++l)
-      for (std::size_t k = 0; k < kPrices; ++k)
-        if (counts[t][l][k] > 0)
-          cells[t].push_back({l, own_price(textures[t], static_cast<int>(k)), counts[t][l][k]});
-  return cells;
+  return given;
 }
 
 /// What a pair is to the loads.
@@ -141,14 +175,29 @@ struct Worth {
   double rise = 0;   // of the loss without it, summed over loads, in parts of the whole ladder's loss
 };
 
+/// `whole`: the texture's hulls with all pairs, by level.
 std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                            const std::vector<Cell>& cells, const std::vector<double>& whole_loss) {
+                            const GivenBytes& given, const std::vector<Hull>& whole) {
   std::vector<Worth> out(texture.pairs.size());
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    const Best best = best_way(texture, keep, cells[c].level, cells[c].price);
-    if (best.pair == kPreview) continue;
-    out[best.pair].loads += cells[c].loads;
-    out[best.pair].rise += cells[c].loads * best.rise / (whole_loss[c] + kUnseen);
+  for (std::size_t level = 0; level < given.size(); ++level) {
+    if (given[level].empty()) continue;
+    const Hull hull = hull_of(texture, keep, level);
+    std::vector<Hull> without(hull.size());
+    for (std::size_t v = 1; v < hull.size(); ++v) {
+      std::vector<std::uint8_t> others = keep;
+      others[hull[v].pair] = 0;
+      without[v] = hull_of(texture, others, level);
+    }
+    for (const double bytes : given[level]) {
+      const double loss = loss_at(hull, bytes), unit = loss_at(whole[level], bytes) + kUnseen;
+      const std::size_t k = segment_of(hull, bytes), last = std::min(k + 1, hull.size() - 1);
+      for (std::size_t v = std::max<std::size_t>(k, 1); v <= last; ++v) {
+        if (v > k && bytes <= hull[k].bytes) continue;  // all fragments are at the vertex before
+        Worth& worth = out[hull[v].pair];
+        worth.loads += 1;
+        worth.rise += (loss_at(without[v], bytes) - loss) / unit;
+      }
+    }
   }
   return out;
 }
@@ -159,7 +208,7 @@ struct Asked {
   double rise_per_byte = 0;  // Worth::rise
 };
 
-/// The pair to go next; kPreview for none. `alone` pairs, the last ones of their levels, and fixed ones stay.
+/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay.
 std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
                        const std::vector<Worth>& worth, const Asked& asked) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
@@ -176,18 +225,15 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
   return next;
 }
 
-/// One pair of every level: of those that have none the best one.
-void keep_one_of_each_level(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
-  for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
-    std::size_t best = kPreview;
-    bool any = false;
-    for (std::size_t k = 0; k < keep.size(); ++k) {
-      const RungPair& pair = texture.pairs[k];
-      if (pair.level != level) continue;
-      any = any || keep[k];
-      if (best == kPreview || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
-    }
-    if (!any && best != kPreview) keep[best] = 1;
+/// `keep` of one texture without what is not worth its bytes.
+void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked& asked,
+                std::vector<std::uint8_t>& keep) {
+  std::vector<Hull> whole;
+  for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hull_of(texture, keep, level));
+  for (;;) {
+    const std::size_t next = next_to_go(texture, keep, worth_of(texture, keep, given, whole), asked);
+    if (next == kPreview) return;
+    keep[next] = 0;
   }
 }
 
@@ -211,22 +257,13 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
     keep.push_back(better_than_the_preview(texture));
     keep_one_of_each_level(texture, keep.back());
   }
-  const auto cells = cells_of(textures, keep, loads);
+  const std::vector<GivenBytes> given = share_loads(textures, keep, loads);
   const auto count = static_cast<double>(loads.size());
   for (std::size_t t = 0; t < textures.size(); ++t) {
-    const TextureWays& texture = textures[t];
-    std::vector<double> whole_loss;
-    for (const Cell& cell : cells[t])
-      whole_loss.push_back(best_way(texture, keep[t], cell.level, cell.price).loss);
     std::uint64_t most = 1;
-    for (const RungPair& pair : texture.pairs) most = std::max(most, pair.bytes);
-    const Asked asked{least_share * count, gain * count / static_cast<double>(most)};
-    for (;;) {
-      const std::size_t next =
-          next_to_go(texture, keep[t], worth_of(texture, keep[t], cells[t], whole_loss), asked);
-      if (next == kPreview) break;
-      keep[t][next] = 0;
-    }
+    for (const RungPair& pair : textures[t].pairs) most = std::max(most, pair.bytes);
+    drop_pairs(textures[t], given[t], {least_share * count, gain * count / static_cast<double>(most)},
+               keep[t]);
   }
   return keep;
 }

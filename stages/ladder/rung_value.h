@@ -33,12 +33,13 @@ struct SimulatedLoad {
 std::vector<SimulatedLoad> simulated_loads(std::size_t count = 1000);
 
 /// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at the
-/// level of the display, and is shown in the way of least loss + price x bytes, by this level or a coarser
-/// one; one price for all textures, with which they take what the load has. First the pairs go that lose no
+/// level of the display, and is shown by pairs of that level or of coarser ones, along the lower hull of loss
+/// over bytes that begins at the preview: some fragments at one vertex, the others at the next one. The
+/// load's bytes are shared at one price, in loss x surface, for all textures. First the pairs go that lose no
 /// less than the preview. Then, one by one, that pair goes whose removal raises the loss least for its bytes,
 /// while the removal raises the mean over loads by less than `gain` times the pair's share of the texture's
-/// most bytes, or while the pair is chosen in less than `least_share` of the loads. What loads choose stands
-/// on the lower hull of loss over bytes. Fixed pairs stay, and one of each level. Pure; same result anywhere.
+/// most bytes, or while less than `least_share` of the loads choose the pair. Fixed pairs stay, and one of
+/// each level. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
                                                            const std::vector<SimulatedLoad>& loads,
                                                            double gain, double least_share);

@@ -21,6 +21,7 @@
 #include "stages/ladder/source_codec.h"
 #include "stages/previews/previews.h"
 #include "tests/bench/bench_texture.h"
+#include "tests/support/all_rungs.h"
 
 namespace texmesh {
 namespace {
@@ -58,8 +59,7 @@ double percent(std::size_t part, std::size_t whole) {
 }
 
 void print_sizes(const std::string& name, const Scene& scene) {
-  LadderOptions options;
-  options.prune = false;
+  const LadderOptions options = testing::all_rungs();
   const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(2));
   const TexturePlane& plane = scene.fragments.planes[0];
   std::printf("%s: %zu fragments of %u px\n  quality      ", name.c_str(), plane.fragment_count(),
@@ -91,7 +91,8 @@ void print_memory(const Scene& scene, int count) {
   std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
   const double before = status_mb("VmRSS");
   const Previews previews = make_previews(scene.fragments, scene.pixels, {}, threads(count));
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, previews, {}, {}, threads(count));
+  const Ladder ladder =
+      encode_ladder(scene.fragments, scene.pixels, previews, {}, testing::all_rungs(), threads(count));
   const double peak = status_mb("VmHWM") - before;
   double result = static_cast<double>(previews.planes[0].file.size());
   for (const LadderRung& rung : ladder.planes[0].rungs)
@@ -111,11 +112,11 @@ void print_time(const Scene& scene) {
     plain = std::min(plain, cpu_seconds() - cpu);
     cpu = cpu_seconds();
     double wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(1));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, testing::all_rungs(), threads(1));
     ours = std::min(ours, cpu_seconds() - cpu);
     one = std::min(one, wall_seconds() - wall);
     wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(2));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, testing::all_rungs(), threads(2));
     two = std::min(two, wall_seconds() - wall);
   }
   std::printf(

@@ -12,6 +12,7 @@
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -59,7 +60,7 @@ Ladder encode(const Plane& p, const LadderOptions& options, int threads = 1) {
 }
 
 LadderOptions rungs(std::vector<int> qualities) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = std::move(qualities);
   return options;
 }
@@ -111,7 +112,7 @@ TEST(SizeKnots, LieBetweenRungsAndPassTheTables) {
 TEST(SizeKnots, OnlyOfFullSizeColoursInBaselineFiles) {
   const auto none = [](auto change) {
     Plane p = make_plane();
-    LadderOptions options;
+    LadderOptions options = testing::all_rungs();
     change(p, options);
     for (const PlaneLadder& plane : encode(p, options).planes) EXPECT_TRUE(plane.knots.quality.empty());
   };
@@ -124,7 +125,8 @@ TEST(SizeKnots, OnlyOfFullSizeColoursInBaselineFiles) {
 
 TEST(SizeKnots, SameForAnyNumberOfThreads) {
   const Plane p = make_plane();
-  const SizeKnots one = encode(p, {}, 1).planes[0].knots, eight = encode(p, {}, 8).planes[0].knots;
+  const SizeKnots one = encode(p, testing::all_rungs(), 1).planes[0].knots,
+                  eight = encode(p, testing::all_rungs(), 8).planes[0].knots;
   EXPECT_EQ(one.quality, eight.quality);
   EXPECT_EQ(one.position, eight.position);
 }
