@@ -155,10 +155,13 @@ void measure_knots(const Fragments& fragments, const std::vector<Pixels>& pixels
 std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector<TrainedPlane>& trained,
                                    bool prune) {
   std::vector<PlaneWork> work(trained.size());
-  std::vector<std::vector<std::uint8_t>> sample = choice_sample(fragments);
+  std::vector<std::vector<std::uint8_t>> sample;
+  if (prune) sample = choice_sample(fragments);
   for (std::size_t p = 0; p < work.size(); ++p) {
-    if (!prune) sample[p].assign(sample[p].size(), 1);
-    work[p].wanted = std::move(sample[p]);
+    if (prune)
+      work[p].wanted = std::move(sample[p]);
+    else
+      work[p].wanted.assign(fragments.planes[p].fragment_count(), 1);
     for (std::size_t r = 0; r < trained[p].rungs.size(); ++r) work[p].rungs.push_back(r);
   }
   return work;
