@@ -10,6 +10,7 @@
 #include "stages/data/pixels.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"
+#include "stages/ladder/source_codec.h"
 
 namespace texmesh {
 
@@ -19,6 +20,8 @@ struct TrainedPlane {
   std::unique_ptr<TextureCodec> codec;
   std::vector<CodecRung> rungs;
   SizeKnots knots;
+  SourceCodec source;        // without its codec, which is the one above
+  bool source_rung = false;  // the last rung has the source's coefficients
 };
 
 /// What is encoded of one plane.

@@ -7,12 +7,14 @@
 
 #include "stages/fragment_codec/coding_space.h"
 #include "stages/image/check_pixels.h"
+#include "stages/image/decode_image.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
 #include "stages/ladder/fragment_windows.h"
-#include "stages/ladder/lossless_top.h"
 #include "stages/ladder/rung_loss.h"
 #include "stages/ladder/size_knots.h"
+#include "stages/ladder/source_codec.h"
+#include "stages/ladder/source_difference.h"
 
 namespace texmesh {
 namespace {
@@ -25,12 +27,6 @@ constexpr double kTrained = 0.15, kSampled = 0.85, kChosen = 0.9;
 
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
   throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
-}
-
-const std::vector<int>& rungs_of(TextureRole role, const LadderOptions& options) {
-  if (is_colour(role)) return options.rungs;
-  if (role == TextureRole::kNormal) return options.normal_rungs;
-  return role == TextureRole::kAlpha ? options.alpha_rungs : options.data_rungs;
 }
 
 void check_rungs(const std::vector<int>& rungs, const char* name) {
@@ -59,7 +55,7 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     const std::size_t base = plane.mip > 0 ? plane.base : p;
     if (options.prune && (base >= previews.planes.size() || previews.planes[base].file.empty()))
       fail(place, "a preview of the full size", "none");
-    if (options.lossless_top && plane.image >= images.size())
+    if (!images.empty() && plane.image >= images.size())
       fail(place, "its source image", std::to_string(images.size()) + " images");
   }
 }
@@ -92,7 +88,7 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   coding.fragment_width_px = plane.fragment_width_px;
   coding.fragment_height_px = plane.fragment_height_px;
   coding.subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
-  coding.qualities = rungs_of(plane.role, options);
+  coding.qualities = ladder_rungs(plane.role, options);
   if (codec == Codec::kJpegProgressive && is_colour(plane.role))
     coding.qualities = {options.progressive_quality};
   return coding;
@@ -109,18 +105,35 @@ void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered unc
   coding.subsampling = space.subsampling;
 }
 
+/// Of mips of a plane that ends at its source. With rungs up to 97 a turtle's three mips took 1.3 to 1.6
+/// times the bytes of the source, whose own coefficients show more.
+void leave_finest_out(std::vector<int>& qualities) {
+  constexpr int kFinest = 86;
+  const auto first = std::ranges::upper_bound(qualities, kFinest);
+  qualities.erase(std::max(first, qualities.begin() + 1), qualities.end());
+}
+
 /// The codecs of all planes, trained on samples of their pixels.
 std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                       const LadderOptions& options, Notes& notes,
-                                       const RunContext& context) {
+                                       const std::vector<Image>& images, const LadderOptions& options,
+                                       Notes& notes, const RunContext& context) {
   std::vector<TrainedPlane> out;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     const Codec codec = codec_of(plane, p, options.mode, notes);
     TrainedPlane& trained = out.emplace_back();
     trained.coding = coding_of(plane, codec, options);
-    choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
-    trained.codec = make_texture_codec(codec, trained.coding);
+    if (plane.mip > 0 && options.prune && out[plane.base].source_rung)
+      leave_finest_out(trained.coding.qualities);
+    if (codec == Codec::kJpeg && options.mode == LadderMode::kJpeg && !images.empty())
+      trained.source = make_source_codec(plane, pixels[p], images[plane.image], options, context);
+    if (trained.source.codec) {
+      trained.codec = std::move(trained.source.codec);
+      trained.source_rung = true;
+    } else {
+      choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
+      trained.codec = make_texture_codec(codec, trained.coding);
+    }
     trained.rungs = trained.codec->train(
         training_sample(plane, pixels[p], options.uncovered, options.training_fragments), context);
     context.report(kTrained * static_cast<double>(p + 1) / static_cast<double>(fragments.planes.size()));
@@ -147,7 +160,10 @@ void measure_knots(const Fragments& fragments, const std::vector<Pixels>& pixels
     PlaneCoding coding = trained[p].coding;
     coding.qualities.clear();
     for (const std::size_t r : kept[p]) coding.qualities.push_back(trained[p].rungs[r].quality);
-    trained[p].knots = measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
+    trained[p].knots =
+        trained[p].source_rung
+            ? size_knots(coding.qualities, trained[p].source.bits)
+            : measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
   }
 }
 
@@ -186,14 +202,42 @@ std::vector<PlaneWork> whole_work(const Fragments& fragments, std::vector<PlaneL
   return work;
 }
 
+std::string hundredths(double x) {
+  const auto whole = static_cast<std::uint64_t>(x * 100 + 0.5);
+  const std::string rest = std::to_string(whole % 100);
+  return std::to_string(whole / 100) + "." + (rest.size() < 2 ? "0" : "") + rest;
+}
+
+/// What a plane's ladder says of its source.
+void finish_plane(const TexturePlane& plane, const Pixels& pixels, const std::vector<Image>& images,
+                  const TrainedPlane& trained, const LadderOptions& options, PlaneLadder& ladder,
+                  Notes& notes) {
+  if (plane.mip > 0 || plane.role == TextureRole::kAlpha || images.empty()) return;
+  const Image& image = images[plane.image];
+  if (!trained.source.why_not.empty())
+    add_info(notes, "jpeg-coded-anew", image.name,
+             "it is coded from its pixels, since " + trained.source.why_not + "; the last rung is " +
+                 hundredths(source_difference(plane, pixels, ladder)) + " of 255 off on average");
+  if (!options.keep_source) return;
+  const bool changed =
+      changes_colours(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
+  ladder.source = changed ? SourceFile::kOtherColours : SourceFile::kSameColours;
+}
+
 }  // namespace
+
+const std::vector<int>& ladder_rungs(TextureRole role, const LadderOptions& options) {
+  if (is_colour(role)) return options.rungs;
+  if (role == TextureRole::kNormal) return options.normal_rungs;
+  return role == TextureRole::kAlpha ? options.alpha_rungs : options.data_rungs;
+}
 
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
                      const std::vector<Image>& images, const LadderOptions& options,
                      const RunContext& context) {
   check(fragments, pixels, previews, images, options);
   Ladder ladder;
-  std::vector<TrainedPlane> trained = train_planes(fragments, pixels, options, ladder.notes, context);
+  std::vector<TrainedPlane> trained = train_planes(fragments, pixels, images, options, ladder.notes, context);
   const auto encode = [&](std::vector<PlaneWork> work, ProgressPart progress) {
     return encode_rungs(fragments, pixels, options.uncovered, trained, std::move(work), progress, context);
   };
@@ -202,12 +246,8 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   auto kept = options.prune ? choose_rungs(fragments, pixels, sample, previews, context) : all_rungs(trained);
   measure_knots(fragments, pixels, options, kept, trained, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
-  if (options.lossless_top)
-    for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-      const TexturePlane& plane = fragments.planes[p];
-      ladder.planes[p] =
-          with_lossless_top(std::move(ladder.planes[p]), plane, images[plane.image], ladder.notes, context);
-    }
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
+    finish_plane(fragments.planes[p], pixels[p], images, trained[p], options, ladder.planes[p], ladder.notes);
   return ladder;
 }
 

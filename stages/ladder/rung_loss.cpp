@@ -221,7 +221,7 @@ TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& 
     const PlaneLadder& ladder = planes[chain[level]];
     const std::vector<std::uint64_t> bytes = bytes_by_rung(fragments.planes[chain[level]], ladder);
     for (std::size_t r = 0; r < bytes.size(); ++r)
-      out.pairs.push_back({level, r, bytes[r], {}, ladder.lossless && r + 1 == bytes.size()});
+      out.pairs.push_back({level, r, bytes[r], {}, ladder.source_rung && r + 1 == bytes.size()});
   }
   for (std::size_t wanted = 0; wanted < chain.size(); ++wanted) {
     const TexturePlane& plane = fragments.planes[chain[wanted]];

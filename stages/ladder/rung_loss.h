@@ -18,11 +18,11 @@ std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base);
 std::vector<std::vector<std::uint8_t>> choice_sample(const Fragments& fragments);
 
 /// The ways to show the texture of plane `base`. Where a ladder lacks fragments, bytes are what those it has
-/// let expect of the covered texels. The last rung of a lossless ladder is fixed. Losses are measured in up
-/// to 6 windows of up to 128 px of the wanted level, in covered fragments evenly spread in index order: what
-/// is shown, scaled up bilinearly as a client does, against the wanted level's `pixels`, over covered texels;
-/// luma of colours, every channel of data. Each window weighs as much as its fragment's surface. `planes` are
-/// ladders of `fragments`; `preview_file` is a complete JPEG. Same result for any thread count.
+/// let expect of the covered texels. The rung of the source's coefficients is fixed. Losses are measured in
+/// up to 6 windows of up to 128 px of the wanted level, in covered fragments evenly spread in index order:
+/// what is shown, scaled up bilinearly as a client does, against the wanted level's `pixels`, over covered
+/// texels; luma of colours, every channel of data. Each window weighs as much as its fragment's surface.
+/// `planes` are ladders of `fragments`; `preview_file` is a complete JPEG. Same result for any thread count.
 TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& pixels,
                          const std::vector<PlaneLadder>& planes, std::size_t base,
                          const std::vector<std::uint8_t>& preview_file, const RunContext& context);

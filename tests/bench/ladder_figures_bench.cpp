@@ -16,8 +16,9 @@
 #include <string>
 
 #include "stages/image/decode_image.h"
+#include "stages/ladder/fragment_windows.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/lossless_top.h"
+#include "stages/ladder/source_codec.h"
 #include "stages/previews/previews.h"
 #include "tests/bench/bench_texture.h"
 #include "tests/support/all_rungs.h"
@@ -39,9 +40,18 @@ double status_mb(const std::string& field) {
 
 /// The least that any tables make of fragments with the file's coefficients: tables made for exactly them.
 std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlane& plane) {
-  std::string why_not;
-  const auto rung = cut_coefficients(plane, probe_image("whole", file, {}), why_not, threads(2));
-  return rung ? rung->data.size() + rung->table_stream.size() : 0;
+  const Image image = probe_image("whole", file, {});
+  const Pixels pixels = decode_image(image);
+  const LadderOptions options;
+  const SourceCodec source = make_source_codec(plane, pixels, image, options, threads(2));
+  if (!source.codec) return 0;
+  const std::vector<CodecRung> rungs = source.codec->train({}, threads(2));
+  const std::size_t top = rungs.size() - 1;
+  const auto encoder = source.codec->encoder(std::span(&top, 1));
+  std::vector<std::uint8_t> streams;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    encoder->encode(fragment_window(plane, pixels, options.uncovered, f), std::span(&streams, 1));
+  return streams.size() + rungs[top].table_stream.size();
 }
 
 double percent(std::size_t part, std::size_t whole) {

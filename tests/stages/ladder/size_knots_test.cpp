@@ -109,16 +109,6 @@ TEST(SizeKnots, LieBetweenRungsAndPassTheTables) {
   EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].knot_quality, knots.quality);
 }
 
-TEST(SizeKnots, NoneAboveARungThatWasReplaced) {
-  const Plane p = make_plane();
-  Ladder ladder = encode(p, rungs({30, 53, 93}));
-  ladder.planes[0].rungs.back().quality = 100;
-  ladder.planes[0].lossless = true;
-  const PlaneTables t = tables_of(p, ladder);
-  ASSERT_FALSE(t.knot_quality.empty());
-  EXPECT_LT(t.knot_quality.back(), 53);
-}
-
 TEST(SizeKnots, OnlyOfFullSizeColoursInBaselineFiles) {
   const auto none = [](auto change) {
     Plane p = make_plane();

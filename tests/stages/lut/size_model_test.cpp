@@ -37,12 +37,12 @@ TEST(SizeModel, FitsAndIsAbsentForOneRung) {
   EXPECT_EQ(single.model_error, 0);
 }
 
-TEST(SizeModel, IsNotFittedOnARungWithoutLoss) {
+TEST(SizeModel, IsNotFittedOnTheSourcesCoefficients) {
   LadderOptions options = testing::all_rungs();
   options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
   Scene s = make_scene(options);
   EXPECT_GT(build(s).planes[0].model_error, 0.01f);
-  s.ladder.planes[0].lossless = true;
+  s.ladder.planes[0].source_rung = true;
   const PlaneTables t = build(s).planes[0];
   EXPECT_NEAR(t.model_error, 0, 1e-5) << "two points have a curve through both";
   EXPECT_NEAR(t.model_correlation, 1, 1e-6);
