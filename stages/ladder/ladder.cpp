@@ -185,7 +185,7 @@ double bytes_per_texel(const TexturePlane& plane, const LadderRung& rung) {
 /// there to be shown. Scans whose mips went up to quality 97 took 0.6 to 1.6 times the bytes of their source
 /// for mips alone. The lowest rungs are left, one of each plane at least.
 void leave_heavy_mips_out(const Fragments& fragments, std::vector<PlaneLadder>& sample) {
-  constexpr double kMost = 1.5, kMoreByMip = 1.6;  // of the top's bytes .375, .15 and .06
+  constexpr double kMost = 1.4, kMoreByMip = 1.4;  // of the top's bytes .35, .12 and .04
   for (std::size_t p = 0; p < sample.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     if (plane.mip == 0 || !sample[plane.base].source_rung) continue;

@@ -20,7 +20,7 @@ namespace texmesh {
 namespace {
 
 // Bytes of the rungs below, as parts of the top's.
-constexpr double kByteShares[] = {0.065, 0.16, 0.4};
+constexpr double kByteShares[] = {0.065, 0.16, 0.35};
 // A quality is taken for a part that it misses by this factor at most, and not when it costs nearly the
 // top's.
 constexpr double kMostOff = 1.6, kMostShare = 0.75;
