@@ -65,7 +65,7 @@ TEST(ChooseRungs, TheSourcesOwnCoefficientsStay) {
   const Chain chain = make_chain(false);
   Ladder ladder = encode(chain, false);
   // Made as bad as a rung can be: nothing but the rule keeps it.
-  ladder.planes[0].lossless = true;
+  ladder.planes[0].source_rung = true;
   ladder.planes[0].rungs.back().data = ladder.planes[0].rungs[0].data;
   ladder.planes[0].rungs.back().offset = ladder.planes[0].rungs[0].offset;
   ladder.planes[0].rungs.back().table_stream = ladder.planes[0].rungs[0].table_stream;
