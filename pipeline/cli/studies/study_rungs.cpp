@@ -88,7 +88,7 @@ std::string percent_of(std::size_t part, int whole) {
   return fixed(100 * static_cast<double>(part) / whole, 1);
 }
 
-std::string rungs_text(PackageReader& package, const PackageUse& use, int loads) {
+std::string uses_text(PackageReader& package, const PackageUse& use, int loads) {
   TextTable table;
   for (const char* header : {"plane", "mip", "quality", "kB", "plane shown %", "rung chosen %"})
     table.column(header);
@@ -108,7 +108,7 @@ std::string rungs_text(PackageReader& package, const PackageUse& use, int loads)
       use.package, table.text(), rare_rungs(use, loads), all_rungs_of(use), loads, use.flip);
 }
 
-Json rungs_json(PackageReader& package, const PackageUse& use, int loads) {
+Json uses_json(PackageReader& package, const PackageUse& use, int loads) {
   Json planes = Json::array();
   for (std::size_t p = 0; p < use.planes.size(); ++p)
     planes.push_back({{"plane", p},
@@ -130,9 +130,9 @@ int run_rungs(const RungArguments& args) {
     const PackageUse use = play_loads(path, args);
     PackageReader package(open_store(path));
     if (args.json)
-      list.push_back(rungs_json(package, use, args.loads));
+      list.push_back(uses_json(package, use, args.loads));
     else
-      std::cout << rungs_text(package, use, args.loads) << std::flush;
+      std::cout << uses_text(package, use, args.loads) << std::flush;
   }
   if (args.json) std::cout << Json{{"packages", list}}.dump() << '\n';
   return kExitOk;

@@ -43,10 +43,10 @@ TEST(RungLoss, ATextureIsAsLargeAsItsTexelsOnABall) {
   EXPECT_NEAR(ways.texels_across, std::sqrt(512 * 384 / 3.14159265), 0.01);
 }
 
-TEST(RungLoss, TheLastRungOfALosslessLadderIsFixed) {
+TEST(RungLoss, TheSourcesOwnRungIsFixed) {
   const Chain chain = make_chain(false);
   Ladder ladder = encode(chain, false);
-  ladder.planes[0].lossless = true;
+  ladder.planes[0].source_rung = true;
   const TextureWays ways = ways_of(chain, ladder);
   for (std::size_t k = 0; k < ways.pairs.size(); ++k) EXPECT_EQ(ways.pairs[k].fixed, k == 9) << k;
 }
