@@ -11,8 +11,8 @@ const kPackages = {
   // Enough bytes for a link of 2 Mbit/s to have something to do.
   large: {scan: ['--triangles', '30000', '--texture', '2048', '--charts', '30'], options: ['--rungs', '10,20,35,50,70,85,95']},
   progressive: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'progressive']},
-  // The source's own coefficients on top, other sources as files.
-  lossless: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--lossless-top']},
+  // Sources stay in the package, too.
+  kept: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--keep-source']},
   webp: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'webp', '--rungs', '20,60']},
   // Meshes that three.js decodes without a worker.
   meshopt: {scan: ['--triangles', '3000', '--texture', '512', '--charts', '8'], options: ['--rungs', '20,60,85', '--mesh-codec', 'meshopt']},

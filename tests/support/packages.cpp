@@ -1,4 +1,5 @@
 #include "tests/support/packages.h"
+#include "tests/support/all_rungs.h"
 
 #include <zlib.h>
 
@@ -131,7 +132,7 @@ void add_texture(PackageParts& p) {
   Fragments fragments;
   fragments.scales = 1;
   fragments.planes = {plane};
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = {20, 70};
   const std::vector<Pixels> pixels{picture(64, 64)};
   const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, {}, options, {}).planes.at(0);

@@ -74,7 +74,7 @@ Json summary_json(PackageReader& p) {
                         {"channels", t.channels},
                         {"fragments", stored_fragments(p.tables().planes[k])},
                         {"rungs", t.rungs.size()}});
-    if (t.lossless) textures.back()["lossless"] = true;
+    if (t.source_rung) textures.back()["source_rung"] = true;
     if (!t.source_extension.empty()) textures.back()["source"] = t.source.path;
   }
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));

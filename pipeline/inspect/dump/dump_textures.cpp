@@ -188,7 +188,7 @@ std::string ladder_text(PackageReader& p) {
                  texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
     const TextureInfo& info = p.textures()[k];
     s += plane_title(info, k) + table.text();
-    if (info.lossless) s += "  the last rung holds the source's coefficients: lossless\n";
+    if (info.source_rung) s += "  the last rung holds the source's coefficients\n";
     if (!info.source_extension.empty())
       s += fmt::format("  {}: the source as it was, {} B{}\n", info.source.path, info.source.bytes,
                        info.source_colours ? "" : ", whose colours were converted for this plane");

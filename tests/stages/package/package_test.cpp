@@ -356,12 +356,12 @@ TEST(Package, HundredsOfPlanesWithMipsStillBootstrapInOneRead) {
   EXPECT_EQ(m.plane_count, 302u);
 }
 
-TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {
+TEST(Package, SourcesStandBehindTheRungsAndRungsOfSourcesAreNamed) {
   Inputs inputs(2);
   inputs.images[0].bytes = {1, 2, 3};
   inputs.images[0].format = ImageFormat::kTiff;
   inputs.ladder.planes[0].source = SourceFile::kOtherColours;
-  inputs.ladder.planes[1].lossless = true;
+  inputs.ladder.planes[1].source_rung = true;
   const Bytes package = inputs.assemble();
   const Manifest m = manifest_of(package);
   EXPECT_TRUE(m.required_features.empty());
@@ -370,8 +370,8 @@ TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {
   resolve_textures(textures, index);
   EXPECT_EQ(textures[0].source.path, "source/000.tif");
   EXPECT_FALSE(textures[0].source_colours);
-  EXPECT_FALSE(textures[0].lossless);
-  EXPECT_TRUE(textures[1].lossless);
+  EXPECT_FALSE(textures[0].source_rung);
+  EXPECT_TRUE(textures[1].source_rung);
   EXPECT_EQ(textures[1].source_extension, "");
   EXPECT_EQ(part(package, textures[0].source), (Bytes{1, 2, 3}));
   EXPECT_EQ(index[index.size() - 2].path, "source/000.tif");

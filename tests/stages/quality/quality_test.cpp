@@ -12,6 +12,7 @@
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -49,7 +50,7 @@ NestedScale every(int n, int step, int number) {
 void encode(Sample& s) {
   const RunContext context;
   s.previews = make_previews(s.fragments, s.pixels, {}, context);
-  s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, LadderOptions{}, context);
+  s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, testing::all_rungs(), context);
   s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context),
                           s.ladder, s.previews, {}, context)
                  .tables;
