@@ -55,12 +55,19 @@ FileImageData ImageCoder::encoded(std::size_t image, const Pixels& pixels, const
                                                coding.full_chroma})};
 }
 
-void ImageCoder::show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
-                      const RunContext& context) const {
+OtherTextures ImageCoder::shown_by(std::size_t image, const FileImageData& file,
+                                   const RunContext& context) const {
+  OtherTextures out;
   for (std::size_t t = 0; t < source_.shown.size(); ++t)
     if (source_.shown[t].image == image)
-      textures[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})),
-                                   source_.shown[t].srgb, 0, context);
+      out[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})), source_.shown[t].srgb, 0,
+                              context);
+  return out;
+}
+
+void ImageCoder::show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
+                      const RunContext& context) const {
+  for (auto& [t, texture] : shown_by(image, file, context)) textures[t] = std::move(texture);
 }
 
 }  // namespace texmesh

@@ -42,7 +42,9 @@ class ImageCoder {
   /// `quick`: for comparisons (see ImageCoding).
   FileImageData encoded(std::size_t image, const Pixels& pixels, const TextureCoding& coding, double quality,
                         bool quick) const;
-  /// Puts what a file shows into textures that BudgetSource::shown counts.
+  /// The textures of what a file shows, by their places in BudgetSource::shown.
+  OtherTextures shown_by(std::size_t image, const FileImageData& file, const RunContext& context) const;
+  /// Puts them there.
   void show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
             const RunContext& context) const;
 

@@ -16,6 +16,7 @@ constexpr double kFewBytes = 16000;                    // of an image: other cod
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
+constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
 
 /// Files that lie on the lower convex border, by rising bytes.
 std::vector<CodedImage> convex(std::vector<CodedImage> files) {
@@ -96,25 +97,32 @@ class LossCurves::Trials {
 };
 
 void LossCurves::render(const std::vector<Trial>& trials) {
+  for (std::size_t first = 0; first < trials.size(); first += kTrialsAtOnce)
+    render_part({trials.data() + first, std::min(kTrialsAtOnce, trials.size() - first)});
+}
+
+void LossCurves::render_part(std::span<const Trial> trials) {
   std::vector<CodedImage> found(trials.size());
+  std::vector<OtherTextures> textures(trials.size());
   std::vector<const Pixels*> pixels;
   for (const Trial& t : trials) pixels.push_back(&coder_.texels(t.image, t.step));
   RunContext serial = source_.context;
   serial.threads = 1;
-  parallel_for(source_.context, trials.size(), 4, [&](std::size_t begin, std::size_t end) {
-    std::vector<RenderTexture> textures = source_.best_textures;
+  parallel_for(source_.context, trials.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const Trial& t = trials[k];
       const FileImageData file = coder_.encoded(t.image, *pixels[k], t.coding, t.quality, true);
-      coder_.show(t.image, file, textures, serial);
+      textures[k] = coder_.shown_by(t.image, file, serial);
       found[k] = {{t.coding, size_step(t.step), t.quality},
-                  static_cast<double>((file.bytes.size() + 3) / 4 * 4),
-                  joined(source_.window_meter->difference(*source_.finest_windows, textures, serial))};
-      for (std::size_t s = 0; s < source_.shown.size(); ++s)
-        if (source_.shown[s].image == t.image) textures[s] = source_.best_textures[s];
+                  static_cast<double>((file.bytes.size() + 3) / 4 * 4)};
     }
   });
-  for (std::size_t k = 0; k < trials.size(); ++k) seen_[trials[k].image].push_back(found[k]);
+  const std::vector<double> losses = source_.window_meter->differences(
+      *source_.finest_windows, source_.best_textures, std::move(textures), source_.context);
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    found[k].loss = joined(losses[k]);
+    seen_[trials[k].image].push_back(found[k]);
+  }
 }
 
 double LossCurves::likely_bytes(std::size_t image, double bytes) const {
