@@ -106,7 +106,12 @@ class JoinedJpeg::Fragments {
   const TextureInfo& info() const { return info_; }
   bool has(std::size_t fragment) const { return !streams_.stream(fragment).empty(); }
   JpegCoefficients at(std::size_t fragment) const {
-    return JpegCoefficients(path_ + ", fragment " + std::to_string(fragment), streams_.file(fragment));
+    try {
+      return JpegCoefficients(path_, streams_.file(fragment));
+    } catch (const InputError& e) {  // of no model, but of the package
+      throw FormatError(path_, "fragment " + std::to_string(fragment) + ", " + e.place(), e.expected(),
+                        e.found());
+    }
   }
   [[noreturn]] void fail(std::size_t fragment, std::string expected) const {
     throw FormatError(path_, "fragment " + std::to_string(fragment), std::move(expected), "another");

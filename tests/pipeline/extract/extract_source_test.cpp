@@ -174,7 +174,6 @@ TEST_F(SourceToExtract, WithBytesEnoughTheMapsAreTheSourcesOwn) {
     const Extracted e = extract_model(reader, request, {});
     EXPECT_TRUE(e.within);
     ASSERT_EQ(e.images.size(), 1u);
-    EXPECT_EQ(e.images[0].quality, 100);
     const Pixels found = decode_image(import(e.glb).images.at(0));
     EXPECT_EQ(found.data, expected.data);
   }
