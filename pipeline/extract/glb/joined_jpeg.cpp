@@ -73,7 +73,7 @@ void write_blocks(jpeg_compress_struct& info, const CoefficientFile& file) {
   jpeg_finish_compress(&info);
 }
 
-std::vector<std::uint8_t> coded(const CoefficientFile& file) {
+std::vector<std::uint8_t> coded_coefficients(const CoefficientFile& file) {
   JpegWriter writer;
   const bool ok = jpeg_guarded(writer.errors, [&] {
     jpeg_mem_dest(&writer.info, &writer.data, &writer.size);
@@ -253,7 +253,7 @@ std::vector<std::uint8_t> JoinedJpeg::file(double quality) const {
           block[k] = requantised(block[k], from.quantisers[k], part.steps[k]);
     part.blocks = coarser[c][0].data();
   }
-  return coded(out);
+  return coded_coefficients(out);
 }
 
 }  // namespace texmesh
