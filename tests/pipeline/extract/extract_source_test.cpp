@@ -9,6 +9,7 @@
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/extract/extract.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
