@@ -85,7 +85,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   t.covered_texels = plane.covered_texels;
   t.surface_fraction = plane.surface_fraction;
   t.features = plane.features;
-  t.skip_dssim = {0.75f, 0.75f, 0.75f, 0};
+  t.skip_dssim = {1, 1, 1, 0};
   t.order = {1, 2, 0};  // eta_0 = 0, 1, 0.5
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {

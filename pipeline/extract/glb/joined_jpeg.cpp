@@ -91,7 +91,7 @@ std::int16_t requantised(std::int16_t value, std::uint16_t from, std::uint16_t t
 
 }  // namespace
 
-bool holds_source(const TextureInfo& info) { return info.lossless; }
+bool holds_source(const TextureInfo& info) { return info.source_rung; }
 
 /// The fragments' files of one rung.
 class JoinedJpeg::Fragments {

@@ -82,6 +82,7 @@ TEST(RungFigures, WeighQualityByTexelsAndBySurface) {
   t.size_bytes = {10, 20, 0, 30, 40, 0};
   t.mse = {100, 10, 0, 50, 5, 0};
   t.dssim = {0.4f, 0.1f, 0, 0.2f, 0.05f, 0};
+  t.skip_dssim = {0.5f, 0.2f, 0};
   t.covered_texels = {300, 100, 0};
   t.surface_fraction = {0.25f, 0.75f, 0};
   t.order = {0, 1};
