@@ -118,6 +118,20 @@ TEST(GltfAbout, WrittenBackAndReadAgain) {
   EXPECT_EQ(root["extensions"]["KHR_xmp_json_ld"]["packets"][0]["dc:title"], "of XMP");
 }
 
+TEST(GltfAbout, WritesOverWhatIsShapedWrongly) {
+  About a = about_of(document());
+  a.metres_per_unit = 2;
+  ordered_json root =
+      ordered_json::parse(R"({"asset":{"extensions":3},"extensions":[],"extensionsUsed":"x","extras":1})");
+  write_gltf_about(a, root);
+  EXPECT_EQ(root["extras"]["texmesh"]["unit"]["metres"], 2);
+  EXPECT_EQ(root["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"], 2);
+  a.source = R"({"asset":3,"xmpPackets":{"a":1}})";
+  EXPECT_NO_THROW(write_gltf_about(a, root));
+  a.source = R"({"xmpPackets":[3,[]],"asset":{"extensions":{"KHR_xmp_json_ld":{"packet":0}}}})";
+  EXPECT_NO_THROW(write_gltf_about(a, root));
+}
+
 TEST(GltfAbout, NothingKnownWritesNothing) {
   ordered_json root = ordered_json::parse(R"({"asset":{"version":"2.0"}})");
   const ordered_json before = root;
