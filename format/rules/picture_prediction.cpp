@@ -40,6 +40,12 @@ double mixed(double a, double b, double part) { return (1 - part) * a + part * b
 
 }  // namespace
 
+SizesAround sizes_around(const QualityTable& table, double displayed_px) {
+  if (table.sizes_px.empty()) return {1, 1};
+  const Between size = size_at(table, displayed_px);
+  return {static_cast<double>(table.sizes_px[size.first]), static_cast<double>(table.sizes_px[size.second])};
+}
+
 GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px) {
   const auto found = std::ranges::find(table.groups, group, &GroupLosses::group);
   if (found == table.groups.end() || table.sizes_px.empty()) return;
@@ -79,15 +85,19 @@ double GroupCurve::Curve::at_level(double levels) const {
   return mixed(value(i), value(i + 1), std::clamp(levels - whole, 0.0, 1.0));
 }
 
-double GroupCurve::coded(double texel_dssim) const {
+double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
   if (!(texel_dssim > kLeastDssim)) return 0;
   if (curves_.empty()) return std::min(texel_dssim, kMostFlip);
-  return std::min(kMostFlip, mixed(curves_[0].at(texel_dssim), curves_[1].at(texel_dssim), part_));
+  const auto at = [&](std::size_t i) {
+    const double grown = growth[i] == 0 ? 1 : portable::pow(kLossPerDoubling, growth[i]);
+    return curves_[i].at(texel_dssim) * grown;
+  };
+  return std::min(kMostFlip, mixed(at(0), at(1), part_));
 }
 
-double GroupCurve::coarser(double levels) const {
-  if (curves_.empty() || !(levels > 0)) return 0;
-  return mixed(curves_[0].at_level(levels), curves_[1].at_level(levels), part_);
+double GroupCurve::coarser(const TexelGrowth& growth) const {
+  if (curves_.empty()) return 0;
+  return mixed(curves_[0].at_level(growth[0]), curves_[1].at_level(growth[1]), part_);
 }
 
 double geometry_flip(const QualityTable& table, double displayed_px, double scale) {

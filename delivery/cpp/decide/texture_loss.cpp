@@ -17,10 +17,13 @@ double surface_of(const Manifest& m) {
   return 2 * (x * y + y * z + z * x);
 }
 
-double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
+double signed_level(PackageReader& package, std::uint32_t base, double displayed_px) {
   const Manifest& m = package.manifest();
-  return std::max(0.0,
-                  display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px));
+  return display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px);
+}
+
+double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
+  return std::max(0.0, signed_level(package, base, displayed_px));
 }
 
 double combined(const QualityTable& table, double geometry, const TextureParts& parts) {
@@ -83,6 +86,7 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   if (!is_new) return out;
   const PlaneTables& t = package_.tables().planes[plane];
   const GroupCurve& curve = curves_[static_cast<std::size_t>(group_of(plane))];
+  const TexelGrowth growth = this->growth(plane);
   const std::size_t fragments = t.fragment_count();
   out.weights = surface_weights(t);
   out.coded.resize((t.rung_count() + 1) * fragments);
@@ -90,7 +94,7 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
     out.weight += static_cast<double>(out.weights[f]);
     out.coded[f] = curve.coded(t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[f]));
     for (std::size_t r = 0; r < t.rung_count(); ++r)
-      out.coded[(r + 1) * fragments + f] = curve.coded(static_cast<double>(t.dssim[r * fragments + f]));
+      out.coded[(r + 1) * fragments + f] = curve.coded(static_cast<double>(t.dssim[r * fragments + f]), growth);
   }
   return out;
 }
@@ -102,16 +106,25 @@ PerGroup TextureLoss::weights(const std::vector<PlaneChoice>& planes) {
   return weights;
 }
 
-PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
+TexelGrowth TextureLoss::growth(std::uint32_t plane) {
   const std::vector<TextureInfo>& textures = package_.textures();
+  const std::uint32_t mip = textures[plane].mip, base = mip > 0 ? textures[plane].base : plane;
+  const double here = mip - signed_level(package_, base, displayed_px_);
+  TexelGrowth out{};
+  const SizesAround sizes = sizes_around(package_.quality(), displayed_px_);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double level = signed_level(package_, base, sizes[i]);
+    out[i] = here - (textures[plane_at_level(textures, base, level)].mip - level);
+  }
+  return out;
+}
+
+PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
   PerGroup loss{}, weights = this->weights(planes);
   for (const PlaneChoice& p : planes) {
     const auto group = static_cast<std::size_t>(group_of(p.plane));
-    const std::uint32_t for_display =
-        plane_at_level(textures, p.base, level_for_display(package_, p.base, displayed_px_));
-    const double levels = static_cast<double>(textures[p.plane].mip) - textures[for_display].mip;
-    if (!(levels > 0) || !(weights[group] > 0)) continue;
-    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(levels);
+    if (!(weights[group] > 0)) continue;
+    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(growth(p.plane));
   }
   return loss;
 }

@@ -57,6 +57,8 @@ class TextureLoss {
   PerGroup weights(const std::vector<PlaneChoice>& planes);
   /// TextureParts::coarser, as the mean over each group's surface.
   PerGroup coarser(const std::vector<PlaneChoice>& planes);
+  /// How much larger the plane's texels are at this height than those that the quality table sampled.
+  TexelGrowth growth(std::uint32_t plane);
   double displayed_px() const { return displayed_px_; }
   PackageReader& package() { return package_; }
 
