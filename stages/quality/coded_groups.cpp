@@ -83,6 +83,20 @@ std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, cons
   return plane_at_level(data.infos, full_size, std::min(level, static_cast<double>(last)));
 }
 
+double texel_level(const TextureData& data, const PlanesOfGroup& group, const Display& display) {
+  double sum = 0, total = 0;
+  for (const std::uint32_t p : group.planes) {
+    const PlaneTables& tables = data.tables.planes[p];
+    double surface = 0;
+    for (const float s : tables.surface_fraction) surface += static_cast<double>(s);
+    const double level =
+        display_level(tables, display.surface_area, display.object_height, display.displayed_px);
+    sum += surface * (data.fragments.planes[shown_plane(data, p, display)].mip - level);
+    total += surface;
+  }
+  return total > 0 ? sum / total : 0;
+}
+
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
                                const Display& display) {
   std::vector<std::uint32_t> planes;

@@ -33,6 +33,10 @@ struct Display {
 /// with whole texels along both axes.
 std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
 
+/// The size of texels on the screen, as a logarithm of base 2 of pixels: mean over the planes that clients
+/// show of the group, by their surface.
+double texel_level(const TextureData& data, const PlanesOfGroup& group, const Display& display);
+
 /// From the highest rung to the lowest, and last the previews. `samples` rungs of the first plane's ladder,
 /// first and last among them (one: the last); the others have the rung whose quality is nearest.
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,

@@ -96,9 +96,9 @@ bool passes(const Losses& losses, const QualityOptions& options, double share) {
   });
 }
 
-/// Below a quarter of the largest height all views count.
+/// Up to a quarter of the largest height all views count.
 bool is_small(double displayed_px, const QualityOptions& options) {
-  return displayed_px < options.largest_px / 4.0 * 0.999;
+  return displayed_px < options.largest_px / 4.0 * 1.001;
 }
 
 /// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
@@ -141,7 +141,7 @@ std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint
   for (std::size_t k = 1; k < n; ++k) {
     if (alive[k]) out[k] = is_small(height.displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
     if (alive[k] || !height.rank) continue;
-    if (*height.rank == 0) out[k] = ViewPart::kLarge;
+    if (*height.rank == 0) out[k] = ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
     if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
   }
@@ -173,9 +173,10 @@ struct RawLosses {
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller) {
+    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller,
+                            bool first_follows = false) {
       if (!smaller_cells) return losses_of(cells, nullptr);
-      const SmallerSize below{*smaller_cells, std::move(smaller)};
+      const SmallerSize below{*smaller_cells, std::move(smaller), first_follows};
       return losses_of(cells, &below);
     };
     const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
@@ -184,9 +185,9 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
                           below ? out[i - 1].geometry : PictureLosses{});
     for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
       const GroupCells& group = sizes[i].groups[g];
-      raw.coded.push_back(losses(
-          group.coded, below ? &below->groups[g].coded : nullptr,
-          below ? along_curve(group.knots, below->groups[g].knots, out[i - 1].coded[g]) : PictureLosses{}));
+      raw.coded.push_back(
+          losses(group.coded, below ? &below->groups[g].coded : nullptr,
+                 below ? along_curve(group, below->groups[g], out[i - 1].coded[g]) : PictureLosses{}, true));
       raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
                                    below ? out[i - 1].coarser[g] : PictureLosses{}));
     }

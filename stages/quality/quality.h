@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 7;
+inline constexpr int kQualityVersion = 8;
 
 struct QualityOptions {
   int views = 4;

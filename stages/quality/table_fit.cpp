@@ -50,19 +50,22 @@ GroupCurve curve_of(TextureLosses losses) {
 
 }  // namespace
 
-PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
-                          const PictureLosses& smaller) {
-  const std::vector<std::size_t> kept = rising_knots(smaller_knots);
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses) {
+  const std::vector<std::size_t> kept = rising_knots(smaller.knots);
+  if (kept.empty()) return losses;
+  const double growth = larger.texel_level - smaller.texel_level;
   PictureLosses out;
-  if (kept.empty()) return smaller;
   for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
-    TextureLosses losses;
+    TextureLosses read;
     for (const std::size_t k : kept) {
-      losses.texel_dssim.push_back(static_cast<float>(smaller_knots[k].mean_dssim));
-      losses.coded.flip.push_back((smaller.*list)[k]);
+      read.texel_dssim.push_back(static_cast<float>(smaller.knots[k].mean_dssim));
+      read.coded.flip.push_back((losses.*list)[k]);
     }
-    const GroupCurve curve = curve_of(std::move(losses));
-    for (const Knot& knot : knots) (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim)));
+    const GroupCurve curve = curve_of(std::move(read));
+    for (const Knot& knot : larger.knots) {
+      const TexelGrowth by = knot.previews ? TexelGrowth{} : TexelGrowth{growth, growth};
+      (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim, by)));
+    }
   }
   return out;
 }

@@ -114,7 +114,7 @@ TEST(Quality, TableHasKeptScalesSizesAndGroups) {
   ASSERT_EQ(t.groups[0].sizes.size(), 3u);
   for (const TextureLosses& losses : t.groups[0].sizes) {
     EXPECT_GE(losses.texel_dssim.size(), 3u);
-    EXPECT_EQ(losses.coarser.size(), 3u);
+    EXPECT_EQ(losses.coarser.size(), 2u);
   }
   EXPECT_EQ(read_quality(std::vector<std::uint8_t>([&] {
               const std::string json = write_quality(t);

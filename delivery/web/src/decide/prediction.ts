@@ -8,6 +8,8 @@ import { exp, log, pow } from './portable_math';
 const leastFlip = 1e-6; // what logarithms take for 0
 const leastDssim = 1e-9;
 const mostLevels = 8;
+/** Twice as large texels lose so many times as much. */
+const lossPerDoubling = 1.6;
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
@@ -51,6 +53,14 @@ class Curve {
   }
 }
 
+/** The two displayed heights of a table around one, px; 1 px for a table without any. */
+export function sizesAround(table: QualityTable, displayedPx: number): readonly [number, number] {
+  const [first, second] = sizeAt(table, displayedPx);
+  return [table.sizesPx[first] ?? 1, table.sizesPx[second] ?? 1];
+}
+/** How many times twice as large texels are on the screen as those that were sampled at each of sizesAround(). */
+export type TexelGrowth = readonly [number, number];
+
 /** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
 export class GroupCurve {
   private readonly curves_: Curve[];
@@ -63,16 +73,18 @@ export class GroupCurve {
     this.part_ = part;
   }
   /** FLIP where the texels' 1 - SSIM is `dssim`. */
-  coded(dssim: number): number {
+  coded(dssim: number, growth: TexelGrowth = [0, 0]): number {
     if (!(dssim > leastDssim)) return 0;
     const [first, second] = this.curves_;
+    if (!first) return Math.min(1, dssim);
     const x = log(dssim);
-    return Math.min(1, first ? mixed(first.at(x), second.at(x), this.part_) : dssim);
+    const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(lossPerDoubling, growth[i])));
+    return Math.min(1, mixed(a, b, this.part_));
   }
-  /** FLIP with mips that are so many `levels` coarser than those for the display. */
-  coarser(levels: number): number {
+  /** FLIP of the source's texels in mips with so much larger ones. */
+  coarser(growth: TexelGrowth): number {
     const [first, second] = this.curves_;
-    return first && levels > 0 ? mixed(first.atLevel(levels), second.atLevel(levels), this.part_) : 0;
+    return first ? mixed(first.atLevel(growth[0]), second.atLevel(growth[1]), this.part_) : 0;
   }
 }
 
