@@ -61,6 +61,7 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
       curve.log_flip.push_back(portable::log(least));
     }
     curve.coarser = losses.coarser.flip;
+    curve.preview = static_cast<double>(losses.preview.flip[0]);
     curves_.push_back(std::move(curve));
   }
 }
@@ -93,6 +94,10 @@ double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
     return curves_[i].at(texel_dssim) * grown;
   };
   return std::min(kMostFlip, mixed(at(0), at(1), part_));
+}
+
+double GroupCurve::preview() const {
+  return curves_.empty() ? kMostFlip : mixed(curves_[0].preview, curves_[1].preview, part_);
 }
 
 double GroupCurve::coarser(const TexelGrowth& growth) const {

@@ -29,6 +29,8 @@ class GroupCurve {
   /// logarithms, which go on before the first and behind the last sample. Twice as large texels lose
   /// kLossPerDoubling times as much. 0..1, not falling.
   double coded(double texel_dssim, const TexelGrowth& growth = {}) const;
+  /// FLIP where all textures of the group show their previews. Without the group 1.
+  double preview() const;
   /// FLIP of the source's texels in mips with so much larger texels, between whole levels linear. 0 where
   /// they are not larger; behind the last sampled level its value.
   double coarser(const TexelGrowth& growth) const;
@@ -38,6 +40,7 @@ class GroupCurve {
   struct Curve {
     std::vector<double> log_dssim, log_flip;
     std::vector<float> coarser;
+    double preview = 0;
     double at(double texel_dssim) const;
     double at_level(double levels) const;
   };

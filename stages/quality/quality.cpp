@@ -168,7 +168,7 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
   PictureLosses geometry;
-  std::vector<PictureLosses> coded, coarser;  // per group
+  std::vector<PictureLosses> coded, preview, coarser;  // per group
 };
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
@@ -188,6 +188,8 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
       raw.coded.push_back(
           losses(group.coded, below ? &below->groups[g].coded : nullptr,
                  below ? along_curve(group, below->groups[g], out[i - 1].coded[g]) : PictureLosses{}, true));
+      raw.preview.push_back(losses(group.preview, below ? &below->groups[g].preview : nullptr,
+                                   below ? out[i - 1].preview[g] : PictureLosses{}));
       raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
                                    below ? out[i - 1].coarser[g] : PictureLosses{}));
     }
@@ -206,7 +208,7 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
     table.geometry.push_back(raw[i].geometry);
     for (std::size_t g = 0; g < groups.size(); ++g)
       table.groups[g].sizes.push_back(
-          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].coarser[g]));
+          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].preview[g], raw[i].coarser[g]));
     for (const TogetherCell& cell : sizes[i].together) {
       TogetherLoss& sample = together.emplace_back();
       sample.measured = pooled(cell.losses).flip.mean();

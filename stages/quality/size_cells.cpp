@@ -37,6 +37,14 @@ class SizeShots {
     return out;
   }
 
+  Replaced previews(const PlanesOfGroup& group) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      if (auto texture = preview_at(sampler_.data, sampler_.shown.textures[t], group, context_))
+        out[t] = add(std::move(*texture));
+    return out;
+  }
+
   /// The source's mips, `levels` coarser than those of the group's planes at this size.
   Replaced coarser(const GroupCells& group, std::uint32_t levels) {
     Replaced out(source_, -1);
@@ -87,14 +95,13 @@ class SizeShots {
 
 /// Short ladders have no other rung.
 bool repeats(const Knot& knot, const Knot& before) {
-  return knot.previews == before.previews &&
-         std::ranges::equal(knot.rungs, before.rungs,
+  return std::ranges::equal(knot.rungs, before.rungs,
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, or the lowest rung and, at the half, the previews.
+/// The knots that are rendered: all, at the half the lowest rung, at the largest none.
 bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
-  return rank == 0 || knot == knots - 2 || (rank == 1 && knot == knots - 1);
+  return rank == 0 || (rank == 1 && knot + 1 == knots);
 }
 
 /// Mips change as much by height as from plane to plane, so they are rendered once, and again where a texture
@@ -170,6 +177,8 @@ void add_group(const TextureSampler& sampler, std::size_t rank, const Display& d
     coded[k] = shots.coded(group, k);
     shots.take(0, coded[k], group.coded[k], coded_views(rank));
   }
+  group.preview.resize(1);
+  shots.take(0, shots.previews(planes), group.preview[0], coded_views(rank));
   for (std::size_t l = 0; l < coarser_samples(sampler, rank, display, planes); ++l)
     shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l],
                other_views(rank));
@@ -189,7 +198,7 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
     cell.scale = samples[i].scale;
     Replaced all = shots.none();
     for (std::size_t g = 0; g < cells.groups.size(); ++g) {
-      const std::size_t lowest = cells.groups[g].knots.size() - 2;
+      const std::size_t lowest = cells.groups[g].knots.size() - 1;
       cell.knots.push_back(samples[i].lowest ? lowest : lowest / 2);
       all = both(std::move(all), coded[g][cell.knots[g]]);
     }

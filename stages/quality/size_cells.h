@@ -22,6 +22,7 @@ struct GroupCells {
   std::vector<Knot> knots;
   double texel_level = 0;  // texel_level() of the planes
   Cells coded;             // per knot
+  Cells preview;           // one
   Cells coarser;           // 1, 2 .. levels
 };
 

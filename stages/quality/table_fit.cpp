@@ -25,7 +25,7 @@ void make_rising(std::vector<float>& values) {
   for (std::size_t i = 1; i < values.size(); ++i) values[i] = std::max(values[i], values[i - 1]);
 }
 
-/// Indices of the knots that stay. Rungs may lose the same, and a preview may be better than the lowest rung.
+/// Indices of the knots that stay. Rungs may lose the same.
 std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < knots.size(); ++k) order.push_back(k);
@@ -44,6 +44,7 @@ std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
 GroupCurve curve_of(TextureLosses losses) {
   QualityTable table;
   table.sizes_px = {1};
+  losses.preview.flip = {0};  // not read
   table.groups = {{PlaneGroup::kColour, {std::move(losses)}}};
   return {table, PlaneGroup::kColour, 1};
 }
@@ -62,17 +63,16 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
       read.coded.flip.push_back((losses.*list)[k]);
     }
     const GroupCurve curve = curve_of(std::move(read));
-    for (const Knot& knot : larger.knots) {
-      const TexelGrowth by = knot.previews ? TexelGrowth{} : TexelGrowth{growth, growth};
-      (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim, by)));
-    }
+    for (const Knot& knot : larger.knots)
+      (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim, {growth, growth})));
   }
   return out;
 }
 
 TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses coarser) {
+                             PictureLosses preview, PictureLosses coarser) {
   TextureLosses out;
+  out.preview = std::move(preview);
   out.coarser = std::move(coarser);
   make_rising(out.coarser.flip);
   std::vector<std::size_t> kept = rising_knots(knots);

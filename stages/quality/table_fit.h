@@ -12,7 +12,7 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
 /// left out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes
 /// as near as three steps of iteration bring it.
 TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses coarser);
+                             PictureLosses preview, PictureLosses coarser);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

@@ -67,6 +67,10 @@ class TextureLoss {
   double displayed_px_ = 0;
   std::array<GroupCurve, kPlaneGroups> curves_;
   std::map<std::uint32_t, Plane> planes_;
+  std::map<std::uint32_t, double> preview_means_;
+
+  double preview_mean(std::uint32_t plane);
+  double preview_loss(std::uint32_t plane);
 };
 
 }  // namespace texmesh

@@ -30,7 +30,7 @@ struct PredictionArguments {
   int plans = 20, views = 4, jobs = 0;
   double display_px = 512;
   std::uint64_t seed = 1;
-  bool json = false;
+  bool every_scale = false, json = false;
 };
 
 /// A plan, and what it looks like.
@@ -80,6 +80,12 @@ ShownPackage read_plan(const std::string& path, PackageReader& package) {
   return shown;
 }
 
+std::vector<int> scales_of(PackageReader& package) {
+  std::vector<int> numbers;
+  for (const ManifestScale& s : package.manifest().scales) numbers.push_back(s.scale);
+  return numbers;
+}
+
 std::vector<Row> rows_of(const PredictionArguments& args, const std::string& path) {
   PackageReader package(open_store(path));
   PlanPictures pictures(package, args.against, args.views, context_of(args.jobs));
@@ -90,12 +96,14 @@ std::vector<Row> rows_of(const PredictionArguments& args, const std::string& pat
         {path, "plan", args.display_px, shown.scale, 0, 0, 0, 0, pictures.measure(shown, args.display_px)});
     return rows;
   }
-  for (const std::string& budget : args.budgets) {
-    DrawnPlan given{DrawnKind::kBudget, {}, {}};
-    given.request.displayed_px = args.display_px;
-    given.plan = plan_budget(package, given.request, parse_bytes(budget, "--budget"));
-    rows.push_back(measured(package, pictures, given, "budget"));
-  }
+  for (const std::string& budget : args.budgets)
+    for (const int scale : args.every_scale ? scales_of(package) : std::vector<int>{-1}) {
+      DrawnPlan given{DrawnKind::kBudget, {}, {}};
+      given.request.displayed_px = args.display_px;
+      given.request.scale = scale;
+      given.plan = plan_budget(package, given.request, parse_bytes(budget, "--budget"));
+      rows.push_back(measured(package, pictures, given, "budget"));
+    }
   if (rows.empty())
     for (const DrawnPlan& drawn : draw_plans(package, args.plans, args.seed))
       rows.push_back(measured(package, pictures, drawn, name_of(drawn.kind)));
@@ -199,6 +207,8 @@ void add_prediction_study(Command& study) {
   c.option("--budget", args->budgets,
            "What plan --budget chooses, instead of random plans; may be given again")
       .value_name("SIZE");
+  c.flag("--every-scale", args->every_scale,
+         "With --budget: the best of every scale, not only of the best one");
   c.option("--plan", args->plan, "What plan --json printed, instead of random plans").value_name("FILE");
   c.option("--display", args->display_px, "Displayed height with --budget and --plan, px")
       .number_in(16, 2048)

@@ -13,8 +13,10 @@ PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 QualityTable make_table(float exponent = 1) {
   QualityTable t{1, {64, 1024}, {0, 4, 8}, {}, {}, exponent, 0};
   t.geometry = {losses({0, 0.125f, 0.25f}), losses({0, 0.25f, 0.5f})};
-  const TextureLosses small{{0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.0625f, 0.125f})};
-  const TextureLosses large{{0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.125f, 0.25f})};
+  const TextureLosses small{
+      {0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.125f}), losses({0.0625f, 0.125f})};
+  const TextureLosses large{
+      {0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.375f}), losses({0.125f, 0.25f})};
   t.groups = {{PlaneGroup::kColour, {small, large}}};
   return t;
 }
@@ -78,6 +80,13 @@ TEST(GroupCurve, LargerTexelsLoseMore) {
   EXPECT_NEAR(between.coarser({1, 0}), 0.0625 / 2, 1e-12);
 }
 
+TEST(GroupCurve, PreviewsAreThoseOfTheHeight) {
+  const QualityTable t = make_table();
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kColour, 64).preview(), 0.125);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).preview(), 0.25, 1e-12);
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kNormal, 64).preview(), 1) << "no such group";
+}
+
 TEST(SizesAround, AreTheTablesNearest) {
   const QualityTable t = make_table();
   EXPECT_EQ(sizes_around(t, 300), (SizesAround{64, 1024}));
@@ -97,7 +106,7 @@ TEST(GroupCurve, GroupsThatTheTableDoesNotHaveLoseTheirTexels) {
 
 TEST(GroupCurve, OneSampleIsALine) {
   QualityTable t = make_table();
-  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), {}};
+  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), losses({0}), {}};
   const GroupCurve curve(t, PlaneGroup::kColour, 64);
   EXPECT_NEAR(curve.coded(0.25), 0.125, 1e-12);
   EXPECT_NEAR(curve.coded(0.125), 0.0625, 1e-12);

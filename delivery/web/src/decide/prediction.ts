@@ -30,12 +30,14 @@ class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
   private readonly coarser_: Float32Array;
+  readonly preview: number;
 
-  constructor({ texelDssim, coded, coarser }: TextureLosses) {
+  constructor({ texelDssim, coded, preview, coarser }: TextureLosses) {
     let least = leastFlip;
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
     this.coarser_ = coarser.flip;
+    this.preview = preview.flip[0];
   }
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
@@ -80,6 +82,11 @@ export class GroupCurve {
     const x = log(dssim);
     const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(lossPerDoubling, growth[i])));
     return Math.min(1, mixed(a, b, this.part_));
+  }
+  /** FLIP where all textures of the group show their previews. */
+  preview(): number {
+    const [first, second] = this.curves_;
+    return first ? mixed(first.preview, second.preview, this.part_) : 1;
   }
   /** FLIP of the source's texels in mips with so much larger ones. */
   coarser(growth: TexelGrowth): number {

@@ -105,6 +105,7 @@ interface PlaneLoss {
 export class TextureLoss {
   private readonly curves_: GroupCurve[];
   private readonly planes_ = new Map<number, PlaneLoss>();
+  private readonly previewMeans_ = new Map<number, number>();
 
   constructor(
     readonly data: PackageData,
@@ -124,11 +125,45 @@ export class TextureLoss {
     const fragments = fragmentCount(t);
     const growth = this.growth_(plane);
     const coded = new Float64Array((t.rungQuality.length + 1) * fragments);
+    const mean = this.previewMean_(plane);
+    const preview = this.previewLoss_(plane);
     for (const f of t.order) {
-      coded[f] = curve.coded(t.skipDssim[f] ?? 1);
+      coded[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f] ?? 1) / mean)) : 0;
       for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f], growth);
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), coded };
+  }
+  /** What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says of their texels. */
+  private previewMean_(plane: number): number {
+    let mean = this.previewMeans_.get(plane);
+    if (mean !== undefined) return mean;
+    const t = tablesOf(this.data, plane);
+    const curve = this.curves_[groupIndex(this.data, plane)];
+    const weights = surfaceWeights(t);
+    let [sum, total] = [0, 0];
+    for (const f of t.order) {
+      sum += weights[f] * curve.coded(t.skipDssim[f] ?? 1);
+      total += weights[f];
+    }
+    this.previewMeans_.set(plane, (mean = total > 0 ? sum / total : 0));
+    return mean;
+  }
+  /** FLIP of the plane's preview, which is the same for all mips of a texture. */
+  private previewLoss_(plane: number): number {
+    const { data } = this;
+    const { mip, base } = data.textures[plane];
+    const group = groupIndex(data, plane);
+    let [sum, total] = [0, 0];
+    for (const full of fullSize(data.textures)) {
+      if (groupIndex(data, full.plane) !== group) continue;
+      const t = tablesOf(data, full.plane);
+      const weights = surfaceWeights(t);
+      const weight = sumOf([...t.order].map((f) => weights[f]));
+      sum += weight * this.previewMean_(full.plane);
+      total += weight;
+    }
+    const share = sum > 0 ? (this.previewMean_(mip > 0 ? base : plane) * total) / sum : 1;
+    return this.curves_[group].preview() * share;
   }
   /** How much larger the plane's texels are at this height than those that the quality table sampled. */
   private growth_(plane: number): TexelGrowth {
