@@ -36,6 +36,15 @@ Between size_at(const QualityTable& table, double displayed_px) {
       [](double px) { return portable::log(px); });
 }
 
+/// How much more a picture of a fixed number of texels loses than at the nearest height of the table.
+double beyond_sizes(const QualityTable& table, double displayed_px) {
+  constexpr double kLn2 = 0.693147180559945309417;
+  const double px = std::max(displayed_px, 1.0);
+  const double nearest =
+      std::clamp(px, static_cast<double>(table.sizes_px.front()), static_cast<double>(table.sizes_px.back()));
+  return px == nearest ? 1 : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / kLn2);
+}
+
 double mixed(double a, double b, double part) { return (1 - part) * a + part * b; }
 
 }  // namespace
@@ -61,7 +70,8 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
       curve.log_flip.push_back(portable::log(least));
     }
     curve.coarser = losses.coarser.flip;
-    curve.preview = static_cast<double>(losses.preview.flip[0]);
+    curve.preview =
+        std::min(kMostFlip, static_cast<double>(losses.preview.flip[0]) * beyond_sizes(table, displayed_px));
     curves_.push_back(std::move(curve));
   }
 }

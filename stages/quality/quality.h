@@ -52,9 +52,9 @@ struct QualityOptions {
 ///   kAnyDisplayPx.
 /// - Views: all at heights up to a quarter of the largest, which the table's least size is; `large_views` of
 ///   them for scales at larger heights, for coarser mips and for samples of everything together; every second
-///   one of these for textures at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak, 0.8 where fewer than 6
-///   do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views than at the size below
-///   are corrected by what these views were among all there.
+///   one of these for textures at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak,
+///   0.8 where fewer than 6 do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views
+///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
 ///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
 ///   the ratio to the size below, linear between the neighbours in the list of scales.
@@ -63,9 +63,10 @@ struct QualityOptions {
 ///   coarser; at the half the lowest rung, and one coarser level of textures that have no finer plane for it.
 ///   Previews are rendered at all sizes. Other rungs follow along the curve of the size below, by
 ///   GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the ratio to it where both
-///   were rendered; the highest rung's ratio is 1. Planes are those that a client shows at the size (format/rules/mip_choice.h). Planes of one
-///   group have the rung whose quality is nearest to that of the group's first plane. FLIP of knots is scaled
-///   so that the mean over fragments of GroupCurve::coded() is what was measured for whole planes.
+///   were rendered; the highest rung's ratio is 1. Planes are those that a client shows at the size
+///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
+///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
+///   what was measured for whole planes.
 /// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size and 1
 ///   at the half, the exponent that predicts best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size

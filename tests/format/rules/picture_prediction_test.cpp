@@ -84,6 +84,10 @@ TEST(GroupCurve, PreviewsAreThoseOfTheHeight) {
   const QualityTable t = make_table();
   EXPECT_EQ(GroupCurve(t, PlaneGroup::kColour, 64).preview(), 0.125);
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).preview(), 0.25, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 32).preview(), 0.125 / GroupCurve::kLossPerDoubling, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 2048).preview(), 0.375 * GroupCurve::kLossPerDoubling,
+              1e-12);
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kColour, 1e6).preview(), 1);
   EXPECT_EQ(GroupCurve(t, PlaneGroup::kNormal, 64).preview(), 1) << "no such group";
 }
 

@@ -25,6 +25,14 @@ function between(axis: readonly number[], at: number, value: (x: number) => numb
 
 const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] => between(sizesPx, Math.max(displayedPx, 1), log);
 
+const ln2 = 0.693147180559945309417;
+/** How much more a picture of a fixed number of texels loses than at the nearest height of the table. */
+function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
+  const px = Math.max(displayedPx, 1);
+  const nearest = clamp(px, sizesPx[0], sizesPx[sizesPx.length - 1]);
+  return px === nearest ? 1 : pow(lossPerDoubling, log(px / nearest) / ln2);
+}
+
 /** One of the two displayed heights around the one that is asked for. */
 class Curve {
   private readonly logDssim_: number[];
@@ -32,12 +40,12 @@ class Curve {
   private readonly coarser_: Float32Array;
   readonly preview: number;
 
-  constructor({ texelDssim, coded, preview, coarser }: TextureLosses) {
+  constructor({ texelDssim, coded, preview, coarser }: TextureLosses, beyond: number) {
     let least = leastFlip;
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
     this.coarser_ = coarser.flip;
-    this.preview = preview.flip[0];
+    this.preview = Math.min(1, preview.flip[0] * beyond);
   }
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
@@ -71,7 +79,8 @@ export class GroupCurve {
   constructor(table: QualityTable, group: PlaneGroup, displayedPx: number) {
     const [first, second, part] = sizeAt(table, displayedPx);
     const sizes = table.groups.find((g) => g.group === group)?.sizes;
-    this.curves_ = sizes ? [new Curve(sizes[first]), new Curve(sizes[second])] : [];
+    const beyond = beyondSizes(table, displayedPx);
+    this.curves_ = sizes ? [new Curve(sizes[first], beyond), new Curve(sizes[second], beyond)] : [];
     this.part_ = part;
   }
   /** FLIP where the texels' 1 - SSIM is `dssim`. */
