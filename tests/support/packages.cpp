@@ -270,8 +270,10 @@ PackageParts make_package_parts() {
   p.manifest.steps = {{200, 5}, {kAnyDisplayPx, 0}};
   p.manifest.plane_count = 1;
   const PictureLosses scales{{0, 0.1f}, {0, 0.2f}, {0, 0.05f}};
-  const TextureLosses colours{
-      {0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{0.1f}, {0.2f}, {0.05f}}};
+  const TextureLosses colours{{0.125f, 0.5f},
+                              {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}},
+                              {{0.2f}, {0.4f}, {0.1f}},
+                              {{0.1f}, {0.2f}, {0.05f}}};
   p.quality = {2, {256}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
   p.provenance = make_provenance();
   return p;

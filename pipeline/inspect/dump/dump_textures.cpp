@@ -115,6 +115,7 @@ std::string groups_text(const QualityTable& q) {
       const TextureLosses& t = group.sizes[i];
       for (std::size_t k = 0; k < t.texel_dssim.size(); ++k)
         add(group, q.sizes_px[i], {"coded", fraction(t.texel_dssim[k])}, t.coded, k);
+      add(group, q.sizes_px[i], {"previews", ""}, t.preview, 0);
       for (std::size_t l = 0; l < t.coarser.size(); ++l)
         add(group, q.sizes_px[i], {fmt::format("{} mips coarser", l + 1), ""}, t.coarser, l);
     }
