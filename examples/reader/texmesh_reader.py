@@ -11,7 +11,6 @@ PACKAGE is a container or the folder of a tree. Needs numpy and Pillow (Debian: 
 import argparse
 import hashlib
 import io
-import json
 import os
 import re
 import struct
@@ -116,7 +115,8 @@ class Package:
                 require(len(tail) == 98, "K10", "no ZIP64 end record")
                 count, length, at = struct.unpack("<QQQ", tail[32:56])
             end = end_record(count, length, at)
-            require(tail[-len(end):] == end, "K10" if len(end) > 22 else "K01", "the end record")
+            is_zip64 = len(end) > 22 or tail[-42:-38] == b"PK\6\7"
+            require(tail[-len(end):] == end, "K10" if is_zip64 else "K01", "the end record")
             require(at + length + len(end) == size, "K01", "bytes of no entry, or too few")
             f.seek(at)
             directory = Cursor(f.read(length), "K01", "the central directory")
@@ -133,17 +133,17 @@ class Package:
                     header = more.get("Q") if header == MAX32 else header
                 require(is_path(path), "K05", f"path {path!r}")
                 require(path not in entries, "K06", f"{path} twice")
-                require(directory.data[begin : directory.at] == central_header(path, bytes_, crc, header),
-                        "K02", f"the central header of {path}")
+                found, expected = directory.data[begin : directory.at], central_header(path, bytes_, crc, header)
+                rule = "K08" if found[30:32] != expected[30:32] else "K09" if fields[1] == fields[2] == 45 else "K02"
+                require(found == expected, rule, f"the central header of {path}")
                 require(header == here, "K01", f"a gap before {path}")
                 expected = local_header(path, bytes_, crc, here)
                 f.seek(here)
                 found = f.read(len(expected))
-                if found != expected:
-                    lengths = struct.unpack("<HH", found[26:30]) if len(found) >= 30 else (0, 0)
-                    aligned = (here + 30 + sum(lengths)) % 64 == 0
-                    raise Refused(f"{'K04' if aligned and found[:26] == expected[:26] else 'K02' if aligned else 'K03'}"
-                                  f": the local header of {path}")
+                lengths = struct.unpack("<HH", found[26:30]) if len(found) >= 30 else (0, 0)
+                is_aligned = (here + 30 + sum(lengths)) % 64 == 0
+                rule = "K03" if not is_aligned else "K04" if found[:26] == expected[:26] else "K02"
+                require(found == expected, rule, f"the local header of {path}")
                 entries[path] = (here + len(expected), bytes_, crc)
                 here += len(expected) + bytes_
                 require(here <= at, "K01", f"{path} goes beyond the central directory")
@@ -536,7 +536,7 @@ def write_mesh(model, scale, raw, file):
     if 2 in kinds:
         for normal in splits.attribute(kinds.index(2)):
             print("vn", *(f"{x:.9g}" for x in normal), file=file)
-    form = {(True, True): "{0}/{0}/{0}", (True, False): "{0}/{0}", (False, True): "{0}//{0}"}.get((0 in kinds, 2 in kinds), "{0}")
+    form = "{0}" + ("/{0}" if 0 in kinds else "/" if 2 in kinds else "") + ("/{0}" if 2 in kinds else "")
     before = None
     for f in sorted(splits.triangles(), key=lambda f: splits.face_group[f]):
         if splits.face_group[f] != before:

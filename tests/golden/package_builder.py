@@ -1,4 +1,5 @@
 """Takes a package apart and lays it out again with other bytes: places, sizes and digests follow. For make_invalid."""
+import copy
 import hashlib
 import json
 import struct
@@ -69,7 +70,6 @@ class Parts:
         self.edit_index = lambda records: records            # [offset, bytes, digest, path] in container order
         self.edit_index_bytes = lambda data: data            # digests of pages are not made anew
         self.edit_manifest = lambda manifest: None
-        self.edit_manifest_bytes = lambda data: data
         self.layout = Layout
         self.fields = struct.unpack("<HH", self.entries["index.bin"][4:8])
 
@@ -111,8 +111,10 @@ class Parts:
         columns = m["scales"]
         for k, scale in enumerate(columns["scale"]):
             path = "mesh/stream.bin" if k in self.prefixes else f"mesh/s{scale:02}.glb"
-            data = self.entries.get(path, b"")
-            columns["offset"][k] = places.get(path, 64)
+            if path not in self.entries:
+                continue
+            data = self.entries[path]
+            columns["offset"][k] = places[path]
             columns["bytes"][k] = columns["bytes"][k] if k in self.prefixes else len(data)
             columns["sha256"][k] = sha(data[: columns["bytes"][k]])
 
@@ -126,8 +128,9 @@ class Parts:
                     layout.add(path, data)
                 self.entries["index.bin"] = self.write_index(places)
             self.refer(places)
-            self.edit_manifest(self.manifest)
-            text = self.edit_manifest_bytes(dump(self.manifest))
+            manifest = copy.deepcopy(self.manifest)
+            self.edit_manifest(manifest)
+            text = dump(manifest)
             if len(text) <= self.slot:
                 break
             self.slot = len(text)
