@@ -2,7 +2,7 @@
 """Reads texmesh packages of format 2, written from format/SPEC.md alone; rule names are those of that text.
 
   texmesh_reader.py info PACKAGE                 what the package holds
-  texmesh_reader.py verify PACKAGE               every rule that this reader knows how to check
+  texmesh_reader.py verify PACKAGE...            every rule that this reader knows how to check
   texmesh_reader.py picture PACKAGE --plane P [--rung R] -o OUT.png
   texmesh_reader.py mesh PACKAGE [--scale N] [--raw] -o OUT.obj
 
@@ -545,10 +545,40 @@ def write_mesh(model, scale, raw, file):
         print("f", *(form.format(w + 1) for w in splits.faces[f]), file=file)
 
 
+def verify(names):
+    """Whether no package breaks a rule."""
+    good = True
+    for name in names:
+        try:
+            Model(name).verify()
+            print(f"{name}: no rule broken")
+        except Refused as refused:
+            print(f"{name}: refused: {refused}")
+            good = False
+    return good
+
+
+def run(options):
+    model = Model(options.package[0])
+    if options.command == "info":
+        return show_info(model)
+    if options.command == "mesh":
+        with open(options.output, "w", encoding="ascii") as file:
+            return write_mesh(model, options.scale, options.raw, file)
+    if not 0 <= options.plane < len(model.textures):
+        sys.exit(f"the package has {len(model.textures)} planes")
+    rungs = len(model.textures[options.plane]["rungQuality"])
+    rung = rungs - 1 if options.rung is None else options.rung
+    if not -1 <= rung < rungs:
+        sys.exit(f"the plane has {rungs} rungs")
+    shown = model.pictures.preview(options.plane) if rung < 0 else model.pictures.picture(options.plane, rung)
+    return shown.save(options.output, format="PNG")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=("info", "verify", "picture", "mesh"))
-    parser.add_argument("package")
+    parser.add_argument("package", nargs="+")
     parser.add_argument("--plane", type=int, default=0)
     parser.add_argument("--rung", type=int, help="default: the highest; -1: the preview alone")
     parser.add_argument("--scale", type=int, default=0)
@@ -558,26 +588,11 @@ def main():
     if options.command in ("picture", "mesh") and not options.output:
         parser.error("-o OUTPUT is missing")
     try:
-        model = Model(options.package)
-        if options.command == "info":
-            show_info(model)
-        elif options.command == "verify":
-            model.verify()
-            print(f"{options.package}: no rule broken")
-        elif options.command == "picture":
-            if not 0 <= options.plane < len(model.textures):
-                parser.error(f"the package has {len(model.textures)} planes")
-            rungs = len(model.textures[options.plane]["rungQuality"])
-            rung = rungs - 1 if options.rung is None else options.rung
-            if not -1 <= rung < rungs:
-                parser.error(f"the plane has {rungs} rungs")
-            shown = model.pictures.preview(options.plane) if rung < 0 else model.pictures.picture(options.plane, rung)
-            shown.save(options.output, format="PNG")
-        else:
-            with open(options.output, "w", encoding="ascii") as file:
-                write_mesh(model, options.scale, options.raw, file)
+        if options.command == "verify":
+            sys.exit(0 if verify(options.package) else 1)
+        run(options)
     except Refused as refused:
-        sys.exit(f"refused: {refused}")
+        sys.exit(f"{options.package[0]}: refused: {refused}")
     except OSError as error:
         sys.exit(f"{error}")
 
