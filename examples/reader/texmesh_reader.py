@@ -332,7 +332,8 @@ class Textures:
             parts = [s[k] for s in streams]
             if codec == "jpeg":
                 good = parts[0][:2] == b"\xff\xd8" and parts[0][-2:] == b"\xff\xd9"
-                require(good and heads[rung][:2] == b"\xff\xd8", "F05", f"fragment {fragment}: no SOI or EOI")
+                good = good and heads[rung][:2] == b"\xff\xd8" and heads[rung][-2:] == b"\xff\xd9"
+                require(good, "F05", f"fragment {fragment}: no SOI or EOI")
                 yield fragment, heads[rung][:-2] + parts[0][2:]
             elif codec == "jpeg-progressive":
                 require(heads[0][:2] == b"\xff\xd8", "F06", "no SOI")
