@@ -24,8 +24,7 @@ from texmesh_rules import *
 from texmesh_splits import Splits
 from texmesh_splits import read_head as read_stream_head
 
-CREDENTIAL = "META-INF/content_credential.c2pa"
-MAX16, MAX32 = 0xFFFF, 0xFFFFFFFF
+MAX16 = 0xFFFF
 
 
 def sha(data):
@@ -203,24 +202,6 @@ def read_index(data, m):
     places = sorted(index.values())
     require(all(a[0] + a[1] < b[0] for a, b in zip(places, places[1:])), "I07", "entries overlap")
     return index
-
-
-def needed_paths(m, textures):
-    paths = ["index.bin", "tables.bin", "textures.json", "quality.json", "about.json", "provenance.json"]
-    stream = m.get("stream", {}).get("offset")
-    paths += [f"mesh/s{s:02}.glb" for s, at in zip(m["scales"]["scale"], m["scales"]["offset"]) if at != stream]
-    paths += [path for name, path in OPTIONAL.items() if name in m]
-    for p, t in enumerate(textures):
-        paths += [f"preview/{p:03}.jpg"] if "mip" not in t else []
-        paths += [f"source/{p:03}.{t['source']}"] if "source" in t else []
-        paths += [f"texture/{p}/tables.pack"]
-        paths += [f"texture/{p}/r{r:02}.pack" for r in range(len(t["rungQuality"]))]
-    return paths
-
-
-OPTIONAL = {"stream": "mesh/stream.bin", "thesis": "thesis.bin", "poster": "poster.jpg"}
-FIXED = {"tables": "tables.bin", "textures": "textures.json", "quality": "quality.json", "about": "about.json",
-         "provenance": "provenance.json"}
 
 
 def read_tables(data, m, textures):
@@ -446,7 +427,7 @@ class Model:
         for path in p.entries:
             require(path in known or m["version"]["minor"] > 0, "E03", f"unknown entry {path}")
         if not p.is_tree:
-            self.check_order(list(p.entries))
+            check_entry_order(list(p.entries), m, self.textures)
         read_quality(p.read("quality.json"), m, self.textures)
         read_about(p.read("about.json"), m)
         parse_json(p.read("provenance.json"), 64 << 20, "provenance.json")
@@ -476,28 +457,7 @@ class Model:
             require(end["triangles"] == columns["triangles"][k], "S21", f"triangles of scale {end['scale']}")
             if columns["offset"][k] == self.manifest["stream"]["offset"]:
                 prefix = (columns["bytes"][k], columns["sha256"][k])
-                require(prefix == (end["bytes"], sha(data[: end["bytes"]])), "M19", f"prefix of scale {end['scale']}")
-
-    def check_order(self, paths):
-        columns = self.manifest["scales"]
-        coarsest = f"mesh/s{columns['scale'][-1]:02}.glb"
-        glbs = [p for p in (f"mesh/s{s:02}.glb" for s in reversed(columns["scale"])) if p in paths and p != coarsest]
-        meshes = [p for p in ["mesh/stream.bin"] + glbs if p in paths]
-        planes = range(len(self.textures))
-        most = max((len(t["rungQuality"]) for t in self.textures), default=0)
-        ladder, done = [], 0
-        for r in range(most):
-            ladder += [f"texture/{p}/r{r:02}.pack" for p in planes if r < len(self.textures[p]["rungQuality"])]
-            while done < len(meshes) and (r + 1) * len(meshes) >= (done + 1) * most:
-                ladder.append(meshes[done])
-                done += 1
-        order = ["manifest.json", coarsest, "index.bin", "textures.json", "quality.json"]
-        order += [f"texture/{p}/tables.pack" for p in planes] + ["tables.bin", "poster.jpg", "about.json"]
-        order += [f"preview/{p:03}.jpg" for p in planes] + ladder + meshes[done:]
-        others = set(paths) - set(order) - {"provenance.json", CREDENTIAL}
-        order += sorted(others) + ["provenance.json", CREDENTIAL]
-        expected = [p for p in order if p in paths]
-        require(paths == expected, "E04", "order of entries")
+                require(prefix == (end["bytes"], sha(data[: end["bytes"]])), "M20", f"prefix of scale {end['scale']}")
 
 
 def show_info(model):

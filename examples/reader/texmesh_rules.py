@@ -8,6 +8,7 @@ import numpy as np
 
 MAX32 = 0xFFFFFFFF
 CODEC_FEATURE = {"jpeg": None, "jpeg-progressive": "codec-jpeg-progressive", "webp": "codec-webp"}
+CREDENTIAL = "META-INF/content_credential.c2pa"
 GROUPS = ("colour", "normal", "data")
 
 
@@ -182,7 +183,7 @@ def check_scales(m):
         for value in take(columns, name, "list", n, n, "M10"):
             check(value, name, *kind)
     require(columns["scale"][0] == 0 and rises(columns["scale"]), "M10", "scale numbers")
-    require(columns["displayPxFlip"][0] == 1e9, "M11", "displayPxFlip of S_0")
+    require(columns["displayPxFlip"][0] == 1e9, "M12", "displayPxFlip of S_0")
     for k in range(n):
         check_offset(columns["offset"][k])
         require(columns["errorRms"][k] <= columns["errorMax"][k], "M12", f"errorRms of element {k}")
@@ -195,15 +196,15 @@ def check_scales(m):
 
 
 def check_steps(m):
-    steps, scales = take(m, "steps", "list", 1, 100, "M20"), m["scales"]
+    steps, scales = take(m, "steps", "list", 1, 100, "M21"), m["scales"]
     for step in steps:
-        check(step, "step", "list", 2, 2, "M20")
-        check(step[0], "upToPx", "number", 0, 1e9, "M20")
-        require(step[1] in scales["scale"], "M20", f"step to scale {step[1]}")
+        check(step, "step", "list", 2, 2, "M21")
+        check(step[0], "upToPx", "number", 0, 1e9, "M21")
+        require(step[1] in scales["scale"], "M21", f"step to scale {step[1]}")
         flip = scales["displayPxFlip"][scales["scale"].index(step[1])]
-        require(step[0] <= flip * (1 + 1e-5), "M21", f"step up to {step[0]} px")
-    require(rises([s[0] for s in steps]) and rises([-s[1] for s in steps]), "M20", "steps")
-    require(steps[-1][0] == 1e9 and steps[-1][1] == 0, "M20", "the last step")
+        require(step[0] <= flip * (1 + 1e-5), "M22", f"step up to {step[0]} px")
+    require(rises([s[0] for s in steps]) and rises([-s[1] for s in steps]), "M21", "steps")
+    require(steps[-1][0] == 1e9 and steps[-1][1] == 0, "M21", "the last step")
 
 
 # Section 7: textures ---------------------------------------------------------------------------------
@@ -259,6 +260,49 @@ def group_of(role):
 
 
 
+# Section 3: entries ----------------------------------------------------------------------------------
+
+
+def needed_paths(m, textures):
+    paths = ["index.bin", "tables.bin", "textures.json", "quality.json", "about.json", "provenance.json"]
+    stream = m.get("stream", {}).get("offset")
+    paths += [f"mesh/s{s:02}.glb" for s, at in zip(m["scales"]["scale"], m["scales"]["offset"]) if at != stream]
+    paths += [path for name, path in OPTIONAL.items() if name in m]
+    for p, t in enumerate(textures):
+        paths += [f"preview/{p:03}.jpg"] if "mip" not in t else []
+        paths += [f"source/{p:03}.{t['source']}"] if "source" in t else []
+        paths += [f"texture/{p}/tables.pack"]
+        paths += [f"texture/{p}/r{r:02}.pack" for r in range(len(t["rungQuality"]))]
+    return paths
+
+
+OPTIONAL = {"stream": "mesh/stream.bin", "thesis": "thesis.bin", "poster": "poster.jpg"}
+FIXED = {"tables": "tables.bin", "textures": "textures.json", "quality": "quality.json", "about": "about.json",
+         "provenance": "provenance.json"}
+
+
+def check_entry_order(paths, m, textures):
+    columns = m["scales"]
+    coarsest = f"mesh/s{columns['scale'][-1]:02}.glb"
+    glbs = [p for p in (f"mesh/s{s:02}.glb" for s in reversed(columns["scale"])) if p in paths and p != coarsest]
+    meshes = [p for p in ["mesh/stream.bin"] + glbs if p in paths]
+    planes = range(len(textures))
+    most = max((len(t["rungQuality"]) for t in textures), default=0)
+    ladder, done = [], 0
+    for r in range(most):
+        ladder += [f"texture/{p}/r{r:02}.pack" for p in planes if r < len(textures[p]["rungQuality"])]
+        while done < len(meshes) and (r + 1) * len(meshes) >= (done + 1) * most:
+            ladder.append(meshes[done])
+            done += 1
+    order = ["manifest.json", coarsest, "index.bin", "textures.json", "quality.json"]
+    order += [f"texture/{p}/tables.pack" for p in planes] + ["tables.bin", "poster.jpg", "about.json"]
+    order += [f"preview/{p:03}.jpg" for p in planes] + ladder + meshes[done:]
+    others = set(paths) - set(order) - {"provenance.json", CREDENTIAL}
+    order += sorted(others) + ["provenance.json", CREDENTIAL]
+    expected = [p for p in order if p in paths]
+    require(paths == expected, "E04", "order of entries")
+
+
 # Sections 10, 12 to 14: meshes and the other documents ------------------------------------------------
 
 
@@ -309,6 +353,7 @@ def read_quality(data, m, textures):
             samples = take(losses, "texelDssim", "list", 1, 100, "Q01")
             require(rises([0] + [check(s, "texelDssim", "number", 0, 2, "Q01") for s in samples]), "Q01", "texelDssim")
             check_losses(take(losses, "coded", "object"), len(samples))
+            check_losses(take(losses, "preview", "object"), 1)
             coarser = take(losses, "coarser", "object")
             check_losses(coarser, len(take(coarser, "flip", "list", 0, 8, "Q01")))
     names = [group["group"] for group in groups]
