@@ -435,15 +435,15 @@ class Model:
             check_thesis(p.read("thesis.bin"), m, self.textures)
         if "poster" in m:
             decode_image(p.read("poster.jpg"), m["poster"]["widthPx"], m["poster"]["heightPx"], 3, "O01", "poster")
-        coarsest = f"mesh/s{m['scales']['scale'][-1]:02}.glb"
-        for path in (path for path in self.index if path.endswith(".glb")):
-            check_glb(p.read(path), path, path == coarsest, self.textures)
         for plane, t in enumerate(self.textures):
             if "mip" not in t:
                 self.pictures.preview(plane)
             for rung in range(len(t["rungQuality"])):
                 for _ in self.pictures.fragments(plane, rung):
                     pass
+        coarsest = f"mesh/s{m['scales']['scale'][-1]:02}.glb"
+        for path in (path for path in self.index if path.endswith(".glb")):
+            check_glb(p.read(path), path, path == coarsest, self.textures, p.read)
         if "stream" in m:
             self.verify_stream()
 

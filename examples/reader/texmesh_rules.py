@@ -306,8 +306,8 @@ def check_entry_order(paths, m, textures):
 # Sections 10, 12 to 14: meshes and the other documents ------------------------------------------------
 
 
-def check_glb(data, name, is_coarsest, textures):
-    """The JSON of a GLB; meshes are not decoded."""
+def check_glb(data, name, is_coarsest, textures, read):
+    """The JSON and the pictures of a GLB; meshes are not decoded. `read` gives an entry."""
     c = Cursor(data, "G01", name)
     magic, version, length, size, kind = c.get("IIIII")
     require((magic, version, length, kind) == (0x46546C67, 2, len(data), 0x4E4F534A), "G01", f"the head of {name}")
@@ -324,7 +324,12 @@ def check_glb(data, name, is_coarsest, textures):
         uri = image.get("uri")
         require(uri is None or not is_coarsest, "G05", f"{name}: an image that is not embedded")
         require(uri is None or uri in previews, "G06", f"{name}: an image's URI")
-    return gltf
+        if is_coarsest and image.get("mimeType") == "image/jpeg":
+            view = gltf["bufferViews"][image["bufferView"]]
+            begin = 28 + size + view.get("byteOffset", 0)  # behind the head of the binary chunk
+            plane = next(p for p, t in enumerate(textures) if t["image"] == int(found[1]) and t["role"] != "alpha")
+            embedded = data[begin : begin + view["byteLength"]]
+            require(embedded == read(f"preview/{plane:03}.jpg"), "G05", f"{name}: not preview {plane}")
 
 
 def check_losses(losses, count, low_first=False):
