@@ -30,12 +30,12 @@ add_test(NAME house_make_scan COMMAND ${house}/check_make_scan $<TARGET_FILE:mak
   ${CMAKE_CURRENT_BINARY_DIR}/make_scan)
 add_test(NAME house_examples COMMAND ${house}/check_examples $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>
   ${PROJECT_SOURCE_DIR}/examples ${CMAKE_CURRENT_BINARY_DIR}/examples)
-add_test(NAME house_serve COMMAND ${house}/check_serve $<TARGET_FILE:texmesh> ${PROJECT_SOURCE_DIR}/tests/golden/v1.1-scan.texmesh
+add_test(NAME house_serve COMMAND ${house}/check_serve $<TARGET_FILE:texmesh> ${PROJECT_SOURCE_DIR}/tests/golden/v2.0-scan.texmesh
   ${PROJECT_SOURCE_DIR}/examples ${CMAKE_CURRENT_BINARY_DIR}/serve)
 set_tests_properties(house_serve PROPERTIES SKIP_RETURN_CODE 77)
 if(NOT TEXMESH_SANITIZE)
   add_executable(delivery_client consumer/client.cpp)
   target_link_libraries(delivery_client PRIVATE texmesh_delivery)
   add_test(NAME house_delivery_size COMMAND ${house}/check_delivery_size $<TARGET_FILE:delivery_client>
-    ${PROJECT_SOURCE_DIR}/tests/golden/v1.1-scan.texmesh)
+    ${PROJECT_SOURCE_DIR}/tests/golden/v2.0-scan.texmesh)
 endif()

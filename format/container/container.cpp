@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "format/base/bytes.h"
+#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {
@@ -240,6 +241,8 @@ void claim_path(const std::string& path, std::set<std::string>& paths, std::set<
     throw FormatError(file, "entry '" + shown + "'", "a relative path of a-z 0-9 . _ -, at most 200 bytes",
                       "another");
   }
+  if (paths.contains(kContentCredentialPath))
+    throw FormatError(file, "entry " + path, "nothing behind the content credential", "another entry");
   if (folders.contains(path))
     throw FormatError(file, "entry " + path, "a file", "also a folder of other entries");
   for (std::size_t at = path.find('/'); at != std::string::npos; at = path.find('/', at + 1)) {
@@ -259,6 +262,7 @@ std::uint32_t crc_of(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 bool is_valid_entry_path(const std::string& path) {
+  if (path == kContentCredentialPath) return true;
   if (path.empty() || path.size() > 200) return false;
   for (std::size_t begin = 0; begin <= path.size();) {
     const std::size_t end = std::min(path.find('/', begin), path.size());

@@ -33,7 +33,7 @@ struct ContainerEntry {
 };
 
 /// Paths a package may hold: relative, '/'-separated, [a-z0-9._-] only, no empty, "." or ".." part, at
-/// most 200 bytes.
+/// most 200 bytes; and kContentCredentialPath, whose capitals are C2PA's.
 bool is_valid_entry_path(const std::string& path);
 
 /// Writes the ISO/IEC 21320-1 profile of SPEC.md: STORE, data 64-byte aligned, dates 1980-01-01, no

@@ -1,9 +1,32 @@
 #pragma once
+#include <string>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 
 /// The version of packages that this library writes, and the highest that it reads
 /// (SPEC.md, Version history).
-inline constexpr int kFormatMajor = 1, kFormatMinor = 1;
+inline constexpr int kFormatMajor = 2, kFormatMinor = 0;
+
+/// What a reader says it has found instead of kFormatMajor.
+inline std::string describe_other_major(int major) {
+  return std::to_string(major) + (major < kFormatMajor ? ", which is no longer read: compile the model again"
+                                                       : ", which a later reader is for");
+}
+
+/// Magic word and version, with which index.bin, tables.bin and thesis.bin begin.
+inline void write_entry_start(BytesOut& out, std::string_view magic) {
+  out.text(magic);
+  out.u16(kFormatMajor);
+  out.u16(kFormatMinor);
+}
+/// The minor version. FormatError for another magic word or major version.
+inline int read_entry_start(BytesIn& in, std::string_view magic) {
+  in.expect("the magic " + std::string(magic), magic);
+  if (const auto major = in.u16(); major != kFormatMajor)
+    in.fail("major version " + std::to_string(kFormatMajor), describe_other_major(major));
+  return in.u16();
+}
 
 }  // namespace texmesh

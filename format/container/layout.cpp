@@ -45,10 +45,17 @@ EntryName parse_texture_path(std::string_view text) {
 
 EntryName parse_any_spelling(std::string_view path) {
   constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},       {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},           {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},         {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream}, {kPosterPath, EntryKind::kPoster}};
+      {kManifestPath, EntryKind::kManifest},
+      {kIndexPath, EntryKind::kIndex},
+      {kTablesPath, EntryKind::kTables},
+      {kTexturesPath, EntryKind::kTextures},
+      {kQualityPath, EntryKind::kQuality},
+      {kProvenancePath, EntryKind::kProvenance},
+      {kSplitStreamPath, EntryKind::kSplitStream},
+      {kPosterPath, EntryKind::kPoster},
+      {kThesisPath, EntryKind::kThesis},
+      {kAboutPath, EntryKind::kAbout},
+      {kContentCredentialPath, EntryKind::kContentCredential}};
   for (const auto& [single, kind] : kSingle)
     if (path == single) return {kind};
   std::string_view text = path;
@@ -89,18 +96,31 @@ std::string spell(const EntryName& name) {
 /// Which of the coarse places of the order an entry has.
 enum Place : int {
   kManifestPlace,
+  kFirstMesh,
   kIndexPlace,
-  kTablesPlace,
   kTexturesPlace,
   kQualityPlace,
-  kFirstMesh,
-  kPreviews,
   kTableStreamsPlace,
+  kTablesPlace,
   kPosterPlace,
+  kAboutPlace,
+  kPreviews,
   kInterleaved,
   kOthers,
-  kLast
+  kLast,
+  kBehindAll
 };
+
+/// Greater than any scale number: the stream stands before the GLBs.
+constexpr std::uint32_t kStreamRank = 0xffffffffu;
+
+bool is_mesh(const EntryName& name) {
+  return name.kind == EntryKind::kMesh || name.kind == EntryKind::kSplitStream;
+}
+/// Falls from coarse to fine.
+std::uint32_t mesh_rank(const EntryName& name) {
+  return name.kind == EntryKind::kSplitStream ? kStreamRank : name.number;
+}
 
 Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
   switch (name.kind) {
@@ -122,13 +142,18 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
       return kTableStreamsPlace;
     case EntryKind::kPoster:
       return kPosterPlace;
+    case EntryKind::kAbout:
+      return kAboutPlace;
     case EntryKind::kRung:
+    case EntryKind::kSplitStream:
       return kInterleaved;
     case EntryKind::kProvenance:
       return kLast;
+    case EntryKind::kContentCredential:
+      return kBehindAll;
     case EntryKind::kFragmentFile:
-    case EntryKind::kSource:  // readers of 1.0 know neither this nor the next and expect them there
-    case EntryKind::kSplitStream:
+    case EntryKind::kSource:
+    case EntryKind::kThesis:
     case EntryKind::kOther:
       return kOthers;
   }
@@ -161,22 +186,23 @@ EntryName parse_entry_path(const std::string& path) {
 
 std::vector<std::string> streaming_order(std::vector<std::string> paths) {
   std::uint32_t coarsest = 0, rungs = 0;
-  std::vector<std::uint32_t> meshes;  // coarse to fine
+  std::vector<std::uint32_t> meshes;  // the stream, then scales from coarse to fine
   for (const std::string& path : paths) {
     const EntryName name = parse_entry_path(path);
-    if (name.kind == EntryKind::kMesh) meshes.push_back(name.number);
+    if (is_mesh(name)) meshes.push_back(mesh_rank(name));
     if (name.kind == EntryKind::kRung) rungs = std::max(rungs, name.rung + 1);
   }
   std::ranges::sort(meshes, std::greater<>());
-  if (!meshes.empty()) {
-    coarsest = meshes.front();
-    meshes.erase(meshes.begin());
+  const auto first = std::ranges::find_if(meshes, [](std::uint32_t rank) { return rank != kStreamRank; });
+  if (first != meshes.end()) {
+    coarsest = *first;
+    meshes.erase(first);
   }
   // Mesh k of M (coarse to fine, without the coarsest) follows the first rung r of R with (r + 1) M >= (k +
   // 1) R: both ladders rise together and end together.
   const auto step_of = [&](const EntryName& name) -> std::uint64_t {
     if (name.kind == EntryKind::kRung) return 2ull * name.rung;
-    const auto k = static_cast<std::uint64_t>(std::ranges::find(meshes, name.number) - meshes.begin());
+    const auto k = static_cast<std::uint64_t>(std::ranges::find(meshes, mesh_rank(name)) - meshes.begin());
     const std::uint64_t after = ((k + 1) * rungs + meshes.size() - 1) / meshes.size();
     return 2 * after - (after > 0 ? 1 : 0);
   };
@@ -187,9 +213,9 @@ std::vector<std::string> streaming_order(std::vector<std::string> paths) {
     const Place place = place_of(name, coarsest);
     const std::uint64_t step = place == kInterleaved ? step_of(name) : 0;
     // Scales count down from coarse to fine; planes count up.
-    const std::uint64_t rank = name.kind == EntryKind::kMesh ? 0xffffffffu - name.number
-                               : place == kOthers            ? 0
-                                                             : name.number;
+    const std::uint64_t rank = is_mesh(name)      ? 0xffffffffu - mesh_rank(name)
+                               : place == kOthers ? 0
+                                                  : name.number;
     keys.emplace_back(place, step, rank, std::move(path));
   }
   std::ranges::sort(keys);

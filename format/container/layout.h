@@ -14,8 +14,19 @@ inline constexpr const char* kTablesPath = "tables.bin";
 inline constexpr const char* kTexturesPath = "textures.json";
 inline constexpr const char* kQualityPath = "quality.json";
 inline constexpr const char* kProvenancePath = "provenance.json";
-inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";  // since 1.1; not every package has it
-inline constexpr const char* kPosterPath = "poster.jpg";            // not every package has it
+inline constexpr const char* kAboutPath = "about.json";
+// Not every package has these:
+inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";
+inline constexpr const char* kPosterPath = "poster.jpg";
+inline constexpr const char* kThesisPath = "thesis.bin";
+
+/// A C2PA manifest store over the container, where there is one: the last entry, named by neither manifest
+/// nor index, because it signs them; and its most bytes.
+inline constexpr const char* kContentCredentialPath = "META-INF/content_credential.c2pa";
+inline constexpr std::uint64_t kMaxContentCredentialBytes = std::uint64_t{64} << 20;
+
+/// Media type of a container.
+inline constexpr const char* kContainerMediaType = "application/vnd.texmesh+zip";
 
 /// Most texture planes of a package, mips included, and most rungs of a plane.
 inline constexpr std::uint32_t kMaxPackagePlanes = 10000, kMaxPackageRungs = 100;
@@ -24,8 +35,7 @@ std::string mesh_path(int scale);                                // mesh/s07.glb
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
 std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack
 std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r07.pack; 0 = lowest rung
-/// source/003.png: the source image of a full-size plane as it was (since 1.1; not every plane has one). Not
-/// beneath texture/, because readers of 1.0 take that folder's unknown files for faults of the index.
+/// source/003.png: the source image of a full-size plane as it was; not every plane has one.
 inline constexpr std::string_view kSourceExtensions[] = {"jpg", "png", "tif", "webp", "exr"};
 std::string source_path(std::uint32_t plane, std::string_view extension);
 /// texture/3/r07/0123.jpg: one fragment as a complete file of its codec (CodecTraits::extension), in trees
@@ -48,8 +58,11 @@ enum class EntryKind : std::uint8_t {
   kSource,
   kSplitStream,
   kPoster,
+  kThesis,
   kOther,
-  kProvenance
+  kProvenance,
+  kAbout,
+  kContentCredential
 };
 struct EntryName {
   EntryKind kind = EntryKind::kOther;
@@ -60,9 +73,9 @@ struct EntryName {
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
 
-/// The one order that SPEC.md prescribes for a set of entries: what the first picture needs first, then
-/// meshes from coarse to fine between texture rungs from low to high, provenance last. Depends on the set
-/// only, not on its order.
+/// The one order that SPEC.md prescribes for a set of entries: the first picture, what a first plan needs,
+/// then the other meshes (the stream, GLBs from coarse to fine) between texture rungs from low to high,
+/// provenance last. Depends on the set only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

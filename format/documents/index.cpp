@@ -27,8 +27,9 @@ std::uint32_t plane_of(const EntryRef& entry) {
 void check_entry(const EntryRef& e) {
   if (!is_valid_entry_path(e.path))
     throw FormatError(kIndexFile, "entry " + e.path, "a valid path", "another");
-  if (e.path == kManifestPath || e.path == kIndexPath)
-    throw FormatError(kIndexFile, "entry " + e.path, "an entry other than manifest and index", e.path);
+  if (e.path == kManifestPath || e.path == kIndexPath || e.path == kContentCredentialPath)
+    throw FormatError(kIndexFile, "entry " + e.path,
+                      "an entry other than manifest, index and content credential", e.path);
   if (e.offset % 64 != 0 || e.offset == 0)
     throw FormatError(kIndexFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
   if (e.offset > std::uint64_t{1} << 53 || e.bytes > std::uint64_t{1} << 53)
@@ -70,9 +71,7 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
   for (const EntryRef& e : entries) (plane_of(e) == kNoPlane ? general : planes[plane_of(e)]).push_back(e);
 
   BytesOut head, pages;
-  head.text(kIndexMagic);
-  head.u16(kFormatMajor);
-  head.u16(kFormatMinor);
+  write_entry_start(head, kIndexMagic);
   head.u32(planes.size() + 1);
   head.u32(entries.size());
   const auto add_page = [&](std::uint32_t plane, const std::vector<EntryRef>& page_entries) {
@@ -91,11 +90,8 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
 
 IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
   BytesIn in(bytes, kIndexFile);
-  in.expect("the magic TXMX", kIndexMagic);
-  if (const auto major = in.u16(); major != kFormatMajor)
-    in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
   IndexHead head;
-  head.minor = in.u16();
+  head.minor = read_entry_start(in, kIndexMagic);
   const std::uint64_t page_count = in.u32(), entry_count = in.u32();
   if (page_count == 0 || page_count > in.left() / kPageFixed)
     in.fail("a page count that fits the file", std::to_string(page_count));

@@ -1,7 +1,5 @@
 #include "format/documents/manifest.h"
 
-#include "format/documents/textures.h"
-
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
@@ -22,11 +20,10 @@ const std::string kManifestFile = kManifestPath;
 constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
 
-/// Features that a package of format 1.1 may require, one per line (SPEC.md, section 14); 1.0 has none.
-constexpr std::array<std::string_view, 3> kKnownFeatures{
+/// Features that a package may require, one per line (SPEC.md, section 14).
+constexpr std::array<std::string_view, 2> kKnownFeatures{
     "codec-jpeg-progressive",
     "codec-webp",
-    kMipsFeature,
 };
 bool is_known_feature(const std::string& name) {
   return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
@@ -70,7 +67,7 @@ Json scales_json(const std::vector<ManifestScale>& scales) {
   Json j;
   for (const char* name :
        {"scale", "triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95",
-        "p99", "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip"})
+        "p99", "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
     j[name] = Json::array();
   for (const ManifestScale& s : scales) {
     j["scale"].push_back(s.scale);
@@ -88,9 +85,8 @@ Json scales_json(const std::vector<ManifestScale>& scales) {
     j["displayPxError"].push_back(six_digits(s.display_px_error));
     j["displayPxEdge"].push_back(six_digits(s.display_px_edge));
     j["displayPxFlip"].push_back(six_digits(s.display_px_flip));
+    j["floor"].push_back(s.floor);
   }
-  if (std::ranges::any_of(scales, [](const ManifestScale& s) { return !s.floor.empty(); }))
-    for (const ManifestScale& s : scales) j["floor"].push_back(s.floor);
   return j;
 }
 
@@ -105,23 +101,20 @@ Json manifest_json(const Manifest& m) {
   j["bounds"]["min"] = vector_json(m.bounds_min);
   j["bounds"]["max"] = vector_json(m.bounds_max);
   j["objectHeight"] = m.object_height;
-  if (m.surface_area > 0) j["surfaceArea"] = six_digits(m.surface_area);
+  j["surfaceArea"] = six_digits(m.surface_area);
   j["jnd"] = m.jnd;
   j["scales"] = scales_json(m.scales);
   j["steps"] = Json::array();
   for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
   j["planeCount"] = m.plane_count;
-  j["firstPicture"]["offset"] = m.first_picture_offset;
-  j["firstPicture"]["bytes"] = m.first_picture_bytes;
-  j["firstPicture"]["sha256"] = to_hex(m.first_picture_digest);
-  j["previews"] = Json::array();
-  for (const ByteRange& r : m.previews) j["previews"].push_back(Json::array({r.offset, r.bytes}));
   j["index"] = ref_json(m.index);
   j["tables"] = ref_json(m.tables);
   j["textures"] = ref_json(m.textures);
   j["quality"] = ref_json(m.quality);
   j["provenance"] = ref_json(m.provenance);
+  j["about"] = ref_json(m.about);
   if (m.stream) j["stream"] = stream_json(*m.stream);
+  if (m.thesis) j["thesis"] = ref_json(*m.thesis);
   if (m.poster) j["poster"] = poster_json(*m.poster);
   return j;
 }
@@ -132,8 +125,7 @@ void read_version(const JsonAt& at, Manifest& m) {
   m.major = static_cast<int>(at["version"]["major"].integer(0, 1'000'000));
   m.minor = static_cast<int>(at["version"]["minor"].integer(0, 1'000'000));
   if (m.major != kFormatMajor)
-    at["version"]["major"].fail(std::to_string(kFormatMajor),
-                                std::to_string(m.major) + ", which another reader is for");
+    at["version"]["major"].fail(std::to_string(kFormatMajor), describe_other_major(m.major));
   const JsonAt features = at["requiredFeatures"];
   for (std::size_t i = 0, n = features.array(0, 100); i < n; ++i) {
     m.required_features.push_back(features[i].text(100));
@@ -196,15 +188,16 @@ void read_shape(const JsonAt& at, Manifest& m) {
     if (m.bounds_min[i] > m.bounds_max[i])
       bounds["max"][static_cast<std::size_t>(i)].fail("at least the minimum", "less");
   m.object_height = at["objectHeight"].number(0, kLargest);
+  m.surface_area = at["surfaceArea"].number(0, kLargest);
   m.jnd = at["jnd"].number(0, 1);
 }
 
-void read_scales(const JsonAt& at, bool floors, Manifest& m) {
+void read_scales(const JsonAt& at, Manifest& m) {
   const std::size_t n = at["scale"].array(1, kMaxScales);
-  for (const char* column : {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax",
-                             "errorRms", "p95", "p99", "displayPxJnd", "displayPxError", "displayPxEdge"})
+  for (const char* column :
+       {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95", "p99",
+        "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
     at[column].array(n, n);
-  if (floors) at["floor"].array(n, n);
   for (std::size_t i = 0; i < n; ++i) {
     ManifestScale s;
     s.scale = static_cast<int>(at["scale"][i].integer(0, kMaxScales - 1));
@@ -224,7 +217,7 @@ void read_scales(const JsonAt& at, bool floors, Manifest& m) {
     s.display_px_error = at["displayPxError"][i].number(0, kAnyDisplayPx);
     s.display_px_edge = at["displayPxEdge"][i].number(0, kAnyDisplayPx);
     s.display_px_flip = at["displayPxFlip"][i].number(0, kAnyDisplayPx);
-    if (floors) s.floor = at["floor"][i].text(kMaxFloorBytes);
+    s.floor = at["floor"][i].text(kMaxFloorBytes);
     m.scales.push_back(std::move(s));
   }
 }
@@ -245,32 +238,28 @@ void read_steps(const JsonAt& at, Manifest& m) {
   if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
 }
 
-void read_first_picture(const JsonAt& at, Manifest& m) {
-  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
-  const JsonAt first = at["firstPicture"];
-  const EntryRef& coarsest = m.scales.back().glb;
-  m.first_picture_offset = read_offset(first["offset"]);
-  if (m.first_picture_offset != coarsest.offset)
-    first["offset"].fail("the offset of the coarsest mesh, " + std::to_string(coarsest.offset),
-                         std::to_string(m.first_picture_offset));
-  m.first_picture_bytes = first["bytes"].integer(coarsest.bytes);
-  m.first_picture_digest = first["sha256"].digest();
-  const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
-  const JsonAt previews = at["previews"];
-  const std::size_t most = std::min<std::size_t>(m.plane_count, kMaxManifestPreviews);
-  // Only textures.json tells how many of the planes are mips, which have none.
-  const bool mips = std::ranges::find(m.required_features, kMipsFeature) != m.required_features.end();
-  const std::size_t n = previews.array(mips ? std::min<std::size_t>(most, 1) : most, most);
-  for (std::size_t i = 0; i < n; ++i) {
-    previews[i].array(2, 2);
-    const ByteRange r{read_offset(previews[i][0]), previews[i][1].integer(1)};
-    if (r.offset < m.first_picture_offset + coarsest.bytes || r.offset + r.bytes > end)
-      previews[i].fail("a range within the first picture, after the mesh", std::to_string(r.offset));
-    m.previews.push_back(r);
+/// Scales whose column says the stream's offset are prefixes of it.
+void resolve_stream_scales(const JsonAt& at, Manifest& m) {
+  std::uint64_t before = m.stream->head_bytes;
+  for (std::size_t i = m.scales.size(); i-- > 0;) {
+    EntryRef& ref = m.scales[i].glb;
+    if (ref.offset != m.stream->offset) continue;
+    if (i == 0 || i + 1 == m.scales.size())
+      at["offset"][i].fail("a GLB of the finest and of the coarsest scale", "the stream");
+    if (ref.bytes <= before || ref.bytes > m.stream->bytes)
+      at["bytes"][i].fail("more than " + std::to_string(before) + " bytes, at most the stream's",
+                          std::to_string(ref.bytes));
+    before = ref.bytes;
+    ref.path = kSplitStreamPath;
   }
 }
 
 }  // namespace
+
+std::uint64_t start_bytes(const Manifest& manifest) {
+  const EntryRef& coarsest = manifest.scales.back().glb;
+  return coarsest.offset + coarsest.bytes;
+}
 
 std::string write_manifest(const Manifest& manifest) {
   const std::string json = dump_json(manifest_json(manifest), kManifestFile);
@@ -288,17 +277,20 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   Manifest m;
   read_version(at, m);
   read_shape(at, m);
-  if (document.contains("surfaceArea")) m.surface_area = at["surfaceArea"].number(0, kLargest);
-  const JsonAt scales = at["scales"];
-  read_scales(scales, document["scales"].is_object() && document["scales"].contains("floor"), m);
+  read_scales(at["scales"], m);
   read_steps(at["steps"], m);
-  read_first_picture(at, m);
+  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   read_paged_ref(at["index"], kIndexPath, m.index);
   read_paged_ref(at["tables"], kTablesPath, m.tables);
   read_ref(at["textures"], kTexturesPath, m.textures);
   read_ref(at["quality"], kQualityPath, m.quality);
   read_ref(at["provenance"], kProvenancePath, m.provenance);
-  if (document.contains("stream")) m.stream = read_stream(at["stream"]);
+  read_ref(at["about"], kAboutPath, m.about);
+  if (document.contains("stream")) {
+    m.stream = read_stream(at["stream"]);
+    resolve_stream_scales(at["scales"], m);
+  }
+  if (document.contains("thesis")) read_ref(at["thesis"], kThesisPath, m.thesis.emplace());
   if (document.contains("poster")) m.poster = read_poster(at["poster"]);
   return m;
 }

@@ -8,6 +8,7 @@
 #include "format/base/sha256.h"
 #include "format/base/vec.h"
 #include "format/container/format_version.h"
+#include "format/container/layout.h"
 #include "format/documents/entry_ref.h"
 
 namespace texmesh {
@@ -19,14 +20,18 @@ inline constexpr std::uint64_t kBootstrapBytes = 16384;
 inline constexpr double kAnyDisplayPx = 1e9;
 /// Longest title in bytes of UTF-8; control characters are not allowed in it.
 inline constexpr std::size_t kMaxTitleBytes = 200;
-/// Most previews whose place the manifest itself tells; those of further planes stand in the index only.
-inline constexpr std::size_t kMaxManifestPreviews = 224;
+/// What a client asks for in its first request. A container whose first picture ends within these bytes is shown
+/// after one round trip (see start_bytes()).
+inline constexpr std::uint64_t kStartBytes = 65536;
 
 /// The measured figures (errors, p95, p99, display_px_*) are written with six significant digits.
 struct ManifestScale {
   int scale = 0;  // scale number; 0 = S_0
   std::uint32_t triangles = 0, vertices = 0;
-  EntryRef glb;  // path is always mesh_path(scale)
+  // What a client reads for the scale: the entry mesh_path(scale), or a prefix of the vertex-split stream.
+  // Then the path is kSplitStreamPath, and bytes and digest are those of the prefix.
+  EntryRef glb;
+  bool has_glb() const { return glb.path != kSplitStreamPath; }
   bool major = false;
   double error_max = 0, error_rms = 0;  // object units
   double p95 = 0, p99 = 0;              // relative distance to S_0 (perceptual value), 0 for S_0
@@ -35,7 +40,7 @@ struct ManifestScale {
   // The same by lit pictures: from the table's least height up to this one no view of the scale can be told
   // from S_0's (stages/quality); 0 = at no height.
   double display_px_flip = 0;
-  // Why it has more vertices than its scale asks for, or why no scale is coarser; else "" (since 1.1).
+  // Why it has more vertices than its scale asks for, or why no scale is coarser; else "".
   std::string floor;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
@@ -54,7 +59,7 @@ struct ManifestStep {
   friend bool operator==(const ManifestStep&, const ManifestStep&) = default;
 };
 
-/// manifest.json (SPEC.md, section Manifest; schemas/manifest.v1.schema.json).
+/// manifest.json (SPEC.md, section Manifest; schemas/manifest.v2.schema.json).
 struct Manifest {
   int major = kFormatMajor, minor = kFormatMinor;
   std::vector<std::string> required_features;  // a reader must know every one of them
@@ -62,23 +67,21 @@ struct Manifest {
   Vec3d origin;                                // local frame -> source coordinates
   Vec3d bounds_min, bounds_max;                // local frame, object units
   double object_height = 0;                    // O_V
-  double surface_area = 0;  // of S_0, object units squared, six digits; 0 = not said (since 1.1)
+  double surface_area = 0;                     // of S_0, object units squared, six digits
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // by the default rule, see viewing.h
   std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
-  // One contiguous range: coarsest mesh, previews, table streams, with the ZIP headers between
-  // them; its SHA-256.
-  std::uint64_t first_picture_offset = 0, first_picture_bytes = 0;
-  Sha256 first_picture_digest{};
-  // Of the full-size planes 0.., at most kMaxManifestPreviews; inside the first picture.
-  std::vector<ByteRange> previews;
   PagedRef index, tables;
-  EntryRef textures, quality, provenance;
-  std::optional<StreamRef> stream;  // vertex splits (since 1.1)
+  EntryRef textures, quality, provenance, about;
+  std::optional<StreamRef> stream;  // vertex splits
+  std::optional<EntryRef> thesis;   // thesis_tables.h
   std::optional<PosterRef> poster;
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
+
+/// Bytes from the container's begin to the end of the first picture, the GLB of the coarsest scale.
+std::uint64_t start_bytes(const Manifest& manifest);
 
 /// Canonical JSON: fixed key order, shortest round-trip numbers, no blanks. FormatError when the manifest
 /// breaks a rule that read_manifest checks, or does not fit kBootstrapBytes with its ZIP header.

@@ -35,9 +35,8 @@ void place_entries(std::vector<EntryRef>& refs, std::uint64_t manifest_bytes) {
 /// Everything of the manifest that is known once the entries have places.
 class ManifestFiller {
  public:
-  ManifestFiller(Manifest& manifest, std::size_t full_size_planes,
-                 const std::map<std::string, const Bytes*>& data)
-      : manifest_(manifest), full_size_planes_(full_size_planes), data_(data) {}
+  ManifestFiller(Manifest& manifest, const std::map<std::string, const Bytes*>& data)
+      : manifest_(manifest), data_(data) {}
 
   void fill(const std::vector<EntryRef>& refs) {
     by_path_.clear();
@@ -45,13 +44,16 @@ class ManifestFiller {
     set(manifest_.textures, kTexturesPath);
     set(manifest_.quality, kQualityPath);
     set(manifest_.provenance, kProvenancePath);
+    set(manifest_.about, kAboutPath);
     set(manifest_.index, kIndexPath);
     set_head(manifest_.index, read_index_head(*data_.at(kIndexPath)).bytes);
     set(manifest_.tables, kTablesPath);
     set_head(manifest_.tables, read_tables_head(*data_.at(kTablesPath)).bytes);
-    for (ManifestScale& s : manifest_.scales) set(s.glb, mesh_path(s.scale));
-    fill_first_picture();
+    for (ManifestScale& s : manifest_.scales)
+      if (s.has_glb()) set(s.glb, mesh_path(s.scale));
     fill_stream();
+    manifest_.thesis.reset();
+    if (by_path_.contains(kThesisPath)) set(manifest_.thesis.emplace(), kThesisPath);
     if (manifest_.poster) set(*manifest_.poster, kPosterPath);
   }
 
@@ -66,63 +68,37 @@ class ManifestFiller {
     const auto it = by_path_.find(kSplitStreamPath);
     if (it == by_path_.end()) return;
     const Bytes& bytes = *data_.at(kSplitStreamPath);
-    const std::uint64_t head_bytes = read_split_head(bytes).bytes;
+    const SplitStreamHead head = read_split_head(bytes);
+    const std::uint64_t head_bytes = head.bytes;
     manifest_.stream = StreamRef{it->second->offset, it->second->bytes, head_bytes,
                                  sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))};
+    for (ManifestScale& s : manifest_.scales)
+      if (!s.has_glb()) fill_prefix(s, head, bytes);
   }
-  void fill_first_picture() {
-    const EntryRef& coarsest = manifest_.scales.back().glb;
-    std::uint64_t end = coarsest.offset + coarsest.bytes;
-    manifest_.previews.clear();
-    for (std::uint32_t p = 0; p < full_size_planes_; ++p) {
-      const EntryRef& preview = *by_path_.at(preview_path(p));
-      if (p < kMaxManifestPreviews) manifest_.previews.push_back({preview.offset, preview.bytes});
-      end = std::max(end, preview.offset + preview.bytes);
-    }
-    for (std::uint32_t p = 0; p < manifest_.plane_count; ++p) {
-      const EntryRef& tables = *by_path_.at(table_streams_path(p));
-      end = std::max(end, tables.offset + tables.bytes);
-    }
-    manifest_.first_picture_offset = coarsest.offset;
-    manifest_.first_picture_bytes = end - coarsest.offset;
+  void fill_prefix(ManifestScale& s, const SplitStreamHead& head, const Bytes& stream) {
+    const std::uint64_t bytes = split_prefix_bytes(head, s.scale);
+    s.glb = {kSplitStreamPath, manifest_.stream->offset, bytes,
+             sha256(std::span(stream).first(static_cast<std::size_t>(bytes)))};
   }
-
   Manifest& manifest_;
-  std::size_t full_size_planes_;
   const std::map<std::string, const Bytes*>& data_;
   std::map<std::string, const EntryRef*> by_path_;
 };
-
-/// The bytes of the first picture's range: entries and the headers between them. Every header there
-/// follows from path, size, CRC and place, so a container of the same entries up to the range's end has
-/// the same bytes.
-Sha256 first_picture_digest(const Manifest& m, const std::vector<EntryRef>& refs,
-                            const std::map<std::string, const Bytes*>& data, std::uint64_t manifest_bytes) {
-  Bytes head;
-  const std::uint64_t end = m.first_picture_offset + m.first_picture_bytes;
-  ContainerWriter writer(
-      [&](std::span<const std::uint8_t> part) { head.insert(head.end(), part.begin(), part.end()); });
-  writer.add(kManifestPath, Bytes(static_cast<std::size_t>(manifest_bytes), ' '));
-  for (const EntryRef& ref : refs) {
-    if (head.size() >= end) break;  // by bytes, not by ref.offset: an empty entry may stand last
-    writer.add(ref.path, *data.at(ref.path));
-  }
-  return sha256(std::span(head).subspan(static_cast<std::size_t>(m.first_picture_offset),
-                                        static_cast<std::size_t>(m.first_picture_bytes)));
-}
 
 void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                    const std::vector<PackageEntry>& entries) {
   std::set<std::string> paths;
   for (const PackageEntry& e : entries) {
     const EntryKind kind = parse_entry_path(e.path).kind;
-    if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures)
+    if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures ||
+        kind == EntryKind::kContentCredential)
       fail_package("entry " + e.path, "an entry that write_package does not make itself", e.path);
     if (!paths.insert(e.path).second) fail_package("entry " + e.path, "one entry of that path", "two");
   }
-  std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath};
+  std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath, kAboutPath};
   if (manifest.poster) needed.emplace_back(kPosterPath);
-  for (const ManifestScale& s : manifest.scales) needed.push_back(mesh_path(s.scale));
+  for (const ManifestScale& s : manifest.scales)
+    needed.push_back(s.has_glb() ? mesh_path(s.scale) : kSplitStreamPath);
   for (std::uint32_t p = 0; p < textures.size(); ++p) {
     if (textures[p].mip == 0) needed.push_back(preview_path(p));
     if (!textures[p].source_extension.empty()) needed.push_back(source_path(p, textures[p].source_extension));
@@ -143,9 +119,6 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
                                         const std::vector<PackageEntry>& entries) {
   check_entries(manifest, textures, entries);
   const std::size_t full = full_size_planes(textures);
-  if (full < textures.size() &&
-      std::ranges::find(manifest.required_features, kMipsFeature) == manifest.required_features.end())
-    manifest.required_features.emplace_back(kMipsFeature);
   const Bytes textures_json = to_bytes(write_textures(textures));
   Bytes index;
   std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};
@@ -180,13 +153,11 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
     }
     index = write_index(without_index());
     index_ref->digest = sha256(index);
-    ManifestFiller(manifest, full, data).fill(refs);
+    ManifestFiller(manifest, data).fill(refs);
     text = write_manifest(manifest);
     if (text.size() <= slot) break;
     slot = text.size();
   }
-  manifest.first_picture_digest = first_picture_digest(manifest, refs, data, slot);
-  text = write_manifest(manifest);  // digests have one length: the text still fits its slot
   text.resize(static_cast<std::size_t>(slot), ' ');
 
   Bytes package;

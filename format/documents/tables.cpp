@@ -5,6 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/base/half.h"
+#include "format/base/unit16.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
 
@@ -13,8 +14,10 @@ namespace {
 
 const std::string kTablesFile = kTablesPath;
 constexpr std::string_view kTablesMagic = "TXMT";
-constexpr std::size_t kDirectoryHead = 16, kDirectoryRecord = 36, kSectionFixed = 56;
+constexpr std::size_t kDirectoryHead = 16, kDirectoryRecord = 36, kSectionFixed = 36;
 constexpr std::uint32_t kMaxFragments = 65535, kMaxScaleCount = 100;
+// Of F * (5 R + N), 4 bytes of memory each: few bytes of a file may tell of many fragments without any.
+constexpr std::uint64_t kMaxPlaneCells = 1u << 24, kMaxPackageCells = 1u << 27;
 constexpr std::uint32_t kFeatureLimit = 1u << 24;
 constexpr float kLargestMse = 65025, kLargestDssim = 2;
 // How far rounding may carry a fraction out of 0..1 before the writer calls it an error.
@@ -42,20 +45,24 @@ void require_range(const std::vector<float>& values, float lo, float hi, const s
                   std::to_string(values[i]));
 }
 
+std::uint64_t cells_of(std::uint64_t fragments, std::uint64_t rungs, std::uint64_t scales) {
+  return fragments * (5 * rungs + scales);
+}
+std::uint64_t cells_of(const PlaneTables& t) {
+  return cells_of(t.fragment_count(), t.rung_count(), t.scale_count());
+}
+
 void check_counts(const PlaneTables& t, const std::string& place) {
-  const std::size_t f = t.fragment_count(), r = t.rung_count(), n = t.scales + std::size_t{1};
+  const std::size_t f = t.fragment_count(), r = t.rung_count(), n = t.scale_count();
   require_count(t.table_bytes, r, place + "/table_bytes");
   require_count(t.size_bytes, r * f, place + "/size_bytes");
   require_count(t.digest, r * f, place + "/digest");
   require_count(t.mse, r * f, place + "/mse");
   require_count(t.dssim, r * f, place + "/dssim");
+  require_count(t.skip_dssim, f, place + "/skip_dssim");
   require_count(t.covered_texels, f, place + "/covered_texels");
   require_count(t.surface_fraction, f, place + "/surface_fraction");
-  for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) require_count(*v, f, place + "/predictors");
-  if (!t.skip_dssim.empty()) require_count(t.skip_dssim, f, place + "/skip_dssim");
   require_count(t.features, n * f, place + "/features");
-  require_count(t.quality, n, place + "/quality");
-  require_count(t.total_bytes, n * kGammaSteps, place + "/total_bytes");
 }
 
 void check_shape(const PlaneTables& t, const std::string& place) {
@@ -63,9 +70,11 @@ void check_shape(const PlaneTables& t, const std::string& place) {
       t.columns >= 1 && t.rows >= 1 && t.columns <= kMaxFragments && t.rows <= kMaxFragments / t.columns,
       place + "/columns,rows", "1 to 65535 fragments",
       std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  require_tables(t.scales < kMaxScaleCount, place + "/scales", "at most 99", std::to_string(t.scales));
+  require_tables(t.scale_count() >= 1 && t.scale_count() <= kMaxScaleCount, place + "/quality",
+                 "1 to 100 scales", std::to_string(t.scale_count()));
   require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxPackageRungs,
                  place + "/rung_quality", "1 to 100 rungs", std::to_string(t.rung_quality.size()));
+  require_tables(cells_of(t) <= kMaxPlaneCells, place, "at most 2^24 cells", std::to_string(cells_of(t)));
   for (std::size_t r = 0; r < t.rung_count(); ++r)
     require_tables(t.rung_quality[r] >= 1 && t.rung_quality[r] <= 100 &&
                        (r == 0 || t.rung_quality[r] > t.rung_quality[r - 1]),
@@ -78,11 +87,10 @@ void check_parameters(const PlaneTables& t, const std::string& place) {
   require_range({t.log_width}, 0, 4, place + "/log_width");
   require_range({t.quality_max}, 1, 100, place + "/quality_max");
   require_range({t.quality_min}, 1, t.quality_max, place + "/quality_min");
-  require_range({t.model_a, t.model_b, t.model_r, t.model_correlation, t.model_error}, -1e30f, 1e30f,
-                place + "/model");
 }
 
-/// Each stored fragment stands in the order once, and only stored fragments have sizes and digests.
+/// Each stored fragment stands in the order once and has bytes at every rung; others have none, and no
+/// covered texels.
 void check_fragment_order(const PlaneTables& t, const std::string& place) {
   const std::size_t fragments = t.fragment_count();
   std::vector<bool> listed(fragments, false);
@@ -91,15 +99,13 @@ void check_fragment_order(const PlaneTables& t, const std::string& place) {
                    std::to_string(f));
     listed[f] = true;
   }
-  std::vector<bool> stored(fragments, false);
-  for (std::size_t k = 0; k < t.size_bytes.size(); ++k) {
-    if (t.size_bytes[k] > 0) stored[k % fragments] = true;
-    require_tables(t.size_bytes[k] > 0 || t.digest[k] == 0, place + "/digest", "0 where nothing is stored",
-                   "a digest");
-  }
+  for (std::size_t k = 0; k < t.size_bytes.size(); ++k)
+    require_tables(listed[k % fragments] == (t.size_bytes[k] > 0), place + "/size_bytes",
+                   "bytes at every rung for the fragments in the order and for no others",
+                   "fragment " + std::to_string(k % fragments) + " with " + std::to_string(t.size_bytes[k]));
   for (std::size_t f = 0; f < fragments; ++f)
-    require_tables(stored[f] == listed[f], place + "/order", "exactly the fragments that have a size",
-                   "fragment " + std::to_string(f));
+    require_tables(listed[f] || t.covered_texels[f] == 0, place + "/covered_texels",
+                   "0 where nothing is stored", std::to_string(t.covered_texels[f]));
 }
 
 /// Each knot lies between two rungs, further on than the one before.
@@ -129,10 +135,9 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   require_range(t.mse, 0, kLargestMse, place + "/mse");
   require_range(t.dssim, -rounding, kLargestDssim, place + "/dssim");
   require_range(t.skip_dssim, -rounding, kLargestDssim, place + "/skip_dssim");
+  require_tables(t.knot_quality.size() < 256, place + "/knot_quality", "at most 255 knots", "more");
   check_knots(t, place);
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
-  for (const auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
-    require_range(*v, -rounding, 1 + rounding, place + "/predictors");
   require_range(t.quality, 0, 100, place + "/quality");
   for (const std::uint32_t f : t.features)
     require_tables(f < kFeatureLimit, place + "/features", "less than 2^24", std::to_string(f));
@@ -145,64 +150,61 @@ int width_of(const std::vector<std::uint32_t>& values) {
   return largest < (1u << 8) ? 1 : largest < (1u << 16) ? 2 : largest < (1u << 24) ? 3 : 4;
 }
 
-std::uint16_t to_unit16(float v) {
-  return static_cast<std::uint16_t>(std::floor(std::clamp(v, 0.0f, 1.0f) * 65535.0 + 0.5));
-}
-float from_unit16(std::uint16_t v) { return static_cast<float>(v / 65535.0); }
+constexpr std::uint8_t kIncremental = 1;  // flag
 
-// What format 1.1 adds to the end of a section.
-constexpr std::uint64_t kExtensionFixed = 4;
-constexpr std::uint8_t kHasSkipDssim = 1;
-constexpr std::uint8_t kIncremental = 2;
-constexpr std::uint8_t kHasKnots = 4;
-constexpr std::uint8_t kAllFlags = kHasSkipDssim | kIncremental | kHasKnots;
+/// What a section's first fields say of the rest.
+struct SectionCounts {
+  std::uint64_t scales = 0, rungs = 0, knots = 0, listed = 0;
+  int size_width = 1, feature_width = 1;
+  std::uint64_t bytes() const {
+    const auto size_bytes = static_cast<std::uint64_t>(size_width),
+               feature_bytes = static_cast<std::uint64_t>(feature_width);
+    return kSectionFixed + listed * 2 + rungs * 5 + knots * 3 + rungs * listed * (size_bytes + 8 + 2 + 2) +
+           listed * (2 + 4 + 4) + scales * listed * feature_bytes + scales * 4;
+  }
+};
 
-std::uint64_t section_bytes(std::uint64_t f, std::uint64_t r, std::uint64_t n, std::uint64_t order,
-                            std::uint64_t size_width, std::uint64_t feature_width) {
-  return kSectionFixed + r * 5 + r * f * (size_width + 8 + 2 + 2) + f * (4 + 4 + 5 * 2) + order * 2 +
-         n * f * feature_width + n * 4 + n * kGammaSteps * 8;
+/// Runs `put` with the index in an array [lines * F] of what is stored, in the file's sequence.
+template <class Put>
+void for_each_listed(const PlaneTables& t, std::uint64_t lines, Put put) {
+  for (std::uint64_t line = 0; line < lines; ++line)
+    for (const std::uint16_t f : t.order) put(static_cast<std::size_t>(line * t.fragment_count() + f));
 }
 
 Bytes write_section(const PlaneTables& t) {
-  const int size_width = width_of(t.size_bytes), feature_width = width_of(t.features);
+  std::vector<std::uint32_t> features;
+  for_each_listed(t, t.scale_count(), [&](std::size_t k) { features.push_back(t.features[k]); });
+  const int size_width = width_of(t.size_bytes), feature_width = width_of(features);
   BytesOut out;
   out.u32(t.columns);
   out.u32(t.rows);
-  out.u8(t.scales);
+  out.u8(t.scale_count());
   out.u8(t.rung_count());
   out.u8(static_cast<std::uint64_t>(size_width));
   out.u8(static_cast<std::uint64_t>(feature_width));
-  out.u8(std::min<std::uint8_t>(t.allocation, 1));  // readers of format 1.0 know 0 and 1
-  out.number(0, 3);
-  for (const float v : {t.quality_width, t.log_width, t.quality_min, t.quality_max, t.model_a, t.model_b,
-                        t.model_r, t.model_correlation, t.model_error})
-    out.f32(v);
+  out.u8(t.allocation);
+  out.u8(t.incremental ? kIncremental : 0u);
+  out.u8(t.knot_quality.size());
+  out.u8(0);
+  for (const float v : {t.quality_width, t.log_width, t.quality_min, t.quality_max}) out.f32(v);
   out.u32(t.order.size());
+  for (const auto v : t.order) out.u16(v);
   out.raw(t.rung_quality);
   for (const auto v : t.table_bytes) out.u32(v);
-  for (const auto v : t.size_bytes) out.number(v, size_width);
-  for (const auto v : t.digest)
-    for (int i = 7; i >= 0; --i) out.u8(v >> (8 * i) & 0xff);  // as the digest's bytes stand
-  for (const auto v : t.mse) out.u16(to_half(v));
-  for (const auto v : t.dssim) out.u16(to_half(std::max(v, 0.0f)));
-  for (const auto v : t.covered_texels) out.u32(v);
-  for (const auto v : t.surface_fraction) out.f32(std::min(v, 1.0f));
-  for (const auto* values : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
-    for (const auto v : *values) out.u16(to_unit16(v));
-  for (const auto v : t.order) out.u16(v);
-  for (const auto v : t.features) out.number(v, feature_width);
+  out.raw(t.knot_quality);
+  for (const auto v : t.knot_position) out.u16(to_unit16(v));
+  const std::size_t r = t.rung_count();
+  for_each_listed(t, r, [&](std::size_t k) { out.number(t.size_bytes[k], size_width); });
+  for_each_listed(t, r, [&](std::size_t k) {
+    for (int i = 7; i >= 0; --i) out.u8(t.digest[k] >> (8 * i) & 0xff);  // as the digest's bytes stand
+  });
+  for_each_listed(t, r, [&](std::size_t k) { out.u16(to_half(t.mse[k])); });
+  for_each_listed(t, r, [&](std::size_t k) { out.u16(to_half(std::max(t.dssim[k], 0.0f))); });
+  for_each_listed(t, 1, [&](std::size_t k) { out.u16(to_half(std::max(t.skip_dssim[k], 0.0f))); });
+  for_each_listed(t, 1, [&](std::size_t k) { out.u32(t.covered_texels[k]); });
+  for_each_listed(t, 1, [&](std::size_t k) { out.f32(std::min(t.surface_fraction[k], 1.0f)); });
+  for (const auto v : features) out.number(v, feature_width);
   for (const auto v : t.quality) out.f32(v);
-  for (const auto v : t.total_bytes) out.u64(v);
-  out.u8(t.allocation);
-  out.u8((t.skip_dssim.empty() ? 0u : kHasSkipDssim) | (t.incremental ? kIncremental : 0u) |
-         (t.knot_quality.empty() ? 0u : kHasKnots));
-  out.number(0, 2);
-  for (const auto v : t.skip_dssim) out.u16(to_half(std::max(v, 0.0f)));
-  if (!t.knot_quality.empty()) {
-    out.u8(t.knot_quality.size());
-    out.raw(t.knot_quality);
-    for (const auto v : t.knot_position) out.u16(to_unit16(v));
-  }
   return out.finish();
 }
 
@@ -218,101 +220,122 @@ float read_half(BytesIn& in) {
   return from_half(v);
 }
 
-void read_arrays(BytesIn& in, PlaneTables& t, std::uint64_t r, std::uint64_t order, int size_width,
-                 int feature_width) {
-  const std::uint64_t f = t.fragment_count(), n = t.scales + std::uint64_t{1};
-  const auto u32 = [&] { return in.u32(); };
+void read_order(BytesIn& in, PlaneTables& t, std::uint64_t listed) {
+  fill(t.order, listed, [&] { return in.u16(); });
+  std::vector<bool> seen(t.fragment_count());
+  for (const std::uint16_t f : t.order) {
+    if (f >= seen.size() || seen[f]) in.fail("every stored fragment once in the order", std::to_string(f));
+    seen[f] = true;
+  }
+}
+
+void read_arrays(BytesIn& in, PlaneTables& t, const SectionCounts& counts) {
+  read_order(in, t, counts.listed);
+  fill(t.rung_quality, counts.rungs, [&] { return in.u8(); });
+  fill(t.table_bytes, counts.rungs, [&] { return in.u32(); });
+  fill(t.knot_quality, counts.knots, [&] { return in.u8(); });
+  fill(t.knot_position, counts.knots, [&] { return from_unit16(in.u16()); });
+  const auto fill_listed = [&](auto& values, std::uint64_t lines, auto get) {
+    values.assign(static_cast<std::size_t>(lines * t.fragment_count()), {});
+    for_each_listed(t, lines, [&](std::size_t k) { values[k] = get(); });
+  };
   const auto half = [&] { return read_half(in); };
-  fill(t.rung_quality, r, [&] { return in.u8(); });
-  fill(t.table_bytes, r, u32);
-  fill(t.size_bytes, r * f, [&] { return static_cast<std::uint32_t>(in.number(size_width)); });
-  fill(t.digest, r * f, [&] {
+  fill_listed(t.size_bytes, counts.rungs,
+              [&] { return static_cast<std::uint32_t>(in.number(counts.size_width)); });
+  fill_listed(t.digest, counts.rungs, [&] {
     std::uint64_t v = 0;
     for (const std::uint8_t byte : in.raw(8)) v = v << 8 | byte;
     return v;
   });
-  fill(t.mse, r * f, half);
-  fill(t.dssim, r * f, half);
-  fill(t.covered_texels, f, u32);
-  fill(t.surface_fraction, f, [&] { return in.f32(); });
-  for (auto* values : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp})
-    fill(*values, f, [&] { return from_unit16(in.u16()); });
-  fill(t.order, order, [&] { return in.u16(); });
-  fill(t.features, n * f, [&] { return static_cast<std::uint32_t>(in.number(feature_width)); });
-  fill(t.quality, n, [&] { return in.f32(); });
-  fill(t.total_bytes, n * kGammaSteps, [&] { return in.u64(); });
+  fill_listed(t.mse, counts.rungs, half);
+  fill_listed(t.dssim, counts.rungs, half);
+  fill_listed(t.skip_dssim, 1, half);
+  fill_listed(t.covered_texels, 1, [&] { return in.u32(); });
+  fill_listed(t.surface_fraction, 1, [&] { return in.f32(); });
+  fill_listed(t.features, counts.scales,
+              [&] { return static_cast<std::uint32_t>(in.number(counts.feature_width)); });
+  fill(t.quality, counts.scales, [&] { return in.f32(); });
 }
 
-/// What stands behind the fields of format 1.0: nothing in such a file.
-void read_extension(BytesIn& in, PlaneTables& t, int minor) {
-  if (minor < 1) return in.finish();
-  const std::uint8_t allocation = in.u8(), flags = in.u8();
-  if (std::min<std::uint8_t>(allocation, 1) != t.allocation)
-    in.fail("the allocation of the section's head, or 2 where that is 1", std::to_string(allocation));
-  t.allocation = allocation;
-  if (minor <= kFormatMinor && (flags > kAllFlags || in.number(2) != 0))
-    in.fail("flags 0 to 7 and 2 zero bytes", "others");
+/// The fields in front of a section's arrays. All counts are small afterwards, so that no product of them
+/// overflows.
+SectionCounts read_section_start(BytesIn& in, PlaneTables& t, int minor) {
+  SectionCounts counts;
+  t.columns = in.u32();
+  t.rows = in.u32();
+  counts.scales = in.u8();
+  counts.rungs = in.u8();
+  counts.size_width = in.u8(), counts.feature_width = in.u8();
+  t.allocation = in.u8();
+  const std::uint8_t flags = in.u8();
+  counts.knots = in.u8();
+  if (const auto reserved = in.u8(); (flags > kIncremental || reserved != 0) && minor <= kFormatMinor)
+    in.fail("flags 0 or 1 and a zero byte", std::to_string(flags) + ", " + std::to_string(reserved));
   t.incremental = (flags & kIncremental) != 0;
-  if (minor > kFormatMinor) in.raw(2);
-  if (flags & kHasSkipDssim) fill(t.skip_dssim, t.fragment_count(), [&] { return read_half(in); });
-  if (flags & kHasKnots) {
-    const std::uint8_t knots = in.u8();
-    if (knots == 0) in.fail("at least one knot", "none");
-    fill(t.knot_quality, knots, [&] { return in.u8(); });
-    fill(t.knot_position, knots, [&] { return from_unit16(in.u16()); });
-  }
-  if (minor <= kFormatMinor) in.finish();
+  for (float* v : {&t.quality_width, &t.log_width, &t.quality_min, &t.quality_max}) *v = in.f32();
+  counts.listed = in.u32();
+  if (t.columns == 0 || t.rows == 0 || t.columns > kMaxFragments || t.rows > kMaxFragments / t.columns)
+    in.fail("1 to 65535 fragments", std::to_string(t.columns) + " x " + std::to_string(t.rows));
+  if (counts.scales == 0 || counts.scales > kMaxScaleCount || counts.rungs == 0 ||
+      counts.rungs > kMaxPackageRungs || counts.listed > t.fragment_count())
+    in.fail("1 to 100 scales, 1 to 100 rungs and every fragment at most once", "others");
+  if (const std::uint64_t cells = cells_of(t.fragment_count(), counts.rungs, counts.scales);
+      cells > kMaxPlaneCells)
+    in.fail("at most 2^24 cells", std::to_string(cells));
+  if (counts.size_width < 1 || counts.size_width > 4 || counts.feature_width < 1 || counts.feature_width > 3)
+    in.fail("widths of 1 to 4 and 1 to 3 bytes",
+            std::to_string(counts.size_width) + ", " + std::to_string(counts.feature_width));
+  return counts;
 }
 
 PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const std::string& place) {
   BytesIn in(bytes, kTablesFile + ": " + place);
   PlaneTables t;
-  t.columns = in.u32();
-  t.rows = in.u32();
-  t.scales = in.u8();
-  const std::uint64_t rungs = in.u8();
-  const int size_width = in.u8(), feature_width = in.u8();
-  t.allocation = in.u8();
-  if (in.number(3) != 0 && minor <= kFormatMinor) in.fail("3 zero bytes", "others");
-  for (float* v : {&t.quality_width, &t.log_width, &t.quality_min, &t.quality_max, &t.model_a, &t.model_b,
-                   &t.model_r, &t.model_correlation, &t.model_error})
-    *v = in.f32();
-  const std::uint64_t order = in.u32();
-  if (t.columns == 0 || t.rows == 0 || t.columns > kMaxFragments || t.rows > kMaxFragments / t.columns)
-    in.fail("1 to 65535 fragments", std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  if (t.scales >= kMaxScaleCount || rungs == 0 || rungs > kMaxPackageRungs || order > t.fragment_count())
-    in.fail("at most 99 scales, 100 rungs and every fragment once", "more");
-  if (size_width < 1 || size_width > 4 || feature_width < 1 || feature_width > 3)
-    in.fail("widths of 1 to 4 and 1 to 3 bytes",
-            std::to_string(size_width) + ", " + std::to_string(feature_width));
-  // All counts are known to be small by now, so the sum cannot overflow; nothing is allocated before
-  // it is checked.
-  const std::uint64_t expected =
-      section_bytes(t.fragment_count(), rungs, t.scales + std::uint64_t{1}, order,
-                    static_cast<std::uint64_t>(size_width), static_cast<std::uint64_t>(feature_width));
-  if (bytes.size() < expected + (minor < 1 ? 0 : kExtensionFixed))
-    in.fail(std::to_string(expected) + " bytes", std::to_string(bytes.size()));
-  read_arrays(in, t, rungs, order, size_width, feature_width);
-  read_extension(in, t, minor);
+  const SectionCounts counts = read_section_start(in, t, minor);
+  // Nothing is allocated before the bytes are known to be there.
+  if (bytes.size() < counts.bytes())
+    in.fail(std::to_string(counts.bytes()) + " bytes", std::to_string(bytes.size()));
+  read_arrays(in, t, counts);
+  if (minor <= kFormatMinor) in.finish();
   check_plane(t, 0, place);
-  if (size_width != width_of(t.size_bytes) || feature_width != width_of(t.features))
+  if (counts.size_width != width_of(t.size_bytes) || counts.feature_width != width_of(t.features))
     in.fail("the least width that holds the values", "another");
   return t;
+}
+
+void add_cells(const PlaneTables& t, std::uint64_t& cells) {
+  cells += cells_of(t);
+  require_tables(cells <= kMaxPackageCells, "", "at most 2^27 cells in all planes", std::to_string(cells));
 }
 
 std::string plane_place(std::size_t plane) { return "plane " + std::to_string(plane); }
 
 }  // namespace
 
+PackageTables select_scales(const PackageTables& tables, const std::vector<std::size_t>& rows) {
+  PackageTables out = tables;
+  for (PlaneTables& t : out.planes) {
+    const std::vector<std::uint32_t> features = std::move(t.features);
+    const std::vector<float> quality = std::move(t.quality);
+    t.features.clear(), t.quality.clear();
+    for (const std::size_t row : rows) {
+      const auto begin = features.begin() + static_cast<std::ptrdiff_t>(row * t.fragment_count());
+      t.features.insert(t.features.end(), begin, begin + static_cast<std::ptrdiff_t>(t.fragment_count()));
+      t.quality.push_back(quality.at(row));
+    }
+  }
+  return out;
+}
+
 std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
   BytesOut head, sections;
-  head.text(kTablesMagic);
-  head.u16(kFormatMajor);
-  head.u16(kFormatMinor);
+  write_entry_start(head, kTablesMagic);
   head.u32(tables.planes.size());
   head.u32(0);
+  std::uint64_t cells = 0;
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     check_plane(tables.planes[p], kRounding, plane_place(p));
+    add_cells(tables.planes[p], cells);
     const Bytes section = write_section(tables.planes[p]);
     head.u32(section.size());
     head.raw(sha256(section));
@@ -324,11 +347,8 @@ std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
 
 TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
   BytesIn in(bytes, kTablesFile);
-  in.expect("the magic TXMT", kTablesMagic);
-  if (const auto major = in.u16(); major != kFormatMajor)
-    in.fail("major version " + std::to_string(kFormatMajor), std::to_string(major));
   TablesHead head;
-  head.minor = in.u16();
+  head.minor = read_entry_start(in, kTablesMagic);
   const std::uint64_t planes = in.u32();
   if (in.u32() != 0 && head.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
   if (planes > in.left() / kDirectoryRecord)
@@ -361,9 +381,12 @@ PackageTables read_tables(std::span<const std::uint8_t> bytes) {
       head.planes.empty() ? head.bytes : head.planes.back().offset + head.planes.back().bytes;
   if (end != bytes.size()) fail_tables("", std::to_string(end) + " bytes", std::to_string(bytes.size()));
   PackageTables tables;
-  for (std::size_t p = 0; p < head.planes.size(); ++p)
+  std::uint64_t cells = 0;
+  for (std::size_t p = 0; p < head.planes.size(); ++p) {
     tables.planes.push_back(
         read_tables_section(head, p, bytes.subspan(head.planes[p].offset, head.planes[p].bytes)));
+    add_cells(tables.planes.back(), cells);
+  }
   return tables;
 }
 

@@ -31,7 +31,7 @@ struct TextureInfo {
   // texture/<plane>/rNN.pack by rising quality: fragments in PlaneTables::order.
   std::vector<EntryRef> rungs;
   std::vector<int> rung_quality;
-  bool lossless = false;  // the last rung holds the coefficients of the source, a JPEG (since 1.1)
+  bool lossless = false;  // the last rung holds the coefficients of the source, a JPEG
   // jpg, png, tif, webp or exr where the package holds the source image; "" = it does not.
   std::string source_extension;
   bool source_colours = true;  // its numbers are the plane's; false: import has converted them
@@ -40,8 +40,6 @@ struct TextureInfo {
 };
 /// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
 inline constexpr int kLosslessQuality = 100;
-/// The feature that packages with mips require.
-inline constexpr const char* kMipsFeature = "mips";
 /// How many of the planes have full size; they stand first.
 std::size_t full_size_planes(const std::vector<TextureInfo>& textures);
 std::string write_textures(const std::vector<TextureInfo>& textures);

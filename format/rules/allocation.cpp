@@ -26,9 +26,9 @@ double quality_of_scale(double scale) { return scale > 1 ? 50 / scale : 100 - 50
 
 double log_quantiser(double quality) { return -portable::log(ijg_scale(quality)); }
 
-std::vector<float> eta_of(const PlaneTables& tables, std::uint32_t scale) {
+std::vector<float> eta_of(const PlaneTables& tables, std::size_t row) {
   const std::size_t n = tables.fragment_count();
-  const std::uint32_t* features = tables.features.data() + scale * n;
+  const std::uint32_t* features = tables.features.data() + row * n;
   std::uint32_t lo = 0xffffffffu, hi = 0;
   for (std::size_t f = 0; f < n; ++f) {
     if (tables.covered_texels[f] == 0) continue;
@@ -43,8 +43,8 @@ std::vector<float> eta_of(const PlaneTables& tables, std::uint32_t scale) {
   return eta;
 }
 
-double mean_eta(const PlaneTables& tables, std::uint32_t scale) {
-  const std::vector<float> eta = eta_of(tables, scale);
+double mean_eta(const PlaneTables& tables, std::size_t row) {
+  const std::vector<float> eta = eta_of(tables, row);
   double sum = 0;
   std::size_t covered = 0;
   for (std::size_t f = 0; f < eta.size(); ++f) {
@@ -55,9 +55,9 @@ double mean_eta(const PlaneTables& tables, std::uint32_t scale) {
   return covered > 0 ? sum / static_cast<double>(covered) : 0;
 }
 
-std::vector<float> quality_of(const PlaneTables& tables, std::uint32_t scale, double gamma) {
-  std::vector<float> result = eta_of(tables, scale);
-  const double middle = static_cast<double>(tables.quality[scale]);
+std::vector<float> quality_of(const PlaneTables& tables, std::size_t row, double gamma) {
+  std::vector<float> result = eta_of(tables, row);
+  const double middle = static_cast<double>(tables.quality[row]);
   const double g = log_quantiser(middle);
   for (float& value : result) {
     const double away = static_cast<double>(value) - gamma;
@@ -84,8 +84,16 @@ std::uint32_t nearest_rung(const PlaneTables& tables, double quality) {
   return best;
 }
 
-std::vector<std::int16_t> rungs_of(const PlaneTables& tables, std::uint32_t scale, double gamma) {
-  const std::vector<float> quality = quality_of(tables, scale, gamma);
+std::uint64_t bytes_asked_for(const PlaneTables& tables, std::size_t row, double gamma) {
+  const std::vector<float> quality = quality_of(tables, row, gamma);
+  std::uint64_t sum = 0;
+  for (const std::uint16_t f : tables.order)
+    sum += bytes_to_show(tables, nearest_rung(tables, static_cast<double>(quality[f])), f);
+  return sum;
+}
+
+std::vector<std::int16_t> rungs_of(const PlaneTables& tables, std::size_t row, double gamma) {
+  const std::vector<float> quality = quality_of(tables, row, gamma);
   std::vector<std::int16_t> rungs(tables.fragment_count(), kSkipped);
   for (const std::uint16_t f : tables.order)
     rungs[f] = static_cast<std::int16_t>(nearest_rung(tables, static_cast<double>(quality[f])));

@@ -13,8 +13,6 @@
 namespace texmesh {
 namespace {
 
-constexpr double kLossOfNothing = 1;  // 1 - SSIM where no preview is known
-
 /// As the file has it, so that tables fresh from the compiler and read back ones give the same choice.
 double half_of(float dssim) { return static_cast<double>(from_half(to_half(std::clamp(dssim, 0.0f, 2.0f)))); }
 
@@ -114,7 +112,7 @@ std::vector<RdCurve> rd_curves(const PlaneTables& tables, const std::vector<floa
     const auto loss = [&](double dssim) { return static_cast<std::uint64_t>(unit * (dssim * 0x1p24)); };
     RdCurve& curve = curves.emplace_back();
     curve.bytes.push_back(0);
-    curve.loss.push_back(loss(tables.skip_dssim.empty() ? kLossOfNothing : half_of(tables.skip_dssim[f])));
+    curve.loss.push_back(loss(half_of(tables.skip_dssim[f])));
     for (std::size_t r = 0; r < tables.rung_count(); ++r) {
       const std::size_t at = r * fragments + f;
       // A rung that leaves this fragment out is no way to show it: as dear as skipping, and no better.
@@ -142,8 +140,7 @@ double surface_dssim(const PlaneTables& tables, const std::vector<std::int16_t>&
   double sum = 0, total = 0;
   for (std::size_t f = 0; f < tables.fragment_count(); ++f) {
     const double w = static_cast<double>(weights[f]);
-    const double skipped =
-        tables.skip_dssim.empty() ? kLossOfNothing : static_cast<double>(tables.skip_dssim[f]);
+    const auto skipped = static_cast<double>(tables.skip_dssim[f]);
     const double dssim =
         rungs[f] == kSkipped
             ? skipped

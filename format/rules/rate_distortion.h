@@ -29,8 +29,7 @@ std::vector<std::uint32_t> spend_bytes(const std::vector<RdCurve>& curves, std::
 std::vector<RdCurve> rd_curves(const PlaneTables& tables, const std::vector<float>& weights,
                                double share = 1);
 /// The rung of every fragment that loses least surface-weighted (1 - SSIM) for at most `budget_bytes` of
-/// fragment streams, skipping included. `weights` default to surface_weights(). Without skip_dssim (format
-/// 1.0) a skipped fragment counts as having nothing of the source (1 - SSIM = 1).
+/// fragment streams, skipping included. `weights` default to surface_weights().
 std::vector<std::int16_t> allocate_rd(const PlaneTables& tables, std::uint64_t budget_bytes,
                                       const std::vector<float>& weights = {});
 

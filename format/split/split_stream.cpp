@@ -1,10 +1,10 @@
 #include "format/split/split_stream.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
 #include "format/base/bytes.h"
-#include "format/container/format_version.h"
 #include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
@@ -121,8 +121,8 @@ std::uint64_t SplitBlock::bytes() const {
 std::vector<std::uint8_t> write_split_head(const SplitStreamHead& head) {
   BytesOut out;
   out.text("TXMS");
-  out.u16(kFormatMajor);
-  out.u16(1);
+  out.u16(kSplitStreamMajor);
+  out.u16(kSplitStreamMinor);
   out.u8(static_cast<std::uint64_t>(head.position.bits));
   out.u8(head.attributes.size());
   out.u8(head.scales.size());
@@ -159,8 +159,9 @@ std::vector<std::uint8_t> write_split_head(const SplitStreamHead& head) {
 SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
   BytesIn in(bytes, kSplitStreamName);
   in.expect("TXMS", "TXMS");
-  if (const auto major = in.u16(); major != kFormatMajor) in.fail("major version 1", std::to_string(major));
-  in.u16();
+  if (const auto major = in.u16(); major != kSplitStreamMajor)
+    in.fail("major version " + std::to_string(kSplitStreamMajor), std::to_string(major));
+  in.u16();  // the minor version
   SplitStreamHead head;
   head.position.bits = read_bits(in, 1);
   const std::size_t attributes = in.u8(), scales = in.u8();
@@ -187,6 +188,14 @@ SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
     at += b.bytes();
   }
   return head;
+}
+
+std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale) {
+  const auto found = std::ranges::find(head.scales, scale, &SplitScale::scale);
+  if (found == head.scales.end())
+    throw FormatError(kSplitStreamName, "scales", "scale " + std::to_string(scale), "none");
+  const SplitBlock& last = head.blocks.at(found->blocks - 1);
+  return last.offset + last.bytes();
 }
 
 std::array<float, 3> octahedral_normal(std::int32_t u, std::int32_t v, int bits) {

@@ -6,6 +6,9 @@
 
 namespace texmesh {
 
+/// The stream's own version, which may stay while that of packages moves.
+inline constexpr int kSplitStreamMajor = 2, kSplitStreamMinor = 0;
+
 // mesh/stream.bin: the model from its coarsest kept scale to S_0 as vertex splits (SPEC.md, section Split
 // stream; after Hoppe's progressive meshes and thesis 10). A head says what the stream holds and where each
 // block of some hundred splits stands; every block has one part for connectivity, one for positions and one
@@ -74,6 +77,10 @@ std::array<std::int32_t, 2> octahedral_code(std::array<float, 3> normal, int bit
 
 /// The head, from a stream or the first bytes of it. Everything is checked that can be without the blocks.
 SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes);
+
+/// Bytes of the stream up to and including a scale's last block, the head among them. FormatError when the
+/// stream does not pass the scale.
+std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale);
 
 /// What a reader is willing to hold; a stream that goes beyond is refused.
 struct SplitLimits {

@@ -11,6 +11,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "pipeline/about/meta.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 
@@ -27,10 +28,10 @@ class CollectionReader {
       : file_(file), list_folder_(list_folder), options_(base) {}
 
   std::vector<CollectionModel> read(const Json& root) {
-    check_members(root, "", {"$schema", "version", "options", "patterns", "models", "folders"});
+    check_members(root, "", {"$schema", "version", "options", "about", "patterns", "models", "folders"});
     if (!root.contains("version") || root["version"] != 1)
       fail("/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
-    if (root.contains("options")) apply(options_, root["options"], "/options");
+    apply_members(options_, root, "");
     read_patterns(root);
     const bool has_folders = root.contains("folders");
     if (!root.contains("models") && !has_folders) fail("/models", "models or folders", "nothing");
@@ -82,6 +83,14 @@ class CollectionReader {
     }
   }
 
+  /// `options` and `about` of the collection, a pattern or a model.
+  void apply_members(CompileOptions& options, const Json& object, const std::string& place) const {
+    if (object.contains("options")) apply(options, object["options"], place + "/options");
+    if (!object.contains("about")) return;
+    const std::string meta = read_meta(object["about"].dump(), file_, place + "/about");
+    options.package.meta = merge_meta(options.package.meta, meta);
+  }
+
   void check_list(const Json& list, const std::string& place, const std::string& what) const {
     if (!list.is_array() || list.empty() || list.size() > kMaxModels)
       fail(place, "a list of 1 to " + std::to_string(kMaxModels) + " " + what, list.type_name());
@@ -93,12 +102,13 @@ class CollectionReader {
     check_list(list, "/patterns", "patterns");
     for (std::size_t i = 0; i < list.size(); ++i) {
       const std::string place = "/patterns/" + std::to_string(i);
-      check_members(list[i], place, {"match", "options"});
+      check_members(list[i], place, {"match", "options", "about"});
       if (!list[i].contains("match")) fail(place + "/match", "a pattern", "nothing");
-      if (!list[i].contains("options")) fail(place + "/options", "options", "nothing");
-      patterns_.push_back({path_at(list[i], "match", place), list[i]["options"], place + "/options"});
+      if (!list[i].contains("options") && !list[i].contains("about"))
+        fail(place + "/options", "options or about", "nothing");
+      patterns_.push_back({path_at(list[i], "match", place), list[i], place});
       CompileOptions check = options_;  // wrong options are an error even where nothing matches
-      apply(check, list[i]["options"], place + "/options");
+      apply_members(check, list[i], place);
     }
   }
 
@@ -110,7 +120,7 @@ class CollectionReader {
     if (!shared) {
       CompileOptions options = options_;
       for (std::size_t i = 0; i < patterns_.size(); ++i)
-        if (matches[i]) apply(options, patterns_[i].options, patterns_[i].place);
+        if (matches[i]) apply_members(options, patterns_[i].json, patterns_[i].place);
       shared = std::make_shared<const CompileOptions>(std::move(options));
     }
     return shared;
@@ -153,7 +163,7 @@ class CollectionReader {
 
   CollectionModel read_model(const Json& json, const std::string& place) {
     namespace fs = std::filesystem;
-    check_members(json, place, {"input", "output", "options"});
+    check_members(json, place, {"input", "output", "options", "about"});
     if (!json.contains("input")) fail(place + "/input", "a path", "nothing");
     CollectionModel m;
     m.input = path_at(json, "input", place);
@@ -167,9 +177,9 @@ class CollectionReader {
     if (!outputs_.insert(output.lexically_normal().string()).second)
       fail(place + "/output", "an output of its own", m.output + ", as another model");
     m.options = options_for(m.input);
-    if (json.contains("options")) {
+    if (json.contains("options") || json.contains("about")) {
       CompileOptions with_changes = *m.options;
-      apply(with_changes, json["options"], place + "/options");
+      apply_members(with_changes, json, place);
       m.options = std::make_shared<const CompileOptions>(std::move(with_changes));
     }
     return m;
@@ -177,7 +187,7 @@ class CollectionReader {
 
   struct Pattern {
     std::string match;
-    Json options;
+    Json json;  // with options or about
     std::string place;
   };
   const std::string& file_;

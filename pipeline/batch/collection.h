@@ -13,7 +13,8 @@ struct CollectionModel {
   std::string input;   // path; relative ones are relative to the collection's folder
   std::string output;  // path beneath the output folder, ends with ".texmesh"
   // Defaults, then the collection's options, then those of the patterns that match, in their order, then the
-  // model's own. Models with equal options share them.
+  // model's own. What `about` says of each of them goes the same way, field by field, into package.meta.
+  // Models with equal options share them.
   std::shared_ptr<const CompileOptions> options;
 };
 

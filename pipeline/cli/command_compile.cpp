@@ -7,6 +7,8 @@
 #include <thread>
 
 #include "format/base/errors.h"
+#include "format/documents/about.h"
+#include "pipeline/about/meta.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
 #include "pipeline/batch/write_reports.h"
@@ -46,13 +48,14 @@ constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
   std::vector<std::string> inputs, layers;
-  std::string output, profile, jnd_profile, memory, model_memory = "8GiB", shard;
+  std::string output, profile, jnd_profile, meta, memory, model_memory = "8GiB", shard;
   CacheChoice cache;
   std::string cache_size = "20GB", cache_age = "90d";
   int jobs = 0;
   bool json = false, quiet = false, keep_going = false;
   RunSettings run;
   std::map<std::string, std::string> options;  // path -> text
+  std::string meta_text;                       // what the file of --meta says
 };
 
 /// The field's own text, what it may be and its default. Names of values and of symbols stay as they are.
@@ -121,10 +124,17 @@ CompileOptions base_options(const CompileArguments& args) {
   return options;
 }
 
+void read_meta_file(CompileArguments& args) {
+  if (args.meta.empty()) return;
+  const auto bytes = read_input_file(args.meta, kMaxAboutBytes);
+  args.meta_text = read_meta(std::string(bytes.begin(), bytes.end()), args.meta);
+}
+
 /// Flags win over everything that a file says.
 void apply_flags(const CompileArguments& args, CompileOptions& options) {
   std::vector<OptionField> fields = list_options(options);
   for (const auto& [path, text] : args.options) set_option(*find_option(fields, path), text, "--" + path);
+  options.package.meta = merge_meta(options.package.meta, args.meta_text);
   check_options(options, "command line");
 }
 
@@ -180,7 +190,7 @@ RunSettings run_settings(const CompileArguments& args) {
   run.cache_limits = {parse_bytes(args.cache_size, "--cache-size"),
                       parse_seconds(args.cache_age, "--cache-age")};
   run.mode = output_mode(args);
-  for (const std::string& file : {args.profile, args.jnd_profile})
+  for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
     if (!file.empty()) run.more_inputs.push_back(file);
   return run;
 }
@@ -286,6 +296,11 @@ void add_compile_options(Command& c, CompileArguments& args) {
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
        "--profile, flags win over the file")
       .value_name("FILE");
+  c.option("--meta", args.meta,
+           "JSON file about the object: title, creator, licence, unit, coordinate reference ... "
+           "(schemas/meta.v1.schema.json). The file wins over what the model and a collection say")
+      .value_name("FILE")
+      .everyday(kEverydayTitle);
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (texmesh stages lists the stages)");
   add_run_options(c, args);
   add_all_cache_options(c, args);
@@ -293,10 +308,11 @@ void add_compile_options(Command& c, CompileArguments& args) {
   add_stage_options(c, args);
 }
 
-int run_compile(const CompileArguments& args) {
+int run_compile(CompileArguments& args) {
   RunSettings settings;
   BatchPlan plan;
   try {
+    read_meta_file(args);
     const PlanRequest request = plan_request(args);
     settings = run_settings(args);
     plan = plan_batch(request);

@@ -49,7 +49,7 @@ void add_dump_command(Command& app) {
        "summary: bounds, scales, textures, bytes by kind, options. scales: the meshes and when each is "
        "enough. fragments: the texture's grid, importance and sizes. ladder: the rungs' bytes and "
        "distortion. tables: size model, allocation, measured quality. entries: every file with offset and "
-       "digest. provenance: inputs, options, versions. all: everything")
+       "digest. about: title, licence, unit and all else that is said about the object. provenance: inputs, options, versions. all: everything")
       .one_of_explained({kDumpParts.begin(), kDumpParts.end()})
       .shows_default();
   c.option(

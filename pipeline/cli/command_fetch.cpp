@@ -16,6 +16,7 @@
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/options/units.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
@@ -106,21 +107,20 @@ struct Moved {
   }
 };
 
-/// Everything that is needed to decide, together with the coarsest mesh: one round trip.
+/// Everything that is needed to decide: one round trip, with what the first answer lacks of the coarsest mesh.
 void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Moved& moved) {
   const Manifest& m = package.manifest();
   const auto start = Clock::now();
-  std::vector<EntryRef> wanted{m.index, m.tables, m.textures, m.quality, m.scales.back().glb};
-  if (table_streams && !package.store().is_folder())
-    wanted.push_back({"", m.first_picture_offset, m.first_picture_bytes, {}});
-  package.store().prefetch(wanted);
-  std::uint64_t bytes = 0, end = kBootstrapBytes;
-  for (const EntryRef& e : wanted) {
-    f.mesh_bytes += e.path.empty() ? 0 : e.bytes;
-    end = std::max(end, e.offset + e.bytes);
-    bytes += e.path.empty() ? 0 : e.bytes;
+  std::vector<EntryRef> wanted{m.scales.back().glb, m.index, m.tables, m.textures, m.quality};
+  std::uint64_t bytes = 0;
+  for (const EntryRef& e : wanted) f.mesh_bytes += e.bytes, bytes += e.bytes;
+  if (!package.store().is_folder()) {
+    // From the index to the end of the tables, the table streams between them.
+    const std::uint64_t end = m.tables.offset + m.tables.bytes;
+    wanted.push_back({"", m.index.offset, end - m.index.offset, {}});
+    bytes = end - std::min(end, kStartBytes);
   }
-  if (!package.store().is_folder()) bytes = end - kBootstrapBytes;
+  package.store().prefetch(wanted);
   if (bytes > 0) moved.add(bytes, seconds_since(start), f.rtt_s);
   package.tables();
   if (table_streams && package.store().is_folder()) {
@@ -142,12 +142,13 @@ int scale_in_time(PackageReader& package, DeliveryRequest request, double rtt_s,
 
 Bytes fetch_mesh(PackageReader& package, Fetched& f, Moved& moved) {
   const EntryRef& entry = package.scale_entry(f.scale);
-  if (f.scale == package.manifest().scales.back().scale) return package.scale_glb(f.scale);
-  const auto start = Clock::now();
-  const Bytes mesh = package.scale_glb(f.scale);
-  moved.add(entry.bytes, seconds_since(start), f.rtt_s);
-  f.mesh_bytes += entry.bytes;
-  return mesh;
+  if (f.scale != package.manifest().scales.back().scale) {
+    const auto start = Clock::now();
+    package.store().prefetch({entry});
+    moved.add(entry.bytes, seconds_since(start), f.rtt_s);
+    f.mesh_bytes += entry.bytes;
+  }
+  return scale_file(package, f.scale, {}, StreamedNormals::kStreamed).finish();
 }
 
 HttpOptions http_options(double time_limit_s) {

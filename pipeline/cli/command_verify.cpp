@@ -56,9 +56,11 @@ Json to_json(const std::string& path, const VerifyReport& r) {
                         {"field", f.field},
                         {"expected", f.expected},
                         {"found", f.found}});
-  return {{"package", path},          {"ok", r.findings.empty()}, {"entries", r.entries},
-          {"bytes", r.bytes},         {"meshes", r.meshes},       {"previews", r.previews},
-          {"fragments", r.fragments}, {"findings", findings}};
+  return {{"package", path},          {"ok", r.findings.empty()},
+          {"entries", r.entries},     {"bytes", r.bytes},
+          {"meshes", r.meshes},       {"previews", r.previews},
+          {"fragments", r.fragments}, {"content_credential", r.content_credential},
+          {"findings", findings}};
 }
 
 void print_verified(const std::string& path, const VerifyReport& r, bool quiet) {
@@ -69,7 +71,8 @@ void print_verified(const std::string& path, const VerifyReport& r, bool quiet) 
                     ? "ok"
                     : std::to_string(r.findings.size()) + (r.findings.size() == 1 ? " finding" : " findings"))
             << " (" << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
-            << r.previews << " previews, " << r.fragments << " fragments)\n";
+            << r.previews << " previews, " << r.fragments << " fragments"
+            << (r.content_credential ? "; the content credential was not checked" : "") << ")\n";
 }
 
 int run_verify(const VerifyArguments& args) {
@@ -106,6 +109,7 @@ void add_verify_command(Command& app) {
   c.notes(
       "verify decodes every mesh and every texture fragment and reports every finding. A finding names the "
       "entry, the place in the entry, what was expected, what was found and [the rule].\n"
+      "A C2PA content credential (META-INF/content_credential.c2pa) is accepted and not checked.\n"
       "Exit code: 0 when all packages are sound, 1 when there is a finding, 2 usage.");
   c.on_run([args] { return run_verify(*args); });
 }

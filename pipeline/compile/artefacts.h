@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/about.h"
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
 #include "pipeline/graph/artefact.h"
 #include "pipeline/import/import.h"
@@ -51,6 +53,7 @@ inline constexpr Artefact<std::string> kProvenance{"provenance"};  // JSON
 inline constexpr Artefact<ImportedMesh> kImportedMesh{"import.mesh"};
 inline constexpr Artefact<std::vector<Material>> kMaterials{"import.materials"};
 inline constexpr Artefact<std::vector<Image>> kImages{"import.images"};
+inline constexpr Artefact<About> kSourceAbout{"import.about"};
 inline constexpr Artefact<ConditionedMesh> kConditionedMesh{"condition"};
 inline constexpr Artefact<Skeleton> kSkeleton{"skeletonization"};
 inline constexpr Artefact<ScaleMap> kScaleMap{"ssf"};
@@ -61,7 +64,8 @@ inline constexpr Artefact<std::vector<Pixels>> kFilledPlanes{"fill"};
 inline constexpr Artefact<Predictors> kPredictors{"zim"};
 inline constexpr Artefact<Previews> kPreviews{"previews"};
 inline constexpr Artefact<Ladder> kLadder{"ladder"};
-inline constexpr Artefact<PackageTables> kTables{"lut"};
+inline constexpr Artefact<PackageTables> kTables{"lut.tables"};
+inline constexpr Artefact<ThesisTables> kThesisTables{"lut.thesis"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
 inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
 inline constexpr Artefact<Poster> kPoster{"poster"};

@@ -17,17 +17,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What made the package, without dates, hosts or paths.
+/// What made the package, without dates, hosts or paths. What package.meta says stands in about.json.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
   Json stages = Json::object(), libraries = Json::object();
   for (const Stage& s : default_stage_table())
     if (s.stored) stages[s.name] = s.version;
   for (const auto& [name, version] : library_versions()) libraries[name] = version;
+  CompileOptions recorded = options;
+  recorded.package.meta.clear();
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
               {"inputs", source.inputs()},
-              {"options", Json::parse(write_profile(options))},
+              {"options", Json::parse(write_profile(recorded))},
               {"stages", stages},
               {"libraries", libraries}}
       .dump();

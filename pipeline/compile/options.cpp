@@ -1,6 +1,7 @@
 #include "pipeline/compile/options.h"
 
 #include "format/base/errors.h"
+#include "pipeline/about/meta.h"
 #include "pipeline/graph/option_text.h"
 
 namespace texmesh {
@@ -12,6 +13,14 @@ void check_rungs(const std::vector<int>& rungs, const std::string& source, const
     if (rungs[i] <= rungs[i - 1])
       throw InputError(source, name, "strictly rising qualities",
                        std::to_string(rungs[i - 1]) + " before " + std::to_string(rungs[i]));
+}
+
+void check_meta(const CompileOptions& o, const std::string& source) {
+  if (o.package.meta.empty()) return;
+  read_meta(o.package.meta, source, "package.meta");
+  const std::string up = up_axis_of_meta(o.package.meta);
+  if (o.import.up != UpAxis::kKeep && !up.empty() && up != "y")
+    throw InputError(source, "package.meta/upAxis", "y, as import.up has it, or no upAxis", up);
 }
 
 }  // namespace
@@ -27,10 +36,12 @@ CompileOptions resolve_options(CompileOptions o) {
   if (o.fragmentation.fill == Fill::kNone &&
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
+  if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
   return o;
 }
 
 void check_options(const CompileOptions& o, const std::string& source) {
+  check_meta(o, source);
   check_rungs(o.ladder.rungs, source, "ladder.rungs");
   check_rungs(o.ladder.normal_rungs, source, "ladder.normal_rungs");
   check_rungs(o.ladder.data_rungs, source, "ladder.data_rungs");

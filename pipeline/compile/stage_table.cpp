@@ -17,12 +17,13 @@ using Planes = std::vector<Pixels>;
 
 // Adapters, where a stage's function does not take its inputs and options as the graph gives them.
 
-Results<ImportedMesh, Materials, Images> import_source(const Source& source, const ImportOptions& options,
-                                                       const RunContext& context) {
+Results<ImportedMesh, Materials, Images, About> import_source(const Source& source,
+                                                              const ImportOptions& options,
+                                                              const RunContext& context) {
   ImportedModel m = source.import(options, context);
   ImportedMesh mesh{std::move(m.model.mesh), std::move(m.model.range), m.normals_by_specification,
                     uv_sets_of(m.model.materials)};
-  return {{std::move(mesh), std::move(m.model.materials), std::move(m.model.images)},
+  return {{std::move(mesh), std::move(m.model.materials), std::move(m.model.images), std::move(m.about)},
           std::move(m.model.notes)};
 }
 
@@ -53,6 +54,14 @@ Previews preview_fragments(const Fragments& fragments, const Planes& planes, int
   return make_previews(fragments, planes, {quality, subsampling}, context);
 }
 
+Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragments, const Planes& planes,
+                                                       const Predictors& predictors, const Ladder& ladder,
+                                                       const Previews& previews, const LutOptions& options,
+                                                       const RunContext& context) {
+  LutTables made = build_tables(fragments, planes, predictors, ladder, previews, options, context);
+  return {{std::move(made.tables), std::move(made.thesis)}, {}};
+}
+
 Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const PerceptualValues& perceptual,
                                           const Materials& materials, const Fragments& fragments,
                                           const Planes& planes, const Ladder& ladder,
@@ -66,11 +75,12 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
 
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
-                  const PackageTables& tables, const ScaleFiles& files, const MeasuredQuality& quality,
-                  const Poster& poster, const std::string& provenance, const PackageOptions& options,
-                  double jnd, const RunContext& context) {
-  return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                          poster, jnd, provenance, options, context);
+                  const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
+                  const MeasuredQuality& quality, const Poster& poster, const About& source,
+                  const std::string& provenance, const PackageOptions& options, double jnd,
+                  const RunContext& context) {
+  return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
+                          quality, poster, source, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -91,8 +101,8 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
   return {
-      stage({"import", kImportVersion, "file -> mesh, materials, images"},  //
-            inputs(kSource), outputs(kImportedMesh, kMaterials, kImages), read_of(o, o.import),
+      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself"},
+            inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "meshoptimizer", "openimageio", "tinygltf"}, import_source),
       stage({"condition", kConditionVersion,
              "mesh -> 2-manifold mesh: weld, drop degenerates, split, components"},
@@ -126,8 +136,9 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes, kPreviews, kImages), outputs(kLadder), read_of(o, o.ladder),
             {"libjpeg-turbo", "libwebp"}, encode_ladder),
       stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
-            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews), outputs(kTables),
-            read_of(o, o.lut), {"libjpeg-turbo", "libwebp"}, build_tables),
+            inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
+            outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
+            measure_fragments),
       stage({"scales", kScalesVersion, "kept scales -> standalone GLB files"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
@@ -141,7 +152,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kScaleFiles, kQuality, kPoster, kProvenance),
+                   kThesisTables, kScaleFiles, kQuality, kPoster, kSourceAbout, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

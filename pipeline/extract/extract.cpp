@@ -6,8 +6,9 @@
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
+#include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
-#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
@@ -95,11 +96,10 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   require_rung(package, request.rung);
   out.triangles = scale_entry(package, out.scale).triangles;
   out.levels = request.lods ? levels_of(m, out.scale) : std::vector<int>{out.scale};
-  StandaloneGlb file(package.scale_glb(out.scale), mesh_path(out.scale));
+  StandaloneGlb file = scale_file(package, out.scale, context);
   if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
   for (std::size_t l = 1; l < out.levels.size(); ++l)
-    file.add_level(StandaloneGlb(package.scale_glb(out.levels[l]), mesh_path(out.levels[l])),
-                   screen_coverage_of(m, out.levels[l]));
+    file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
   if (!request.recentre) file.move_to(m.origin);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
@@ -110,6 +110,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
     context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
   }
   file.set_images(images);
+  file.set_about(package.about());
   out.glb = file.finish();
   out.mesh_bytes = out.glb.size();
   for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
@@ -119,8 +120,11 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
 }  // namespace
 
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  return request.bytes > 0 ? extract_bytes(package, request, context)
-                           : extract_whole(package, request, context);
+  if (request.bytes == 0) return extract_whole(package, request, context);
+  Extracted out = extract_bytes(package, request, context);
+  if (about_within(package.about(), request.bytes / kAboutShare) != package.about())
+    out.notes.emplace_back("the file is too small for all that is known of the object; see dump PKG about");
+  return out;
 }
 
 }  // namespace texmesh

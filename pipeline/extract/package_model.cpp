@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "format/container/layout.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/scale_model.h"
-#include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
 #include "stages/image/decode_image.h"
 
@@ -53,8 +53,7 @@ const PackageImage& image_named(const std::vector<PackageImage>& images, const s
 }
 
 Model scale_model(PackageReader& package, int scale, const RunContext& context) {
-  const std::string entry = mesh_path(scale);
-  return read_model({package.scale_glb(scale), entry}, entry, context);
+  return read_model(scale_file(package, scale, context), mesh_path(scale), context);
 }
 
 /// Mesh and materials of a scale. The list of textures counts the package's images.

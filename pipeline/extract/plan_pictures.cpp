@@ -6,8 +6,8 @@
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/plane_pixels.h"
 #include "pipeline/extract/glb/resize.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/scale_model.h"
-#include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
 #include "pipeline/extract/package_model.h"
 #include "pipeline/render/picture_sheet.h"
@@ -83,7 +83,7 @@ RenderedModel& PlanPictures::scale(int scale) {
   if (found != scales_.end()) return found->second;
   package_.scale_index(scale);  // says which there are
   const std::string entry = mesh_path(scale);
-  Model model = read_model({package_.scale_glb(scale), entry}, entry, context_);
+  Model model = read_model(scale_file(package_, scale, context_), entry, context_);
   RenderedModel& out =
       scales_.emplace(scale, untextured_model(std::move(model.mesh), model.materials)).first->second;
   if (images_.empty())

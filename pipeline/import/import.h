@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "format/base/fields.h"
+#include "format/documents/about.h"
 #include "format/model/model.h"
 #include "pipeline/io/resolver.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 6;
+inline constexpr int kImportVersion = 7;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>
@@ -57,14 +58,15 @@ struct ImportOptions {
   }
 };
 
-/// What the source's format says about meshes without normals (glTF: flat), for ConditionOptions::normals.
 struct ImportedModel {
   Model model;
+  /// What the source's format says about meshes without normals (glTF: flat), for ConditionOptions::normals.
   bool normals_by_specification = false;
   std::string format;  // "glb", "gltf", "obj", "ply", "stl", "range"
+  About about;         // what the source says about itself; unit and up axis as ImportOptions leave them
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.model, s.normals_by_specification, s.format);
+    a(s.model, s.normals_by_specification, s.format, s.about);
   }
 };
 

@@ -39,17 +39,9 @@ Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) 
                                      : "content of another kind named ." + extension);
 }
 
-}  // namespace
-
-ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
-                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
-  if (bytes.empty()) throw InputError(file_name, "", "a model", "an empty file");
-  if (static_cast<double>(bytes.size()) > options.max_file_bytes)
-    throw InputError(
-        file_name, "",
-        "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
-        std::to_string(bytes.size()));
-  switch (kind_of(file_name, bytes)) {
+ImportedModel import_kind(Kind kind, const std::string& file_name, std::span<const std::uint8_t> bytes,
+                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
+  switch (kind) {
     case Kind::kGltf:
       return import_gltf(file_name, bytes, resolver, options, context);
     case Kind::kObj:
@@ -62,6 +54,24 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
       break;
   }
   return import_range_scan(file_name, bytes, resolver, options, context);
+}
+
+}  // namespace
+
+ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
+  if (bytes.empty()) throw InputError(file_name, "", "a model", "an empty file");
+  if (static_cast<double>(bytes.size()) > options.max_file_bytes)
+    throw InputError(
+        file_name, "",
+        "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
+        std::to_string(bytes.size()));
+  ImportedModel imported =
+      import_kind(kind_of(file_name, bytes), file_name, bytes, resolver, options, context);
+  if (imported.about.source.empty()) imported.about.source = "{\"format\":\"" + imported.format + "\"}";
+  // The user has said which axis is up, or the model has been turned.
+  if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
+  return imported;
 }
 
 }  // namespace texmesh

@@ -1,8 +1,11 @@
 #include "pipeline/inspect/package_tree.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "delivery/cpp/package/package_reader.h"
@@ -56,6 +59,26 @@ Bytes manifest_bytes(PackageReader& package) {
   return bytes;
 }
 
+/// The C2PA manifest store, which no index names and no digest covers: only the container's CRC-32 does.
+std::optional<Bytes> content_credential(PackageStore& store) {
+  std::vector<ContainerEntry> listed;
+  try {
+    listed = store.list();
+  } catch (const InputError&) {
+    return std::nullopt;  // files of a web server have no list
+  }
+  const auto it = std::ranges::find(listed, std::string(kContentCredentialPath), &ContainerEntry::path);
+  if (it == listed.end()) return std::nullopt;
+  if (it->bytes > kMaxContentCredentialBytes)
+    throw FormatError(it->path, "", "at most " + std::to_string(kMaxContentCredentialBytes) + " bytes",
+                      std::to_string(it->bytes));
+  Bytes bytes = store.read({it->path, it->offset, it->bytes, {}}, 0, it->bytes);
+  const auto crc = static_cast<std::uint32_t>(crc32_z(crc32_z(0, nullptr, 0), bytes.data(), bytes.size()));
+  if (!store.is_folder() && crc != it->crc32)
+    throw FormatError(it->path, "CRC-32", std::to_string(it->crc32), std::to_string(crc));
+  return bytes;
+}
+
 /// Reads the files of a tree, as many as there are and no more.
 class TreeFiles {
  public:
@@ -90,7 +113,7 @@ class TreeFiles {
   }
 
   void check_names() {
-    std::set<std::string> named{kManifestPath, kIndexPath, kFragmentIndexPath};
+    std::set<std::string> named{kManifestPath, kIndexPath, kFragmentIndexPath, kContentCredentialPath};
     for (const EntryRef& e : package_.index()) named.insert(e.path);
     for (const auto& [path, bytes] : sizes_)
       if (!named.count(path) && parse_entry_path(path).kind != EntryKind::kFragmentFile)
@@ -107,15 +130,6 @@ void check_offset(const ContainerEntry& written, const EntryRef& stated) {
                       std::to_string(written.offset));
 }
 
-void check_first_picture_place(const Manifest& m, const Bytes& container) {
-  const bool inside = m.first_picture_offset <= container.size() &&
-                      m.first_picture_bytes <= container.size() - m.first_picture_offset;
-  if (!inside || sha256(std::span(container).subspan(static_cast<std::size_t>(m.first_picture_offset),
-                                                     static_cast<std::size_t>(m.first_picture_bytes))) !=
-                     m.first_picture_digest)
-    throw FormatError(kManifestPath, "/firstPicture", "a range of the container with that digest", "another");
-}
-
 }  // namespace
 
 void unpack_package(const std::string& package_path, const std::string& folder,
@@ -125,6 +139,8 @@ void unpack_package(const std::string& package_path, const std::string& folder,
   NewTree tree(folder, options.force);
   tree.add(kManifestPath, manifest);
   for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
+  if (const auto credential = content_credential(package.store()))
+    tree.add(kContentCredentialPath, *credential);
   if (options.fragment_files) {
     const FragmentIndex index = make_fragment_files(
         package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
@@ -147,8 +163,9 @@ void pack_folder(const std::string& folder, const std::string& package_path) {
     writer.add(e.path, files.entry(e));
     check_offset(writer.entries().back(), e);
   }
+  if (const auto credential = content_credential(package.store()))
+    writer.add(kContentCredentialPath, *credential);
   writer.finish();
-  check_first_picture_place(package.manifest(), container);
   write_output_file(package_path, container);
 }
 

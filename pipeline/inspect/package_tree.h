@@ -15,7 +15,8 @@ void unpack_package(const std::string& package, const std::string& folder, const
 
 /// The container of an unpacked tree, byte for byte the file it came from: entries in the order of the index,
 /// offsets checked against it. Fragment files are left out; a rung whose entry is missing is put together
-/// from them. Throws FormatError when a file is missing, too many, or not what its digest says.
+/// from them. A content credential stays the last entry. Throws FormatError when a file is missing, too many,
+/// or not what its digest says.
 void pack_folder(const std::string& folder, const std::string& package);
 
 }  // namespace texmesh

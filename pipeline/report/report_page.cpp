@@ -70,6 +70,19 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
   return out + "</figure>\n";
 }
 
+/// Whose the object is; the licence as a link to where it can be read.
+std::string rights_line(const About& about) {
+  std::string out = html_escaped(about.attribution.empty() ? about.creator : about.attribution);
+  if (!about.licence.empty()) {
+    const std::string licence = html_escaped(about.licence);
+    if (!out.empty()) out += ", ";
+    out += about.licence_url.empty() ? licence
+                                     : fmt::format("<a rel=\"license\" href=\"{}\">{}</a>",
+                                                   html_escaped(about.licence_url), licence);
+  }
+  return out.empty() ? out : "<p class=\"quiet\">" + out + "</p>\n";
+}
+
 }  // namespace
 
 std::string header_section(PackageReader& package, Report& report) {
@@ -85,6 +98,7 @@ std::string header_section(PackageReader& package, Report& report) {
       "{:.4g} x {:.4g} x {:.4g} object units.</p>\n",
       short_bytes(static_cast<double>(bytes)), m.scales.size(), thin_grouped(m.scales.front().triangles),
       m.plane_count, size.x, size.y, size.z);
+  out += rights_line(package.about());
   out += "<nav aria-label=\"Sections\"><ul>";
   for (const auto& [id, name] : {std::pair{"switches", "Switch sizes"},
                                  {"source", "Against the source"},

@@ -43,7 +43,7 @@ std::string media_type(const std::string& path) {
       {".woff2", "font/woff2"},
       {".txt", "text/plain; charset=utf-8"},
       {".glb", "model/gltf-binary"},
-      {".texmesh", "application/zip"},
+      {".texmesh", kContainerMediaType},
   }};
   for (const auto& [ending, type] : kTypes)
     if (path.ends_with(ending)) return std::string(type);

@@ -8,7 +8,7 @@ namespace texmesh {
 
 struct ScaleFile {
   int scale = 0;                              // scale number
-  std::vector<std::uint8_t> glb;              // a standalone glTF 2.0 binary with preview textures inside
+  std::vector<std::uint8_t> glb;              // glTF 2.0 binary; empty: the stream alone has the scale
   std::uint32_t triangles = 0, vertices = 0;  // as stored: a vertex is a wedge
   template <class S, class A>
   static void archive(S& s, A& a) {

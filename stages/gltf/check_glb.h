@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "format/base/finding.h"
+#include "format/base/sha256.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
@@ -14,17 +15,20 @@ struct GlbFacts {
   std::uint64_t triangles = 0, vertices = 0;  // over all primitives; vertices are counted as stored (wedges)
   std::uint64_t primitives = 0;
   std::vector<std::string> image_names;  // in order; "" where an image has no name
+  std::vector<std::string> image_uris;   // in order; "" where an image is within the file
+  std::vector<Sha256> image_digests;     // in order; zeros where an image is not
   std::string codec = "none";            // none, quantized, meshopt or draco, as ScalesOptions::mesh_codec
   std::vector<Vec3d> positions;  // all different ones under their nodes' transforms, sorted by x, y, z
   bool has_bounds = false;
   Vec3d bounds_min, bounds_max;  // of the decoded positions under their nodes' transforms
 };
 
-/// Whose rules a file keeps: meshes of a package, or files that `texmesh extract` writes, which also may have
+/// Whose rules a file keeps: meshes of a package, whose images may be previews by their relative URIs
+/// ("../preview/003.jpg"), or files that `texmesh extract` writes, which also may have
 /// WebP images (EXT_texture_webp) and levels of detail (MSFT_lod).
 enum class GlbRules : std::uint8_t { kPackage, kStandalone };
 
-/// Checks that a GLB is structurally valid glTF 2.0 that stands alone: header and chunks, JSON, every index
+/// Checks that a GLB is structurally valid glTF 2.0 that stands alone, or with the previews: header and chunks, JSON, every index
 /// in range, buffer views and accessors within the binary chunk, Draco and meshopt data that decodes to what
 /// the accessors say, indices within the vertices, finite positions, a node tree without cycles, images that
 /// decode. The Khronos validator checks more (tests/node); this one needs no JavaScript and also decodes.

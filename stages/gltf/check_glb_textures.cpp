@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "format/container/layout.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 
@@ -23,15 +24,33 @@ void check_texture_infos(GlbDocument& d, const Json& object, std::size_t texture
   }
 }
 
+/// The path of a preview from the folder of the meshes.
+bool is_preview_uri(const Json& uri) {
+  constexpr std::string_view kUp = "../";
+  if (!uri.is_string() || !uri.get_ref<const std::string&>().starts_with(kUp)) return false;
+  const EntryName name = parse_entry_path(uri.get_ref<const std::string&>().substr(kUp.size()));
+  return name.kind == EntryKind::kPreview;
+}
+
 }  // namespace
 
 void check_glb_image(GlbDocument& d, std::size_t i, GlbFacts& facts) {
   const Json& json = d.root()["images"][i];
   const std::string place = GlbDocument::element("images", i);
   facts.image_names.push_back(json.value("name", std::string()));
+  facts.image_uris.emplace_back();
+  facts.image_digests.emplace_back();
+  if (!d.standalone() && json.contains("uri")) {
+    const bool preview = is_preview_uri(json["uri"]) && !json.contains("bufferView");
+    if (!preview || json.value("mimeType", std::string()) != "image/jpeg")
+      d.fail("glb-image", place + "/uri", "a preview as image/jpeg, ../preview/PPP.jpg", json["uri"].dump().substr(0, 80));
+    facts.image_uris.back() = json["uri"].get<std::string>();
+    return;
+  }
   const auto& view = d.views()[d.index(json, "bufferView", d.views().size(), place)];
   if (!view.ok) return;
   const std::vector<std::uint8_t> bytes(view.data.begin(), view.data.end());
+  facts.image_digests.back() = sha256(bytes);
   const std::string type = json.value("mimeType", std::string());
   const auto shown = sniff_image_format(bytes);
   const bool jpeg = shown == ImageFormat::kJpeg, png = shown == ImageFormat::kPng;

@@ -15,8 +15,6 @@
 namespace texmesh {
 namespace {
 
-constexpr int kGammas = 21;  // 0, 0.05 .. 1
-
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const Predictors& predictors,
            const Ladder& ladder, const Previews& previews, const LutOptions& options) {
   const auto fail = [](std::string place, std::string expected, std::string found) {
@@ -77,12 +75,11 @@ double least_quality(TextureRole role, const LutOptions& options) {
 }
 
 /// Everything that is copied or follows from the options.
-PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors,
-                        const PlaneLadder& ladder, std::uint32_t scales, const LutOptions& options) {
+PlaneTables start_plane(const TexturePlane& plane, const PlaneLadder& ladder, std::uint32_t scales,
+                        const LutOptions& options) {
   PlaneTables out;
   out.columns = plane.columns;
   out.rows = plane.rows;
-  out.scales = scales;
   out.incremental = codec_traits(ladder.codec).incremental;
   for (const LadderRung& rung : ladder.rungs) {
     out.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
@@ -103,11 +100,6 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.skip_dssim.resize(plane.fragment_count());
   out.covered_texels = plane.covered_texels;
   out.surface_fraction = plane.surface_fraction;
-  out.z = predictors.z;
-  out.i = predictors.i;
-  out.zeta = predictors.zeta;
-  out.m = predictors.m;
-  out.vqp = predictors.vqp;
   out.features = plane.features;
   for (std::uint32_t s = 0; s <= scales; ++s)
     out.quality.push_back(static_cast<float>(
@@ -131,26 +123,32 @@ std::vector<std::uint16_t> importance_order(const TexturePlane& plane) {
   return order;
 }
 
-/// D_i(Gamma): bytes of all fragments, each at the rung nearest to its q_i.
-std::vector<std::uint64_t> total_bytes(const PlaneTables& tables) {
-  std::vector<std::uint64_t> out;
-  for (std::uint32_t scale = 0; scale <= tables.scales; ++scale)
-    for (int g = 0; g < kGammas; ++g) {
-      const std::vector<float> quality = quality_of(tables, scale, g / 20.0);
-      std::uint64_t sum = 0;
-      for (std::uint16_t f : tables.order) sum += bytes_to_show(tables, nearest_rung(tables, quality[f]), f);
-      out.push_back(sum);  // with rd, too: that is what rungs_of() then spends
-    }
+/// What the thesis's policy reads of a plane whose tables are there.
+PlaneThesis describe_thesis(const PlanePredictors& predictors, const TexturePlane& plane,
+                            const PlaneLadder& ladder, const PlaneTables& tables) {
+  PlaneThesis out;
+  out.z = predictors.z;
+  out.i = predictors.i;
+  out.zeta = predictors.zeta;
+  out.m = predictors.m;
+  out.vqp = predictors.vqp;
+  out.quality = tables.quality;
+  for (std::size_t scale = 0; scale < tables.scale_count(); ++scale)
+    for (std::size_t g = 0; g < kGammaSteps; ++g)  // with rd, too: that is what rungs_of() then spends
+      out.total_bytes.push_back(bytes_asked_for(tables, scale, static_cast<double>(g) / (kGammaSteps - 1)));
+  out.model =
+      fit_size_model(ladder, plane.fragment_width_px, plane.fragment_height_px, tables, predictors.vqp);
   return out;
 }
 
 }  // namespace
 
-PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const Predictors& predictors, const Ladder& ladder, const Previews& previews,
-                           const LutOptions& options, const RunContext& context) {
+LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                       const Predictors& predictors, const Ladder& ladder, const Previews& previews,
+                       const LutOptions& options, const RunContext& context) {
   check(fragments, pixels, predictors, ladder, previews, options);
-  PackageTables out;
+  LutTables out;
+  std::vector<PlaneTables>& tables = out.tables.planes;
   std::vector<SamplePatch> skipped;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];  // a mip is skipped for its full-size plane's preview
@@ -158,25 +156,24 @@ PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>
   }
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-    out.planes.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],
-                                     static_cast<std::uint32_t>(fragments.scales), options));
-    out.planes[p].order = importance_order(fragments.planes[p]);
-    for (std::uint16_t f : out.planes[p].order) tasks.emplace_back(p, f);
+    tables.push_back(start_plane(fragments.planes[p], ladder.planes[p],
+                                 static_cast<std::uint32_t>(fragments.scales), options));
+    tables[p].order = importance_order(fragments.planes[p]);
+    for (std::uint16_t f : tables[p].order) tasks.emplace_back(p, f);
   }
   std::atomic<std::size_t> done{0};
   parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto [p, f] = tasks[t];
-      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, out.planes[p]);
+      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, tables[p]);
       context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
     }
   });
-  parallel_for(context, out.planes.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      out.planes[p].total_bytes = total_bytes(out.planes[p]);
-      const TexturePlane& plane = fragments.planes[p];
-      fit_size_model(ladder.planes[p], plane.fragment_width_px, plane.fragment_height_px, out.planes[p]);
-    }
+  out.thesis.planes.resize(tables.size());
+  parallel_for(context, tables.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p)
+      out.thesis.planes[p] =
+          describe_thesis(predictors.planes[p], fragments.planes[p], ladder.planes[p], tables[p]);
   });
   return out;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
@@ -12,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 7;
+inline constexpr int kLutVersion = 8;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>
@@ -50,19 +51,24 @@ struct LutOptions {
   }
 };
 
-/// The document `tables` of the package: quality and size of every fragment (thesis 3.3, 8.4). Streams are
-/// decoded again for it.
+/// Of all scales of the chain, by scale number; stage package takes the rows of those that it stores.
+struct LutTables {
+  PackageTables tables;
+  ThesisTables thesis;
+};
+
+/// Quality and size of every fragment (thesis 3.3, 8.4). Streams are decoded again for it.
 /// - Per rung and fragment: the exact bytes, the digest, MSE and 1 - SSIM over covered texels, of luma, or of
 ///   every channel of data.
 /// - Per fragment 1 - SSIM of the preview, scaled up bilinearly, for where no rung is shown.
-/// - Q_i, and D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not counted. With
-///   `allocate = rd` they are the bytes of log, which rungs_of() spends.
 /// - The order of falling importance: eta of scale 0, then surface, then index.
-/// - The size model (stages/lut/size_model.h).
+/// - Q_i, and for the thesis D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not
+///   counted. With `allocate = rd` they are the bytes of log, which rungs_of() spends.
+/// - For the thesis the predictors, and the size model (stages/lut/size_model.h).
 /// `pixels` are fill_planes()'s, `previews` make_previews()'s. Throws StageError for parts that do not fit
 /// each other, FormatError for a stream that does not decode. Same result for any thread count.
-PackageTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                           const Predictors& predictors, const Ladder& ladder, const Previews& previews,
-                           const LutOptions& options, const RunContext& context);
+LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                       const Predictors& predictors, const Ladder& ladder, const Previews& previews,
+                       const LutOptions& options, const RunContext& context);
 
 }  // namespace texmesh

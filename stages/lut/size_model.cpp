@@ -85,10 +85,10 @@ double constant_bytes(const PlaneLadder& ladder, std::uint32_t width_px, std::ui
   return kMarkers + kBytesOfBlock * blocks_of(ladder.rungs[0].table_stream, width_px, height_px);
 }
 
-void fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std::uint32_t height_px,
-                    PlaneTables& t) {
+SizeModel fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std::uint32_t height_px,
+                         const PlaneTables& t, const std::vector<float>& vqp) {
   const std::vector<std::size_t> modelled = modelled_rungs(ladder);
-  if (t.order.empty() || modelled.size() < 2) return;
+  if (t.order.empty() || modelled.size() < 2) return {};
   const auto stored = static_cast<double>(t.order.size());
   const double constant = constant_bytes(ladder, width_px, height_px) * stored;
   std::vector<double> quality, size, log_size;
@@ -100,17 +100,18 @@ void fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std::uint
     size.push_back(bytes);
     log_size.push_back(portable::log(std::max(bytes - constant, 1.0)));
   }
-  for (const std::uint16_t f : t.order) predictor += static_cast<double>(t.vqp[f]) / stored;
+  for (const std::uint16_t f : t.order) predictor += static_cast<double>(vqp[f]) / stored;
   const Line line = least_squares(quality, log_size);
   double error = 0;
   for (std::size_t k = 0; k < size.size(); ++k)
     error += std::fabs(portable::exp(line.offset + line.slope * quality[k]) + constant - size[k]) / size[k];
-  t.model_a = static_cast<float>(portable::exp(line.offset));
-  t.model_r = static_cast<float>(portable::exp(line.slope));
-  t.model_b =
-      static_cast<float>(line.slope / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
-  t.model_correlation = static_cast<float>(line.correlation);
-  t.model_error = static_cast<float>(error / static_cast<double>(size.size()));
+  SizeModel model;
+  model.a = static_cast<float>(portable::exp(line.offset));
+  model.r = static_cast<float>(portable::exp(line.slope));
+  model.b = static_cast<float>(line.slope / portable::log(100 * std::clamp(predictor, kLeastPredictor, 1.0)));
+  model.correlation = static_cast<float>(line.correlation);
+  model.error = static_cast<float>(error / static_cast<double>(size.size()));
+  return model;
 }
 
 }  // namespace texmesh

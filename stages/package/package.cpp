@@ -5,10 +5,12 @@
 
 #include "format/base/box.h"
 #include "format/base/bytes.h"
+#include "format/base/clean_text.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
+#include "stages/gltf/glb_copyright.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -21,33 +23,6 @@ namespace {
 std::string plane_place(std::size_t plane) { return "texture plane " + std::to_string(plane); }
 
 Bytes to_bytes(const std::string& s) { return {s.begin(), s.end()}; }
-
-/// Source names are shown by tools, so bytes that are not UTF-8 and control characters become '?', and what
-/// is longer than `max_bytes` is cut at a character.
-std::string clean_text(const std::string& text, std::size_t max_bytes) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size();) {
-    const auto at = [&](std::size_t k) {
-      return i + k < text.size() ? static_cast<std::uint8_t>(text[i + k]) : 0u;
-    };
-    const unsigned c = at(0);
-    const std::size_t length = c < 0x80                ? 1
-                               : c >= 0xc2 && c < 0xe0 ? 2
-                               : c >= 0xe0 && c < 0xf0 ? 3
-                               : c >= 0xf0 && c < 0xf5 ? 4
-                                                       : 0;
-    bool good = length > 0 && (c >= 0x20 && c != 0x7f);
-    for (std::size_t k = 1; k < length; ++k) good = good && (at(k) & 0xc0) == 0x80;
-    // Overlong forms, surrogates and numbers past U+10FFFF show in the second byte.
-    good = good && !(c == 0xe0 && at(1) < 0xa0) && !(c == 0xed && at(1) > 0x9f) &&
-           !(c == 0xf0 && at(1) < 0x90) && !(c == 0xf4 && at(1) > 0x8f);
-    const std::string part = good ? text.substr(i, length) : "?";
-    if (out.size() + part.size() > max_bytes) break;
-    out += part;
-    i += good ? length : 1;
-  }
-  return out;
-}
 
 /// Stage results must belong together before anything is read from them by index.
 void check_inputs(const NestedScales& scales, const PerceptualValues& perceptual,
@@ -111,7 +86,7 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
     s.scale = file.scale;
     s.triangles = file.triangles;
     s.vertices = file.vertices;
-    s.glb.path = mesh_path(file.scale);
+    s.glb.path = file.glb.empty() ? kSplitStreamPath : mesh_path(file.scale);
     s.major = perceptual.major[k] != 0;
     s.error_max = static_cast<double>(nested.error_max);
     s.error_rms = static_cast<double>(nested.error_rms);
@@ -212,6 +187,19 @@ Bytes pack_rung(const LadderRung& rung, const PlaneTables& tables, std::size_t r
   return pack;
 }
 
+/// Rows of the manifest's scales in tables that have one for every scale of the chain.
+std::vector<std::size_t> stored_rows(const Manifest& manifest, const PackageTables& tables) {
+  std::vector<std::size_t> rows;
+  for (const ManifestScale& s : manifest.scales) {
+    rows.push_back(static_cast<std::size_t>(s.scale));
+    for (std::size_t p = 0; p < tables.planes.size(); ++p)
+      if (tables.planes[p].scale_count() <= rows.back())
+        fail(plane_place(p), "tables of scale " + std::to_string(s.scale),
+             std::to_string(tables.planes[p].scale_count()) + " scales");
+  }
+  return rows;
+}
+
 void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview, const PlaneTables& tables,
                          std::size_t plane, std::vector<PackageEntry>& entries) {
   const auto p = static_cast<std::uint32_t>(plane);
@@ -228,24 +216,38 @@ void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview,
   entries.push_back({table_streams_path(p), std::move(streams)});
 }
 
+/// What the source says, what the publisher says over it, and the title over both.
+About describe_object(const About& source, const PackageOptions& options) {
+  About over;
+  if (!options.meta.empty()) over = read_about(to_bytes(options.meta));
+  if (!options.title.empty()) over.title = options.title;
+  return merge_about(source, over);
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
-                                           const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
+                                           const PackageTables& tables, const ThesisTables& thesis,
+                                           const ScaleFiles& files, const MeasuredQuality& quality,
+                                           const Poster& poster, const About& source, double jnd,
                                            const std::string& provenance_json, const PackageOptions& options,
                                            const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
-  Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, options.title);
+  const About about = describe_object(source, options);
+  Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, about.title);
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
-  entries.push_back({kTablesPath, write_tables(tables)});
+  entries.push_back({kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)))});
+  if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
-  for (const ScaleFile& file : files.files) entries.push_back({mesh_path(file.scale), file.glb});
+  entries.push_back({kAboutPath, to_bytes(write_about(about))});
+  for (const ScaleFile& file : files.files)
+    if (!file.glb.empty())
+      entries.push_back({mesh_path(file.scale), with_copyright(file.glb, copyright_line(source))});
   if (!poster.file.empty()) {
     manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
     entries.push_back({kPosterPath, poster.file});

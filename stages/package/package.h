@@ -3,7 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/about.h"
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/measured_quality.h"
@@ -16,27 +18,30 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 3;
+inline constexpr int kPackageVersion = 4;
 
 struct PackageOptions {
-  std::string title;
+  std::string title, meta;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("title", s.title, "shown by viewers; nothing is taken from file names");
+    v("title", s.title, "shown by viewers, before any other title; nothing is taken from file names");
+    v("meta", s.meta, "about.json without what the source says, as one text; --meta FILE sets it");
   }
 };
 
 /// Describes the model in a manifest, packs every rung's fragments by importance, and lays out the container
 /// (format/documents/package_writer.h). Throws StageError when the stages' results do not belong together,
-/// FormatError when the title or a value breaks a rule of the format. A pure function of its inputs: nothing
-/// runs in parallel here. `provenance_json` is made by the pipeline (options, input digests, stage versions;
-/// no dates, hosts or paths).
-std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
-                                           const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const Previews& previews,
-                                           const PackageTables& tables, const ScaleFiles& files,
-                                           const MeasuredQuality& quality, const Poster& poster, double jnd,
-                                           const std::string& provenance_json, const PackageOptions& options,
-                                           const RunContext& context);
+/// FormatError when the title or a value breaks a rule of the format. `tables` and `thesis` have a row for
+/// every scale of the chain. A pure function of its inputs: nothing runs in parallel here. `source` is what
+/// the source says about itself: about.json is that with options.meta and options.title over it.
+/// asset.copyright of the scales' files is the source's own, so that they stay as they are when options.meta
+/// changes. `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates, hosts
+/// or paths).
+std::vector<std::uint8_t> assemble_package(
+    const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Image>& images,
+    const Fragments& fragments, const Ladder& ladder, const Previews& previews, const PackageTables& tables,
+    const ThesisTables& thesis, const ScaleFiles& files, const MeasuredQuality& quality, const Poster& poster,
+    const About& source,
+    double jnd, const std::string& provenance_json, const PackageOptions& options, const RunContext& context);
 
 }  // namespace texmesh

@@ -32,8 +32,8 @@ void add_texels(const PlaneTables& tables, std::optional<std::size_t> rung, Knot
   const std::vector<float> weights = surface_weights(tables);
   const std::size_t fragments = tables.fragment_count();
   for (std::size_t f = 0; f < fragments; ++f) {
-    const float skipped = tables.skip_dssim.empty() ? 1.f : tables.skip_dssim[f];
-    knot.dssim.push_back(static_cast<double>(rung ? tables.dssim[*rung * fragments + f] : skipped));
+    knot.dssim.push_back(
+        static_cast<double>(rung ? tables.dssim[*rung * fragments + f] : tables.skip_dssim[f]));
     knot.weight.push_back(static_cast<double>(weights[f]));
   }
 }

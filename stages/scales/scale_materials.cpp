@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "format/container/layout.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
@@ -42,13 +43,17 @@ float unit(float x) { return std::clamp(x, 0.0f, 1.0f); }
 /// Hands out texture and sampler indices, equal ones once.
 class TextureTable {
  public:
-  TextureTable(GlbWriter& writer, const std::vector<PreviewImage>& previews, std::array<bool, 2> has_uv)
+  TextureTable(GlbWriter& writer, const std::vector<PreviewImage>& previews, PreviewForm form,
+               std::array<bool, 2> has_uv)
       : writer_(writer), has_uv_(has_uv) {
     for (const PreviewImage& p : previews) {
       image_of_[p.image] = writer_.array("images").size();
-      const std::size_t view = writer_.add_view(p.bytes);
-      writer_.array("images").push_back(
-          {{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}, {"bufferView", view}});
+      Json image{{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}};
+      if (form == PreviewForm::kRelative && p.mime_type == std::string_view("image/jpeg"))
+        image["uri"] = "../" + preview_path(p.plane);
+      else
+        image["bufferView"] = writer_.add_view(p.bytes);
+      writer_.array("images").push_back(std::move(image));
     }
   }
 
@@ -165,7 +170,7 @@ std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previ
   for (std::size_t i = 0; i < fragments.planes.size(); ++i) {
     const TexturePlane& plane = fragments.planes[i];
     if (plane.role == TextureRole::kAlpha || plane.mip > 0) continue;
-    PreviewImage image{plane.image, "image/jpeg", previews.planes.at(i).file};
+    PreviewImage image{plane.image, static_cast<std::uint32_t>(i), "image/jpeg", previews.planes.at(i).file};
     for (std::size_t j = 0; j < fragments.planes.size(); ++j) {
       if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha ||
           fragments.planes[j].mip > 0)
@@ -180,8 +185,9 @@ std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previ
 }
 
 void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
-                     const std::vector<PreviewImage>& previews, bool has_uv0, bool has_uv1) {
-  TextureTable textures(writer, previews, {has_uv0, has_uv1});
+                     const std::vector<PreviewImage>& previews, PreviewForm form, bool has_uv0,
+                     bool has_uv1) {
+  TextureTable textures(writer, previews, form, {has_uv0, has_uv1});
   for (const Material& m : materials) writer.array("materials").push_back(material_json(m, textures, writer));
 }
 

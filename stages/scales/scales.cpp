@@ -154,8 +154,8 @@ std::string node_name(const Mesh& mesh, std::uint16_t part) {
   return parts_merged(mesh) ? "parts" : mesh.part_names.at(part);
 }
 
-Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_index) {
-  Json node{{"name", node_name(coding.mesh, part)}, {"mesh", mesh_index}};
+Json node_json(const ScaleCoding& coding, std::uint16_t part) {
+  Json node{{"name", node_name(coding.mesh, part)}};
   if (coding.positions_are_indices()) {
     const Vec3f origin = coding.position.origin;
     const float step = coding.position.step();
@@ -166,7 +166,8 @@ Json node_json(const ScaleCoding& coding, std::uint16_t part, std::size_t mesh_i
 }
 
 ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
-                      const std::vector<Material>& materials, const std::vector<PreviewImage>& previews) {
+                      const std::vector<Material>& materials, const std::vector<PreviewImage>& previews,
+                      PreviewForm form) {
   ScaleFile file;
   file.scale = scale.scale;
   GlbWriter writer;
@@ -174,6 +175,9 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   int open_part = -1;
   std::vector<ScalePrimitive> primitives = split_primitives(coding.mesh, scale, coding.position);
   const std::vector<std::string> merged_names = name_merged_parts(coding.mesh, primitives);
+  const std::size_t nodes = parts_merged(coding.mesh) ? 1 : coding.mesh.part_names.size();
+  for (std::size_t part = 0; part < nodes; ++part)
+    writer.array("nodes").push_back(node_json(coding, static_cast<std::uint16_t>(part)));
   for (ScalePrimitive& primitive : primitives) {
     const std::uint16_t part = primitive.part, material = primitive.material;
     CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco
@@ -184,7 +188,7 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
     file.vertices += coded.vertices;
     if (open_part != part) {
       open_part = part;
-      writer.array("nodes").push_back(node_json(coding, part, writer.array("meshes").size()));
+      writer.array("nodes").at(part)["mesh"] = writer.array("meshes").size();
       writer.array("meshes").push_back(
           {{"name", node_name(coding.mesh, part)}, {"primitives", Json::array()}});
       if (parts_merged(coding.mesh)) writer.array("meshes").back()["extras"]["partNames"] = merged_names;
@@ -200,7 +204,7 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
     throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid",
                      std::to_string(coding.position.bits) + " bits per coordinate collapse all");
   writer.set_fallback_buffer(fallback_bytes);
-  write_materials(writer, materials, previews, coding.write_uv[0], coding.write_uv[1]);
+  write_materials(writer, materials, previews, form, coding.write_uv[0], coding.write_uv[1]);
   file.glb = writer.finish();
   return file;
 }
@@ -228,15 +232,28 @@ VertexSplitCoding stream_coding(const ScaleCoding& coding, const std::vector<Mat
   return out;
 }
 
-/// Whether the stream's scales show the files' triangles. Files keep positions as they are where no grid is
-/// fine enough (slivers of 1e-12 of the size); the stream has none but its grid.
-bool shows_the_same(const std::vector<std::uint8_t>& stream, const std::vector<ScaleFile>& files) {
+/// What the stream says of a scale that has no file.
+ScaleFile count_streamed(const SplitStreamHead& head, int scale) {
+  const auto found = std::ranges::find(head.scales, scale, &SplitScale::scale);
+  return {scale, {}, found->triangles, found->wedges};
+}
+
+/// Whether the stream's scales show the triangles that files would. Files keep positions as they are where no
+/// grid is fine enough (slivers of 1e-12 of the size); the stream has none but its grid.
+bool shows_the_same(const std::vector<std::uint8_t>& stream, const NestedScales& scales,
+                    const std::vector<std::size_t>& kept, const QuantisationGrid& grid) {
   const SplitStreamHead head = read_split_head(stream);
-  return std::all_of(head.scales.begin(), head.scales.end(), [&](const SplitScale& s) {
-    return std::any_of(files.begin(), files.end(), [&](const ScaleFile& file) {
-      return file.scale == s.scale && file.triangles == s.triangles;
-    });
+  return std::ranges::all_of(kept, [&](std::size_t k) {
+    std::size_t triangles = 0;
+    for (const ScalePrimitive& p : split_primitives(scales.mesh, scales.scales[k], grid))
+      triangles += p.indices.size() / 3;
+    return count_streamed(head, scales.scales[k].scale).triangles == triangles;
   });
+}
+
+/// The kept scales that have files of their own.
+bool has_file(std::size_t kept_index, std::size_t kept_count, const Mesh& mesh, const ScaleFiles& files) {
+  return kept_index == 0 || kept_index + 1 == kept_count || files.stream.empty() || parts_merged(mesh);
 }
 
 void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
@@ -246,7 +263,7 @@ void write_stream(const ScaleCoding& coding, const NestedScales& scales, const s
   try {
     result.stream = write_split_stream(
         make_vertex_splits(scales, kept, stream_coding(coding, materials, images), context));
-    if (shows_the_same(result.stream, result.files)) return;
+    if (shows_the_same(result.stream, scales, kept, coding.position)) return;
     result.stream.clear();
     add_info(result.notes, "no-stream", "",
              "the scales have no vertex-split stream: triangles are too small for any grid");
@@ -313,18 +330,58 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   result.position_bits = coding.position.bits;
   result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
   result.position_error = largest_rounding(scales.mesh, coding.position);
+  write_stream(coding, scales, kept, materials, images, context, result);
   result.files.resize(kept.size());
-  parallel_for(context, kept.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
+  std::vector<std::size_t> written;  // indices into kept
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (has_file(i, kept.size(), scales.mesh, result))
+      written.push_back(i);
+    else
+      result.files[i] = count_streamed(read_split_head(result.stream), scales.scales[kept[i]].scale);
+  }
+  parallel_for(context, written.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t w = begin; w < end; ++w) {
+      const std::size_t i = written[w];
       ScaleCoding lit = coding;
       lit.frames = scale_frames(scales, kept[i], context);
-      result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files);
-      context.report(static_cast<double>(i + 1) / static_cast<double>(kept.size() + 1));
+      const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
+      result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
+      context.report(static_cast<double>(w + 1) / static_cast<double>(written.size() + 1));
     }
   });
   note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
-  write_stream(coding, scales, kept, materials, images, context, result);
   return result;
+}
+
+std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
+                                               const ScalesOptions& options) {
+  const auto grid = [](const SplitGrid& g) {
+    return QuantisationGrid{g.bits, {g.origin[0], g.origin[1], g.origin[2]}, g.range};
+  };
+  std::uint16_t materials = 0;
+  for (const std::uint16_t m : mesh.triangle_material) materials = std::max(materials, m);
+  ScaleCoding coding{mesh,
+                     options,
+                     {},
+                     {},
+                     {!mesh.uv0.empty(), !mesh.uv1.empty()},
+                     needs_fine_colours(mesh.colours),
+                     std::vector<bool>(materials + std::size_t{1}, false),
+                     {mesh.normals, {}}};
+  constexpr int kShortBits = 16;
+  const bool draco = options.mesh_codec == MeshCodec::kDraco;
+  if (draco || (options.mesh_codec != MeshCodec::kNone && head.position.bits <= kShortBits))
+    coding.position = grid(head.position);
+  if (draco)
+    for (const SplitAttribute& a : head.attributes)
+      if (a.kind == SplitKind::kUv0 || a.kind == SplitKind::kUv1)
+        coding.uv[a.kind == SplitKind::kUv1 ? 1 : 0] = grid(a.grid);
+  NestedScale scale;
+  scale.triangles = mesh.triangles;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) scale.triangle_source.push_back(t);
+  return write_scale(coding, scale, std::vector<Material>(materials + std::size_t{1}), {},
+                     PreviewForm::kEmbedded)
+      .glb;
 }
 
 }  // namespace texmesh

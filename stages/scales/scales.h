@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/model/model.h"
+#include "format/split/split_stream.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
@@ -13,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 6;
+inline constexpr int kScalesVersion = 7;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -56,11 +57,14 @@ struct ScalesOptions {
   }
 };
 
-/// Writes every kept scale as a GLB.
-/// - A node per part, a primitive per material in it. Above 256 parts there is one node for all: its mesh
-///   lists the names of those that are left in extras.partNames, and its vertices have feature ids.
+/// Writes all kept scales as a stream of vertex splits, and S_0 and the coarsest as GLBs. Every kept scale is a
+/// GLB where there is no stream, and where parts are merged, whose feature ids the stream does not have.
+/// - Node k is part k, without a mesh where the scale has no triangle of the part; a primitive per material in
+///   it. Above 256 parts there is one node for all: its mesh lists the names of those that are left in
+///   extras.partNames, and its vertices have feature ids.
 /// - The source's materials, with the previews of the planes as images (RGBA PNG where a material needs
-///   alpha). GLB image k is named "texture/<k>" for source image k.
+///   alpha): embedded in the coarsest, elsewhere as "../preview/PPP.jpg". A GLB image is named "texture/<k>"
+///   for source image k.
 /// - Positions are quantised on one grid for all scales, so shared vertices are bit-equal between scales.
 ///   Triangles with two corners in one place of the grid are left out, and a note says how many of S_0's.
 ///   Positions stay in the local frame (Mesh::origin is the manifest's).
@@ -80,5 +84,11 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
                         const std::vector<Material>& materials, const std::vector<Image>& images,
                         const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context);
+
+/// A mesh that lies on the grids of a stream's head (split_model), as the GLB that write_scales() would have
+/// written, but without images and with nameless materials: as many as its triangles count. Throws StageError
+/// when nothing is left on the grid.
+std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
+                                               const ScalesOptions& options);
 
 }  // namespace texmesh

@@ -51,7 +51,7 @@ void print_package(const std::string& path, double log_width) {
   };
   std::size_t fragments = 0;
   for (const PlaneTables& t : planes.tables) fragments += t.order.size();
-  const std::uint32_t middle = planes.tables[0].scales / 2;
+  const std::size_t middle = planes.tables[0].scale_count() / 2;
   const Curve rd = rate_distortion(planes, all.front().bytes * 0.5, all.back().bytes);
   std::string at;
   for (const std::size_t r : {std::size_t{3}, std::size_t{5}, std::size_t{7}})
@@ -85,7 +85,7 @@ void print_sizes(const std::string& path) {
   const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, {}, context);
   const Ladder other = encode_ladder(model.fragments, pixels, previews, {}, between, context);
   const Predictors predictors = predict_quality(model.fragments, pixels, {}, context);
-  const PackageTables tables =
+  const auto [tables, thesis] =
       build_tables(model.fragments, pixels, predictors, ladder, previews, {}, context);
   Errors at_rungs, inside, whole, without_knots;
   double correlation = 1, model_error = 0;
@@ -111,8 +111,8 @@ void print_sizes(const std::string& path) {
       whole.add(std::fabs(guess - real) / real);
       without_knots.add(std::fabs(plain_guess - real) / real);
     }
-    correlation = std::min(correlation, static_cast<double>(t.model_correlation));
-    model_error = std::max(model_error, static_cast<double>(t.model_error));
+    correlation = std::min(correlation, static_cast<double>(thesis.planes[p].model.correlation));
+    model_error = std::max(model_error, static_cast<double>(thesis.planes[p].model.error));
   }
   std::cout << fmt::format("{:<26} {:6.2f}   {}   {}   {}   {:7.4f} {:7.1f}\n", model_name(path),
                            100 * at_rungs.worst, inside.text(), whole.text(), without_knots.text(),

@@ -62,10 +62,8 @@ List list_of(const std::string& path) {
     const double weight = t.surface_fraction[fragment];
     // What a preview leaves is not in the tables as a mean squared error; as much worse as its SSIM says.
     const double lowest = t.mse[fragment],
-                 skip = t.skip_dssim.empty()
-                            ? 4 * lowest
-                            : lowest * std::max(1.0, static_cast<double>(t.skip_dssim[fragment]) /
-                                                         std::max(1e-3f, t.dssim[fragment]));
+                 skip = lowest * std::max(1.0, static_cast<double>(t.skip_dssim[fragment]) /
+                                                   std::max(1e-3f, t.dssim[fragment]));
     f.loss = {weight * skip};
     for (std::size_t r = 0; r < f.bytes.size(); ++r)
       f.loss.push_back(weight * t.mse[r * t.fragment_count() + fragment]);

@@ -127,7 +127,8 @@ Measured measure(const Fragments& fragments, const std::vector<std::size_t>& sho
   const Predictors predictors = predict_quality(fragments, pixels, {}, context);
   const Previews previews = make_previews(fragments, pixels, {}, context);
   const Ladder ladder = encode_ladder(fragments, pixels, previews, {}, options, context);
-  const PackageTables tables = build_tables(fragments, pixels, predictors, ladder, previews, {}, context);
+  const PackageTables tables =
+      build_tables(fragments, pixels, predictors, ladder, previews, {}, context).tables;
   return {fill_curve(tables, shown), mixed_means(fragments, shown, ladder, kMiddleRung),
           mixed_means(fragments, shown, ladder, kTopRung)};
 }

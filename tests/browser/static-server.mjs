@@ -6,7 +6,7 @@ import path from 'node:path';
 const kTypes = {
   '.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.mjs': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8',
   '.json': 'application/json', '.svg': 'image/svg+xml', '.wasm': 'application/wasm', '.jpg': 'image/jpeg',
-  '.webp': 'image/webp', '.png': 'image/png', '.glb': 'model/gltf-binary', '.texmesh': 'application/zip',
+  '.webp': 'image/webp', '.png': 'image/png', '.glb': 'model/gltf-binary', '.texmesh': 'application/vnd.texmesh+zip',
 };
 
 /** [first, end) of a Range header, null for none, 'bad' for one behind the end. */

@@ -9,6 +9,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/documents/about.h"
 #include "format/documents/index.h"
 #include "format/rules/allocation.h"
 #include "format/split/split_reader.h"
@@ -68,7 +69,13 @@ inline void fuzz_tables(Input input) {
   const Bytes once = write_tables(read_tables(input));
   require(write_tables(read_tables(once)) == once, "tables changed by being written twice");
   if (input[6] == 0 && input[7] == 0)
-    require(std::ranges::equal(once, input), "tables of 1.0 have a second form");
+    require(std::ranges::equal(once, input), "tables of this version have a second form");
+}
+
+inline void fuzz_thesis(Input input) {
+  const Bytes once = write_thesis(read_thesis(input).tables);
+  require(write_thesis(read_thesis(once).tables) == once,
+          "the thesis's tables changed by being written twice");
 }
 
 inline void fuzz_quality(Input input) {
@@ -76,10 +83,16 @@ inline void fuzz_quality(Input input) {
   require(read_quality(as_bytes(write_quality(table))) == table, "a quality table changed by being written");
 }
 
+inline void fuzz_about(Input input) {
+  const std::string json = write_about(read_about(input));
+  require(write_about(read_about(as_bytes(json))) == json, "about.json changed by being written twice");
+}
+
 inline void fuzz_package(Input input) {
   PackageReader reader(open_container(memory_source(input)));
   for (const EntryRef& e : reader.index()) reader.entry(e);
-  for (const ManifestScale& s : reader.manifest().scales) reader.scale_glb(s.scale);
+  for (const ManifestScale& s : reader.manifest().scales)
+    s.has_glb() ? reader.scale_glb(s.scale) : reader.split_prefix(s.scale);
   reader.quality();
   for (std::uint32_t p = 0; p < reader.textures().size(); ++p) {
     reader.preview(p);
@@ -87,7 +100,8 @@ inline void fuzz_package(Input input) {
     for (std::uint32_t r = 0; r < t.rung_count(); ++r)
       for (std::uint32_t f = 0; f < t.fragment_count(); ++f)
         if (reader.fragment_range(p, r, f).bytes > 0) reader.complete_fragment(p, r, f);
-    for (std::uint32_t k = 0; k <= t.scales; ++k)
+    reader.plane_thesis(p);
+    for (std::size_t k = 0; k < t.scale_count(); ++k)
       for (const float q : quality_of(t, k, mean_eta(t, k)))
         require(nearest_rung(t, q) < t.rung_count(), "no such rung");
   }
@@ -153,8 +167,9 @@ inline Bytes tagged(std::uint8_t kind, Input bytes) {
 
 /// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
 /// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader, 9 a vertex-split stream. Anything but an answer or a FormatError is a fault: it aborts.
-/// What is read must also be written again, unchanged where the format has one form only.
+/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables, 11 about.json. Anything but an answer or a
+/// FormatError is a fault: it aborts. What is read must also be written again, unchanged where the format has
+/// one form only.
 inline void read_format(std::span<const std::uint8_t> input) {
   using namespace detail;
   constexpr void (*kReaders[])(Input) = {fuzz_container,
@@ -166,7 +181,9 @@ inline void read_format(std::span<const std::uint8_t> input) {
                                          fuzz_package,
                                          fuzz_index_with_digests,
                                          fuzz_tables_with_digests,
-                                         fuzz_split_stream};
+                                         fuzz_split_stream,
+                                         fuzz_thesis,
+                                         fuzz_about};
   if (input.empty()) return;
   try {
     kReaders[input[0] % std::size(kReaders)](input.subspan(1));
@@ -192,6 +209,9 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
     corpus.push_back(tagged(5, reader.entry(kQualityPath)));
   }
   corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  corpus.push_back(tagged(10, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
+    "identifiers":[{"scheme":"doi","value":"1"}],"unit":{"name":"m","metres":1},"upAxis":"y",
+    "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")));
   for (const std::uint32_t n : {3u, 9u})
     corpus.push_back(tagged(9, write_split_stream(texmesh::testing::split_fixture(n).source)));
   return corpus;

@@ -48,7 +48,7 @@ inline Point uniform(const Planes& planes, std::size_t rung) {
 }
 
 /// Thesis or log at one scale, Q_i swept, Gamma = mean eta. A negative log_width: as the tables have it.
-inline Curve swept(Planes planes, std::uint8_t allocation, std::uint32_t scale, double log_width) {
+inline Curve swept(Planes planes, std::uint8_t allocation, std::size_t scale, double log_width) {
   Curve curve;
   for (double q = 1; q <= 100; q += 0.25) {
     std::vector<std::vector<std::int16_t>> rungs;

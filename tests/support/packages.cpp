@@ -80,11 +80,11 @@ TexturePlane make_plane() {
 
 PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   PlaneTables t;
-  t.columns = plane.columns, t.rows = plane.rows, t.scales = 1;
+  t.columns = plane.columns, t.rows = plane.rows;
   t.covered_texels = plane.covered_texels;
   t.surface_fraction = plane.surface_fraction;
   t.features = plane.features;
-  for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
+  t.skip_dssim = {0.75f, 0.75f, 0.75f, 0};
   t.order = {1, 2, 0};  // eta_0 = 0, 1, 0.5
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {
@@ -98,16 +98,20 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
       t.dssim.push_back(f < kStored ? 0.25f : 0);
     }
   }
-  for (std::uint32_t s = 0; s <= t.scales; ++s)
-    for (int g = 0; g <= 20; ++g) {
-      const auto quality = quality_of(t, s, g / 20.0);
-      std::uint64_t bytes = 0;
-      for (const std::uint16_t f : t.order)
-        bytes += t.size_bytes[nearest_rung(t, static_cast<double>(quality[f])) * kFragments + f];
-      t.total_bytes.push_back(bytes);
-    }
-  t.model_a = 300, t.model_b = 0.5f, t.model_r = 1.02f, t.model_correlation = 0.98f, t.model_error = 0.05f;
   return t;
+}
+
+/// Of scales 0 to 5; sizes of those between are made up.
+PlaneThesis make_thesis(const PlaneTables& t) {
+  PlaneThesis out;
+  for (auto* v : {&out.z, &out.i, &out.zeta, &out.m, &out.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
+  out.model = {300, 0.5f, 1.02f, 0.98f, 0.05f};
+  for (std::size_t scale = 0; scale <= 5; ++scale) {
+    out.quality.push_back(80 - 8 * static_cast<float>(scale));
+    for (int g = 0; g <= 20; ++g)
+      out.total_bytes.push_back(scale % 5 == 0 ? bytes_asked_for(t, scale / 5, g / 20.0) : 1000);
+  }
+  return out;
 }
 
 json make_provenance() {
@@ -133,6 +137,7 @@ void add_texture(PackageParts& p) {
   const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, {}, options, {}).planes.at(0);
   const PlanePreview preview = make_previews(fragments, pixels, {}, {}).planes.at(0);
   p.tables.planes = {make_tables(plane, ladder)};
+  p.thesis.planes = {make_thesis(p.tables.planes[0])};
   p.streams[preview_path(0)] = preview.file;
   for (std::uint32_t r = 0; r < 2; ++r) {
     const LadderRung& rung = ladder.rungs[r];
@@ -153,7 +158,9 @@ void add_texture(PackageParts& p) {
 }
 
 void add_scale(PackageParts& p, int scale, const Mesh& mesh) {
-  p.meshes[scale] = make_glb(mesh, p.streams[preview_path(0)]).glb();
+  GlbParts glb = make_glb(mesh, p.streams[preview_path(0)]);
+  if (scale == 0) name_previews(glb);  // the coarsest scale alone has them
+  p.meshes[scale] = glb.glb();
   ManifestScale s;
   s.scale = scale;
   s.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
@@ -234,6 +241,13 @@ GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg) {
   return g;
 }
 
+void name_previews(GlbParts& g) {
+  for (json& image : g.json["images"]) {
+    image.erase("bufferView");
+    image["uri"] = "../" + preview_path(0);
+  }
+}
+
 Mesh fine_mesh() { return sphere(6, 8); }
 
 Mesh coarse_mesh() {
@@ -266,8 +280,12 @@ Bytes PackageParts::build() const {
   const auto bytes_of = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(tables)});
+  if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
   entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
+  About said = about;
+  said.title = manifest.title;
+  entries.push_back({kAboutPath, bytes_of(write_about(said))});
   for (const auto& [scale, glb] : meshes) entries.push_back({mesh_path(scale), glb});
   for (const auto& [path, bytes] : streams) entries.push_back({path, bytes});
   return write_package(manifest, textures, entries);
@@ -305,11 +323,6 @@ PackagePatcher& PackagePatcher::edit(const std::string& path, const std::functio
 }
 
 void PackagePatcher::write_manifest_entry(Manifest m) {
-  const auto slice = [&](std::uint64_t offset, std::uint64_t bytes) {
-    return std::span<const std::uint8_t>(package_).subspan(static_cast<std::size_t>(offset),
-                                                           static_cast<std::size_t>(bytes));
-  };
-  m.first_picture_digest = sha256(slice(m.first_picture_offset, m.first_picture_bytes));
   std::string json = write_manifest(m);
   const std::size_t room = entry(kManifestPath).size();
   if (json.size() > room) throw std::runtime_error("the manifest grew");
@@ -321,9 +334,12 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
   Manifest m = manifest_;
   std::vector<EntryRef> index = read_index(entry(kIndexPath));
   for (EntryRef& e : index) e.digest = sha256(entry(e.path));
-  for (EntryRef* ref : std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.tables})
+  for (EntryRef* ref :
+       std::initializer_list<EntryRef*>{&m.textures, &m.quality, &m.provenance, &m.about, &m.tables})
     ref->digest = sha256(entry(ref->path));
-  for (ManifestScale& s : m.scales) s.glb.digest = sha256(entry(s.glb.path));
+  for (ManifestScale& s : m.scales)
+    if (s.has_glb()) s.glb.digest = sha256(entry(s.glb.path));
+  if (m.thesis) m.thesis->digest = sha256(entry(kThesisPath));
   if (change) change(index);
   Bytes written = write_index(index);
   patch(kIndexPath, written);

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
 
 namespace texmesh::testing {
@@ -23,6 +25,8 @@ struct GlbParts {
 /// A valid GLB of a mesh without compression: positions, UVs, indices; `jpeg` as image "texture/0" unless
 /// empty.
 GlbParts make_glb(const Mesh& mesh, const Bytes& jpeg);
+/// Gives the images the place of plane 0's preview in a package's tree.
+void name_previews(GlbParts& glb);
 
 /// The meshes of make_package_parts(): the coarser one has half of the finer one's triangles.
 Mesh fine_mesh();
@@ -34,8 +38,10 @@ struct PackageParts {
   Manifest manifest;
   std::vector<TextureInfo> textures;
   PackageTables tables;
+  ThesisTables thesis;  // of the chain S_0 to S_5; no planes: the package has none
   QualityTable quality;
   nlohmann::json provenance;
+  About about;  // but for the title, which is the manifest's
   std::map<int, Bytes> meshes;
   std::map<std::string, Bytes> streams;  // previews, table streams, rungs by path
   Bytes build() const;

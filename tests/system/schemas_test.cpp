@@ -12,10 +12,12 @@
 #include <valijson/schema_parser.hpp>
 #include <valijson/validator.hpp>
 
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
 #include "format/rules/allocation.h"
+#include "pipeline/about/meta.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
@@ -45,9 +47,11 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 using Reader = std::function<void(const std::string& document)>;
 const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> map{
-      {"manifest.v1", [](const std::string& s) { read_manifest(bytes_of(s)); }},
-      {"textures.v1", [](const std::string& s) { read_textures(bytes_of(s)); }},
-      {"quality.v1", [](const std::string& s) { read_quality(bytes_of(s)); }},
+      {"manifest.v2", [](const std::string& s) { read_manifest(bytes_of(s)); }},
+      {"about.v2", [](const std::string& s) { read_about(bytes_of(s)); }},
+      {"meta.v1", [](const std::string& s) { read_meta(s, "meta.json", "meta"); }},
+      {"textures.v2", [](const std::string& s) { read_textures(bytes_of(s)); }},
+      {"quality.v2", [](const std::string& s) { read_quality(bytes_of(s)); }},
       {"provenance.v1", [](const std::string& s) { read_provenance(bytes_of(s)); }},
       {"fragments.v1", [](const std::string& s) { read_fragment_index(bytes_of(s)); }},
       {"collection.v1", [](const std::string& s) { read_collection(s, "collection.json", {}); }},
@@ -140,6 +144,21 @@ TEST(Collection, ModelOptionsStandOverThoseOfTheCollection) {
   EXPECT_EQ(models[1].options->ssf.scales, 7);
 }
 
+TEST(Collection, WhatIsSaidOfTheNearerPlaceWinsFieldByField) {
+  const auto models = read_collection(
+      R"({"version":1,"about":{"licence":"CC0-1.0","creator":"all"},"patterns":[{"match":"*.ply","about":{"unit":"mm"}}],
+          "models":[{"input":"a.ply","about":{"creator":"one"}},{"input":"b.obj"}]})",
+      "c.json", {});
+  const auto about_of = [&](std::size_t i) {
+    return read_about(bytes_of(models.at(i).options->package.meta));
+  };
+  EXPECT_EQ(about_of(0).licence, "CC0-1.0");
+  EXPECT_EQ(about_of(0).creator, "one");
+  EXPECT_EQ(about_of(0).metres_per_unit, 0.001);
+  EXPECT_EQ(about_of(1).creator, "all");
+  EXPECT_EQ(about_of(1).metres_per_unit, 0);
+}
+
 TEST(Collection, NamesThePlaceOfAFault) {
   const auto place_of = [](const std::string& text) {
     try {
@@ -151,6 +170,8 @@ TEST(Collection, NamesThePlaceOfAFault) {
   };
   EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.glb","options":{"ssf":{"scales":99}}}]})"),
             "/models/0/options/ssf/scales");
+  EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a.glb","about":{"licence":"CC-BY-9.0"}}]})"),
+            "/models/0/about/licence");
   EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb"},{"input":"b/x.glb"}]})"),
             "/models/1/output");
   EXPECT_EQ(place_of(R"({"version":1,"models":[{"input":"a/x.glb","output":"k/../x.texmesh"}]})"),

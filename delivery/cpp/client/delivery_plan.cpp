@@ -49,29 +49,29 @@ void predict(PackageReader& package, double displayed_px, const FragmentList& li
   plan.flip = picture_flip(package.quality(), displayed_px, plan.scale, parts);
 }
 
-/// Bytes of a range that the first request has not brought yet.
-std::uint64_t beyond_bootstrap(std::uint64_t offset, std::uint64_t bytes) {
-  return offset >= kBootstrapBytes ? bytes : bytes - std::min(bytes, kBootstrapBytes - offset);
-}
-
-/// The table streams behind the previews, which the coarsest mesh has as its images.
-std::uint64_t table_stream_bytes(const Manifest& m) {
-  std::uint64_t before = m.scales.back().glb.bytes;
-  for (const ByteRange& preview : m.previews) before += preview.bytes;
-  return m.first_picture_bytes - std::min(before, m.first_picture_bytes);
+/// Bytes of begin .. end behind those that the first request has brought.
+std::uint64_t beyond_start(std::uint64_t begin, std::uint64_t end) {
+  return end - std::min(end, std::max(begin, kStartBytes));
 }
 
 /// What every delivery takes besides fragments.
 void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
-  plan.bootstrap_bytes = kBootstrapBytes;
-  plan.first_picture_bytes = beyond_bootstrap(m.scales.back().glb.offset, m.scales.back().glb.bytes);
-  // Index, tables, textures.json: asked for together with the first picture's end.
-  plan.table_bytes = table_stream_bytes(m);
-  for (const EntryRef& e : {static_cast<EntryRef>(m.index), static_cast<EntryRef>(m.tables), m.textures})
-    plan.table_bytes += beyond_bootstrap(e.offset, e.bytes);
+  const EntryRef& coarsest_glb = m.scales.back().glb;
+  plan.bootstrap_bytes = std::min(kStartBytes, m.provenance.offset + m.provenance.bytes);  // the last entry
+  plan.first_picture_bytes = beyond_start(coarsest_glb.offset, start_bytes(m));
+  // One range: index, textures.json, quality.json, table streams and tables.
+  plan.table_bytes = beyond_start(m.index.offset, m.tables.offset + m.tables.bytes);
   const bool coarsest = scale == m.scales.back().scale;
   for (const ManifestScale& s : m.scales)
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
+}
+
+/// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that one.
+double shown_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_s) {
+  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+  if (moved == 0) return static_cast<double>(plan.bootstrap_bytes) / std::max(1e-9, manifest_s - rtt_s);
+  const double moved_s = std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - rtt_s : moved;
+  return moved / std::max(1e-9, moved_s);
 }
 
 ListOptions list_options(const DeliveryRequest& request, int scale) {
@@ -95,11 +95,8 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   HtcOptions htc = request.htc;
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
   htc.rtt_s = request.network.rtt_s;
-  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
-  const double moved_s =
-      std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - request.network.rtt_s : moved;
   htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved / std::max(1e-9, moved_s);
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
   const TextureBudget budget = texture_for_budget(
       loss, list_options(request, scale),
       static_cast<std::uint64_t>(std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s));

@@ -48,10 +48,9 @@ void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const 
 void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& options, FragmentList& list) {
   const TextureLoss::Plane& losses = loss.plane(entry.plane);
   const PlaneTables& t = loss.package().tables().planes[entry.plane];
-  const std::uint32_t scale = std::min(static_cast<std::uint32_t>(std::max(options.scale, 0)), t.scales);
-  const std::vector<float> eta = eta_of(t, scale);
-  const std::vector<float> quality =
-      quality_of(t, scale, options.gamma < 0 ? mean_eta(t, scale) : options.gamma);
+  const std::size_t row = loss.package().scale_index(options.scale);
+  const std::vector<float> eta = eta_of(t, row);
+  const std::vector<float> quality = quality_of(t, row, options.gamma < 0 ? mean_eta(t, row) : options.gamma);
   const std::uint16_t low = limit_rung(t, options.quality_low, true),
                       high = limit_rung(t, options.quality_high, false);
   for (const std::uint16_t f : t.order) {

@@ -30,7 +30,7 @@ struct FragmentList {
 };
 
 struct ListOptions {
-  int scale = 0;
+  int scale = 0;                              // number of a scale of the package
   double displayed_px = 1000;                 // > 0: height of the object
   double gamma = -1;                          // of q_i(x, y); -1 = the mean of eta
   double quality_low = 5, quality_high = 97;  // limits, see HtcOptions::hard_limits

@@ -88,7 +88,7 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   out.coded.resize((t.rung_count() + 1) * fragments);
   for (const std::uint16_t f : t.order) {
     out.weight += static_cast<double>(out.weights[f]);
-    out.coded[f] = curve.coded(t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[f]));
+    out.coded[f] = curve.coded(static_cast<double>(t.skip_dssim[f]));
     for (std::size_t r = 0; r < t.rung_count(); ++r)
       out.coded[(r + 1) * fragments + f] = curve.coded(static_cast<double>(t.dssim[r * fragments + f]));
   }

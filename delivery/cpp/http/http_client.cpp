@@ -25,6 +25,7 @@ struct Transfer {
   HttpAnswer answer;
   std::uint64_t max_bytes = 0;
   std::optional<HttpRange> range;
+  std::optional<std::uint64_t> length;  // Content-Length
   const HttpOptions* options = nullptr;
   std::optional<Clock::time_point> sent, error_page;  // the request; the first byte of an answer of no use
   Clock::time_point moved{};                          // when a byte came last, or the request was sent
@@ -77,9 +78,12 @@ std::size_t receive_header(char* data, std::size_t size, std::size_t count, void
   std::string_view value;
   if (line.starts_with("HTTP/")) {  // of another answer after a redirect
     transfer.answer.etag.clear();
+    transfer.length = std::nullopt;
     transfer.answer.first = transfer.answer.last = transfer.answer.total = std::nullopt;
   } else if (starts_with_name(line, "content-range", value)) {
     read_content_range(value, transfer.answer);
+  } else if (starts_with_name(line, "content-length", value)) {
+    transfer.length = number(value);
   } else if (starts_with_name(line, "etag", value) && value.starts_with('"')) {
     transfer.answer.etag = std::string(value.substr(0, 200));
   } else if (starts_with_name(line, "retry-after", value)) {
@@ -163,7 +167,7 @@ void start_curl() {
 }
 
 /// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
-curl_slist* prepare(Transfer& transfer, const std::string& url, const std::string& if_range_etag) {
+curl_slist* prepare(Transfer& transfer, const std::string& url) {
   CURL* h = transfer.handle;
   const HttpOptions& options = *transfer.options;
   const std::optional<HttpRange>& range = transfer.range;
@@ -188,8 +192,6 @@ curl_slist* prepare(Transfer& transfer, const std::string& url, const std::strin
     const std::string asked = "Range: bytes=" + std::to_string(range->first) + "-" +
                               std::to_string(range->first + range->bytes - 1);
     headers = ::curl_slist_append(headers, asked.c_str());
-    if (!if_range_etag.empty())
-      headers = ::curl_slist_append(headers, ("If-Range: " + if_range_etag).c_str());
   }
   ::curl_easy_setopt(h, CURLOPT_HTTPHEADER, headers);
   return headers;
@@ -199,6 +201,7 @@ void conclude(Transfer& transfer, CURLcode rc) {
   HttpAnswer& answer = transfer.answer;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &answer.status);
   answer.complete = rc == CURLE_OK;
+  if (answer.status == 200) answer.total = transfer.length;
   curl_off_t sent_us = 0, first_us = 0, total_us = 0;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_PRETRANSFER_TIME_T, &sent_us);
   ::curl_easy_getinfo(transfer.handle, CURLINFO_STARTTRANSFER_TIME_T, &first_us);
@@ -213,6 +216,11 @@ void conclude(Transfer& transfer, CURLcode rc) {
 }
 
 }  // namespace
+
+bool is_same_file(const HttpAnswer& a, const std::string& etag, std::uint64_t total) {
+  if (!a.etag.empty() && !etag.empty()) return a.etag == etag;
+  return !a.total || total == 0 || *a.total == total;
+}
 
 bool may_retry(const HttpAnswer& a) {
   return a.problem != "cancelled" &&
@@ -278,7 +286,7 @@ HttpPool::HttpPool(const HttpOptions& options, int connections_per_server)
 HttpPool::~HttpPool() = default;
 
 void HttpPool::start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
-                     std::uint64_t max_bytes, const std::string& if_range_etag) {
+                     std::uint64_t max_bytes) {
   cancel(number);
   auto running = std::make_unique<State::Running>();
   Transfer& transfer = running->transfer;
@@ -286,7 +294,7 @@ void HttpPool::start(std::uint64_t number, const std::string& url, const std::op
   transfer.max_bytes = std::min(max_bytes, state_->options.max_whole_bytes);
   transfer.range = range;
   transfer.options = &state_->options;
-  running->headers = prepare(transfer, url, if_range_etag);
+  running->headers = prepare(transfer, url);
   ::curl_multi_add_handle(state_->multi, running->transfer.handle);
   state_->running[number] = std::move(running);
 }

@@ -31,13 +31,17 @@ struct HttpAnswer {
   std::string problem;
   std::vector<std::uint8_t> body;
   std::string etag;                                 // strong ones only
-  std::optional<std::uint64_t> first, last, total;  // of Content-Range
+  std::optional<std::uint64_t> first, last, total;  // of Content-Range; total of a 200: Content-Length
   bool complete = false;                            // the body ended as the server said it would
   bool too_long = false;     // more than asked for, or a whole file, was coming: the transfer was ended
   bool timed_out = false;    // silent, or slower than the options allow
   double retry_after_s = 0;  // as the server says, 0 = not
   double first_byte_s = 0, received_s = 0;  // from the request's last byte to the answer's first and last
 };
+/// Whether an answer is about the file that an answer with this strong ETag ("" = none) and total length (0 = not
+/// known) was about. ETags decide where both have one, otherwise lengths; what cannot be compared counts as
+/// the same.
+bool is_same_file(const HttpAnswer& answer, const std::string& etag, std::uint64_t total);
 /// Whether the request is worth another try.
 bool may_retry(const HttpAnswer& answer);
 /// The answer in a few words, for messages.
@@ -62,7 +66,7 @@ class HttpPool {
   /// server that knows ranges answers 206; on a 200 the transfer ends at once, and `body` is empty. The body
   /// of an error is not kept.
   void start(std::uint64_t number, const std::string& url, const std::optional<HttpRange>& range,
-             std::uint64_t max_bytes, const std::string& if_range_etag = "");
+             std::uint64_t max_bytes);
   void cancel(std::uint64_t number);  // no answer will come
   /// The answer so far of a request under way; gone with cancel().
   const HttpAnswer* so_far(std::uint64_t number) const;

@@ -14,8 +14,8 @@ constexpr std::uint64_t kJoinBytes = 4096;  // ranges so near to each other are 
 
 HttpSource::HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpLink> link, HttpAnswer first)
     : urls_(std::move(urls)), link_(std::move(link)) {
-  check_range(first, 0, kBootstrapBytes);
-  const std::uint64_t bytes = std::min(kBootstrapBytes, *total_);
+  check_range(first, 0, kStartBytes);
+  const std::uint64_t bytes = std::min(kStartBytes, *total_);
   if (first.complete && first.body.size() != bytes)
     throw FormatError(name(), "byte 0", std::to_string(bytes) + " bytes", std::to_string(first.body.size()));
   store(0, std::move(first.body));
@@ -127,7 +127,7 @@ void HttpSource::fetch(std::vector<Piece> pieces) {
 
 void HttpSource::start(std::size_t number, const Piece& p) {
   const std::uint64_t bytes = p.bytes - p.got.size();
-  link_->pool.start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes, etag_);
+  link_->pool.start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes);
 }
 
 bool HttpSource::accept(Piece& p, HttpAnswer& a) {
@@ -150,21 +150,21 @@ bool HttpSource::accept(Piece& p, HttpAnswer& a) {
     p.retries.emplace(link_->options);
     return false;
   }
-  if (a.status == 200)
-    throw FormatError(name(), "", "the file that reading began with",
-                      "status 200: it was replaced, or the server no longer answers ranges");
-  if (a.status == 416) throw FormatError(name(), place, "a longer file", "status 416");
+  if (a.status == 200 && is_same_file(a, etag_, *total_))
+    throw RangesEnded(name(), place, "an answer with status 206", "status 200: ranges are no longer answered");
+  if (a.status == 200 || a.status == 416) fail_replaced("status " + std::to_string(a.status));
   throw InputError(name(), place, "an answer with status 206", describe_answer(a));
+}
+
+void HttpSource::fail_replaced(const std::string& found) const {
+  throw FormatError(name(), "", "the file that reading began with", found + ": it was replaced, read it anew");
 }
 
 void HttpSource::check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
   const std::string place = "byte " + std::to_string(offset);
   if (!a.first) throw FormatError(name(), place, "a Content-Range", "none that can be read");
-  if (total_ && *a.total != *total_)
-    throw FormatError(name(), place, "a file of " + std::to_string(*total_) + " bytes",
-                      std::to_string(*a.total));
-  if (!etag_.empty() && !a.etag.empty() && a.etag != etag_)
-    throw FormatError(name(), place, "the file that reading began with", "another one (ETag)");
+  if (total_ && *a.total != *total_) fail_replaced(std::to_string(*a.total) + " bytes");
+  if (total_ && !is_same_file(a, etag_, *total_)) fail_replaced("ETag " + a.etag);
   if (*a.first != offset || *a.last != std::min(offset + bytes, *a.total) - 1)
     throw FormatError(name(), place, "the range that was asked for",
                       std::to_string(*a.first) + "-" + std::to_string(*a.last));

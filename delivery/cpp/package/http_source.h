@@ -9,15 +9,22 @@
 
 #include "delivery/cpp/package/http_link.h"
 #include "format/base/bytes.h"
+#include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/documents/entry_ref.h"
 
 namespace texmesh {
 
+/// A server that has answered ranges answers 200 for one, and the file is still the same.
+class RangesEnded : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// Reads ranges of a container from the first server that delivers them.
 class HttpSource final : public ByteSource {
  public:
-  /// `first`: the answer of urls[0] to a request for the first kBootstrapBytes, or a part of it.
+  /// `first`: the answer of urls[0] to a request for the first kStartBytes, or a part of it.
   HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpLink> link, HttpAnswer first);
   std::string name() const override { return shown_url(urls_.front()); }
   std::uint64_t size() override { return *total_; }
@@ -51,6 +58,7 @@ class HttpSource final : public ByteSource {
   /// Takes an answer. False: the piece is not complete and must be asked for again.
   bool accept(Piece& p, HttpAnswer& a);
 
+  [[noreturn]] void fail_replaced(const std::string& found) const;
   void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes);
 
   std::vector<std::string> urls_;

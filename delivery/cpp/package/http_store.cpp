@@ -60,7 +60,13 @@ class UrlStore final : public HttpStore {
   }
   Bytes read(const EntryRef& entry, std::uint64_t offset, std::uint64_t bytes) override {
     if (!container_ && !tree_) read_manifest();
-    if (container_) return container_->read(entry, offset, bytes);
+    if (container_) {
+      try {
+        return container_->read(entry, offset, bytes);
+      } catch (const RangesEnded&) {
+        if (!take_tree()) throw;
+      }
+    }
     if (offset > entry.bytes || bytes > entry.bytes - offset)
       throw FormatError(name(), "entry " + entry.path,
                         std::to_string(bytes) + " bytes from " + std::to_string(offset),
@@ -77,7 +83,11 @@ class UrlStore final : public HttpStore {
       std::vector<ByteRange> ranges;
       for (const EntryRef& e : entries)
         if (e.bytes <= most_entry_bytes(e.path)) ranges.push_back({e.offset, e.bytes});
-      source_->prefetch(std::move(ranges));
+      try {
+        source_->prefetch(std::move(ranges));
+      } catch (const RangesEnded&) {
+        if (!take_tree()) throw;
+      }
     } else if (tree_) {
       std::vector<HttpTree::Wanted> files;
       for (const EntryRef& e : entries)
@@ -130,16 +140,18 @@ class UrlStore final : public HttpStore {
       if (none || !retries.wait(last)) throw_problem(last);
     }
   }
+  /// A tree's manifest is a file of its own.
+  static std::uint64_t first_bytes(bool tree) { return tree ? kBootstrapBytes : kStartBytes; }
   void ask_first(std::size_t mirror) {
     const bool tree = is_tree(urls_[mirror]);
     link_->pool.start(mirror, tree ? urls_[mirror] + kManifestPath : urls_[mirror],
-                      HttpRange{0, kBootstrapBytes, tree}, kBootstrapBytes);
+                      HttpRange{0, first_bytes(tree), tree}, first_bytes(tree));
   }
   [[noreturn]] void throw_problem(const HttpAnswer& a) const {
     std::string names = shown_url(urls_.front());
     for (std::size_t m = 1; m < urls_.size(); ++m) names += ", " + shown_url(urls_[m]);
     if (a.too_long)
-      throw FormatError(names, "byte 0", "at most " + std::to_string(kBootstrapBytes) + " bytes", "more");
+      throw FormatError(names, "byte 0", "at most " + std::to_string(kStartBytes) + " bytes", "more");
     if (a.status == 416) throw FormatError(names, "byte 0", "a longer file", "status 416");
     throw InputError(names, "byte 0", "an answer with status 206", describe_answer(a));
   }
@@ -173,6 +185,22 @@ class UrlStore final : public HttpStore {
     tree_ = std::make_unique<HttpTree>(root, link_, place_.ranges);
     tree_->store(kManifestPath, manifest.body);
     return std::move(manifest.body);
+  }
+  /// After ranges have ended: the tree beside the container, where it is the same package.
+  bool take_tree() {
+    const std::string root = tree_beside(place_.url);
+    if (root.empty()) return false;
+    const Bytes known = container_->read_manifest();
+    link_->pool.start(0, root + kManifestPath, std::nullopt, kBootstrapBytes);
+    auto ended = link_->pool.wait(kRequestWait_s);
+    if (!ended || !ended->answer.complete || ended->answer.status != 200) return false;
+    if (ended->answer.body != known)
+      throw FormatError(shown_url(root), kManifestPath, "the package that reading began with",
+                        "another: it was replaced, read it anew");
+    container_.reset();
+    source_ = nullptr;
+    open_tree(root, std::move(ended->answer));
+    return true;
   }
   Bytes open_ranges(std::size_t mirror, HttpAnswer first) {
     std::vector<std::string> urls{urls_[mirror]};

@@ -25,10 +25,13 @@ class HttpStore : public PackageStore {
 };
 
 /// A package on a web server (SPEC.md, section Serving).
-/// - The first request is for 16 KiB. A range that was read is not asked for again.
+/// - The first request is for kStartBytes: manifest, first picture, and more. A range that was read is not
+///   asked for again.
 /// - A server that answers 200 for a range is asked for the tree beside the container (the URL without
 ///   .texmesh, plus /), and without a tree for the whole container. Entries of a tree are read by ranges
 ///   where the server knows ranges.
+/// - A server that stops answering ranges of the same file is asked for the tree, too, where its manifest has
+///   the same bytes.
 /// - A transfer that breaks is resumed where it broke. A try that brings new bytes begins the count of tries
 ///   again.
 /// InputError when the server does not deliver. FormatError when an answer cannot be true (other ranges or

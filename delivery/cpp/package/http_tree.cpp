@@ -40,11 +40,16 @@ void HttpTree::fetch(std::vector<Wanted> wanted) {
 void HttpTree::start(std::size_t number, const Wanted& w) {
   const std::uint64_t have = w.got.size();
   const HttpRange rest{have, w.max_bytes - have, true};  // all of it where it was replaced
-  link_->pool.start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes,
-                    w.etag);
+  link_->pool.start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes);
 }
 
 bool HttpTree::accept(Wanted& w, HttpAnswer& a) const {
+  if (a.status == 206 && !is_same_file(a, w.etag, 0)) {  // replaced meanwhile: all of it anew
+    w.got.clear();
+    w.etag.clear();
+    a.complete = a.too_long = false;  // worth another try
+    return false;
+  }
   if (a.status == 200) w.got.clear();
   if (a.status != 200 && (a.status != 206 || !a.first || *a.first != w.got.size())) return false;
   w.got.insert(w.got.end(), a.body.begin(), a.body.end());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
@@ -55,6 +56,13 @@ Bytes PackageReader::read_paged(const PagedRef& ref) {
   return bytes;
 }
 
+void PackageReader::require_minor(const std::string& path, int minor) const {
+  if (minor != manifest_.minor)
+    throw FormatError(store_->name(), path,
+                      "the manifest's minor version, " + std::to_string(manifest_.minor),
+                      std::to_string(minor));
+}
+
 void PackageReader::require_head(const PagedRef& ref, std::uint64_t head_bytes) const {
   if (ref.head_bytes != head_bytes)
     throw FormatError(store_->name(), "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
@@ -64,7 +72,9 @@ void PackageReader::require_head(const PagedRef& ref, std::uint64_t head_bytes) 
 const std::vector<EntryRef>& PackageReader::index() {
   if (index_) return *index_;
   const Bytes bytes = read_paged(manifest_.index);
-  require_head(manifest_.index, read_index_head(bytes).bytes);
+  const IndexHead head = read_index_head(bytes);
+  require_minor(kIndexPath, head.minor);
+  require_head(manifest_.index, head.bytes);
   std::vector<EntryRef> entries = read_index(bytes);
   const auto require_entry = [&](const EntryRef& ref) {
     const auto it = std::ranges::find(entries, ref.path, &EntryRef::path);
@@ -72,10 +82,19 @@ const std::vector<EntryRef>& PackageReader::index() {
       throw FormatError(store_->name(), "index entry " + ref.path, "what the manifest says of it",
                         it == entries.end() ? "none" : "another offset, size or digest");
   };
-  for (const EntryRef& ref :
-       {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality, manifest_.provenance})
+  for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
+                              manifest_.provenance, manifest_.about})
     require_entry(ref);
-  for (const ManifestScale& scale : manifest_.scales) require_entry(scale.glb);
+  for (const ManifestScale& scale : manifest_.scales)
+    if (scale.has_glb()) require_entry(scale.glb);
+  if (manifest_.thesis) require_entry(*manifest_.thesis);
+  if (manifest_.poster) require_entry(*manifest_.poster);
+  if (manifest_.stream) {
+    const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
+    if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
+      throw FormatError(store_->name(), std::string("index entry ") + kSplitStreamPath,
+                        "what the manifest says of it", it == entries.end() ? "none" : "another place");
+  }
   index_ = std::move(entries);
   return *index_;
 }
@@ -99,19 +118,7 @@ const std::vector<TextureInfo>& PackageReader::textures() {
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
       throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
   const std::size_t full = full_size_planes(textures);
-  const bool mips =
-      std::ranges::find(manifest_.required_features, kMipsFeature) != manifest_.required_features.end();
-  if (mips != (full < textures.size()))
-    throw FormatError(store_->name(), kTexturesPath, mips ? "mips, as the manifest requires" : "no mips",
-                      std::to_string(textures.size() - full));
-  if (manifest_.previews.size() != std::min(full, kMaxManifestPreviews))
-    throw FormatError(store_->name(), kManifestPath, "previews of the full-size planes",
-                      std::to_string(manifest_.previews.size()));
   resolve_textures(textures, index());
-  for (std::size_t p = 0; p < manifest_.previews.size(); ++p)
-    if (manifest_.previews[p] != ByteRange{textures[p].preview.offset, textures[p].preview.bytes})
-      throw FormatError(store_->name(), textures[p].preview.path, "the range that the manifest says",
-                        "another");
   textures_ = std::move(textures);
   return *textures_;
 }
@@ -123,6 +130,11 @@ void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
   if (tables.columns != texture.columns || tables.rows != texture.rows || !same_rungs)
     throw FormatError(store_->name(), plane_place(plane), "the grid and rungs of textures.json in tables.bin",
                       "others");
+  if (tables.scale_count() != manifest_.scales.size())
+    throw FormatError(store_->name(), plane_place(plane),
+                      "a row in tables.bin for each of the manifest's " +
+                          std::to_string(manifest_.scales.size()) + " scales",
+                      std::to_string(tables.scale_count()));
   if (tables.incremental != codec_traits(texture.codec).incremental)
     throw FormatError(store_->name(), plane_place(plane), "tables of the codec in textures.json", "others");
   const auto require_sum = [&](const EntryRef& ref, std::uint64_t sum) {
@@ -147,7 +159,9 @@ const PackageTables& PackageReader::tables() {
   if (!textures_) needed.push_back(manifest_.textures);
   store_->prefetch(needed);
   const Bytes bytes = read_paged(manifest_.tables);
-  require_head(manifest_.tables, read_tables_head(bytes).bytes);
+  const TablesHead head = read_tables_head(bytes);
+  require_minor(kTablesPath, head.minor);
+  require_head(manifest_.tables, head.bytes);
   PackageTables tables = read_tables(bytes);
   if (tables.planes.size() != manifest_.plane_count)
     throw FormatError(store_->name(), kTablesPath, std::to_string(manifest_.plane_count) + " planes",
@@ -170,14 +184,72 @@ const PackageTables& PackageReader::tables() {
   return *tables_;
 }
 
+const PlaneThesis* PackageReader::plane_thesis(std::size_t plane) {
+  if (!thesis_ && manifest_.thesis) thesis_ = read_thesis_entry();
+  return thesis_ && plane < thesis_->planes.size() ? &thesis_->planes[plane] : nullptr;
+}
+
+ThesisTables PackageReader::read_thesis_entry() {
+  ThesisFile file = read_thesis(read_all(*manifest_.thesis));
+  require_minor(kThesisPath, file.minor);
+  const auto require = [&](bool good, std::size_t plane, const char* expected) {
+    if (!good)
+      throw FormatError(store_->name(), std::string(kThesisPath) + ", " + plane_place(plane), expected,
+                        "others");
+  };
+  const auto last_scale = static_cast<std::size_t>(manifest_.scales.back().scale);
+  for (std::size_t p = 0; p < file.tables.planes.size(); ++p) {
+    const PlaneThesis& t = file.tables.planes[p];
+    require(p < textures().size(), p, "planes of the package");
+    require(t.z.empty() || t.z.size() == std::size_t{textures()[p].columns} * textures()[p].rows, p,
+            "predictors of the plane's fragments");
+    require(t.quality.empty() || t.quality.size() > last_scale, p, "sizes of all scales");
+  }
+  return std::move(file.tables);
+}
+
 const QualityTable& PackageReader::quality() {
-  if (!quality_) quality_ = read_quality(read_all(manifest_.quality));
+  if (quality_) return *quality_;
+  QualityTable table = read_quality(read_all(manifest_.quality));
+  const auto number_of = [](const ManifestScale& s) { return s.scale; };
+  if (!std::ranges::equal(table.scales, manifest_.scales, {}, {}, number_of))
+    throw FormatError(store_->name(), kQualityPath, "the manifest's scales", "others");
+  std::set<PlaneGroup> planes, found;
+  for (const TextureInfo& t : textures()) planes.insert(group_of(t.role));
+  for (const GroupLosses& g : table.groups) found.insert(g.group);
+  if (planes != found)
+    throw FormatError(store_->name(), kQualityPath, "the groups of the planes in textures.json", "others");
+  quality_ = std::move(table);
   return *quality_;
+}
+
+const About& PackageReader::about() {
+  if (!about_) about_ = read_about(read_all(manifest_.about));
+  return *about_;
 }
 
 Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
 
-Bytes PackageReader::scale_glb(int scale) { return read_all(scale_entry(scale)); }
+Bytes PackageReader::scale_glb(int scale) {
+  const ManifestScale& s = manifest_.scales[scale_index(scale)];
+  if (!s.has_glb())
+    throw InputError(store_->name(), mesh_path(scale), "a scale with a file of its own",
+                     "one that the stream alone has");
+  return read_all(s.glb);
+}
+
+Bytes PackageReader::split_prefix(int scale) {
+  const ManifestScale& s = manifest_.scales[scale_index(scale)];
+  if (s.has_glb() || !manifest_.stream)
+    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file", "scale " + std::to_string(scale));
+  Bytes bytes = store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0,
+                             s.glb.bytes);
+  const Sha256 digest = sha256(bytes);
+  if (digest != s.glb.digest)
+    throw FormatError(store_->name(), std::string("prefix of ") + kSplitStreamPath,
+                      "SHA-256 " + to_hex(s.glb.digest), to_hex(digest));
+  return bytes;
+}
 
 std::size_t PackageReader::scale_index(int scale) const {
   std::string known;

@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "format/container/container.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/documents/thesis_tables.h"
 #include "format/split/split_stream.h"
 
 namespace texmesh {
@@ -61,11 +63,19 @@ class PackageReader {
   const EntryRef& find(const std::string& path);  // FormatError when the index has no such entry
   const std::vector<TextureInfo>& textures();     // refs resolved
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()
-  const QualityTable& quality();
+  const QualityTable& quality();                  // of the manifest's scales and the planes' groups
+  const About& about();
+  /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of
+  /// it.
+  const PlaneThesis* plane_thesis(std::size_t plane);
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
-  std::vector<std::uint8_t> scale_glb(int scale);  // needs no index
+  /// The GLB of a scale, as it is stored; needs no index. InputError where the scale has none: then
+  /// split_prefix() has it. Images of all but the coarsest scale's may be relative URIs of previews.
+  std::vector<std::uint8_t> scale_glb(int scale);
+  /// The bytes of the vertex-split stream that hold a scale without a GLB: head and blocks, digest checked.
+  std::vector<std::uint8_t> split_prefix(int scale);
   /// Index into manifest().scales. Without such a scale: InputError that names the scales there are.
   std::size_t scale_index(int scale) const;
   const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }
@@ -88,6 +98,8 @@ class PackageReader {
   std::vector<std::uint8_t> read_all(const EntryRef& ref);
   std::vector<std::uint8_t> read_paged(const PagedRef& ref);
   void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
+  void require_minor(const std::string& path, int minor) const;
+  ThesisTables read_thesis_entry();
   void check_plane(std::size_t plane, const PlaneTables& tables);
   const TextureInfo& texture(std::uint32_t plane);
   std::unique_ptr<PackageStore> store_;
@@ -97,6 +109,8 @@ class PackageReader {
   std::optional<std::vector<TextureInfo>> textures_;
   std::optional<PackageTables> tables_;
   std::optional<QualityTable> quality_;
+  std::optional<ThesisTables> thesis_;
+  std::optional<About> about_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
   std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane

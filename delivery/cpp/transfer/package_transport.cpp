@@ -158,7 +158,7 @@ class HttpTransport final : public Transport {
     HttpRange range = place_of(open, part);
     const bool whole = mirror.tree && p.range.offset == 0 && range.bytes == p.entry.bytes;
     pool_.start(number_of(request, part), mirror.tree ? mirror.url + p.entry.path : mirror.url,
-                whole ? std::nullopt : std::optional(range), range.bytes, mirror.etag);
+                whole ? std::nullopt : std::optional(range), range.bytes);
   }
   /// Whether the part is complete now; otherwise the outcome says why not.
   bool store_part(Open& open, std::size_t part, HttpAnswer a, Outcome& outcome) {
@@ -190,17 +190,16 @@ class HttpTransport final : public Transport {
     outcome.problem = a.timed_out ? "timeout (" + describe_answer(a) + ")" : describe_answer(a);
     if (a.status == 200) {
       outcome.for_good = true;
-      outcome.problem = mirror.tree           ? "status 200: the server knows no ranges"
-                        : mirror.etag.empty() ? "status 200: the server knows no ranges"
-                                              : "status 200: the package was replaced by another";
+      outcome.problem = mirror.tree || is_same_file(a, mirror.etag, mirror.total)
+                            ? "status 200: the server knows no ranges"
+                            : "status 200: the package was replaced by another";
     }
     if (a.status == 429 || a.status >= 500 || (a.status == 0 && !a.timed_out))
       outcome.wait_s = std::max(kBusyWait_s, a.retry_after_s);
     return false;
   }
   static bool is_another(Mirror& mirror, const HttpAnswer& a) {
-    if ((!mirror.etag.empty() && !a.etag.empty() && mirror.etag != a.etag) ||
-        (mirror.total > 0 && mirror.total != *a.total))
+    if (!is_same_file(a, mirror.etag, mirror.total) || (mirror.total > 0 && mirror.total != *a.total))
       return true;
     mirror.total = *a.total;
     if (mirror.etag.empty()) mirror.etag = a.etag;

@@ -19,7 +19,7 @@ struct TransportOptions {
 /// Over HTTP, from one or more mirrors that serve the same package: URLs of containers (ranges) or, ending in
 /// a slash, of trees (ranges of an entry, the whole entry where that is asked for). InputError for anything
 /// that is no URL. Requests are tried once: transfer() asks elsewhere or again; what a cut answer has brought
-/// is kept until then. A container that is replaced meanwhile (If-Range, ETag, length), or that is not
+/// is kept until then. A container that is replaced meanwhile (ETag, length), or that is not
 /// answered in ranges, has failed for good.
 std::unique_ptr<Transport> open_transport(const std::vector<std::string>& mirrors,
                                           const TransportOptions& options = {});

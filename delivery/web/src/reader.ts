@@ -4,6 +4,7 @@ export { FormatError, InputError, TexmeshError } from './format/errors';
 export * from './format/manifest';
 export * from './format/layout';
 export * from './format/entry_paths';
+export * from './format/about';
 export * from './format/index_table';
 export * from './format/textures';
 export * from './format/tables';

@@ -115,11 +115,11 @@ function checkViewing(manifest: t.Manifest, v: Json): void {
 function checkTables(table: t.PlaneTables, v: Json): void {
   expectBits(t.surfaceWeights(table), v.surface_weights, 'weights');
   for (const s of v.scales) {
-    expectBits(t.etaOf(table, s.scale), s.eta, 'eta');
+    expectBits(t.etaOf(table, s.row), s.eta, 'eta');
     for (const g of s.gammas) {
-      const gamma = g.gamma < 0 ? t.meanEta(table, s.scale) : g.gamma;
-      expectBits(t.qualityOf(table, s.scale, gamma), g.quality, 'quality');
-      expectBits(t.rungsOf(table, s.scale, gamma), g.rungs, 'rungs');
+      const gamma = g.gamma < 0 ? t.meanEta(table, s.row) : g.gamma;
+      expectBits(t.qualityOf(table, s.row, gamma), g.quality, 'quality');
+      expectBits(t.rungsOf(table, s.row, gamma), g.rungs, 'rungs');
     }
   }
   for (const [fragment, quality, bytes] of v.fragment_quality_bytes)

@@ -50,7 +50,7 @@ const tables = (more: Partial<PlaneTables> = {}): PlaneTables => ({
 
 describe("the viewer's plots", () => {
   it('of scales ask by each rule for triangles of a scale, for no fewer on a larger display', async () => {
-    const { manifest } = await PackageReader.openBytes(golden('v1.1-scan'));
+    const { manifest } = await PackageReader.openBytes(golden('v2.0-scan'));
     const [x, ...rules] = stepData(manifest);
     expect(rules.length).toBe(3);
     expect(x).toEqual([...x].sort((a, b) => a - b));

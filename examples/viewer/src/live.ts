@@ -1,4 +1,4 @@
-import type { Manifest, PlaneTables, TextureInfo } from 'texmesh';
+import type { About, Manifest, PlaneTables, TextureInfo } from 'texmesh';
 
 /** One fragment's turn in the plan, as the time line shows it. Times in seconds since the load began. */
 export interface Turn {
@@ -27,6 +27,8 @@ export interface Live {
   tables: (PlaneTables | undefined)[];
   packageBytes: number;
   title: string;
+  /** Read when the first picture stands. */
+  about: About | null;
   phase: string;
   scale: number | null;
   displayedPx: number;
@@ -52,7 +54,7 @@ export interface Live {
 
 export function emptyLive(): Live {
   return {
-    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
+    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', about: null, phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
     firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedFlip: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
     rungs: new Map(), skipped: new Map(), turns: [], transfers: [], problem: '', problems: 0,
   };

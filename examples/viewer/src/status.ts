@@ -1,5 +1,6 @@
 import { readable } from './choices';
-import { byId } from './dom';
+import type { About } from 'texmesh';
+import { byId, make } from './dom';
 import * as format from './format';
 import type { Live } from './live';
 
@@ -25,14 +26,32 @@ function shortName(url: string): string {
   return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
 }
 
-function showTitle({ manifest, packageBytes }: Live, name: string): void {
+/** The attribution, and the licence as a link to where it can be read. Written once: a link under the pointer must stay. */
+let shownRights: About | null = null;
+function showRights(about: About | null): void {
+  if (about === shownRights) return;
+  shownRights = about;
+  const line = byId('rights');
+  const by = about?.attribution ?? about?.creator ?? '';
+  line.replaceChildren();
+  if (by !== '') line.append(by);
+  if (about?.licence) {
+    // Only http and https: the library has refused any other URL.
+    const licence = about.licenceUrl ? make('a', { href: about.licenceUrl, rel: 'license noopener noreferrer', target: '_blank' }, about.licence) : about.licence;
+    line.append(...(by === '' ? [licence] : [' · ', licence]));
+  }
+  line.hidden = line.childNodes.length === 0;
+}
+
+function showTitle({ manifest, textures: planes, packageBytes, about }: Live, name: string): void {
   byId('name').textContent = name;
   if (!manifest) return;
   const finest = manifest.scales[0];
-  const textures = manifest.previews.length;
+  const textures = planes.filter((p) => p.mip === 0).length;
   byId('subtitle').textContent = [
     finest ? `${format.count(finest.triangles)} triangles` : '', textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
     format.bytes(packageBytes)].filter(Boolean).join(' · ');
+  showRights(about);
   document.title = `${name} · texmesh`;
 }
 

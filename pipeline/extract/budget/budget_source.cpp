@@ -6,7 +6,7 @@
 
 #include "format/base/errors.h"
 #include "format/container/layout.h"
-#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "stages/data/coverage.h"
 
 namespace texmesh {
@@ -43,7 +43,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
       side_px(static_cast<std::uint32_t>(std::clamp(display_px, 64.0, 768.0))),
       textures(from, std::max(kTexelsPerByte * static_cast<double>(wishes.bytes), 65536.0), run) {
   context.progress = nullptr;
-  source = read_model({package.scale_glb(0), mesh_path(0)}, mesh_path(0), context);
+  source = read_model(scale_file(package, 0, context), mesh_path(0), context);
   const BoundingSphere sphere = sphere_of(source.mesh);
   light = normal_samples(source.mesh);
   extent = longest_side(source.mesh);

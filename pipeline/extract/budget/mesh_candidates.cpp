@@ -4,8 +4,9 @@
 
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
+#include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
-#include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/glb/scale_file.h"
 
 namespace texmesh {
 namespace {
@@ -41,7 +42,8 @@ DracoSteps MeshCandidates::steps_of(const MeshKey& key) const {
 }
 
 std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, const MeshKey& key) const {
-  auto file = std::make_unique<StandaloneGlb>(source_.package.scale_glb(scale), mesh_path(scale));
+  auto file = std::make_unique<StandaloneGlb>(scale_file(source_.package, scale, source_.context,
+                                                         StreamedNormals::kStreamed));
   const bool lit_anew = scale > 0 && !source_.light.places.empty();
   if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
     file->recode(steps_of(key), lit_anew ? &source_.light : nullptr, source_.context);
@@ -63,6 +65,7 @@ const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   if (!source_.request.recentre) file->move_to(m.origin);
+  file->set_about(about_within(source_.package.about(), source_.request.bytes / kAboutShare));
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
   c.windows = std::make_unique<LitViews>(c.mesh, source_.windows, source_.context);

@@ -13,6 +13,9 @@ namespace texmesh {
 /// images with alpha become PNG where JPEG would be taken.
 enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
 
+/// Of a file of so many bytes, one in this many may say what the object is (about_within()).
+inline constexpr std::uint64_t kAboutShare = 20;
+
 /// A standalone file's wishes: a number of bytes, or a scale and a rung, or what suits a displayed height.
 struct ExtractRequest {
   std::uint64_t bytes = 0;         // most bytes of the file, 0 = no limit

@@ -8,6 +8,7 @@
 #include "format/base/bounded_json.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "pipeline/about/gltf_about.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"
@@ -91,6 +92,7 @@ struct StandaloneGlb::Document {
 
 StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
     : entry_(other.entry_),
+      about_(other.about_),
       document_(std::make_unique<Document>(*other.document_)),
       fallback_bytes_(other.fallback_bytes_),
       level_node_(other.level_node_) {}
@@ -159,6 +161,27 @@ std::vector<std::uint32_t> StandaloneGlb::source_images() const {
   return out;
 }
 
+std::map<std::uint32_t, FileImageData> StandaloneGlb::images() const {
+  std::map<std::uint32_t, FileImageData> out;
+  for (const Json& image : document_->root.value("images", Json::array())) {
+    std::uint32_t source = 0;
+    if (!source_image_of(image, source) || !image.contains("bufferView")) continue;
+    const FileImage format = image.value("mimeType", "") == "image/png" ? FileImage::kPng : FileImage::kJpeg;
+    out[source] = {format, document_->views.at(number(image, "bufferView")).bytes};
+  }
+  return out;
+}
+
+MeshCodec StandaloneGlb::codec() const {
+  const auto uses = [&](const char* name) {
+    const Json used = document_->root.value("extensionsUsed", Json::array());
+    return std::find(used.begin(), used.end(), Json(name)) != used.end();
+  };
+  if (uses(kDraco)) return MeshCodec::kDraco;
+  if (uses(kMeshopt)) return MeshCodec::kMeshopt;
+  return uses("KHR_mesh_quantization") ? MeshCodec::kQuantized : MeshCodec::kNone;
+}
+
 void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
   if (!document_->root.contains("images")) return;
   std::vector<bool> webp(document_->root["images"].size());
@@ -169,6 +192,7 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
     if (found != images.end()) {
       image["mimeType"] = mime_type_of(found->second.format);
       image["bufferView"] = add_view(found->second.bytes);
+      image.erase("uri");
     }
     webp[k] = image.value("mimeType", "") == "image/webp";
   }
@@ -190,11 +214,7 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
   if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
 }
 
-bool StandaloneGlb::has_draco() const {
-  return document_->root.contains("extensionsUsed") &&
-         std::find(document_->root["extensionsUsed"].begin(), document_->root["extensionsUsed"].end(),
-                   Json(kDraco)) != document_->root["extensionsUsed"].end();
-}
+bool StandaloneGlb::has_draco() const { return codec() == MeshCodec::kDraco; }
 
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
   std::vector<DracoStream> streams;
@@ -239,28 +259,53 @@ void StandaloneGlb::begin_levels(double screen_coverage) {
   use_extension(kLod, false);
 }
 
+std::size_t StandaloneGlb::append_meshes(StandaloneGlb& other) {
+  Json& from = other.document_->root;
+  Json& to = document_->root;
+  const std::size_t view = document_->views.size(), accessor = to["accessors"].size(),
+                    mesh = to["meshes"].size();
+  for (Document::View& v : other.document_->views) {
+    if (v.meshopt) v.json["byteOffset"] = number(v.json, "byteOffset") + fallback_bytes_;
+    document_->views.push_back(std::move(v));
+  }
+  fallback_bytes_ += (other.fallback_bytes_ + 3) / 4 * 4;
+  for (const char* list : {"accessors", "meshes"})
+    for_each_key(from[list], "bufferView", [&](Json& index) { index = index.get<std::size_t>() + view; });
+  for (Json& a : from["accessors"]) to["accessors"].push_back(std::move(a));
+  for_each_primitive(from, [&](Json& primitive) {
+    for (Json& a : primitive["attributes"]) a = a.get<std::size_t>() + accessor;
+    if (primitive.contains("indices")) primitive["indices"] = number(primitive, "indices") + accessor;
+  });
+  for (Json& m : from["meshes"]) to["meshes"].push_back(std::move(m));
+  for (const char* list : {"extensionsUsed", "extensionsRequired"})
+    for (const Json& name : from.value(list, Json::array()))
+      use_extension(name.get<std::string>(), list == std::string("extensionsRequired"));
+  return mesh;
+}
+
+void StandaloneGlb::take_meshes(StandaloneGlb other) {
+  Json& root = document_->root;
+  root["accessors"] = root["meshes"] = Json::array();
+  fallback_bytes_ = 0;
+  append_meshes(other);
+  const Json& theirs = other.document_->root["nodes"];
+  if (theirs.size() > root["nodes"].size())
+    throw FormatError(entry_, "/nodes", std::to_string(theirs.size()) + " parts of " + other.entry_,
+                      std::to_string(root["nodes"].size()));
+  for (std::size_t k = 0; k < root["nodes"].size(); ++k) {
+    Json& node = root["nodes"][k];
+    node.erase("mesh");
+    if (k >= theirs.size() || !theirs[k].contains("mesh")) continue;
+    node["mesh"] = theirs[k]["mesh"];
+    root["meshes"].at(number(node, "mesh"))["name"] = node.value("name", "");
+  }
+}
+
 void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   for (const char* shared : {"materials", "textures", "samplers"})
     if (document_->root.value(shared, Json::array()) != coarser.document_->root.value(shared, Json::array()))
       throw FormatError(coarser.entry_, std::string("/") + shared, "those of " + entry_, "others");
-  const std::size_t view = document_->views.size(), accessor = document_->root["accessors"].size(),
-                    mesh = document_->root["meshes"].size(), node = document_->root["nodes"].size();
-  for (Document::View& v : coarser.document_->views) {
-    if (v.meshopt) v.json["byteOffset"] = number(v.json, "byteOffset") + fallback_bytes_;
-    document_->views.push_back(std::move(v));
-  }
-  fallback_bytes_ += (coarser.fallback_bytes_ + 3) / 4 * 4;
-  const auto moved = [](std::size_t by) {
-    return [by](Json& index) { index = index.get<std::size_t>() + by; };
-  };
-  for (const char* list : {"accessors", "meshes"})
-    for_each_key(coarser.document_->root[list], "bufferView", moved(view));
-  for (Json& a : coarser.document_->root["accessors"]) document_->root["accessors"].push_back(std::move(a));
-  for_each_primitive(coarser.document_->root, [&](Json& primitive) {
-    for (Json& a : primitive["attributes"]) a = a.get<std::size_t>() + accessor;
-    if (primitive.contains("indices")) primitive["indices"] = number(primitive, "indices") + accessor;
-  });
-  for (Json& m : coarser.document_->root["meshes"]) document_->root["meshes"].push_back(std::move(m));
+  const std::size_t node = document_->root["nodes"].size(), mesh = append_meshes(coarser);
   for (Json& n : coarser.document_->root["nodes"]) {
     if (n.contains("mesh")) n["mesh"] = number(n, "mesh") + mesh;
     if (n.contains("children"))
@@ -276,9 +321,6 @@ void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   ids.push_back(document_->root["nodes"].size());
   document_->root["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
   document_->root["nodes"].push_back(level);
-  for (const char* list : {"extensionsUsed", "extensionsRequired"})
-    for (const Json& name : coarser.document_->root.value(list, Json::array()))
-      use_extension(name.get<std::string>(), list == std::string("extensionsRequired"));
 }
 
 void StandaloneGlb::move_to(Vec3d translation) {
@@ -290,6 +332,8 @@ void StandaloneGlb::move_to(Vec3d translation) {
   nodes = Json::array({document_->root["nodes"].size()});
   document_->root["nodes"].push_back(parent);
 }
+
+void StandaloneGlb::set_about(const About& about) { about_ = std::make_shared<const About>(about); }
 
 Bytes StandaloneGlb::finish() const {
   Json root = document_->root;
@@ -320,6 +364,7 @@ Bytes StandaloneGlb::finish() const {
     root["buffers"].push_back(
         {{"byteLength", fallback_bytes_}, {"extensions", {{kMeshopt, {{"fallback", true}}}}}});
 
+  if (about_) write_gltf_about(*about_, root);  // last: values of strangers must not be taken for indices
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
 }
 

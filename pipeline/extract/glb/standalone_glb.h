@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "format/documents/about.h"
 #include "pipeline/extract/glb/draco_recode.h"
 #include "pipeline/extract/glb/image_codecs.h"
+#include "stages/scales/scales.h"
 
 namespace texmesh {
 
@@ -25,9 +27,15 @@ class StandaloneGlb {
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
   std::vector<std::uint32_t> source_images() const;
+  /// Of these the images that are within the file.
+  std::map<std::uint32_t, FileImageData> images() const;
+  /// How the file codes its meshes.
+  MeshCodec codec() const;
   /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
   /// makes EXT_texture_webp a required extension.
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
+  /// Takes the meshes of another file of the same package, whose node k is this file's node k, for its own.
+  void take_meshes(StandaloneGlb other);
   /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
   void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
   bool has_draco() const;
@@ -44,15 +52,21 @@ class StandaloneGlb {
   /// Positions stay as they are. Nothing happens for {0, 0, 0}. After all levels of detail.
   void move_to(Vec3d translation);
 
+  /// What finish() writes of the object: asset.copyright, asset.extras, KHR_xmp_json_ld (write_gltf_about()).
+  void set_about(const About& about);
+
   /// The file; views in their first order, those that nothing uses left out. Same input, same bytes.
   std::vector<std::uint8_t> finish() const;
 
  private:
   struct Document;
   std::size_t add_view(std::vector<std::uint8_t> bytes);
+  /// Appends views, accessors and meshes; gives the index of the first mesh.
+  std::size_t append_meshes(StandaloneGlb& other);
   void use_extension(const std::string& name, bool required);
   void forget_extension(const std::string& name);
   std::string entry_;
+  std::shared_ptr<const About> about_;
   std::unique_ptr<Document> document_;
   std::uint64_t fallback_bytes_ = 0;
   std::size_t level_node_ = 0;

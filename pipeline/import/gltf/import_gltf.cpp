@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/about/gltf_about.h"
 #include "pipeline/import/finish_model.h"
 #include "pipeline/import/gltf/import_gltf_assembler.h"
 #include "pipeline/import/gltf/import_gltf_nodes.h"
@@ -41,16 +42,18 @@ class GltfReader {
   GltfReader(const Source& source, ByteSpan bytes, Model& model)
       : source_(source),
         container_(split_container(source, bytes)),
-        document_(checked(source, container_)),
+        document_(checked(source, container_, about_)),
         structure_(parse_structure(source, document_)),
         buffers_(source, document_, container_.bin),
         model_(model) {}
   void read();
   bool is_glb() const { return container_.is_glb; }
+  const About& about() const { return about_; }
 
  private:
-  static Json checked(const Source& source, const Container& container) {
+  static Json checked(const Source& source, const Container& container, About& about) {
     Json document = parse_json(source, container.json);
+    about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source.notes);
     check_document(source, document);
     return document;
   }
@@ -60,6 +63,7 @@ class GltfReader {
 
   const Source& source_;
   const Container container_;
+  About about_;
   const Json document_;
   const tinygltf::Model structure_;
   Buffers buffers_;
@@ -155,6 +159,7 @@ ImportedModel import_gltf(const std::string& file_name, std::span<const std::uin
   gltf::GltfReader reader(source, bytes, out.model);
   reader.read();
   out.format = reader.is_glb() ? "glb" : "gltf";
+  out.about = reader.about();
   out.normals_by_specification = true;
   finish_model(out.model, file_name, options);
   return out;

@@ -16,11 +16,17 @@ std::string string_of(const Json& object, const char* key) {
   return it == object.end() || it->is_null() ? std::string() : it->get<std::string>();
 }
 
-const Json* meshopt_extension(const Json& view) {
+/// Of either name; the name goes to `name`.
+const Json* meshopt_extension(const Json& view, std::string& name) {
   const auto e = view.find("extensions");
   if (e == view.end() || !e->is_object()) return nullptr;
-  const auto m = e->find("EXT_meshopt_compression");
-  return m == e->end() || m->is_null() ? nullptr : &*m;
+  for (const char* known : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+    const auto m = e->find(known);
+    if (m == e->end() || m->is_null()) continue;
+    name = known;
+    return &*m;
+  }
+  return nullptr;
 }
 
 MeshoptMode mode_of(const std::string& name) {
@@ -31,6 +37,7 @@ MeshoptMode mode_of(const std::string& name) {
 MeshoptFilter filter_of(const std::string& name) {
   if (name == "OCTAHEDRAL") return MeshoptFilter::kOctahedral;
   if (name == "QUATERNION") return MeshoptFilter::kQuaternion;
+  if (name == "COLOR") return MeshoptFilter::kColour;
   return name == "EXPONENTIAL" ? MeshoptFilter::kExponential : MeshoptFilter::kNone;
 }
 
@@ -103,10 +110,9 @@ ByteSpan Buffers::view(std::size_t index, const std::string& place) {
   if (index >= views_.size()) source_.fail(place, "an element of /bufferViews", std::to_string(index));
   const Json& declared = document_["bufferViews"][index];
   const std::string view_place = "/bufferViews/" + std::to_string(index);
-  if (const Json* extension = meshopt_extension(declared)) {
-    if (!views_[index]) {
-      views_[index] = decompressed(*extension, view_place + "/extensions/EXT_meshopt_compression");
-    }
+  std::string name;
+  if (const Json* extension = meshopt_extension(declared, name)) {
+    if (!views_[index]) views_[index] = decompressed(*extension, view_place + "/extensions/" + name);
     return *views_[index];
   }
   return range(declared["buffer"].get<std::size_t>(), size_of(declared, "byteOffset"),

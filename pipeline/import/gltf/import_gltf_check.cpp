@@ -15,9 +15,9 @@ constexpr double kMaxSize = 9007199254740991.0;  // 2^53 - 1
 constexpr double kMaxInt = 2147483647.0;         // tinygltf keeps some sizes as int
 constexpr std::size_t kMaxArray = 1'000'000;
 
-constexpr std::array<std::string_view, 6> kSupported{"KHR_draco_mesh_compression", "KHR_mesh_quantization",
-                                                     "EXT_meshopt_compression",    "KHR_texture_transform",
-                                                     "EXT_texture_webp",           "KHR_materials_unlit"};
+constexpr std::array<std::string_view, 7> kSupported{
+    "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression",
+    "KHR_texture_transform",      "EXT_texture_webp",      "KHR_materials_unlit"};
 
 bool supported(const std::string& name) {
   return find_material_extension(name) ||
@@ -199,7 +199,7 @@ void check_buffer_view(const Item& view) {
   if (view.has("byteStride") && view.value()["byteStride"].get<std::uint64_t>() % 4 != 0) {
     view.source().fail(view.place_of("byteStride"), "a multiple of 4", shown(view.value()["byteStride"]));
   }
-  view.extension("EXT_meshopt_compression", [](const Item& e) {
+  const auto check_meshopt = [](const Item& e, bool khronos) {
     e.required("buffer")
         .index("buffer", "buffers")
         .size("byteOffset")
@@ -207,7 +207,16 @@ void check_buffer_view(const Item& view) {
         .size("byteLength");
     e.required("byteStride").size("byteStride", 1, 256).required("count").size("count");
     e.required("mode").one_of("mode", {"ATTRIBUTES", "TRIANGLES", "INDICES"});
-    e.one_of("filter", {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"});
+    if (khronos)
+      e.one_of("filter", {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"});
+    else
+      e.one_of("filter", {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"});
+  };
+  view.extension("EXT_meshopt_compression", [&](const Item& e) { check_meshopt(e, false); });
+  view.extension("KHR_meshopt_compression", [&](const Item& e) {
+    if (view.value()["extensions"].contains("EXT_meshopt_compression"))
+      view.source().fail(view.place_of("extensions"), "one of EXT_ and KHR_meshopt_compression", "both");
+    check_meshopt(e, true);
   });
 }
 

@@ -1,7 +1,9 @@
 #include <meshoptimizer.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
@@ -14,7 +16,8 @@ void check_layout(const Source& source, const std::string& place, std::uint64_t 
     return std::to_string(count) + " elements of " + std::to_string(stride) + " bytes";
   };
   if (mode == MeshoptMode::kAttributes) {
-    const bool fits = filter == MeshoptFilter::kOctahedral ? stride == 4 || stride == 8
+    const bool fits = filter == MeshoptFilter::kOctahedral || filter == MeshoptFilter::kColour
+                          ? stride == 4 || stride == 8
                       : filter == MeshoptFilter::kQuaternion
                           ? stride == 8
                           : stride % 4 == 0 && stride >= 4 && stride <= 256;
@@ -29,12 +32,13 @@ void check_layout(const Source& source, const std::string& place, std::uint64_t 
 /// Fewest bytes that the codec spends on so many elements; a header that promises more is a lie, found
 /// out before anything is allocated. Attributes: 2 bits per 16 bytes of one column; triangles and
 /// indices: a byte each.
-std::uint64_t fewest_bytes(std::uint64_t count, std::uint64_t stride, MeshoptMode mode) {
+std::uint64_t fewest_bytes(ByteSpan data, std::uint64_t count, std::uint64_t stride, MeshoptMode mode) {
+  if (mode == MeshoptMode::kAttributes && is_attributes_v1(data)) return fewest_attribute_bytes_v1(count, stride);
   if (mode == MeshoptMode::kAttributes) return count / 64 * stride;
   return mode == MeshoptMode::kTriangles ? count / 3 : count;
 }
 
-// The filters are those of EXT_meshopt_compression, in scalar code: meshoptimizer's own use _mm_rsqrt_ps,
+// The filters are those of EXT_meshopt_compression and KHR_meshopt_compression, in scalar code: meshoptimizer's own use _mm_rsqrt_ps,
 // whose last bits differ between processors, and convert what hostile data makes infinite.
 
 template <class T>
@@ -87,6 +91,27 @@ void decode_exponential(std::uint8_t* at) {
   std::memcpy(at, &value, sizeof value);
 }
 
+/// Luma, two differences of colours and alpha, all of as many bits as alpha's highest one says: that bit is no
+/// part of alpha, which has one bit less than the others.
+template <class Unsigned, class Signed>
+void decode_colour(std::uint8_t* at) {
+  constexpr float kLargest = std::numeric_limits<Unsigned>::max();
+  Unsigned v[4];
+  std::memcpy(v, at, sizeof v);
+  const int y = v[0], co = static_cast<Signed>(v[1]), cg = static_cast<Signed>(v[2]), stored = v[3];
+  const int most = static_cast<int>(std::bit_ceil(static_cast<unsigned>(stored) + 1)) - 1;
+  const int alpha = (stored << 1 & most) | (stored & 1);
+  const float scale = most > 0 ? kLargest / static_cast<float>(most) : 0;
+  const auto whole = [&](int x) {
+    return static_cast<Unsigned>(std::fmin(std::fmax(static_cast<float>(x) * scale + 0.5f, 0.0f), kLargest));
+  };
+  v[0] = whole(y + co - cg);
+  v[1] = whole(y + cg);
+  v[2] = whole(y - co - cg);
+  v[3] = whole(alpha);
+  std::memcpy(at, v, sizeof v);
+}
+
 void apply_filter(std::vector<std::uint8_t>& bytes, std::uint64_t stride, MeshoptFilter filter) {
   const std::size_t step = filter == MeshoptFilter::kExponential ? 4 : stride;
   for (std::size_t at = 0; at < bytes.size(); at += step) {
@@ -106,6 +131,13 @@ void apply_filter(std::vector<std::uint8_t>& bytes, std::uint64_t stride, Meshop
       case MeshoptFilter::kExponential:
         decode_exponential(&bytes[at]);
         break;
+      case MeshoptFilter::kColour:
+        if (stride == 4) {
+          decode_colour<std::uint8_t, std::int8_t>(&bytes[at]);
+        } else {
+          decode_colour<std::uint16_t, std::int16_t>(&bytes[at]);
+        }
+        break;
     }
   }
 }
@@ -117,7 +149,7 @@ std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string
                                          MeshoptFilter filter) {
   check_layout(source, place, count, stride, mode, filter);
   if (count == 0) return {};
-  if (fewest_bytes(count, stride, mode) > data.size()) {
+  if (fewest_bytes(data, count, stride, mode) > data.size()) {
     source.fail(place, "data for " + std::to_string(count) + " elements",
                 std::to_string(data.size()) + " bytes");
   }
@@ -127,7 +159,9 @@ std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string
   int status = 0;
   switch (mode) {
     case MeshoptMode::kAttributes:
-      status = meshopt_decodeVertexBuffer(out.data(), count, stride, data.data(), data.size());
+      status = is_attributes_v1(data)
+                   ? !decode_attributes_v1(data, count, stride, out)
+                   : meshopt_decodeVertexBuffer(out.data(), count, stride, data.data(), data.size());
       break;
     case MeshoptMode::kTriangles:
       status = meshopt_decodeIndexBuffer(out.data(), count, stride, data.data(), data.size());

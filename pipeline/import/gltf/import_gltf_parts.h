@@ -64,7 +64,7 @@ tinygltf::Model parse_structure(const Source& source, const Json& document);
 // import_gltf_buffers.cpp
 
 /// The bytes behind bufferViews: the BIN chunk, data: URIs and files, read at first use,
-/// with EXT_meshopt_compression undone.
+/// with EXT_meshopt_compression or KHR_meshopt_compression undone.
 class Buffers {
  public:
   Buffers(const Source& source, const Json& document, std::optional<ByteSpan> bin);
@@ -87,11 +87,22 @@ class Buffers {
 // import_gltf_meshopt.cpp
 
 enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
-enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential };
-/// count * stride bytes. Throws InputError; allocates at most in proportion to `data`.
+enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential, kColour };
+/// count * stride bytes, of EXT_meshopt_compression or KHR_meshopt_compression: the latter adds version 1 of
+/// attribute streams and the filter of colours. Throws InputError; allocates at most in proportion to `data`.
 std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
                                          std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
                                          MeshoptFilter filter);
+
+// import_gltf_meshopt_attributes.cpp
+
+/// Whether the data say that they are version 1.
+bool is_attributes_v1(ByteSpan data);
+/// Fewest bytes that so many elements take.
+std::uint64_t fewest_attribute_bytes_v1(std::uint64_t count, std::uint64_t stride);
+/// Fills `out`, which has count * stride bytes; `stride` is a multiple of 4 from 4 to 256. False when the data
+/// are broken.
+bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride, std::vector<std::uint8_t>& out);
 
 // import_gltf_accessors.cpp
 

@@ -2,6 +2,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
+#include "pipeline/about/source_fields.h"
 #include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
@@ -110,6 +111,7 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
   if (data.faces.empty()) throw InputError(file_name, "", "faces", "none");
   ImportedModel out;
   out.format = "obj";
+  out.about = about_from_comments(obj_comments(text_of(bytes)), out.format, out.model.notes);
   add_obj_materials(data, file_name, out.model, resolver, options);
   out.model.mesh = build_mesh(data, out.model, options, context);
   out.model.mesh.part_names = data.parts;

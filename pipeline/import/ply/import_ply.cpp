@@ -1,4 +1,5 @@
 #include "format/base/errors.h"
+#include "pipeline/about/source_fields.h"
 #include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
@@ -149,8 +150,11 @@ ImportedModel import_ply(const std::string& file_name, std::span<const std::uint
                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
   PlySurface surface = read_ply_surface(file_name, bytes, options, context);
-  out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build();
   out.format = "ply";
+  Notes notes;
+  out.about = about_from_comments(surface.comments, out.format, notes);
+  out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build();
+  out.model.notes.insert(out.model.notes.end(), notes.begin(), notes.end());
   return out;
 }
 

@@ -110,12 +110,18 @@ Pixels decode(const std::string& name, std::vector<std::uint8_t> bytes) {
   return decode_image(probe_image(name, std::move(bytes), {}));
 }
 
-/// Scale files are whole: they refer to nothing outside.
-class NothingOutside : public Resolver {
+/// The files that scale files refer to: "../preview/003.jpg".
+class PreviewsOf : public Resolver {
  public:
-  std::optional<std::vector<std::uint8_t>> read(const std::string&, std::uint64_t) override {
+  explicit PreviewsOf(PackageReader& package) : package_(package) {}
+  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t) override {
+    for (std::uint32_t p = 0; p < package_.textures().size(); ++p)
+      if (uri == "../" + preview_path(p)) return package_.preview(p);
     return std::nullopt;
   }
+
+ private:
+  PackageReader& package_;
 };
 
 PaintedGrid grid_of(PackageReader& package, std::uint32_t plane) {
@@ -159,9 +165,9 @@ DebugView view_fragments(const ConditionedMesh& mesh, const std::vector<Material
 }
 
 DebugView view_fragments(PackageReader& package, const RunContext& context) {
-  NothingOutside nothing;
+  PreviewsOf previews(package);
   const std::string name = mesh_path(0);
-  const ImportedModel s0 = import_model(name, package.scale_glb(0), nothing, {}, context);
+  const ImportedModel s0 = import_model(name, package.scale_glb(0), previews, {}, context);
   std::vector<std::int32_t> grid_of_image(s0.model.images.size(), -1);
   std::vector<PaintedGrid> grids;
   for (std::size_t i = 0; i < s0.model.images.size(); ++i) {

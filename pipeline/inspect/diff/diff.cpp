@@ -34,15 +34,39 @@ class NamedDifferences {
   std::vector<Difference> all_;
 };
 
-std::vector<Difference> differences_of(const std::array<Provenance, 2>& p) {
+/// Fields of about.json by name, "identifier doi" by what it is of. What the source said verbatim is one
+/// field.
+void add_about(int side, const About& about, NamedDifferences& fields) {
+  const auto add_list = [&](const char* name, const std::vector<NamedText>& list) {
+    std::map<std::string, std::string> texts;
+    for (const NamedText& item : list) {
+      std::string& text = texts[std::string(name) + " " + item.name];
+      text += (text.empty() ? "" : "; ") + item.text;
+    }
+    for (auto& [key, text] : texts) fields.add(side, key, std::move(text));
+  };
+  for (NamedText& line : about_lines(about))
+    if (line.name != "identifier" && line.name != "date") fields.add(side, line.name, std::move(line.text));
+  add_list("identifier", about.identifiers);
+  add_list("date", about.dates);
+  for (const auto& [name, json] :
+       {std::pair{"what the source said", &about.source}, {"extras", &about.extras}})
+    if (!json->empty())
+      fields.add(side, name,
+                 to_hex(sha256({reinterpret_cast<const std::uint8_t*>(json->data()), json->size()})));
+}
+
+std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
+                                       const std::array<About, 2>& about) {
   NamedDifferences inputs(DifferenceKind::kInput), options(DifferenceKind::kOption),
-      stages(DifferenceKind::kStageVersion), libraries(DifferenceKind::kLibrary), tool(DifferenceKind::kTool),
-      format(DifferenceKind::kFormat);
+      fields(DifferenceKind::kAbout), stages(DifferenceKind::kStageVersion),
+      libraries(DifferenceKind::kLibrary), tool(DifferenceKind::kTool), format(DifferenceKind::kFormat);
   for (int side = 0; side < 2; ++side) {
     for (const Provenance::Input& i : p[side].inputs) inputs.add(side, i.uri, i.sha256, i.bytes);
     for (const auto& [stage, section] : p[side].options->items())
       if (section.is_object())
         for (const auto& [name, value] : section.items()) options.add(side, stage + "." + name, value.dump());
+    add_about(side, about[side], fields);
     for (const auto& [name, version] : p[side].stages) stages.add(side, name, std::to_string(version));
     for (const auto& [name, version] : p[side].libraries) libraries.add(side, name, version);
     tool.add(side, "tool", p[side].tool);
@@ -50,7 +74,7 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p) {
                std::to_string(p[side].format_major) + "." + std::to_string(p[side].format_minor));
   }
   std::vector<Difference> all;
-  for (const NamedDifferences* list : {&inputs, &options, &stages, &libraries, &tool, &format})
+  for (const NamedDifferences* list : {&inputs, &options, &fields, &stages, &libraries, &tool, &format})
     list->append_to(all);
   return all;
 }
@@ -63,6 +87,7 @@ std::string maker(const std::string& path) {
     case EntryKind::kPoster:
       return "poster";
     case EntryKind::kTables:
+    case EntryKind::kThesis:
       return "lut";
     case EntryKind::kQuality:
       return "quality";
@@ -152,6 +177,7 @@ class Causes {
       case DifferenceKind::kLibrary:
         return std::any_of(s.libraries.begin(), s.libraries.end(),
                            [&](const StageLibrary& l) { return l.name == d.name; });
+      case DifferenceKind::kAbout:
       case DifferenceKind::kTool:
       case DifferenceKind::kFormat:
         return s.name == "package";
@@ -188,7 +214,8 @@ PackageDiff diff_packages(PackageReader& a, PackageReader& b) {
   PackageDiff diff;
   diff.ids = {to_hex(a.id()), to_hex(b.id())};
   diff.differences = differences_of(
-      {read_provenance(a.entry(a.manifest().provenance)), read_provenance(b.entry(b.manifest().provenance))});
+      {read_provenance(a.entry(a.manifest().provenance)), read_provenance(b.entry(b.manifest().provenance))},
+      {a.about(), b.about()});
   compare_entries(a, b, diff);
   diff.stages = by_stage(diff);
   return diff;

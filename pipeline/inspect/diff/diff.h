@@ -12,10 +12,10 @@
 namespace texmesh {
 
 /// What packages can differ in.
-enum class DifferenceKind : std::uint8_t { kInput, kOption, kStageVersion, kLibrary, kTool, kFormat };
+enum class DifferenceKind : std::uint8_t { kInput, kOption, kAbout, kStageVersion, kLibrary, kTool, kFormat };
 template <>
 struct EnumNames<DifferenceKind> {
-  static constexpr std::array<std::string_view, 6> names{"input",   "option", "stage",
+  static constexpr std::array<std::string_view, 7> names{"input",   "option", "about", "stage",
                                                          "library", "tool",   "format"};
 };
 
@@ -23,7 +23,7 @@ struct EnumNames<DifferenceKind> {
 /// package has no such thing.
 struct Difference {
   DifferenceKind kind;
-  std::string name;                      // uri ("" = the model itself), "ladder.rungs", stage, library
+  std::string name;  // uri ("" = the model itself), "ladder.rungs", "licence", stage, library
   std::array<std::string, 2> values;     // digest, JSON text, version
   std::array<std::uint64_t, 2> bytes{};  // inputs only
 };
@@ -46,7 +46,7 @@ struct StageDifference {
 struct PackageDiff {
   std::array<std::string, 2> ids;        // package ids, hexadecimal
   std::array<std::uint64_t, 2> bytes{};  // of all entries
-  std::vector<Difference> differences;   // inputs, options, stage versions, libraries, tool, format
+  std::vector<Difference> differences;   // inputs, options, fields of about.json, versions ...
   std::vector<EntryDifference> entries;  // in A's order, then those that only B has
   std::vector<StageDifference> stages;   // in the order of the graph
   std::uint64_t equal_entries = 0;

@@ -38,7 +38,8 @@ std::string head_text(const PackageDiff& diff, const std::array<std::string, 2>&
 }
 
 std::string recorded_text(const PackageDiff& diff) {
-  if (diff.differences.empty()) return "recorded: inputs, options, stages, libraries and tool are the same\n";
+  if (diff.differences.empty())
+    return "recorded: inputs, options, what is said of the object, stages, libraries and tool are the same\n";
   TextTable table;
   for (const char* header : {"recorded", "what", "A", "B"}) table.column(header, Align::kLeft);
   for (const Difference& d : diff.differences)

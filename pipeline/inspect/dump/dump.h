@@ -17,11 +17,12 @@ enum class DumpPart : std::uint8_t {
   kLadder,
   kTables,
   kEntries,
+  kAbout,
   kProvenance,
   kAll
 };
-inline constexpr std::array<std::string_view, 8> kDumpParts{"summary", "scales",  "fragments",  "ladder",
-                                                            "tables",  "entries", "provenance", "all"};
+inline constexpr std::array<std::string_view, 9> kDumpParts{
+    "summary", "scales", "fragments", "ladder", "tables", "entries", "about", "provenance", "all"};
 
 /// A page about one part of a package for people: aligned tables, units in the headers, bytes in decimal
 /// units. With `gamma` (0..1) `tables` are at it instead of the default Gamma, with every fragment's

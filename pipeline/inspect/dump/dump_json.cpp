@@ -100,7 +100,7 @@ Json summary_json(PackageReader& p) {
           {"poster", poster_json(m)},
           {"textures", textures},
           {"bytes", kinds},
-          {"first_picture", {{"offset", m.first_picture_offset}, {"bytes", m.first_picture_bytes}}}};
+          {"start", {{"bytes", start_bytes(m)}, {"in_one_request", start_bytes(m) <= kStartBytes}}}};
 }
 
 Json scales_json(PackageReader& p) {
@@ -124,23 +124,27 @@ Json scales_json(PackageReader& p) {
   return {{"scales", list}};
 }
 
-Json fragment_json(const PlaneTables& t, std::size_t i, const std::vector<float>& eta) {
+Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t i,
+                   const std::vector<float>& eta) {
   Json bytes = Json::array(), features = Json::array();
   for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
-  for (std::size_t s = 0; s <= t.scales; ++s) features.push_back(t.features[s * t.fragment_count() + i]);
-  return {{"fragment", i},
-          {"column", i % t.columns},
-          {"row", i / t.columns},
-          {"covered_texels", t.covered_texels[i]},
-          {"surface_fraction", t.surface_fraction[i]},
-          {"eta", eta[i]},
-          {"vqp", t.vqp[i]},
-          {"z", t.z[i]},
-          {"i", t.i[i]},
-          {"zeta", t.zeta[i]},
-          {"m", t.m[i]},
-          {"features", features},
-          {"bytes", bytes}};
+  for (std::size_t row = 0; row < t.scale_count(); ++row)
+    features.push_back(t.features[row * t.fragment_count() + i]);
+  Json j{{"fragment", i},
+         {"column", i % t.columns},
+         {"row", i / t.columns},
+         {"covered_texels", t.covered_texels[i]},
+         {"surface_fraction", t.surface_fraction[i]},
+         {"eta", eta[i]},
+         {"features", features},
+         {"bytes", bytes}};
+  if (thesis && i < thesis->vqp.size())
+    j.update(Json{{"vqp", thesis->vqp[i]},
+                  {"z", thesis->z[i]},
+                  {"i", thesis->i[i]},
+                  {"zeta", thesis->zeta[i]},
+                  {"m", thesis->m[i]}});
+  return j;
 }
 
 Json fragments_json(PackageReader& p) {
@@ -150,7 +154,7 @@ Json fragments_json(PackageReader& p) {
     const PlaneTables& t = p.tables().planes[k];
     const std::vector<float> eta = eta_of(t, 0);
     Json fragments = Json::array();
-    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, i, eta));
+    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, p.plane_thesis(k), i, eta));
     planes.push_back({{"plane", k},
                       {"columns", info.columns},
                       {"rows", info.rows},
@@ -188,8 +192,8 @@ Json ladder_json(PackageReader& p) {
   return {{"ladder", planes}};
 }
 
-Json allocation_json(const PlaneTables& t, std::uint32_t scale, std::optional<double> gamma) {
-  const AllocationFigures f = allocation_figures(t, scale, gamma);
+Json allocation_json(const PlaneTables& t, int scale, std::size_t row, std::optional<double> gamma) {
+  const AllocationFigures f = allocation_figures(t, row, gamma);
   Json q = Json::array(), rungs = Json::array(), bytes = Json::array(), total = Json::array();
   for (std::size_t i = 0; i < t.fragment_count(); ++i) {
     const bool stored = f.fragment_rung[i] != kSkipped;
@@ -197,11 +201,32 @@ Json allocation_json(const PlaneTables& t, std::uint32_t scale, std::optional<do
     rungs.push_back(stored ? Json(f.fragment_rung[i]) : Json());
     bytes.push_back(stored ? Json(f.fragment_bytes[i]) : Json());
   }
-  for (std::size_t g = 0; g < kGammaSteps; ++g) total.push_back(t.total_bytes[scale * kGammaSteps + g]);
-  return {{"scale", scale},         {"quality", t.quality[scale]},
+  for (std::size_t g = 0; g < kGammaSteps; ++g)
+    total.push_back(bytes_asked_for(t, row, static_cast<double>(g) / (kGammaSteps - 1)));
+  return {{"scale", scale},         {"quality", t.quality[row]},
           {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
           {"total_bytes", total},   {"fragment_quality", q},
           {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
+}
+
+/// The size model, and D_i(Gamma) of all scales of the chain.
+Json thesis_json(const PlaneThesis& thesis) {
+  const SizeModel& model = thesis.model;
+  Json scales = Json::array();
+  for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
+    const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
+    scales.push_back({{"scale", s},
+                      {"quality", thesis.quality[s]},
+                      {"total_bytes",
+                       std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
+  }
+  return {{"size_model",
+           {{"a", model.a},
+            {"b", model.b},
+            {"r", model.r},
+            {"correlation", model.correlation},
+            {"error", model.error}}},
+          {"chain", scales}};
 }
 
 Json tables_json(PackageReader& p, std::optional<double> gamma) {
@@ -209,20 +234,16 @@ Json tables_json(PackageReader& p, std::optional<double> gamma) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
     Json scales = Json::array();
-    for (std::uint32_t s = 0; s <= t.scales; ++s) scales.push_back(allocation_json(t, s, gamma));
+    for (std::size_t row = 0; row < t.scale_count(); ++row)
+      scales.push_back(allocation_json(t, p.manifest().scales[row].scale, row, gamma));
     planes.push_back({{"plane", k},
                       {"allocation", allocation_name(t)},
                       {"quality_width", t.quality_width},
                       {"log_width", t.log_width},
                       {"quality_min", t.quality_min},
                       {"quality_max", t.quality_max},
-                      {"size_model",
-                       {{"a", t.model_a},
-                        {"b", t.model_b},
-                        {"r", t.model_r},
-                        {"correlation", t.model_correlation},
-                        {"error", t.model_error}}},
                       {"scales", scales}});
+    if (const PlaneThesis* thesis = p.plane_thesis(k)) planes.back()["thesis"] = thesis_json(*thesis);
   }
   return {{"tables", planes}, {"measured_quality", Json::parse(write_quality(p.quality()))}};
 }
@@ -240,6 +261,12 @@ Json entries_json(PackageReader& p) {
   list.push_back(entry_json(index.path, index.offset, index.bytes, to_hex(index.digest)));
   for (const EntryRef& e : p.index()) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
   return {{"entries", list}};
+}
+
+Json about_json(PackageReader& p) {
+  const auto bytes = p.entry(p.manifest().about);
+  read_about(bytes);
+  return {{"about", Json::parse(bytes.begin(), bytes.end())}};
 }
 
 Json provenance_json(PackageReader& p) {
@@ -262,6 +289,8 @@ Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
       return tables_json(p, gamma);
     case DumpPart::kEntries:
       return entries_json(p);
+    case DumpPart::kAbout:
+      return about_json(p);
     default:
       return provenance_json(p);
   }

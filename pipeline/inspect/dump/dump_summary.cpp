@@ -130,7 +130,7 @@ std::string options_text(const Provenance& provenance) {
 
 std::string scales_text(PackageReader& p) {
   TextTable table;
-  for (const char* header : {"scale", "triangles", "vertices", "kB", "major", "max error", "rms error",
+  for (const char* header : {"scale", "triangles", "vertices", "kB", "from", "major", "max error", "rms error",
                              "p95 [%]", "p99 [%]", "flip [px]", "jnd [px]", "error [px]", "edge [px]"})
     table.column(header);
   std::string floors;
@@ -138,7 +138,7 @@ std::string scales_text(PackageReader& p) {
     if (!s.floor.empty()) floors += fmt::format("S_{} is no coarser: {}\n", s.scale, printable(s.floor));
   for (const ManifestScale& s : p.manifest().scales)
     table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
-               kilobytes(s.glb.bytes), s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
+               kilobytes(s.glb.bytes), s.has_glb() ? "file" : "stream", s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
                percent(s.p95, 2), percent(s.p99, 2), pixels(s.display_px_flip), pixels(s.display_px_jnd),
                pixels(s.display_px_error), pixels(s.display_px_edge)});
   return "scales (errors in object units; px = displayed height up to which the scale is enough, by lit "
@@ -147,12 +147,29 @@ std::string scales_text(PackageReader& p) {
          table.text() + floors;
 }
 
+/// The first lines: what the object is and what may be done with it.
+static std::string about_head(const About& about) {
+  std::string s = about.title.empty() ? std::string() : printable(about.title) + "\n";
+  const auto add = [&s](const char* name, const std::string& text) {
+    if (!text.empty()) s += fmt::format("{:<10}{}\n", name, printable(text));
+  };
+  add("by", about.attribution.empty() ? about.creator : about.attribution);
+  add("licence", about.licence.empty() ? "not given" : about.licence);
+  for (const NamedText& line : about_lines(about))
+    if (line.name == "coordinate reference") add("crs", line.text);
+  const std::string up = about.up_axis.empty() ? "up axis not known" : about.up_axis + " is up";
+  add("unit", about.metres_per_unit > 0
+                  ? fmt::format("{}, {} m; {}", about.unit, shortest(about.metres_per_unit, 7), up)
+                  : "not known; " + up);
+  return s;
+}
+
 std::string summary_text(PackageReader& p) {
   const Manifest& m = p.manifest();
   const Provenance provenance = read_provenance(p.entry(m.provenance));
   const auto kinds = bytes_by_kind(m, p.store().read_manifest().size(), p.index());
   const Vec3d size = m.bounds_max - m.bounds_min;
-  std::string s = m.title.empty() ? std::string() : printable(m.title) + "\n";
+  std::string s = about_head(p.about());
   s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
                    printable(provenance.tool));
   s += fmt::format("origin    {}\nbounds    {}\n       to {}\nsize      {}   object units\n",
@@ -162,9 +179,9 @@ std::string summary_text(PackageReader& p) {
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
   s += fmt::format(
-      "start     {} kB show the object: manifest and index, then one range of {} bytes from {}\n\n",
-      kilobytes(m.first_picture_offset + m.first_picture_bytes), m.first_picture_bytes,
-      m.first_picture_offset);
+      "start     {} bytes from byte 0 show the object{}\n\n", grouped(start_bytes(m)),
+      start_bytes(m) <= kStartBytes ? ": one request of 64 KiB does"
+                                    : "; a client's first request, of 64 KiB, does not");
   return s + scales_text(p) + "\n" + stream_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" +
          kinds_text(kinds) + "\n" + options_text(provenance);
 }

@@ -52,6 +52,26 @@ std::string provenance_text(PackageReader& p) {
   return s + versions.text();
 }
 
+/// What the source said is JSON of strangers: escaped, so that a terminal sees no control characters.
+std::string verbatim_text(const char* title, const std::string& json) {
+  if (json.empty()) return "";
+  return fmt::format("\n{}\n{}\n", title,
+                     nlohmann::ordered_json::parse(json).dump(
+                         1, ' ', true, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+std::string about_text(PackageReader& p) {
+  const About& about = p.about();
+  TextTable table;
+  table.column("about", Align::kLeft);
+  table.column("", Align::kLeft);
+  const std::vector<NamedText> lines = about_lines(about);
+  for (const NamedText& line : lines) table.row({line.name, printable(line.text)});
+  return (lines.empty() ? "about: nothing is known\n" : table.text()) +
+         verbatim_text("what the publisher added", about.extras) +
+         verbatim_text("what the source said", about.source);
+}
+
 std::string part_text(PackageReader& p, DumpPart part, std::optional<double> gamma) {
   switch (part) {
     case DumpPart::kSummary:
@@ -66,6 +86,8 @@ std::string part_text(PackageReader& p, DumpPart part, std::optional<double> gam
       return tables_text(p, gamma);
     case DumpPart::kEntries:
       return entries_text(p);
+    case DumpPart::kAbout:
+      return about_text(p);
     default:
       return provenance_text(p);
   }

@@ -25,37 +25,40 @@ std::string eta_map(const PlaneTables& t, const std::vector<float>& eta) {
   return map;
 }
 
-std::string allocation_text(const PlaneTables& t, std::optional<double> gamma) {
+std::string allocation_text(const PlaneTables& t, const std::vector<ManifestScale>& scales,
+                            std::optional<double> gamma) {
   TextTable table;
   for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB",
                              "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
     table.column(header);
-  for (std::uint32_t s = 0; s <= t.scales; ++s) {
+  for (std::size_t s = 0; s < t.scale_count(); ++s) {
     const AllocationFigures f = allocation_figures(t, s, gamma);
-    std::vector<std::string> row{fmt::format("S_{}", s),   fixed(static_cast<double>(t.quality[s]), 1),
-                                 fixed(f.gamma, 3),        fixed(f.quality_min, 1),
-                                 fixed(f.quality_mean, 1), fixed(f.quality_max, 1),
+    std::vector<std::string> row{fmt::format("S_{}", scales[s].scale),
+                                 fixed(static_cast<double>(t.quality[s]), 1),
+                                 fixed(f.gamma, 3),
+                                 fixed(f.quality_min, 1),
+                                 fixed(f.quality_mean, 1),
+                                 fixed(f.quality_max, 1),
                                  kilobytes(f.bytes)};
-    for (std::size_t g = 0; g < kGammaSteps; g += 5)
-      row.push_back(kilobytes(t.total_bytes[s * kGammaSteps + g]));
+    for (const double g : {0.0, 0.25, 0.5, 0.75, 1.0}) row.push_back(kilobytes(bytes_asked_for(t, s, g)));
     table.row(std::move(row));
   }
   return table.text();
 }
 
 /// q_i(x, y) and d_i(x, y) of every stored fragment and scale at one Gamma.
-std::string gamma_text(const PlaneTables& t, double gamma) {
+std::string gamma_text(const PlaneTables& t, const std::vector<ManifestScale>& scales, double gamma) {
   TextTable table;
   table.column("fragment");
-  std::vector<AllocationFigures> scales;
-  for (std::uint32_t s = 0; s <= t.scales; ++s) {
-    table.column(fmt::format("q_{}", s));
-    table.column(fmt::format("d_{} B", s));
-    scales.push_back(allocation_figures(t, s, gamma));
+  std::vector<AllocationFigures> rows;
+  for (std::size_t s = 0; s < t.scale_count(); ++s) {
+    table.column(fmt::format("q_{}", scales[s].scale));
+    table.column(fmt::format("d_{} B", scales[s].scale));
+    rows.push_back(allocation_figures(t, s, gamma));
   }
   for (const std::uint16_t i : t.order) {
     std::vector<std::string> row{std::to_string(i)};
-    for (const AllocationFigures& f : scales) {
+    for (const AllocationFigures& f : rows) {
       row.push_back(fixed(static_cast<double>(f.fragment_quality[i]), 1));
       row.push_back(std::to_string(f.fragment_bytes[i]));
     }
@@ -65,6 +68,16 @@ std::string gamma_text(const PlaneTables& t, double gamma) {
              "  fragments by falling importance at Gamma {}: quality, 0 = skipped, and bytes at S_i\n",
              shortest(gamma)) +
          table.text();
+}
+
+std::string size_model_text(const PlaneThesis* thesis) {
+  if (!thesis || thesis->model == SizeModel{}) return "  no size model\n";
+  const SizeModel& model = thesis->model;
+  return fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
+                     shortest(static_cast<double>(model.a)), shortest(static_cast<double>(model.b)),
+                     shortest(static_cast<double>(model.r), 6),
+                     fixed(static_cast<double>(model.correlation), 4),
+                     percent(static_cast<double>(model.error)));
 }
 
 std::string fraction(float value) { return fixed(static_cast<double>(value), 4); }
@@ -122,6 +135,7 @@ std::string fragments_text(PackageReader& p) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& info = p.textures()[k];
     const PlaneTables& t = p.tables().planes[k];
+    const PlaneThesis* thesis = p.plane_thesis(k);
     const std::vector<float> eta = eta_of(t, 0);
     TextTable table;
     for (const char* header :
@@ -132,16 +146,17 @@ std::string fragments_text(PackageReader& p) {
     const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
     for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
       const std::size_t i = t.order[rank];
-      std::vector<std::string> row{std::to_string(rank),
-                                   std::to_string(i),
-                                   std::to_string(i % t.columns),
-                                   std::to_string(i / t.columns),
-                                   percent(t.covered_texels[i] / texels),
-                                   percent(static_cast<double>(t.surface_fraction[i]), 2),
-                                   fixed(static_cast<double>(eta[i]), 3),
-                                   fixed(static_cast<double>(t.vqp[i]), 3),
-                                   fixed(static_cast<double>(finest.fragment_quality[i]), 1),
-                                   std::to_string(finest.fragment_bytes[i])};
+      std::vector<std::string> row{
+          std::to_string(rank),
+          std::to_string(i),
+          std::to_string(i % t.columns),
+          std::to_string(i / t.columns),
+          percent(t.covered_texels[i] / texels),
+          percent(static_cast<double>(t.surface_fraction[i]), 2),
+          fixed(static_cast<double>(eta[i]), 3),
+          thesis && i < thesis->vqp.size() ? fixed(static_cast<double>(thesis->vqp[i]), 3) : std::string(),
+          fixed(static_cast<double>(finest.fragment_quality[i]), 1),
+          std::to_string(finest.fragment_bytes[i])};
       for (std::size_t r = 0; r < t.rung_count(); ++r)
         row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
       table.row(std::move(row));
@@ -189,20 +204,14 @@ std::string tables_text(PackageReader& p, std::optional<double> gamma) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
     s += plane_title(p.textures()[k], k);
-    if (t.model_r > 0)
-      s += fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
-                       shortest(static_cast<double>(t.model_a)), shortest(static_cast<double>(t.model_b)),
-                       shortest(static_cast<double>(t.model_r), 6),
-                       fixed(static_cast<double>(t.model_correlation), 4),
-                       percent(static_cast<double>(t.model_error)));
-    else
-      s += "  no size model: it needs two rungs\n";
+    s += size_model_text(p.plane_thesis(k));
     s += fmt::format(
         "  allocation {}, width {}, q within {} .. {}; D_i at {}, then by Gamma\n", allocation_name(t),
         shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
         shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)),
         gamma ? "the Gamma asked for" : "the default Gamma");
-    s += allocation_text(t, gamma) + (gamma ? gamma_text(t, *gamma) : "") + "\n";
+    s += allocation_text(t, p.manifest().scales, gamma) +
+         (gamma ? gamma_text(t, p.manifest().scales, *gamma) : "") + "\n";
   }
   return s + measured_text(p.quality());
 }

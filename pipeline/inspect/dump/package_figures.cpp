@@ -15,8 +15,8 @@ struct Kind {
   std::vector<EntryKind> kinds;
 };
 
-const std::array<Kind, 9>& kinds() {
-  static const std::array<Kind, 9> list{
+const std::array<Kind, 10>& kinds() {
+  static const std::array<Kind, 10> list{
       {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
        {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
        {"meshes", {EntryKind::kMesh}},
@@ -25,7 +25,9 @@ const std::array<Kind, 9>& kinds() {
        {"poster", {EntryKind::kPoster}},
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"source images", {EntryKind::kSource}},
-       {"provenance and others", {EntryKind::kProvenance, EntryKind::kOther}}}};
+       {"the thesis's tables", {EntryKind::kThesis}},
+       {"about, provenance and others",
+        {EntryKind::kAbout, EntryKind::kProvenance, EntryKind::kOther, EntryKind::kContentCredential}}}};
   return list;
 }
 
@@ -95,11 +97,11 @@ std::vector<RungFigures> rung_figures(const PlaneTables& t) {
 
 std::uint64_t stored_fragments(const PlaneTables& tables) { return tables.order.size(); }
 
-AllocationFigures allocation_figures(const PlaneTables& t, std::uint32_t scale, std::optional<double> gamma) {
+AllocationFigures allocation_figures(const PlaneTables& t, std::size_t row, std::optional<double> gamma) {
   AllocationFigures f;
-  f.gamma = gamma ? *gamma : mean_eta(t, scale);
-  f.fragment_quality = quality_of(t, scale, f.gamma);
-  f.fragment_rung = rungs_of(t, scale, f.gamma);
+  f.gamma = gamma ? *gamma : mean_eta(t, row);
+  f.fragment_quality = quality_of(t, row, f.gamma);
+  f.fragment_rung = rungs_of(t, row, f.gamma);
   f.fragment_bytes = bytes_of(t, f.fragment_rung);
   f.bytes = sum_of(f.fragment_bytes);
   if (t.order.empty()) return f;

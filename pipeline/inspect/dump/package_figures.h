@@ -39,7 +39,7 @@ struct RungFigures {
 std::vector<RungFigures> rung_figures(const PlaneTables& tables);
 std::uint64_t stored_fragments(const PlaneTables& tables);
 
-/// The texture quality that the tables ask for at one scale and Gamma.
+/// The texture quality that the tables ask for at the scale of a row and Gamma.
 struct AllocationFigures {
   double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;  // quality 0: skipped
   std::uint64_t bytes = 0;  // of the chosen rungs, table streams not counted
@@ -49,7 +49,7 @@ struct AllocationFigures {
   std::vector<std::uint32_t> fragment_bytes;
 };
 /// Without `gamma` (0..1): at the default one, the mean of eta.
-AllocationFigures allocation_figures(const PlaneTables& tables, std::uint32_t scale,
+AllocationFigures allocation_figures(const PlaneTables& tables, std::size_t row,
                                      std::optional<double> gamma = {});
 std::string allocation_name(const PlaneTables& tables);  // "thesis", "log" or "rd"
 

@@ -42,8 +42,14 @@ class Verifier {
     return guarded(findings_, "index", kIndexPath, [&] {
       const Bytes bytes = store_.read(package_.manifest.index);
       package_.index = read_index(bytes);
-      check_head(package_.manifest.index, bytes, read_index_head(bytes).bytes, "/index");
+      const IndexHead head = read_index_head(bytes);
+      check_minor(head.minor, kIndexPath);
+      check_head(package_.manifest.index, bytes, head.bytes, "/index");
     });
+  }
+
+  void check_minor(int minor, const char* entry) {
+    findings_.require_equal(package_.manifest.minor, minor, "version", entry, "minor version");
   }
 
   void check_head(const PagedRef& ref, const Bytes& bytes, std::uint64_t head_bytes,
@@ -64,11 +70,22 @@ class Verifier {
     guarded(findings_, "tables", kTablesPath, [&] {
       const Bytes bytes = store_.read(package_.manifest.tables);
       package_.tables = read_tables(bytes);
-      check_head(package_.manifest.tables, bytes, read_tables_head(bytes).bytes, "/tables");
+      const TablesHead head = read_tables_head(bytes);
+      check_minor(head.minor, kTablesPath);
+      check_head(package_.manifest.tables, bytes, head.bytes, "/tables");
+    });
+    guarded(findings_, "thesis", kThesisPath, [&] {
+      if (!package_.manifest.thesis) return;
+      const ThesisFile thesis = read_thesis(store_.read(*package_.manifest.thesis));
+      check_minor(thesis.minor, kThesisPath);
+      if (package_.tables) check_thesis(package_.manifest, *package_.tables, thesis.tables, findings_);
     });
     guarded(findings_, "quality", kQualityPath, [&] {
       const QualityTable quality = read_quality(store_.read(package_.manifest.quality));
       if (package_.textures) check_quality(package_.manifest, *package_.textures, quality, findings_);
+    });
+    guarded(findings_, "about", kAboutPath, [&] {
+      check_about(package_.manifest, read_about(store_.read(package_.manifest.about)), findings_);
     });
     guarded(findings_, "provenance", kProvenancePath, [&] {
       const Provenance provenance = read_provenance(store_.read(package_.manifest.provenance));

@@ -5,10 +5,12 @@
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/finding.h"
 #include "format/base/vec.h"
+#include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -22,26 +24,31 @@ struct Provenance;
 /// the step function.
 void check_manifest(const Manifest& manifest, Findings& findings);
 
-/// Every place that the manifest names (offset, bytes, digest) is where the index has it; previews
-/// and first picture.
+/// Every place that the manifest names (offset, bytes, digest) is where the index has it.
 void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
 
 /// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
 void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                     const PackageTables& tables, Findings& findings);
 
-/// One plane's tables in themselves: stored fragments, order, surface, D_i(Gamma) against a recomputation.
+/// One plane's tables in themselves: order, surface, covered texels.
 void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
                         Findings& findings);
+
+/// thesis.bin against what tables.bin says of the scales that are stored: fragments, Q_i, D_i(Gamma).
+void check_thesis(const Manifest& manifest, const PackageTables& tables, const ThesisTables& thesis,
+                  Findings& findings);
 
 /// Scales and groups are those of the package, S_0 loses nothing, and the manifest's switch sizes lie between
 /// the heights that were rendered.
 void check_quality(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                    const QualityTable& quality, Findings& findings);
+void check_about(const Manifest& manifest, const About& about, Findings& findings);
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 
-/// A GLB and what the manifest says about it. Returns its positions, sorted; none when the GLB is broken.
+/// A GLB and what manifest and index say about it and about the previews that it shows. Returns its positions,
+/// sorted; none when the GLB is broken. Textures without refs have not been found in the index.
 std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
                               Findings& findings);

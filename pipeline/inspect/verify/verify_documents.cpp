@@ -53,37 +53,6 @@ void check_steps(const Manifest& m, Findings& findings) {
   }
 }
 
-void check_previews(const Manifest& m, const std::map<std::string, const EntryRef*>& entries,
-                    Findings& findings) {
-  for (std::size_t k = 0; k < m.previews.size(); ++k) {
-    const auto it = entries.find(preview_path(static_cast<std::uint32_t>(k)));
-    if (it == entries.end()) {
-      findings.add("reference", kManifestPath, at("previews", k),
-                   "an entry " + preview_path(static_cast<std::uint32_t>(k)), "none");
-      continue;
-    }
-    const EntryRef& e = *it->second;
-    findings.require(
-        m.previews[k] == ByteRange{e.offset, e.bytes}, "reference", kManifestPath, at("previews", k),
-        std::to_string(e.bytes) + " bytes at " + std::to_string(e.offset),
-        std::to_string(m.previews[k].bytes) + " bytes at " + std::to_string(m.previews[k].offset));
-  }
-}
-
-/// The first picture is one range that holds the coarsest mesh, all previews and all table streams.
-void check_first_picture(const Manifest& m, const std::vector<EntryRef>& index, Findings& findings) {
-  const std::uint64_t begin = m.first_picture_offset, end = begin + m.first_picture_bytes;
-  for (const EntryRef& e : index) {
-    const EntryKind kind = parse_entry_path(e.path).kind;
-    const bool member =
-        e.path == m.scales.back().glb.path || kind == EntryKind::kPreview || kind == EntryKind::kTableStreams;
-    if (member)
-      findings.require(
-          e.offset >= begin && e.bytes <= end - begin && e.offset - begin <= end - begin - e.bytes,
-          "first-picture", kManifestPath, "/firstPicture", e.path + " inside the range", text_of(e));
-  }
-}
-
 }  // namespace
 
 void check_manifest(const Manifest& m, Findings& findings) {
@@ -110,6 +79,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   check(m.textures, "/textures");
   check(m.quality, "/quality");
   check(m.provenance, "/provenance");
+  check(m.about, "/about");
   if (m.stream) {
     const auto it = entries.find(kSplitStreamPath);
     if (it == entries.end())
@@ -120,10 +90,14 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
                        "reference", kManifestPath, "/stream", text_of(*it->second) + " as in the index",
                        std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
   }
+  if (m.thesis) check(*m.thesis, "/thesis");
   if (m.poster) check(*m.poster, "/poster");
-  for (std::size_t k = 0; k < m.scales.size(); ++k) check(m.scales[k].glb, at("scales/offset", k));
-  check_previews(m, entries, findings);
-  check_first_picture(m, index, findings);
+  for (std::size_t k = 0; k < m.scales.size(); ++k)
+    if (m.scales[k].has_glb()) check(m.scales[k].glb, at("scales/offset", k));
+}
+
+void check_about(const Manifest& m, const About& about, Findings& findings) {
+  findings.require_equal(about.title, m.title, "about", kManifestPath, "/title");
 }
 
 /// Switch sizes are heights that were rendered.
@@ -182,7 +156,7 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     return (*section)[name];
   };
   const auto title = option("package", "title");
-  if (title.is_string() && title != m.title)
+  if (title.is_string() && title != "" && title != m.title)
     findings.add("provenance", kProvenancePath, "/options/package/title", m.title + ", as the manifest",
                  title.get<std::string>());
   const auto jnd = option("perceptual_values", "jnd");

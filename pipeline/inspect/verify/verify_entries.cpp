@@ -23,6 +23,9 @@ void EntryVerifier::check_entry(const EntryRef& e) {
             [&] { check_split_stream(package_.manifest, store_.read(e), context_, findings_); });
   } else if (name.kind == EntryKind::kPoster) {
     guarded(findings_, "poster", e.path, [&] { check_poster_entry(e); });
+  } else if (name.kind == EntryKind::kThesis) {
+    findings_.require(package_.manifest.thesis.has_value(), "entry-set", e.path, "",
+                      "to be named by the manifest", "not there");
   } else if (name.kind == EntryKind::kSource) {
     guarded(findings_, "source", e.path, [&] { check_source_entry(e, name); });
   } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
@@ -38,8 +41,8 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
   const Bytes bytes = store_.read(e);
   const auto scale = std::find_if(package_.manifest.scales.begin(), package_.manifest.scales.end(),
                                   [&](const ManifestScale& s) { return s.scale == number; });
-  if (!findings_.require(scale != package_.manifest.scales.end(), "entry-set", e.path, "",
-                         "a scale of the manifest", "none"))
+  if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), "entry-set", e.path, "",
+                         "a file of a scale of the manifest", "none"))
     return;
   ++report_.meshes;
   std::vector<Vec3d> positions = check_mesh(

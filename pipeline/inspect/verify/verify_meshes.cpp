@@ -1,11 +1,40 @@
 #include <algorithm>
 #include <tuple>
 
+#include "format/container/layout.h"
 #include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/io/text_table.h"
 #include "stages/gltf/check_glb.h"
 
 namespace texmesh {
+
+namespace {
+
+/// The coarsest scale has the previews within it, others name them; a picture with alpha is no preview.
+void check_previews_of(const Manifest& m, const ManifestScale& scale,
+                       const std::vector<TextureInfo>& textures, const GlbFacts& facts, Findings& findings) {
+  const bool coarsest = scale.scale == m.scales.back().scale;
+  for (std::size_t k = 0; k < facts.image_names.size(); ++k) {
+    const auto plane = std::ranges::find_if(textures, [&](const TextureInfo& t) {
+      return t.role != "alpha" && t.mip == 0 && facts.image_names[k] == "texture/" + std::to_string(t.image);
+    });
+    if (plane == textures.end()) continue;  // has its finding
+    const auto number = static_cast<std::uint32_t>(plane - textures.begin());
+    const bool alpha = std::ranges::any_of(
+        textures, [&](const TextureInfo& t) { return t.role == "alpha" && t.image == plane->image; });
+    const std::string place = "/images/" + std::to_string(k), &uri = facts.image_uris[k];
+    const bool named = !coarsest && !alpha;
+    if (!findings.require(uri == (named ? "../" + preview_path(number) : ""), "mesh-images", scale.glb.path,
+                          place + "/uri", named ? "../" + preview_path(number) : "an image within the file",
+                          uri.empty() ? "none" : uri))
+      continue;
+    if (uri.empty() && !alpha && !plane->preview.path.empty())
+      findings.require_equal(to_hex(plane->preview.digest), to_hex(facts.image_digests[k]), "mesh-images",
+                             scale.glb.path, place);
+  }
+}
+
+}  // namespace
 
 std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
@@ -38,6 +67,7 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
                                  }),
                      "mesh-images", entry, "/images/" + std::to_string(k) + "/name",
                      "texture/<image> of textures.json", facts.image_names[k]);
+  check_previews_of(m, scale, textures, facts, findings);
   return std::move(facts.positions);
 }
 

@@ -61,6 +61,14 @@ void CheckedStore::check_stored(const std::string& path, const Bytes& bytes, std
   findings_.require_equal<std::uint64_t>(it->second->bytes, bytes.size(), "entry-set", path, "bytes");
 }
 
+/// It is the last entry: list() has seen to that.
+void CheckedStore::check_content_credential(const ContainerEntry& entry) {
+  report_.content_credential = true;
+  findings_.require(entry.bytes > 0 && entry.bytes <= kMaxContentCredentialBytes, "content-credential",
+                    entry.path, "", "1 to " + std::to_string(kMaxContentCredentialBytes) + " bytes",
+                    std::to_string(entry.bytes));
+}
+
 void CheckedStore::check_entry_set(const std::vector<EntryRef>& index) {
   if (listed_.empty()) return;  // "container" says why
   std::vector<std::string> named{kManifestPath, kIndexPath};
@@ -73,7 +81,9 @@ void CheckedStore::check_entry_set(const std::vector<EntryRef>& index) {
   for (const ContainerEntry& e : listed_) {
     const bool extra = store_.is_folder() && (parse_entry_path(e.path).kind == EntryKind::kFragmentFile ||
                                               e.path == kFragmentIndexPath);
-    if (!extra && !std::binary_search(sorted.begin(), sorted.end(), e.path))
+    if (e.path == kContentCredentialPath)
+      check_content_credential(e);
+    else if (!extra && !std::binary_search(sorted.begin(), sorted.end(), e.path))
       findings_.add("entry-set", e.path, "", "to be named by the index", "not there");
   }
   const std::vector<std::string> order = streaming_order(named);

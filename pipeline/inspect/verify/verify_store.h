@@ -32,6 +32,7 @@ class CheckedStore {
   bool contains(const std::string& path) const { return by_path_.contains(path); }
 
  private:
+  void check_content_credential(const ContainerEntry& entry);
   void check_stored(const std::string& path, const Bytes& bytes, std::uint64_t offset);
 
   PackageStore& store_;

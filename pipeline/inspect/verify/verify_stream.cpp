@@ -22,6 +22,20 @@ void check_head(const Manifest& m, std::span<const std::uint8_t> bytes, const Sp
                                         kSplitStreamPath, "end of the last block");
 }
 
+void check_scale(const ManifestScale& scale, const SplitScale& s, std::span<const std::uint8_t> stream,
+                 std::uint64_t prefix_bytes, Findings& findings) {
+  const std::string place = "scale " + std::to_string(s.scale);
+  findings.require_equal(scale.triangles, s.triangles, "split-stream", kSplitStreamPath, place + ", triangles");
+  if (scale.has_glb()) return;
+  findings.require_equal(scale.vertices, s.wedges, "split-stream", kSplitStreamPath, place + ", vertices");
+  if (!findings.require_equal(scale.glb.bytes, prefix_bytes, "reference", kManifestPath,
+                              place + ", bytes of its prefix"))
+    return;
+  const Sha256 digest = sha256(stream.first(static_cast<std::size_t>(prefix_bytes)));
+  findings.require_equal(to_hex(scale.glb.digest), to_hex(digest), "reference", kManifestPath,
+                         place + ", sha256 of its prefix");
+}
+
 }  // namespace
 
 void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, const RunContext& context,
@@ -39,8 +53,7 @@ void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, 
     const auto scale = std::ranges::find(m.scales, s.scale, &ManifestScale::scale);
     if (findings.require(scale != m.scales.end(), "split-stream", kSplitStreamPath, place,
                          "a scale of the manifest", "none"))
-      findings.require_equal(scale->triangles, s.triangles, "split-stream", kSplitStreamPath,
-                             place + ", triangles");
+      check_scale(*scale, s, bytes, split_prefix_bytes(head, s.scale), findings);
   }
 }
 

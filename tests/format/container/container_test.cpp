@@ -56,6 +56,23 @@ TEST(Container, RoundTripKeepsOrderBytesAndAlignment) {
   read_all(bytes);
 }
 
+TEST(Container, AContentCredentialIsTheLastEntryAndTheOnlyPathWithCapitals) {
+  auto files = small_files();
+  const Bytes unsigned_package = write(files);
+  files.emplace_back("META-INF/content_credential.c2pa", text("jumb"));
+  const Bytes bytes = write(files);
+  EXPECT_EQ(read(bytes).back().path, "META-INF/content_credential.c2pa");
+  // The entries before it keep their places.
+  const std::size_t end = read(bytes)[files.size() - 2].offset + read(bytes)[files.size() - 2].bytes;
+  EXPECT_TRUE(
+      std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end), unsigned_package.begin()));
+  std::swap(files[files.size() - 1], files[files.size() - 2]);
+  EXPECT_THROW(write(files), FormatError);
+  for (const char* path :
+       {"META-INF/content_credential.C2PA", "META-INF/other.c2pa", "meta-INF/content_credential.c2pa"})
+    EXPECT_FALSE(is_valid_entry_path(path)) << path;
+}
+
 TEST(Container, SameInputSameBytes) { EXPECT_EQ(write(small_files()), write(small_files())); }
 
 TEST(Container, DataOffsetPredictsTheWriter) {

@@ -33,19 +33,23 @@ TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
 }
 
 TEST(Layout, StreamingOrder) {
-  const std::vector<std::string> order{"manifest.json",         "index.bin",          "tables.bin",
-                                       "textures.json",         "quality.json",       "mesh/s09.glb",
-                                       "preview/000.jpg",       "preview/001.jpg",    "texture/0/tables.pack",
-                                       "texture/1/tables.pack", "poster.jpg",         "texture/0/r00.pack",
-                                       "texture/1/r00.pack",    "texture/0/r01.pack", "texture/1/r01.pack",
-                                       "mesh/s04.glb",          "texture/0/r02.pack", "texture/1/r02.pack",
-                                       "texture/0/r03.pack",    "mesh/s00.glb",       "extra/thing.bin",
-                                       "provenance.json"};
+  const std::vector<std::string> order{
+      "manifest.json",         "mesh/s09.glb",       "index.bin",          "textures.json",      "quality.json",
+      "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin",      "poster.jpg",         "about.json",
+      "preview/000.jpg",       "preview/001.jpg",    "texture/0/r00.pack", "texture/1/r00.pack",
+      "texture/0/r01.pack",    "texture/1/r01.pack", "mesh/s04.glb",       "texture/0/r02.pack",
+      "texture/1/r02.pack",    "texture/0/r03.pack", "mesh/s00.glb",       "extra/thing.bin",
+      "source/000.png",        "provenance.json",    "META-INF/content_credential.c2pa"};
   std::vector<std::string> shuffled = order;
   std::ranges::sort(shuffled);
   EXPECT_EQ(streaming_order(shuffled), order);
   std::ranges::reverse(shuffled);
   EXPECT_EQ(streaming_order(shuffled), order);
+  // The stream is the first of the other meshes.
+  EXPECT_EQ(streaming_order({"mesh/s00.glb", "mesh/s09.glb", "mesh/stream.bin", "texture/0/r00.pack",
+                             "texture/0/r01.pack", "manifest.json"}),
+            (std::vector<std::string>{"manifest.json", "mesh/s09.glb", "texture/0/r00.pack", "mesh/stream.bin",
+                                      "texture/0/r01.pack", "mesh/s00.glb"}));
   // Untextured: meshes from coarse to fine.
   EXPECT_EQ(
       streaming_order({"mesh/s00.glb", "mesh/s02.glb", "mesh/s01.glb", "provenance.json", "manifest.json"}),

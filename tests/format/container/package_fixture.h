@@ -47,7 +47,7 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
     entries.push_back(
         {mesh_path(scale), std::vector<std::uint8_t>(mesh_bytes, static_cast<std::uint8_t>(scale))});
   for (std::uint32_t p = 0; p < planes; ++p) {
-    PlaneTables t = make_tables(2, 1, 2, 1);
+    PlaneTables t = make_tables(2, 1, 2, 3);
     t.order = {1, 0};
     t.covered_texels = {100, 200};
     t.skip_dssim = {1.5f, 1.5f};  // every rung shows more
@@ -86,10 +86,14 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
   }
   QualityTable quality{4, {128}, {0, 4, 9}, {}, {}, 1, 0};
   quality.geometry = {{{0, 0.1f, 0.2f}, {0, 0.2f, 0.4f}, {0, 0.1f, 0.2f}}};
+  if (planes > 0)
+    quality.groups = {{PlaneGroup::kColour,
+                       {{{0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{}, {}, {}}}}}};
   const auto text = [](const std::string& s) { return std::vector<std::uint8_t>(s.begin(), s.end()); };
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, text(write_quality(quality))});
   entries.push_back({kProvenancePath, text("{}")});
+  entries.push_back({kAboutPath, text(R"({"title":"test"})")});
   return write_package(m, textures, entries);
 }
 

@@ -46,15 +46,6 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   for (int k = scales - 1; k >= 0; --k)
     m.steps.push_back({k == 0 ? kAnyDisplayPx : 12345.6 + 10 * (scales - k), k});
   m.plane_count = planes;
-  const EntryRef& coarsest = m.scales.back().glb;
-  m.first_picture_offset = coarsest.offset;
-  std::uint64_t at = coarsest.offset + (coarsest.bytes + 127) / 64 * 64;
-  for (std::uint32_t p = 0; p < planes && p < kMaxManifestPreviews; ++p) {
-    m.previews.push_back({at, 16000});
-    at += 16064;
-  }
-  m.first_picture_bytes = at - coarsest.offset;
-  m.first_picture_digest = digest;
   static_cast<EntryRef&>(m.index) = {kIndexPath, far, 4000, digest};
   m.index.head_bytes = 60;
   m.index.head_digest = digest;
@@ -63,6 +54,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   m.textures = {kTexturesPath, far, 4000, digest};
   m.quality = {kQualityPath, far, 4000, digest};
   m.provenance = {kProvenancePath, far, 4000, digest};
+  m.about = {kAboutPath, far, 4000, digest};
   if (long_numbers) m.poster = PosterRef{{kPosterPath, far, 1'000'000, digest}, 4096, 4096};
   if (long_numbers) m.stream = StreamRef{far, 4'000'000'000u, 400'000, digest};
   return m;

@@ -182,9 +182,6 @@ TEST(Manifest, TypesRangesAndOrderAreChecked) {
   expect("/steps/1/0", [](Json& j) { j["steps"][1][0] = 1; });
   expect("/steps/1/1", [](Json& j) { j["steps"][1][1] = 2; });
   expect("/steps/2/0", [](Json& j) { j["steps"][2][0] = 5e8; });
-  expect("/firstPicture/offset", [](Json& j) { j["firstPicture"]["offset"] = 64; });
-  expect("/previews", [](Json& j) { j["previews"].erase(0); });
-  expect("/previews/1", [](Json& j) { j["previews"][1][1] = 1000000; });
   expect("/index/headBytes", [](Json& j) { j["index"]["headBytes"] = 100000; });
   expect("/tables/sha256", [](Json& j) { j["tables"]["sha256"] = ""; });
 }
@@ -200,14 +197,35 @@ TEST(Manifest, HostileJson) {
   EXPECT_THROW(read("{\"format\":\"\xff\"}"), FormatError);
 }
 
-TEST(Manifest, OnlyMipsMayLackPreviews) {
-  Manifest m = make_manifest(3, 4);
-  m.previews.resize(2);
-  EXPECT_THROW(write_manifest(m), FormatError);
-  m.required_features = {kMipsFeature};
-  EXPECT_EQ(read_manifest(as_bytes(write_manifest(m))), m);
-  m.previews.clear();
-  EXPECT_THROW(write_manifest(m), FormatError);
+/// Five scales, those between as prefixes of a stream.
+Manifest with_stream() {
+  Manifest m = make_manifest(5, 1);
+  m.stream = StreamRef{1 << 20, 90000, 100, m.quality.digest};
+  for (std::size_t k = 1; k + 1 < m.scales.size(); ++k)
+    m.scales[k].glb = {kSplitStreamPath, m.stream->offset, 50000 - 10000 * k, m.quality.digest};
+  return m;
+}
+
+TEST(Manifest, ScalesMayBePrefixesOfTheStream) {
+  const Manifest m = with_stream();
+  EXPECT_TRUE(m.scales[0].has_glb() && m.scales[4].has_glb());
+  EXPECT_FALSE(m.scales[1].has_glb() || m.scales[3].has_glb());
+  EXPECT_EQ(read(write_manifest(m)), m);
+  const auto refused = [&](auto change) {
+    Manifest bad = with_stream();
+    change(bad);
+    EXPECT_THROW(write_manifest(bad), FormatError);
+  };
+  refused([](Manifest& bad) { bad.scales[0].glb = bad.scales[1].glb; });
+  refused([](Manifest& bad) { bad.scales[4].glb = bad.scales[3].glb; });
+  refused([](Manifest& bad) { bad.scales[3].glb.bytes = bad.stream->head_bytes; });
+  refused([](Manifest& bad) { bad.scales[1].glb.bytes = bad.stream->bytes + 1; });
+  refused([](Manifest& bad) { bad.scales[2].glb.bytes = bad.scales[3].glb.bytes; });
+}
+
+TEST(Manifest, TheStartEndsWithTheCoarsestGlb) {
+  const Manifest m = with_stream();
+  EXPECT_EQ(start_bytes(m), m.scales[4].glb.offset + m.scales[4].glb.bytes);
 }
 
 }  // namespace

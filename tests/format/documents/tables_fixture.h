@@ -5,13 +5,13 @@
 
 namespace texmesh::testing {
 
-/// Tables of a plane that follow every rule; with more than one fragment the last one is not stored.
+/// Tables of a plane that follow every rule, of so many scales; with more than one fragment the last one is
+/// not stored.
 inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::uint32_t rungs,
                                std::uint32_t scales) {
   PlaneTables t;
   t.columns = columns;
   t.rows = rows;
-  t.scales = scales;
   const std::size_t fragments = t.fragment_count(), stored = fragments > 1 ? fragments - 1 : 1;
   std::uint32_t state = 12345;
   const auto random = [&state] { return (state = state * 1664525u + 1013904223u) >> 8; };  // 24 bits
@@ -30,7 +30,6 @@ inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::u
     t.covered_texels.push_back(f < stored ? random() % 65536 + 1 : 0);
     t.surface_fraction.push_back(f < stored ? 1 / static_cast<float>(stored) : 0);
     t.skip_dssim.push_back(f < stored ? 0.5f + fraction() : 0);
-    for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) v->push_back(f < stored ? fraction() : 0);
     if (f < stored) t.order.push_back(static_cast<std::uint16_t>(stored - 1 - f));
   }
   if (rungs > 1 && rungs <= 30) {  // between the first two, which lie apart
@@ -38,16 +37,10 @@ inline PlaneTables make_tables(std::uint32_t columns, std::uint32_t rows, std::u
                       static_cast<std::uint8_t>(t.rung_quality[0] + 2)};
     t.knot_position = {0.25f, 0.625f};
   }
-  for (std::uint32_t k = 0; k <= scales; ++k) {
+  for (std::uint32_t k = 0; k < scales; ++k) {
     for (std::size_t f = 0; f < fragments; ++f) t.features.push_back(f < stored ? random() % 3000 : 0);
-    t.quality.push_back(80 - 40 * static_cast<float>(k) / static_cast<float>(scales + 1));
-    for (int g = 0; g < 21; ++g) t.total_bytes.push_back(random());
+    t.quality.push_back(80 - 40 * static_cast<float>(k) / static_cast<float>(scales));
   }
-  t.model_a = 300;
-  t.model_b = 0.4f;
-  t.model_r = 1.03f;
-  t.model_correlation = 0.97f;
-  t.model_error = 0.15f;
   return t;
 }
 

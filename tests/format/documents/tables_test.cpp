@@ -14,7 +14,7 @@ namespace texmesh {
 namespace {
 
 using testing::make_tables;
-PackageTables small() { return {{make_tables(3, 2, 2, 1), make_tables(1, 1, 1, 0)}}; }
+PackageTables small() { return {{make_tables(3, 2, 2, 2), make_tables(1, 1, 1, 1)}}; }
 
 Bytes flat(const PackageTables& t) { return write_tables(t); }
 
@@ -34,8 +34,6 @@ TEST(Tables, RoundTrip) {
   EXPECT_EQ(a.covered_texels, b.covered_texels);
   EXPECT_EQ(a.surface_fraction, b.surface_fraction);
   EXPECT_EQ(a.quality, b.quality);
-  EXPECT_EQ(a.total_bytes, b.total_bytes);
-  EXPECT_EQ(a.model_r, b.model_r);
   EXPECT_EQ(b.allocation, 1);
   ASSERT_EQ(b.skip_dssim.size(), 6u);
   for (std::size_t f = 0; f < 6; ++f) EXPECT_NEAR(b.skip_dssim[f], a.skip_dssim[f], a.skip_dssim[f] / 2048);
@@ -47,12 +45,11 @@ TEST(Tables, RoundTrip) {
     EXPECT_NEAR(b.mse[i], a.mse[i], a.mse[i] / 2048);
     EXPECT_NEAR(b.dssim[i], a.dssim[i], std::max(a.dssim[i] / 2048, 0x1p-25f));
   }
-  for (std::size_t f = 0; f < a.z.size(); ++f) EXPECT_NEAR(b.vqp[f], a.vqp[f], 0.5001 / 65535);
   EXPECT_TRUE(read_tables(write_tables({})).planes.empty());
 }
 
-TEST(Tables, FullPlaneStaysUnder64KB) {
-  PlaneTables t = make_tables(16, 16, 10, 20);
+TEST(Tables, FullPlaneStaysUnder48KB) {
+  PlaneTables t = make_tables(16, 16, 10, 5);
   t.size_bytes[0] = 1u << 16;  // u24 sizes and features
   t.features[0] = (1u << 24) - 1;
   t.rung_quality = {5, 8, 11, 18, 30, 53, 75, 86, 93, 97};
@@ -63,42 +60,43 @@ TEST(Tables, FullPlaneStaysUnder64KB) {
     t.knot_position.push_back(0.5f);
   }
   const Bytes bytes = write_tables({{t}});
-  EXPECT_EQ(bytes.size(), 64182u);  // 62.7 KiB
+  EXPECT_EQ(bytes.size(), 45602u);
   EXPECT_EQ(read_tables(bytes).planes[0].features, t.features);
   RecordProperty("bytes", static_cast<int>(bytes.size()));
 }
 
-/// As format 1.0 wrote it: without what 1.1 put at the end.
-Bytes as_first_minor(const Bytes& bytes, std::size_t extension) {
-  Bytes old(bytes.begin(), bytes.end() - static_cast<std::ptrdiff_t>(extension));
-  old[6] = 0;
-  const TablesHead head = read_tables_head(bytes);
-  const std::size_t section = head.planes[0].bytes - extension;
-  for (std::size_t k = 0; k < 4; ++k) old[16 + k] = static_cast<std::uint8_t>(section >> (8 * k));
-  const Sha256 digest = sha256(std::span(old).subspan(head.bytes));
-  std::copy(digest.begin(), digest.end(), old.begin() + 20);
-  return old;
+/// What the file says of a fragment that is not stored is nothing, whatever was measured of it.
+TEST(Tables, OnlyStoredFragmentsComeBack) {
+  PlaneTables t = make_tables(3, 2, 2, 2);  // fragment 5 is not stored
+  t.mse[5] = t.dssim[11] = t.skip_dssim[5] = 1;
+  t.surface_fraction[5] = 0.5f;
+  t.features[5] = 1u << 20;
+  const Bytes bytes = write_tables({{t}});
+  EXPECT_EQ(bytes, write_tables({{make_tables(3, 2, 2, 2)}}));
+  const PlaneTables back = read_tables(bytes).planes[0];
+  EXPECT_EQ(back.fragment_count(), 6u);
+  EXPECT_EQ(back.mse[5] + back.dssim[11] + back.skip_dssim[5] + back.surface_fraction[5], 0);
+  EXPECT_EQ(back.features[5], 0u);
 }
 
-TEST(Tables, SectionsOfTheFirstMinorVersionAreRead) {
-  PlaneTables t = make_tables(3, 2, 2, 1);
-  for (const std::uint8_t allocation : {0, 1, 2}) {
-    t.allocation = allocation;
-    const Bytes old = as_first_minor(write_tables({{t}}), 4 + 6 * 2 + 1 + 2 * 3);
-    const PlaneTables back = read_tables(old).planes[0];
-    EXPECT_EQ(back.allocation, std::min<int>(allocation, 1));  // what a reader of 1.0 takes rd for
-    EXPECT_TRUE(back.skip_dssim.empty());
-    EXPECT_TRUE(back.knot_quality.empty());
-    EXPECT_EQ(back.total_bytes, t.total_bytes);
-    EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].allocation, allocation);
-    // Written again it is of this version and says that it does not know.
-    EXPECT_TRUE(read_tables(write_tables({{back}})).planes[0].skip_dssim.empty());
-    // Neither form passes for the other.
-    EXPECT_THROW(read_tables(as_first_minor(write_tables({{t}}), 3 + 6 * 2 + 1 + 2 * 3)), FormatError);
-    Bytes newer = old;
-    newer[6] = 1;
-    EXPECT_THROW(read_tables(newer), FormatError);
-  }
+TEST(Tables, PlanesWithoutAnyStoredFragmentAreRead) {
+  PlaneTables t = make_tables(2, 1, 2, 3);
+  t.order.clear();
+  for (auto* v : {&t.size_bytes, &t.covered_texels}) std::fill(v->begin(), v->end(), 0u);
+  const PlaneTables back = read_tables(write_tables({{t}})).planes[0];
+  EXPECT_TRUE(back.order.empty());
+  EXPECT_EQ(back.mse.size(), 4u);
+  EXPECT_EQ(back.scale_count(), 3u);
+}
+
+TEST(Tables, ScalesAreSelectedByRow) {
+  const PlaneTables all = make_tables(3, 2, 2, 4);
+  const PlaneTables some = select_scales({{all}}, {0, 3}).planes[0];
+  EXPECT_EQ(some.quality, (std::vector<float>{all.quality[0], all.quality[3]}));
+  ASSERT_EQ(some.features.size(), 12u);
+  EXPECT_TRUE(std::equal(some.features.begin() + 6, some.features.end(), all.features.begin() + 18));
+  EXPECT_EQ(some.size_bytes, all.size_bytes);
+  EXPECT_THROW(select_scales({{all}}, {4}), std::out_of_range);
 }
 
 TEST(Tables, SectionsCanBeReadOneByOne) {
@@ -137,7 +135,7 @@ TEST(Tables, EveryFlippedBitIsRefusedOrIsTheMinorVersion) {
 /// The digest catches accidents; whoever makes a package on purpose writes a fitting digest. So flips are
 /// tried behind it.
 TEST(Tables, FlipsWithACorrectedDigestAreRefusedOrInRange) {
-  const Bytes bytes = write_tables({{make_tables(3, 2, 2, 1)}});
+  const Bytes bytes = write_tables({{make_tables(3, 2, 2, 2)}});
   const TablesHead head = read_tables_head(bytes);
   std::size_t accepted = 0;
   for (std::size_t i = head.bytes; i < bytes.size(); ++i)
@@ -158,21 +156,26 @@ TEST(Tables, FlipsWithACorrectedDigestAreRefusedOrInRange) {
 
 TEST(Tables, VersionsAreChecked) {
   Bytes bytes = write_tables(small());
-  bytes[4] = 2;
+  bytes[4] = 3;
   EXPECT_THROW(read_tables(bytes), FormatError);
-  bytes[4] = 0;
-  EXPECT_THROW(read_tables(bytes), FormatError);
+  bytes[4] = 1;
+  try {
+    read_tables(bytes);
+    FAIL();
+  } catch (const FormatError& e) {
+    EXPECT_NE(e.found().find("compile the model again"), std::string::npos) << e.what();
+  }
 }
 
 TEST(Tables, CountsAreCheckedBeforeAnythingIsAllocated) {
-  // 65535 fragments, 100 rungs and 100 scales promised by a section of 56 bytes.
-  Bytes section(56, 0);
+  // 65535 stored fragments, 30 rungs and 100 scales promised by a section of 36 bytes.
+  Bytes section(36, 0);
   section[0] = section[1] = 0xff;
   section[4] = 1;
-  section[8] = 99;
-  section[9] = 100;
+  section[8] = 100, section[9] = 30;
   section[10] = section[11] = 1;
-  Bytes bytes{'T', 'X', 'M', 'T', 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 56, 0, 0, 0};
+  section[32] = section[33] = 0xff;
+  Bytes bytes{'T', 'X', 'M', 'T', 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 36, 0, 0, 0};
   const Sha256 digest = sha256(section);
   bytes.insert(bytes.end(), digest.begin(), digest.end());
   bytes.insert(bytes.end(), section.begin(), section.end());
@@ -181,9 +184,32 @@ TEST(Tables, CountsAreCheckedBeforeAnythingIsAllocated) {
   EXPECT_THROW(read_tables(bytes), FormatError);
 }
 
+/// A section without a stored fragment takes 140 bytes, whatever its grid: what is made of it is bounded.
+TEST(Tables, GridsAreBoundedByTheMemoryTheyTake) {
+  const auto empty = [](std::uint32_t columns, std::uint32_t rungs) {
+    PlaneTables t = make_tables(1, 1, rungs, 1);
+    const std::size_t f = columns, r = rungs;
+    t.columns = columns;
+    t.order.clear();
+    for (auto* v : {&t.size_bytes, &t.covered_texels, &t.features}) v->assign(f, 0);
+    t.size_bytes.assign(r * f, 0), t.digest.assign(r * f, 0);
+    t.mse.assign(r * f, 0), t.dssim.assign(r * f, 0);
+    t.skip_dssim.assign(f, 0), t.surface_fraction.assign(f, 0);
+    return t;
+  };
+  EXPECT_NO_THROW(read_tables(write_tables({{empty(65535, 10)}})));
+  EXPECT_THROW(write_tables({{empty(65535, 60)}}), FormatError);
+  Bytes bytes = write_tables({{empty(10, 60)}});
+  bytes[52] = 0xff, bytes[53] = 0xff;  // columns
+  const Sha256 digest = sha256(std::span(bytes).subspan(52));
+  std::copy(digest.begin(), digest.end(), bytes.begin() + 20);
+  EXPECT_THROW(read_tables(bytes), FormatError);
+  EXPECT_THROW(write_tables({std::vector<PlaneTables>(11, empty(65000, 38))}), FormatError);
+}
+
 TEST(Tables, WriterRefusesBadTables) {
   const auto refused = [](auto change) {
-    PlaneTables t = make_tables(3, 2, 2, 1);
+    PlaneTables t = make_tables(3, 2, 2, 2);
     change(t);
     EXPECT_THROW(write_tables({{t}}), FormatError);
   };
@@ -194,7 +220,11 @@ TEST(Tables, WriterRefusesBadTables) {
   refused([](PlaneTables& t) { t.mse[0] = std::numeric_limits<float>::quiet_NaN(); });
   refused([](PlaneTables& t) { t.mse[0] = -1; });
   refused([](PlaneTables& t) { t.dssim[0] = 3; });
-  refused([](PlaneTables& t) { t.z[0] = 1.5f; });
+  refused([](PlaneTables& t) { t.size_bytes[0] = 0; });
+  refused([](PlaneTables& t) { t.size_bytes[5] = 7; });
+  refused([](PlaneTables& t) { t.covered_texels[5] = 7; });
+  refused([](PlaneTables& t) { t.quality.clear(), t.features.clear(); });
+  refused([](PlaneTables& t) { t.quality[1] = 101; });
   refused([](PlaneTables& t) { t.features[0] = 1u << 24; });
   refused([](PlaneTables& t) { t.order.push_back(t.order[0]); });
   refused([](PlaneTables& t) { t.order.pop_back(); });
@@ -210,42 +240,29 @@ TEST(Tables, WriterRefusesBadTables) {
   refused([](PlaneTables& t) { t.knot_quality[0] = t.rung_quality[0]; });
   refused([](PlaneTables& t) { t.knot_quality[1] = t.rung_quality[1]; });
   refused([](PlaneTables& t) { t.knot_quality[1] = static_cast<std::uint8_t>(t.rung_quality[1] + 1); });
-  refused([](PlaneTables& t) { t.model_r = std::numeric_limits<float>::infinity(); });
 }
 
 TEST(Tables, KnotsMayFallFromRungToRung) {
-  PlaneTables t = make_tables(1, 1, 3, 0);
+  PlaneTables t = make_tables(1, 1, 3, 1);
   t.knot_quality = {6, 7, static_cast<std::uint8_t>(t.rung_quality[1] + 1)};
   t.knot_position = {0.5f, 1, 0};
   const PlaneTables back = read_tables(write_tables({{t}})).planes[0];
   EXPECT_EQ(back.knot_quality, t.knot_quality);
   EXPECT_EQ(back.knot_position[1], 1);
   EXPECT_EQ(back.knot_position[2], 0);
-  // Flag bit 2 promises at least one.
-  t.knot_quality.clear(), t.knot_position.clear();
-  Bytes bytes = write_tables({{t}});
-  const TablesHead head = read_tables_head(bytes);
-  bytes[bytes.size() - 5] = 5;  // flags, 2 bytes 0, one half
-  bytes.push_back(0);
-  ++bytes[16];
-  const Sha256 digest = sha256(std::span(bytes).subspan(head.bytes));
-  std::copy(digest.begin(), digest.end(), bytes.begin() + 20);
-  EXPECT_THROW(read_tables(bytes), FormatError);
 }
 
 TEST(Tables, FractionsMayLeaveTheirRangeByRoundingOnly) {
-  PlaneTables t = make_tables(1, 1, 1, 0);
+  PlaneTables t = make_tables(1, 1, 1, 1);
   t.surface_fraction[0] = 1.0000001f;
-  t.z[0] = -1e-7f;
   t.dssim[0] = -1e-7f;
   const PlaneTables back = read_tables(write_tables({{t}})).planes[0];
   EXPECT_EQ(back.surface_fraction[0], 1.0f);
-  EXPECT_EQ(back.z[0], 0.0f);
   EXPECT_EQ(back.dssim[0], 0.0f);
 }
 
 TEST(Tables, ReaderTakesNoFractionAboveOne) {
-  PlaneTables t = make_tables(1, 1, 1, 0);
+  PlaneTables t = make_tables(1, 1, 1, 1);
   t.surface_fraction[0] = 1;
   Bytes bytes = write_tables({{t}});
   const Bytes one{0, 0, 0x80, 0x3f};

@@ -16,7 +16,7 @@ namespace {
 
 using testing::make_tables;
 PlaneTables allocation_case(std::uint8_t allocation) {
-  PlaneTables t = make_tables(4, 1, 2, 1);
+  PlaneTables t = make_tables(4, 1, 2, 2);
   t.allocation = allocation;
   t.rung_quality = {30, 75};
   t.covered_texels = {10, 10, 10, 0};

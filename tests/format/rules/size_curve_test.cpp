@@ -28,7 +28,7 @@ void expect_rising(const PlaneTables& t, double first, double last) {
 }
 
 TEST(InterpolatedBytes, ExactAtRungsAndMonotoneBetween) {
-  PlaneTables t = make_tables(2, 1, 6, 0);
+  PlaneTables t = make_tables(2, 1, 6, 1);
   t.knot_quality.clear(), t.knot_position.clear();
   t.rung_quality = {5, 11, 30, 53, 86, 97};
   const std::vector<std::uint32_t> sizes{700, 1100, 2500, 2500, 9000, 30000};
@@ -51,12 +51,12 @@ TEST(InterpolatedBytes, ExactAtRungsAndMonotoneBetween) {
   const double middle = interpolated_bytes(t, 0, 45.5);
   EXPECT_GT(middle, interpolated_bytes(t, 0, 45));
   EXPECT_LT(middle, interpolated_bytes(t, 0, 46));
-  PlaneTables one = make_tables(1, 1, 1, 0);
+  PlaneTables one = make_tables(1, 1, 1, 1);
   EXPECT_DOUBLE_EQ(interpolated_bytes(one, 0, 80), one.size_bytes[0]);
 }
 
 TEST(InterpolatedBytes, KnotsBendTheWayBetweenRungs) {
-  PlaneTables t = make_tables(2, 1, 6, 0);
+  PlaneTables t = make_tables(2, 1, 6, 1);
   t.rung_quality = {5, 11, 30, 53, 86, 97};
   const std::vector<std::uint32_t> sizes{700, 1100, 2500, 2500, 9000, 30000};
   for (std::size_t r = 0; r < 6; ++r) t.size_bytes[r * 2] = sizes[r];

@@ -96,7 +96,7 @@ TEST_F(DebugCommand, ExitCodes) {
   EXPECT_EQ(texmesh({"debug", scan(), "--what", "R", "-o", out, "--set", "ssf.scales=999"}).exit_code, 2);
   EXPECT_EQ(texmesh({"debug", folder_ / "absent.glb", "--what", "R", "-o", out, "--no-cache"}).exit_code, 1);
   const CommandResult package = texmesh(
-      {"debug", TEXMESH_SOURCE_DIR "/tests/golden/v1.0-scan.texmesh", "--what", "persistence", "-o", out});
+      {"debug", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--what", "persistence", "-o", out});
   EXPECT_EQ(package.exit_code, 1);
   EXPECT_NE(package.errors.find("texmesh debug MODEL --what persistence"), std::string::npos);
   EXPECT_TRUE(read_text(out).empty());  // no failure left anything behind

@@ -19,7 +19,7 @@ using testing::follows_schema;
 using testing::read_text;
 using testing::write_text;
 
-const std::string kSource = TEXMESH_SOURCE_DIR, kGolden = kSource + "/tests/golden/v1.0-scan.texmesh";
+const std::string kSource = TEXMESH_SOURCE_DIR, kGolden = kSource + "/tests/golden/v2.0-scan.texmesh";
 
 CommandResult texmesh(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
@@ -59,7 +59,7 @@ TEST_F(CliInspect, EveryCodecIsUnpackedAndPackedAgain) {
 
 TEST_F(CliInspect, DumpShowsEveryPart) {
   for (const char* part :
-       {"summary", "scales", "fragments", "ladder", "tables", "entries", "provenance", "all"}) {
+       {"summary", "scales", "fragments", "ladder", "tables", "entries", "about", "provenance", "all"}) {
     const CommandResult text = texmesh({"dump", kGolden, part}),
                         data = texmesh({"dump", kGolden, part, "--json"});
     EXPECT_EQ(text.exit_code, 0) << part << text.errors;
@@ -104,7 +104,7 @@ TEST_F(CliInspect, VerifyTellsSoundFromDamaged) {
   EXPECT_NE(both.output.find("damaged.texmesh: "), std::string::npos);
   EXPECT_NE(both.output.find("[entry-digest]"), std::string::npos);
   EXPECT_NE(both.output.find("nowhere.texmesh: "), std::string::npos);
-  EXPECT_NE(both.output.find("v1.0-scan.texmesh: ok ("), std::string::npos)
+  EXPECT_NE(both.output.find("v2.0-scan.texmesh: ok ("), std::string::npos)
       << "the others are looked at all the same";
   EXPECT_EQ(texmesh({"verify"}).exit_code, 2);
 }

@@ -11,7 +11,7 @@ namespace texmesh::testing {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 CommandResult extract(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {TEXMESH_BINARY, "extract"});

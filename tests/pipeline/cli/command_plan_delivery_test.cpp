@@ -15,7 +15,7 @@ namespace texmesh::testing {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.0-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 CommandResult texmesh(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
@@ -177,7 +177,7 @@ TEST(CliPlan, SaysTheRungOfEveryFragment) {
 }
 
 TEST(CliPlan, ABudgetIsKeptAndMoreBytesLookBetter) {
-  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+  const std::string golden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
   double before = 1;
   for (const int kb : {30, 50, 60, 100, 200}) {
     const bool fits = kb > 30;  // the least there is takes 39 kB
@@ -201,7 +201,7 @@ TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
   const std::string host = "http://127.0.0.1:" + std::to_string(port);
   TemporaryFolder folder;
   const CommandResult r =
-      texmesh({"fetch", host + "/v1.1-scan.texmesh", "--mirror", "http://127.0.0.1:9/none.texmesh", "--time",
+      texmesh({"fetch", host + "/v2.0-scan.texmesh", "--mirror", "http://127.0.0.1:9/none.texmesh", "--time",
                "1", "--refine", "2", "-o", folder / "got", "--json"});
   const CommandResult none = texmesh({"fetch", host + "/none.texmesh"});
   server.stop();

@@ -10,7 +10,7 @@ namespace texmesh::testing {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kPackage = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+const std::string kPackage = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 CommandResult render(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {TEXMESH_BINARY, "render"});

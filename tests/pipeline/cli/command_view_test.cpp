@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 /// A viewer of two files, one of them hidden, and packages in every form.
 class CliView : public ::testing::Test {
@@ -117,8 +117,8 @@ TEST_F(CliView, NamesWithMarksStandInTheQueryAsAUrlDoes) {
 
 TEST_F(CliView, ServesThePageThePackageAndItsRanges) {
   const Json said = start(kGolden);
-  EXPECT_NE(said["url"].get<std::string>().find("/?pkg=packages/v1.1-scan.texmesh"), std::string::npos);
-  const std::string bytes = read_text(kGolden), path = "/packages/v1.1-scan.texmesh";
+  EXPECT_NE(said["url"].get<std::string>().find("/?pkg=packages/v2.0-scan.texmesh"), std::string::npos);
+  const std::string bytes = read_text(kGolden), path = "/packages/v2.0-scan.texmesh";
   const auto page = client().Get("/");
   ASSERT_TRUE(page);
   EXPECT_EQ(page->body, "<!doctype html>");

@@ -53,6 +53,15 @@ TEST_F(Reruns, OtherRungsLeavePreviewsAndTheFilesOfScalesAlone) {
   EXPECT_EQ(compile(), (Ran{"fill", "ladder", "lut", "quality", "package"}));  // fill is never stored
 }
 
+TEST_F(Reruns, WhatIsSaidOfTheObjectMakesNoMeshAndNoTextureAnew) {
+  compile();
+  options_.package.meta = R"({"title":"Tent","licence":"CC-BY-4.0","unit":"mm"})";
+  EXPECT_EQ(compile(), Ran{"package"});
+  EXPECT_EQ(compile(), Ran{});
+  options_.package.meta = R"({"unit":"mm","title":"Tent","licence":"cc-by-4.0"})";  // the same in other words
+  EXPECT_EQ(compile(), Ran{});
+}
+
 TEST_F(Reruns, AnotherPreviewQualityRunsWhatShowsOrMeasuresPreviews) {
   compile();
   options_.ladder.preview_quality = 80;

@@ -10,6 +10,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/material_extensions.h"
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
@@ -25,14 +26,14 @@ struct Package {
   std::unique_ptr<PackageReader> reader;
   Notes notes;
   Json glb_json(int scale = 0) {
-    const Bytes glb = reader->scale_glb(scale);
+    const Bytes glb = scale_file(*reader, scale, {}).finish();
     std::uint32_t length = 0;
     std::memcpy(&length, glb.data() + 12, 4);
     return Json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(length));
   }
   ImportedModel import_scale(int scale = 0) {
     testing::MemoryResolver nothing;
-    return import_model("scale.glb", reader->scale_glb(scale), nothing, {}, {});
+    return import_model("scale.glb", scale_file(*reader, scale, {}).finish(), nothing, {}, {});
   }
 };
 

@@ -8,7 +8,7 @@ namespace texmesh {
 namespace {
 
 PackageReader open_scan() {
-  return PackageReader(open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.1-scan.texmesh"));
+  return PackageReader(open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh"));
 }
 
 /// Every fragment of the full-size planes at one rung.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
@@ -69,7 +70,8 @@ class BadGeometry : public ::testing::Test {
       Mesh first;
       for (const ManifestScale& scale : reader.manifest().scales) {
         MemoryResolver nothing;
-        Mesh read = import_model("scale.glb", reader.scale_glb(scale.scale), nothing, {}, {}).model.mesh;
+        Mesh read = import_model("scale.glb", scale_file(reader, scale.scale, {}).finish(), nothing, {}, {})
+                        .model.mesh;
         EXPECT_EQ(read.triangles.size(), scale.triangles);
         if (first.triangles.empty()) first = read;
         if (codec == MeshCodec::kNone) expect_no_more_cracks(first, read, scale.scale);

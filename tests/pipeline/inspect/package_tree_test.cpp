@@ -46,16 +46,47 @@ struct Tree : ::testing::Test {
 TEST_F(Tree, PackAfterUnpackGivesTheSameBytes) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   EXPECT_EQ(verify(folder / "tree"), "");
-  EXPECT_EQ(files_beneath(folder / "tree").size(), 12u);
+  EXPECT_EQ(files_beneath(folder / "tree").size(), 13u);
   pack_folder(folder / "tree", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   expect_names({"a.texmesh", "b.texmesh", "tree"});
 }
 
+TEST_F(Tree, AContentCredentialStaysTheLastEntryAndIsNotChecked) {
+  unpack_package(folder / "a.texmesh", folder / "tree", {});
+  fs::create_directory(folder / "tree/META-INF");
+  write_text((folder.path() / "tree" / kContentCredentialPath).string(), "not really signed");
+  EXPECT_EQ(verify(folder / "tree"), "");
+  pack_folder(folder / "tree", folder / "signed.texmesh");
+  EXPECT_EQ(verify(folder / "signed.texmesh"), "");
+  const auto store = open_store(folder / "signed.texmesh");
+  EXPECT_EQ(store->list().back().path, kContentCredentialPath);
+  EXPECT_TRUE(verify_package(*store, {}).content_credential);
+  EXPECT_FALSE(verify_package(*open_store(folder / "a.texmesh"), {}).content_credential);
+  EXPECT_EQ(PackageReader(open_store(folder / "signed.texmesh")).id(),
+            PackageReader(open_store(folder / "a.texmesh")).id());
+  unpack_package(folder / "signed.texmesh", folder / "again", {});
+  EXPECT_EQ(read_text((folder.path() / "again" / kContentCredentialPath).string()), "not really signed");
+  fs::remove_all(fs::path(folder / "tree/META-INF"));
+  pack_folder(folder / "tree", folder / "b.texmesh");
+  EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
+}
+
+TEST_F(Tree, ADamagedContentCredentialIsNotUnpacked) {
+  unpack_package(folder / "a.texmesh", folder / "tree", {});
+  fs::create_directory(folder / "tree/META-INF");
+  write_text((folder.path() / "tree" / kContentCredentialPath).string(), "not really signed");
+  pack_folder(folder / "tree", folder / "signed.texmesh");
+  std::string bytes = read_text(folder / "signed.texmesh");
+  bytes[bytes.rfind("not really signed")] ^= 1;
+  write_text(folder / "damaged.texmesh", bytes);
+  EXPECT_THROW(unpack_package(folder / "damaged.texmesh", folder / "new", {}), FormatError);
+}
+
 TEST_F(Tree, PackAfterUnpackWithFragmentFiles) {
   unpack_package(folder / "a.texmesh", folder / "tree", {true, false});
   EXPECT_EQ(verify(folder / "tree"), "");
-  EXPECT_EQ(files_beneath(folder / "tree").size(), 12u + 6 + 1);
+  EXPECT_EQ(files_beneath(folder / "tree").size(), 13u + 6 + 1);
   pack_folder(folder / "tree/", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   for (std::uint32_t rung = 0; rung < 2; ++rung) fs::remove(fs::path(folder / "tree") / rung_path(0, rung));

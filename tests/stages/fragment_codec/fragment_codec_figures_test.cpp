@@ -98,7 +98,8 @@ TEST(TextureFigures, FreeTexelsAgainstTheBackgroundAtEqualErrorOfWhatIsCovered) 
     const PackageTables tables =
         build_tables(scene.fragments, pixels, predict_quality(scene.fragments, pixels, {}, context),
                      encode_ladder(scene.fragments, pixels, {}, {}, options, context),
-                     make_previews(scene.fragments, pixels, {}, context), {}, context);
+                     make_previews(scene.fragments, pixels, {}, context), {}, context)
+            .tables;
     return testing::fill_curve(tables, {0});
   };
   const auto background = curve(scene.pixels, Uncovered::kKept);
@@ -121,7 +122,7 @@ TEST(TextureFigures, AllocationsAgainstOneQualityEverywhereAtEqualLossOfTheSurfa
                                             predict_quality(scene.fragments, pixels, {}, context),
                                             encode_ladder(scene.fragments, pixels, {}, {}, {}, context),
                                             make_previews(scene.fragments, pixels, {}, context), {}, context)
-                                   .planes};
+                                   .tables.planes};
   testing::Curve all;
   for (std::size_t r = 0; r < planes.tables[0].rung_count(); ++r) all.push_back(testing::uniform(planes, r));
   const testing::Curve inner(all.begin() + 1, all.end() - 1);

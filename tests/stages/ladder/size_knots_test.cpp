@@ -67,7 +67,7 @@ LadderOptions rungs(std::vector<int> qualities) {
 PlaneTables tables_of(const Plane& p, const Ladder& ladder) {
   return build_tables(p.fragments, p.pixels, predict_quality(p.fragments, p.pixels, {}, {}), ladder,
                       make_previews(p.fragments, p.pixels, {}, {}), {}, {})
-      .planes[0];
+      .tables.planes[0];
 }
 
 /// Mean error of the whole plane's bytes at the rungs of another ladder.

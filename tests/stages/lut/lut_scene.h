@@ -64,10 +64,16 @@ inline Scene make_scene(LadderOptions ladder_options = {}) {
   return s;
 }
 
-inline PackageTables build(const Scene& s, const LutOptions& options = {}, int threads = 1) {
+inline LutTables build_all(const Scene& s, const LutOptions& options = {}, int threads = 1) {
   RunContext context;
   context.threads = threads;
   return build_tables(s.fragments, s.pixels, s.predictors, s.ladder, s.previews, options, context);
+}
+inline PackageTables build(const Scene& s, const LutOptions& options = {}) {
+  return build_all(s, options).tables;
+}
+inline PlaneThesis thesis_of(const Scene& s, const LutOptions& options = {}, std::size_t plane = 0) {
+  return build_all(s, options).thesis.planes[plane];
 }
 
 }  // namespace texmesh::testing

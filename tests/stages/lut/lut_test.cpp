@@ -106,15 +106,19 @@ TEST(Lut, OrderQualityAndTotals) {
     }
     EXPECT_EQ(t.quality, (std::vector<float>{80, 60, 40}));
     EXPECT_EQ(t.allocation, static_cast<int>(allocate));
-    ASSERT_EQ(t.total_bytes.size(), 3u * 21u);
+    const PlaneThesis thesis = thesis_of(s, options);
+    EXPECT_EQ(thesis.quality, t.quality);
+    EXPECT_EQ(thesis.vqp, s.predictors.planes[0].vqp);
+    EXPECT_EQ(thesis.zeta, s.predictors.planes[0].zeta);
+    ASSERT_EQ(thesis.total_bytes.size(), 3u * 21u);
     for (std::uint32_t scale = 0; scale < 3; ++scale)
       for (std::size_t g = 0; g < 21; ++g) {
         const auto quality = quality_of(t, scale, static_cast<double>(g) / 20);
         std::uint64_t sum = 0;
         for (std::size_t f = 0; f < t.fragment_count(); ++f)
           sum += t.size_bytes[nearest_rung(t, quality[f]) * t.fragment_count() + f];
-        EXPECT_EQ(t.total_bytes[scale * 21 + g], sum);
-        EXPECT_LE(t.total_bytes[scale * 21 + g], t.total_bytes[scale * 21 + (g == 0 ? 0 : g - 1)]);
+        EXPECT_EQ(thesis.total_bytes[scale * 21 + g], sum);
+        EXPECT_LE(thesis.total_bytes[scale * 21 + g], thesis.total_bytes[scale * 21 + (g == 0 ? 0 : g - 1)]);
       }
   }
 }
@@ -201,14 +205,15 @@ TEST(Lut, RateDistortionSpendsNoMoreAndLosesLess) {
   const PlaneTables log = build(s, options).planes[0];
   options.allocate = Allocation::kRd;
   const PlaneTables rd = build(s, options).planes[0];
-  EXPECT_EQ(rd.total_bytes, log.total_bytes);
+  const std::vector<std::uint64_t> total = thesis_of(s).total_bytes;
+  EXPECT_EQ(thesis_of(s, options).total_bytes, total);
   EXPECT_EQ(rd.allocation, 2);
   for (std::uint32_t scale = 0; scale < 3; ++scale)
     for (std::size_t g = 0; g < 21; g += 4) {
       const auto a = rungs_of(log, scale, static_cast<double>(g) / 20),
                  b = rungs_of(rd, scale, static_cast<double>(g) / 20);
-      EXPECT_EQ(sum_of(bytes_of(log, a)), log.total_bytes[scale * 21 + g]);
-      EXPECT_LE(sum_of(bytes_of(rd, b)), log.total_bytes[scale * 21 + g]);
+      EXPECT_EQ(sum_of(bytes_of(log, a)), total[scale * 21 + g]);
+      EXPECT_LE(sum_of(bytes_of(rd, b)), total[scale * 21 + g]);
       // A step that does not fit ends its fragment's walk: with so few of them up to a step's bytes are left
       // over.
       EXPECT_LE(surface_dssim(rd, b), 1.01 * surface_dssim(log, a) + 1e-6);
@@ -242,19 +247,24 @@ TEST(Lut, EveryRoleHasItsOwnLeastQuality) {
   const PackageTables tables = build(s, options);
   for (const float q : quality_of(tables.planes[1], 0, 0.5)) EXPECT_EQ(q, 80);
   for (const float q : quality_of(tables.planes[0], 0, 0.5)) EXPECT_LT(q, 40);
+  const std::uint64_t dear = thesis_of(s, options, 1).total_bytes[0];
   options.data_quality_min = 18;
-  EXPECT_GT(tables.planes[1].total_bytes[0], build(s, options).planes[1].total_bytes[0]);
+  EXPECT_GT(dear, thesis_of(s, options, 1).total_bytes[0]);
 }
 
 TEST(Lut, TablesPassTheirCodec) {
-  const PackageTables tables = build(make_scene());
-  const auto bytes = write_tables(tables);
+  const LutTables made = build_all(make_scene());
+  const auto bytes = write_tables(made.tables);
   EXPECT_EQ(write_tables(read_tables(bytes)), bytes);
+  const auto thesis = write_thesis(made.thesis);
+  EXPECT_EQ(write_thesis(read_thesis(thesis).tables), thesis);
 }
 
 TEST(Lut, SameTablesForAnyNumberOfThreads) {
   const Scene s = make_scene();
-  EXPECT_EQ(encode_artefact(build(s, {}, 1)), encode_artefact(build(s, {}, 8)));
+  const LutTables one = build_all(s, {}, 1), eight = build_all(s, {}, 8);
+  EXPECT_EQ(encode_artefact(one.tables), encode_artefact(eight.tables));
+  EXPECT_EQ(encode_artefact(one.thesis), encode_artefact(eight.thesis));
 }
 
 TEST(Lut, EmptyAndUnfitInput) {
@@ -284,7 +294,7 @@ TEST(Lut, EmptyAndUnfitInput) {
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables none = build(s);
   EXPECT_TRUE(none.planes[0].order.empty());
-  EXPECT_EQ(none.planes[0].total_bytes[0], 0u);
+  EXPECT_EQ(thesis_of(s).total_bytes[0], 0u);
   EXPECT_NO_THROW(write_tables(none));
 }
 

@@ -13,38 +13,38 @@ using namespace testing;  // NOLINT: fixtures
 
 TEST(SizeModel, FitsAndIsAbsentForOneRung) {
   const PlaneTables t = build(make_scene()).planes[0];
-  EXPECT_GT(t.model_correlation, 0.95f);
-  EXPECT_LT(t.model_error, 0.2f);
-  EXPECT_GT(t.model_r, 1.0f);
+  const PlaneThesis thesis = thesis_of(make_scene());
+  const SizeModel& model = thesis.model;
+  EXPECT_GT(model.correlation, 0.95f);
+  EXPECT_LT(model.error, 0.2f);
+  EXPECT_GT(model.r, 1.0f);
   double predictor = 0;
-  for (std::uint16_t f : t.order) predictor += t.vqp[f] / static_cast<double>(t.order.size());
-  EXPECT_NEAR(t.model_b, std::log(t.model_r) / std::log(100 * predictor), 1e-4);
+  for (std::uint16_t f : t.order) predictor += thesis.vqp[f] / static_cast<double>(t.order.size());
+  EXPECT_NEAR(model.b, std::log(model.r) / std::log(100 * predictor), 1e-4);
   // Nine fragments of 32 x 48 texels in 4:2:0: 36 blocks of two bits each, SOI and EOI.
   const double constant = 9 * (4 + 36.0 / 4);
   double error = 0;
   for (std::size_t r = 2; r < 9; ++r) {  // of quality 10 to 95
     double size = 0;
     for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
-    error += std::fabs(t.model_a * std::pow(t.model_r, t.rung_quality[r]) + constant - size) / size / 7;
+    error += std::fabs(model.a * std::pow(model.r, t.rung_quality[r]) + constant - size) / size / 7;
   }
-  EXPECT_NEAR(t.model_error, error, 1e-3);
+  EXPECT_NEAR(model.error, error, 1e-3);
 
   LadderOptions one;
   one.rungs = {50};
-  const PlaneTables single = build(make_scene(one)).planes[0];
-  EXPECT_EQ(single.model_a, 0);
-  EXPECT_EQ(single.model_error, 0);
+  EXPECT_EQ(thesis_of(make_scene(one)).model, SizeModel{});
 }
 
 TEST(SizeModel, IsNotFittedOnARungWithoutLoss) {
   LadderOptions options;
   options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
   Scene s = make_scene(options);
-  EXPECT_GT(build(s).planes[0].model_error, 0.01f);
+  EXPECT_GT(thesis_of(s).model.error, 0.01f);
   s.ladder.planes[0].lossless = true;
-  const PlaneTables t = build(s).planes[0];
-  EXPECT_NEAR(t.model_error, 0, 1e-5) << "two points have a curve through both";
-  EXPECT_NEAR(t.model_correlation, 1, 1e-6);
+  const SizeModel model = thesis_of(s).model;
+  EXPECT_NEAR(model.error, 0, 1e-5) << "two points have a curve through both";
+  EXPECT_NEAR(model.correlation, 1, 1e-6);
 }
 
 TEST(SizeModel, ConstantBytesAreTheCodecs) {
@@ -93,13 +93,14 @@ TEST(SizeModel, HoldsForBlurredTextures) {  // whose blocks' shortest codes are 
               static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
   s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
-  const PackageTables tables = build(s);
+  const auto [tables, thesis] = build_all(s);
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneTables& t = tables.planes[p];
     const double constant = constant_bytes(s.ladder.planes[p], 32, 48), count = t.order.size();
     for (const std::uint16_t f : t.order) EXPECT_LT(t.size_bytes[f], 2 * constant) << "the case is this one";
-    EXPECT_NEAR(t.model_correlation, correlation_with(t, constant * count), 1e-5);
-    EXPECT_GT(t.model_correlation, correlation_with(t, 4 * count) + 0.03) << "SOI and EOI alone";
+    const float correlation = thesis.planes[p].model.correlation;
+    EXPECT_NEAR(correlation, correlation_with(t, constant * count), 1e-5);
+    EXPECT_GT(correlation, correlation_with(t, 4 * count) + 0.03) << "SOI and EOI alone";
   }
 }
 

@@ -11,6 +11,7 @@
 #include "format/documents/index.h"
 #include "format/documents/package_writer.h"
 #include "stages/base/run_context.h"
+#include "stages/gltf/glb_container.h"
 #include "tests/format/documents/tables_fixture.h"
 #include "tests/support/meshes.h"
 
@@ -33,6 +34,7 @@ struct Inputs {
   Ladder ladder;
   Previews previews;
   PackageTables tables;
+  ThesisTables thesis;
   ScaleFiles files;
   MeasuredQuality quality;
   PackageOptions options;
@@ -64,7 +66,7 @@ struct Inputs {
   }
 
   void add_plane(std::size_t p) {
-    PlaneTables t = testing::make_tables(3, 2, 2, 1);
+    PlaneTables t = testing::make_tables(3, 2, 2, 10);
     PlaneLadder rungs;
     for (std::size_t r = 0; r < 2; ++r) {
       LadderRung rung;
@@ -94,14 +96,18 @@ struct Inputs {
     images.push_back(image);
     fragments.planes.push_back(plane);
     ladder.planes.push_back(std::move(rungs));
+    PlaneThesis& said = thesis.planes.emplace_back();
+    said.quality = t.quality;
+    said.total_bytes.assign(10 * kGammaSteps, 1000);
     tables.planes.push_back(std::move(t));
   }
 
   Poster poster;  // none
+  About about;
 
   Bytes assemble() const {
-    return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, files, quality,
-                            poster, 0.1, "{\"texmesh\":\"test\"}", options, {});
+    return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
+                            quality, poster, about, 0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
@@ -117,7 +123,7 @@ Bytes part(const Bytes& package, const EntryRef& ref) {
   return memory_source(package)->read(ref.offset, ref.bytes);
 }
 
-TEST(Package, ThePosterStandsBehindTheFirstPicture) {
+TEST(Package, ThePosterStandsBehindTheTables) {
   Inputs inputs(1);
   EXPECT_FALSE(manifest_of(inputs.assemble()).poster);
   inputs.poster = {fake_jpeg(900, 'x'), 512, 512};
@@ -129,8 +135,7 @@ TEST(Package, ThePosterStandsBehindTheFirstPicture) {
   const std::vector<EntryRef> index = read_index(part(package, m.index));
   const auto poster = std::ranges::find(index, std::string(kPosterPath), &EntryRef::path);
   ASSERT_NE(poster, index.end());
-  EXPECT_EQ(std::prev(poster)->path, table_streams_path(0));
-  EXPECT_GE(poster->offset, m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_EQ(std::prev(poster)->path, kTablesPath);
 }
 
 TEST(Package, EveryReferenceLeadsToItsBytes) {
@@ -139,11 +144,12 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
     const Bytes package = inputs.assemble();
     const Manifest m = manifest_of(package);
     const std::vector<EntryRef> index = read_index(part(package, m.index));
-    const auto entries = read_container(*memory_source(package));
-    ASSERT_EQ(index.size() + 2, entries.size());
+    auto entries = read_container(*memory_source(package));
+    std::erase_if(entries, [](const ContainerEntry& e) { return e.path == kManifestPath || e.path == kIndexPath; });
+    ASSERT_EQ(index.size(), entries.size());
     for (std::size_t i = 0; i < index.size(); ++i) {
-      EXPECT_EQ(index[i].path, entries[i + 2].path);
-      EXPECT_EQ(index[i].offset, entries[i + 2].offset);
+      EXPECT_EQ(index[i].path, entries[i].path);
+      EXPECT_EQ(index[i].offset, entries[i].offset);
       EXPECT_EQ(sha256(part(package, index[i])), index[i].digest) << index[i].path;
     }
     for (const EntryRef& ref : {static_cast<EntryRef>(m.index), static_cast<EntryRef>(m.tables), m.textures,
@@ -151,8 +157,6 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
       EXPECT_EQ(sha256(part(package, ref)), ref.digest) << ref.path;
     for (const PagedRef& ref : {m.index, m.tables})
       EXPECT_EQ(sha256(memory_source(package)->read(ref.offset, ref.head_bytes)), ref.head_digest);
-    const Bytes first = memory_source(package)->read(m.first_picture_offset, m.first_picture_bytes);
-    EXPECT_EQ(sha256(first), m.first_picture_digest);
     EXPECT_EQ(part(package, m.provenance), (Bytes{'{', '"', 't', 'e', 'x', 'm', 'e', 's', 'h', '"', ':', '"',
                                                   't', 'e', 's', 't', '"', '}'}));
   }
@@ -162,10 +166,11 @@ TEST(Package, OrderIsStreamingOrder) {
   std::vector<std::string> paths;
   for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);
   EXPECT_EQ(paths, (std::vector<std::string>{
-                       "manifest.json", "index.bin", "tables.bin", "textures.json", "quality.json",
-                       "mesh/s09.glb", "preview/000.jpg", "preview/001.jpg", "texture/0/tables.pack",
-                       "texture/1/tables.pack", "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
-                       "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb", "provenance.json"}));
+                       "manifest.json", "mesh/s09.glb", "index.bin", "textures.json", "quality.json",
+                       "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin", "about.json",
+                       "preview/000.jpg", "preview/001.jpg", "texture/0/r00.pack", "texture/1/r00.pack",
+                       "mesh/s04.glb", "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb",
+                       "provenance.json"}));
   EXPECT_EQ(streaming_order(paths), paths);
 }
 
@@ -189,7 +194,6 @@ TEST(Package, PacksHoldFragmentsByImportance) {
   }
   EXPECT_EQ(textures[0].name, "wall.jpg");
   EXPECT_EQ(textures[0].colour_space, "srgb");
-  EXPECT_EQ(m.previews, (std::vector<ByteRange>{{textures[0].preview.offset, textures[0].preview.bytes}}));
 }
 
 TEST(Package, ManifestDescribesTheModel) {
@@ -244,11 +248,49 @@ TEST(Package, DeterministicAndReproducedFromItsOwnEntries) {
   EXPECT_EQ(write_package(m, textures, files), package);
 }
 
+About about_of(const Bytes& package) { return read_about(part(package, manifest_of(package).about)); }
+
+TEST(Package, AboutIsWhatTheSourceSaysWithThePublishersWordsOverIt) {
+  Inputs inputs(1);
+  for (ScaleFile& file : inputs.files.files) file.glb = glb_container(R"({"asset":{}})", {});
+  inputs.about.title = "of the source";
+  inputs.about.licence = "CC0-1.0";
+  inputs.about.metres_per_unit = 1;
+  inputs.about.unit = "metre";
+  EXPECT_EQ(about_of(inputs.assemble()), inputs.about);
+  EXPECT_EQ(manifest_of(inputs.assemble()).title, "of the source");
+  inputs.options.meta = R"({"title":"of the museum","creator":"A. Smith"})";
+  EXPECT_EQ(about_of(inputs.assemble()).title, "of the museum");
+  EXPECT_EQ(about_of(inputs.assemble()).licence, "CC0-1.0");
+  inputs.options.title = "of the command line";
+  const Bytes package = inputs.assemble();
+  EXPECT_EQ(about_of(package).title, "of the command line");
+  EXPECT_EQ(about_of(package).creator, "A. Smith");
+  EXPECT_EQ(manifest_of(package).title, "of the command line");
+}
+
+TEST(Package, TheFilesOfScalesSayWhatTheSourceSaysWhateverThePublisherAdds) {
+  Inputs inputs(1);
+  const std::string json = R"({"asset":{"version":"2.0"}})";
+  for (ScaleFile& file : inputs.files.files) file.glb = glb_container(json, {});
+  const Bytes silent = inputs.assemble();
+  EXPECT_EQ(part(silent, manifest_of(silent).scales[0].glb), inputs.files.files[0].glb);
+  inputs.about.attribution = "A. Smith";
+  const auto first_glb = [&] {
+    const Bytes package = inputs.assemble();
+    return part(package, manifest_of(package).scales[0].glb);
+  };
+  const Bytes said = first_glb();
+  const std::string text(said.begin(), said.end());
+  EXPECT_NE(text.find(R"("copyright":"A. Smith")"), std::string::npos);
+  inputs.options.meta = R"({"attribution":"B. Jones","licence":"CC-BY-4.0"})";
+  EXPECT_EQ(first_glb(), said);
+}
+
 TEST(Package, HundredsOfPlanesStillBootstrapInOneRead) {
   const Bytes package = Inputs(220).assemble();
   const Manifest m = manifest_of(package);
   EXPECT_EQ(m.plane_count, 220u);
-  EXPECT_EQ(m.previews.size(), 220u);
   EXPECT_EQ(read_index_head(part(package, m.index)).pages.size(), 221u);
 }
 
@@ -270,21 +312,35 @@ Inputs inputs_with_mips(std::size_t full) {
   return inputs;
 }
 
-TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
+TEST(Package, TablesHaveTheRowsOfTheStoredScales) {
+  const Inputs inputs(2);
+  const Bytes package = inputs.assemble();
+  const Manifest m = manifest_of(package);
+  const PackageTables tables = read_tables(part(package, m.tables));
+  const std::vector<float>& all = inputs.tables.planes[1].quality;
+  EXPECT_EQ(tables.planes[1].quality, (std::vector<float>{all[0], all[4], all[9]}));
+  ASSERT_TRUE(m.thesis.has_value());
+  EXPECT_EQ(read_thesis(part(package, *m.thesis)).tables.planes[1].quality, all);
+  EXPECT_GT(m.thesis->offset, m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_FALSE(manifest_of(Inputs(0).assemble()).thesis.has_value());
+
+  Inputs few(1);
+  few.tables.planes[0] = select_scales(few.tables, {0, 1, 2, 3}).planes[0];
+  EXPECT_THROW(few.assemble(), StageError);
+}
+
+TEST(Package, MipsShareTheirBasesPreview) {
   const Bytes package = inputs_with_mips(2).assemble();
   const Manifest m = manifest_of(package);
-  EXPECT_EQ(m.required_features, std::vector<std::string>{"mips"});
+  EXPECT_TRUE(m.required_features.empty());
   EXPECT_EQ(m.plane_count, 4u);
-  EXPECT_EQ(m.previews.size(), 2u);
   std::vector<TextureInfo> textures = read_textures(part(package, m.textures));
   const auto index = read_index(part(package, m.index));
   resolve_textures(textures, index);
   EXPECT_EQ(textures[3].preview, textures[0].preview);
   EXPECT_EQ(textures[3].mip, 2u);
   EXPECT_TRUE(std::ranges::none_of(index, [](const EntryRef& e) { return e.path == preview_path(2); }));
-  EXPECT_LE(textures[3].tables.offset + textures[3].tables.bytes,
-            m.first_picture_offset + m.first_picture_bytes);
-  EXPECT_TRUE(manifest_of(Inputs(2).assemble()).required_features.empty());
+  EXPECT_LE(textures[3].tables.offset + textures[3].tables.bytes, m.tables.offset);
 
   Inputs wrong = inputs_with_mips(1);
   wrong.fragments.planes[1].base = 1;
@@ -297,7 +353,6 @@ TEST(Package, MipsShareTheirBasesPreviewAndRequireTheFeature) {
 TEST(Package, HundredsOfPlanesWithMipsStillBootstrapInOneRead) {
   const Manifest m = manifest_of(inputs_with_mips(300).assemble());
   EXPECT_EQ(m.plane_count, 302u);
-  EXPECT_EQ(m.previews.size(), kMaxManifestPreviews);
 }
 
 TEST(Package, SourcesStandBehindTheRungsAndRungsWithoutLossAreNamed) {

@@ -51,7 +51,8 @@ void encode(Sample& s) {
   s.previews = make_previews(s.fragments, s.pixels, {}, context);
   s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, LadderOptions{}, context);
   s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context),
-                          s.ladder, s.previews, {}, context);
+                          s.ladder, s.previews, {}, context)
+                 .tables;
 }
 
 Sample sample_sheet(bool textured) {

@@ -30,7 +30,9 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   m.normal_texture.image = 1, m.normal_scale = 0.5f;
   c.materials[1].alpha_mode = AlphaMode::kBlend;
   c.materials[1].base_colour_texture.image = 0;
-  const Glb glb = open(c.write(MeshCodec::kDraco).files[0].glb);
+  const ScaleFiles files = c.write(MeshCodec::kDraco);
+  ASSERT_GT(files.files.size(), 1u);
+  const Glb glb = open(files.files[0].glb);
   const Json& j = glb.json["materials"][0];
   EXPECT_EQ(j["name"], "glass");
   EXPECT_EQ(j["pbrMetallicRoughness"]["baseColorFactor"], Json::parse("[0.1,0.2,0.3,0.4]"));
@@ -53,7 +55,15 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   EXPECT_EQ(glb.json["images"][0]["name"], "texture/0");
   EXPECT_EQ(glb.json["images"][0]["mimeType"], "image/png");
   EXPECT_EQ(glb.json["images"][1]["name"], "texture/1");
-  EXPECT_EQ(view_bytes(glb, glb.json["images"][1]["bufferView"]), c.previews.planes[2].file);
+  // The coarsest scale has the previews; others name them, but for a picture that is no preview.
+  EXPECT_EQ(glb.json["images"][1]["uri"], "../preview/002.jpg");
+  EXPECT_EQ(glb.json["images"][1]["mimeType"], "image/jpeg");
+  EXPECT_FALSE(glb.json["images"][1].contains("bufferView"));
+  const Glb coarsest = open(files.files.back().glb);
+  EXPECT_EQ(view_bytes(coarsest, coarsest.json["images"][1]["bufferView"]), c.previews.planes[2].file);
+  EXPECT_FALSE(coarsest.json["images"][1].contains("uri"));
+  for (const char* same : {"materials", "textures", "samplers"})
+    EXPECT_EQ(coarsest.json[same], glb.json[same]);
 
   // The PNG holds the colours of one preview and the alpha of the other.
   Image png = probe_image("preview", view_bytes(glb, glb.json["images"][0]["bufferView"]), {});

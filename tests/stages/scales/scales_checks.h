@@ -73,6 +73,7 @@ struct Case {
   }
   ScaleFiles write(MeshCodec codec, ScalesOptions options = {}, int threads = 1) const {
     options.mesh_codec = codec;
+    options.stream = false;  // every scale has a file
     RunContext context;
     context.threads = threads;
     return write_scales(scales, perceptual, materials, images, fragments, previews, options, context);

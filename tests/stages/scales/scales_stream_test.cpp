@@ -182,12 +182,17 @@ struct Case {
   }
 };
 
-/// Each file's faces are those of the stream up to its scale.
+/// Each file's faces, as files are written without a stream, are those of the stream up to its scale. Beside a
+/// stream only the finest and the coarsest have files.
 void expect_files_in_stream(const Case& c, ScalesOptions options = {}) {
+  const ScaleFiles with_stream = c.write(options);
+  const Bytes& stream = with_stream.stream;
+  ASSERT_FALSE(stream.empty());
+  options.stream = false;
   const ScaleFiles files = c.write(options);
   ASSERT_GE(files.files.size(), 3u);
-  ASSERT_FALSE(files.stream.empty());
-  SplitStreamReader reader(read_split_head(files.stream));
+  ASSERT_EQ(with_stream.files.size(), files.files.size());
+  SplitStreamReader reader(read_split_head(stream));
   ASSERT_EQ(reader.head().scales.size(), files.files.size());
   Normals finest;
   for (const Face& face : file_faces(files.files[0].glb))
@@ -195,9 +200,18 @@ void expect_files_in_stream(const Case& c, ScalesOptions options = {}) {
   for (std::size_t i = 0; i < files.files.size(); ++i) {
     const ScaleFile& file = files.files[files.files.size() - 1 - i];
     SCOPED_TRACE("scale " + std::to_string(file.scale));
-    reader.read_to_scale(i, files.stream);
+    reader.read_to_scale(i, stream);
     EXPECT_EQ(reader.head().scales[i].scale, file.scale);
     EXPECT_EQ(reader.head().scales[i].triangles, file.triangles);
+    const ScaleFile& beside = with_stream.files[files.files.size() - 1 - i];
+    EXPECT_EQ(beside.triangles, file.triangles);
+    if (i == 0 || i + 1 == files.files.size()) {
+      EXPECT_EQ(beside.vertices, file.vertices);
+      EXPECT_FALSE(beside.glb.empty());
+    } else {
+      EXPECT_EQ(beside.vertices, reader.head().scales[i].wedges);
+      EXPECT_TRUE(beside.glb.empty());
+    }
     expect_same(file_faces(file.glb), stream_faces(reader, c.scales.mesh.part_names), finest,
                 c.scales.mesh.normals.empty() ? 0 : std::cos(4.0 / (1 << (options.normal_bits - 1))));
   }

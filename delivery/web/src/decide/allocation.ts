@@ -13,10 +13,10 @@ export function logQuantiser(quality: number): number {
 
 const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 - 50 * scale);
 
-/** eta_i (3.1) of one scale: feature counts min-max over covered fragments; 0 for the others. [F] */
-export function etaOf(t: PlaneTables, scale: number): Float32Array {
+/** eta_i (3.1) of one scale, by its row: feature counts min-max over covered fragments; 0 for the others. [F] */
+export function etaOf(t: PlaneTables, row: number): Float32Array {
   const covered = positive(t.coveredTexels);
-  const features = (f: number): number => t.features[scale * fragmentCount(t) + f];
+  const features = (f: number): number => t.features[row * fragmentCount(t) + f];
   const rising = covered.map(features).sort((a, b) => a - b);
   const [low, high] = [rising[0], rising[rising.length - 1]];
   const eta = new Float32Array(fragmentCount(t));
@@ -25,14 +25,14 @@ export function etaOf(t: PlaneTables, scale: number): Float32Array {
 }
 
 /** The default Gamma: mean of eta over covered fragments. */
-export function meanEta(t: PlaneTables, scale: number): number {
-  return sumOf(etaOf(t, scale)) / Math.max(positive(t.coveredTexels).length, 1);
+export function meanEta(t: PlaneTables, row: number): number {
+  return sumOf(etaOf(t, row)) / Math.max(positive(t.coveredTexels).length, 1);
 }
 
 /** q_i(x, y): the quality that the tables' allocation asks for, clipped. [F] */
-export function qualityOf(t: PlaneTables, scale: number, gamma: number): Float32Array {
-  const result = etaOf(t, scale);
-  const middle = t.quality[scale];
+export function qualityOf(t: PlaneTables, row: number, gamma: number): Float32Array {
+  const result = etaOf(t, row);
+  const middle = t.quality[row];
   const g = logQuantiser(middle);
   for (let f = 0; f < result.length; ++f) {
     const away = result[f] - gamma;
@@ -58,8 +58,8 @@ export function nearestRung(t: PlaneTables, quality: number): number {
 }
 
 /** The rung of every fragment at a scale and Gamma (default: mean of eta); -1 for those that are not stored. [F] */
-export function rungsOf(t: PlaneTables, scale: number, gamma: number): Int16Array {
-  const quality = qualityOf(t, scale, gamma);
+export function rungsOf(t: PlaneTables, row: number, gamma: number): Int16Array {
+  const quality = qualityOf(t, row, gamma);
   const rungs = new Int16Array(fragmentCount(t)).fill(-1);
   let bytes = 0;
   for (const f of t.order) {

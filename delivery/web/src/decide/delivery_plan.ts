@@ -1,4 +1,4 @@
-import { bootstrapBytes } from '../format/layout';
+import { startBytes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
 import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
@@ -42,26 +42,20 @@ export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: De
   return scale >= 0 ? scale : selectScale(manifest, displayedPx, undefined, rule);
 }
 
-/** Bytes of a range that the first request has not brought yet. */
-function beyondBootstrap({ offset, bytes }: { offset: number; bytes: number }): number {
-  return offset >= bootstrapBytes ? bytes : bytes - Math.min(bytes, bootstrapBytes - offset);
-}
-
-/** The table streams behind the previews, which the coarsest mesh has as its images. */
-function tableStreamBytes({ firstPicture, scales, previews }: Manifest): number {
-  let before = scales[scales.length - 1].glb.bytes;
-  for (const preview of previews) before += preview.bytes;
-  return firstPicture.bytes - Math.min(before, firstPicture.bytes);
-}
+/** Bytes of begin .. end behind those that the first request has brought. */
+const beyondStart = (begin: number, end: number): number => end - Math.min(end, Math.max(begin, startBytes));
+/** Bytes of the first request; provenance.json is the last entry. */
+const firstBytes = ({ provenance }: Manifest): number => Math.min(startBytes, provenance.offset + provenance.bytes);
 
 /** When the fixed parts are there. */
 function timesOf(m: Manifest, link: LinkOptions, scale: number) {
   const coarsest = m.scales[m.scales.length - 1];
-  const firstPictureBytes = beyondBootstrap(coarsest.glb);
+  const firstPictureBytes = beyondStart(coarsest.glb.offset, coarsest.glb.offset + coarsest.glb.bytes);
   const mesh = scale === coarsest.scale ? undefined : m.scales.find((s) => s.scale === scale);
-  const tableBytes = tableStreamBytes(m) + beyondBootstrap(m.index) + beyondBootstrap(m.tables) + beyondBootstrap(m.textures);
+  // One range: index, textures.json, quality.json, table streams and tables.
+  const tableBytes = beyondStart(m.index.offset, m.tables.offset + m.tables.bytes);
   const moved = firstPictureBytes + (mesh?.glb.bytes ?? 0) + tableBytes;
-  const manifestS = fetchedS(link, 0, bootstrapBytes);
+  const manifestS = fetchedS(link, 0, firstBytes(m));
   const firstPictureS = fetchedS(link, manifestS, firstPictureBytes);
   return { moved, manifestS, firstPictureS, meshS: fetchedS(link, manifestS, moved) };
 }
@@ -78,7 +72,9 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
     displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
     afterMesh: (scale) => {
       const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
-      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : moved / Math.max(1e-9, meshS - manifestS - link.rttS);
+      // Where the first request has brought all, that request shows the throughput.
+      const [shown, shownS] = moved > 0 ? [moved, meshS - manifestS] : [firstBytes(manifest), manifestS];
+      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
       const throughput = { ...request.htc.throughput, initialBytesS };
       const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
       return { plan: planOptions(htc), linkBytesS: link.bytesS };
@@ -89,5 +85,5 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const best = at.value;
   if (!best) return undefined;
   const { moved, firstPictureS, meshS } = timesOf(manifest, link, best.scale);
-  return { ...best, fixedBytes: bootstrapBytes + moved, firstPictureS, meshS, completeS: meshS + best.endS };
+  return { ...best, fixedBytes: firstBytes(manifest) + moved, firstPictureS, meshS, completeS: meshS + best.endS };
 }

@@ -1,7 +1,7 @@
+import { InputError } from '../format/errors';
 import type { PackageData } from '../format/package_data';
 import { bytesToShow, fragmentCount } from '../format/tables';
 import { etaOf, meanEta, qualityOf } from './allocation';
-import { clamp } from './numbers';
 import { FragmentOffer } from './plan_types';
 import { interpolatedBytes } from './size_curve';
 import { PerGroup, PlaneChoice, TextureLoss, TextureParts, everyGroup, groupIndex, tablesOf } from './texture_loss';
@@ -48,9 +48,10 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
   const t = tablesOf(data, plane);
   const group = groupIndex(data, plane);
   const { weights, coded } = loss.plane(plane);
-  const scale = clamp(options.scale, 0, t.scales);
-  const eta = etaOf(t, scale);
-  const quality = qualityOf(t, scale, options.gamma < 0 ? meanEta(t, scale) : options.gamma);
+  const row = data.manifest.scales.findIndex((s) => s.scale === options.scale);
+  if (row < 0) throw new InputError('', `scale ${options.scale}`, 'a scale of the package', 'none');
+  const eta = etaOf(t, row);
+  const quality = qualityOf(t, row, options.gamma < 0 ? meanEta(t, row) : options.gamma);
   // Rungs whose quality is within the limits, as near as there are any.
   const rungs = [...t.rungQuality.keys()];
   const highRung = Math.max(t.rungQuality.filter((q) => q <= options.qualityHigh).length - 1, 0);

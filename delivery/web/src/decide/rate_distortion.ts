@@ -66,7 +66,7 @@ export function rdCurves(t: PlaneTables, weights: Float32Array = surfaceWeights(
   for (const f of Array.from(t.order).sort((a, b) => a - b)) {
     const unit = largest > 0 ? Math.floor((weights[f] / largest) * share * 1048576 + 0.5) : 0;
     const loss = (dssim: number): number => Math.floor(unit * (dssim * 16777216));
-    const curve: RdCurve = { bytes: [0], loss: [loss(t.skipDssim.length === 0 ? 1 : t.skipDssim[f])] };
+    const curve: RdCurve = { bytes: [0], loss: [loss(t.skipDssim[f])] };
     for (let r = 0; r < rungCount(t); ++r) {
       const at = r * fragments + f;
       curve.bytes.push(bytesToShow(t, r, f));

@@ -124,7 +124,7 @@ export class TextureLoss {
     const fragments = fragmentCount(t);
     const coded = new Float64Array((t.rungQuality.length + 1) * fragments);
     for (const f of t.order) {
-      coded[f] = curve.coded(t.skipDssim[f] ?? 1);
+      coded[f] = curve.coded(t.skipDssim[f]);
       for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f]);
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), coded };

@@ -3,7 +3,8 @@ import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
 import { fullSizePlanes } from './layout';
-import { EntryRef, Manifest, manifestOfContainer, mostManifestPreviews, readManifest } from './manifest';
+import { ByteRange, EntryRef, Manifest, hasGlb, manifestOfContainer, readManifest } from './manifest';
+import { QualityTable, readQuality } from './quality_table';
 import { parseTablesSection, readTablesHead } from './read_tables';
 import { sha256 } from './sha256';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
@@ -14,9 +15,9 @@ import * as layout from './layout';
 // Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
 // where there are none. Digests have been checked before.
 
+export { readAbout as about } from './about';
 export { readIndex } from './index_table';
 export { requireSelfContained } from './self_contained_glb';
-export { readQuality as quality } from './quality_table';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 
@@ -37,9 +38,16 @@ export interface PageRef extends EntryRef {
   entries: number;
   minor: number;
 }
+/** The entries of one package have one version. */
+function requireMinor(minor: number, { version }: Manifest, file: string): void {
+  require(minor === version.minor, file, '', `the manifest's minor version, ${version.minor}`, minor);
+}
+
 /** The pages of index.bin, from its head or more. */
-export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
+export function indexPages(bytes: Uint8Array, m: Manifest): PageRef[] {
+  const { index } = m;
   const { bytes: headBytes, pages, minor } = readIndexHead(bytes);
+  requireMinor(minor, m, paths.indexPath);
   require(headBytes === index.headBytes, paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
   return pages.map((p) => ({ ...p, minor, path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
 }
@@ -48,42 +56,52 @@ export function indexPages(bytes: Uint8Array, { index }: Manifest): PageRef[] {
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
-  for (const ref of [m.tables, m.textures, m.quality, m.provenance, ...m.scales.map((s) => s.glb)]) {
+  const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
+    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
+  ];
+  for (const ref of refs) {
+    if (!ref) continue;
     const e = entries.get(ref.path);
-    const same = e && e.offset === ref.offset && e.bytes === ref.bytes && e.sha256.every((byte, i) => byte === ref.sha256[i]);
+    const same = e && e.offset === ref.offset && e.bytes === ref.bytes && (ref.sha256 ?? e.sha256).every((byte, i) => byte === e.sha256[i]);
     require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
   }
   return entries;
 }
 
 /** The planes of textures.json. */
-export function textures(bytes: Uint8Array, { planeCount, previews, requiredFeatures }: Manifest): TextureInfo[] {
+export function textures(bytes: Uint8Array, { planeCount, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
   require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
   const feature = missingFeature(planes, requiredFeatures);
   require(feature === '', paths.manifestPath, '/requiredFeatures', feature, 'a codec without it');
-  const full = fullSizePlanes(planes);
-  const mips = requiredFeatures.includes('mips');
-  const mipCount = planes.length - full;
-  require(mips === mipCount > 0, paths.texturesPath, '', mips ? 'mips, as the manifest requires' : 'no mips', mipCount);
-  const said = previews.length === Math.min(full, mostManifestPreviews);
-  require(said, paths.manifestPath, '', 'previews of the full-size planes', previews.length);
   return planes;
+}
+
+/** Losses of lit pictures, of the manifest's scales. */
+export function quality(bytes: Uint8Array, { scales }: Manifest): QualityTable {
+  const table = readQuality(bytes);
+  const same = table.scales.length === scales.length && scales.every((s, k) => s.scale === table.scales[k]);
+  require(same, paths.qualityPath, '/scales', "the manifest's scales", 'others');
+  return table;
 }
 
 /** A plane's section of tables.bin. */
 export interface SectionRef extends EntryRef {
   minor: number;
+  /** Rows of scales that the section must have. */
+  scales: number;
 }
 /** The sections of tables.bin by plane, from its head or more. */
-export function tableSections(bytes: Uint8Array, { tables: ref, planeCount }: Manifest): SectionRef[] {
+export function tableSections(bytes: Uint8Array, m: Manifest): SectionRef[] {
+  const { tables: ref, planeCount, scales } = m;
   const head = readTablesHead(bytes);
+  requireMinor(head.minor, m, paths.tablesPath);
   require(head.bytes === ref.headBytes, paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
   require(head.planes.length === planeCount, paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
   const last = head.planes[planeCount - 1];
   const end = last ? last.offset + last.bytes : head.bytes;
   require(end === ref.bytes, paths.tablesPath, '', `${end} bytes`, ref.bytes);
-  return head.planes.map((s, p) => ({ ...s, minor: head.minor, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
+  return head.planes.map((s, p) => ({ ...s, minor: head.minor, scales: scales.length, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
 }
 
 /** Tables of one plane, and where its fragments are. */
@@ -100,7 +118,7 @@ export interface PlaneDocument {
 /** Tables from a section of tables.bin; textures.json and the index must speak of the same fragments and bytes. */
 export function planeTables(
   bytes: Uint8Array,
-  { minor }: SectionRef,
+  { minor, scales }: SectionRef,
   plane: number,
   info: TextureInfo,
   entries: Map<string, EntryRef>,
@@ -111,6 +129,8 @@ export function planeTables(
   const { columns, rows, rungQuality, order, sizeBytes } = tables;
   const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
   requireHere(columns === info.columns && rows === info.rows && sameRungs, 'the grid and rungs of textures.json', 'others');
+  const { length: rowCount } = tables.quality;
+  requireHere(rowCount === scales, `a row for each of the manifest's ${scales} scales`, rowCount);
   requireHere(tables.incremental === codecTraits(info.codec).incremental, 'tables of the codec in textures.json', 'others');
   const requireSum = (path: string, total: number): void =>
     requireHere(entries.get(path)?.bytes === total, `${path} of ${total} bytes in the index`, entries.get(path)?.bytes ?? 'none');

@@ -12,6 +12,10 @@ export const texturesPath = 'textures.json';
 export const qualityPath = 'quality.json';
 /** How the package was made. */
 export const provenancePath = 'provenance.json';
+/** What only the thesis's policy reads. */
+export const thesisPath = 'thesis.bin';
+/** What the object is, whose it is, what its coordinates mean. */
+export const aboutPath = 'about.json';
 /** Path of a scale's GLB, as mesh/s07.glb. */
 export const meshPath = (scale: number): string => `mesh/s${String(scale).padStart(2, '0')}.glb`;
 

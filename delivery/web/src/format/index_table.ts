@@ -1,8 +1,9 @@
 import { toHex } from './bytes';
 import { BytesIn } from './bytes_in';
 import * as paths from './entry_paths';
+import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
-import { EntryRef, formatMajor, formatMinor } from './manifest';
+import { EntryRef, formatMinor } from './manifest';
 import { sha256 } from './sha256';
 
 const file = paths.indexPath;
@@ -27,10 +28,7 @@ export interface IndexHead {
 /** Head of index.bin (format/SPEC.md, section 6); the bytes may stop after it. */
 export function readIndexHead(bytes: Uint8Array): IndexHead {
   const input = new BytesIn(bytes, file);
-  input.expect('TXMX');
-  const major = input.u16();
-  if (major !== formatMajor) input.fail(`major version ${formatMajor}`, `${major}`);
-  const minor = input.u16();
+  const minor = readEntryStart(input, 'TXMX');
   const pageCount = input.u32();
   const entryCount = input.u32();
   if (pageCount === 0 || pageCount > input.left / 44) input.fail('a page count that fits the file', `${pageCount}`);

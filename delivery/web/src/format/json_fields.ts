@@ -54,6 +54,10 @@ export class JsonAt {
     if (/[\u0000-\u001f\u007f]/.test(v)) this.fail('a text without control characters', 'one');
     return v;
   }
+  /** Whatever the value is. */
+  value(): unknown {
+    return this.value_;
+  }
   /** A SHA-256 (or its first bytes) as lower-case hexadecimal digits. */
   digest(bytes = 32): Uint8Array {
     const v = this.text(2 * bytes);

@@ -4,13 +4,11 @@ import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
 
 /** Major version of the format that this reader is for. */
-export const formatMajor = 1;
+export const formatMajor = 2;
 /** Minor version: packages of later ones can be read, too. */
-export const formatMinor = 1;
+export const formatMinor = 0;
 /** Features that packages may require of this reader. */
-export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp', 'mips'];
-/** Most previews whose places the manifest tells. */
-export const mostManifestPreviews = 224;
+export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp'];
 
 /** Where an entry's data stands in the container, and its digest. */
 export interface EntryRef {
@@ -51,6 +49,7 @@ export interface ManifestScale {
   scale: number;
   triangles: number;
   vertices: number;
+  /** What is read for the scale: its file, or a prefix of the vertex-split stream; see hasGlb. */
   glb: EntryRef;
   /** The last scale of a tier whose members cannot be told apart. */
   major: boolean;
@@ -63,9 +62,11 @@ export interface ManifestScale {
   displayPxEdge: number;
   /** By lit pictures: up to this height no view of the scale can be told from S_0's; 0 = at no height. */
   displayPxFlip: number;
-  /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". Since 1.1. */
+  /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". */
   floor: string;
 }
+/** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */
+export const hasGlb = ({ glb }: ManifestScale): boolean => glb.path !== layout.splitStreamPath;
 /** One step of the step function from displayed height to scale. */
 export interface ManifestStep {
   upToPx: number;
@@ -82,7 +83,7 @@ export interface Manifest {
   boundsMax: Vector3;
   /** O_V: largest extent of the bounds. */
   objectHeight: number;
-  /** Area of S_0; 0 = not said. */
+  /** Area of S_0, object units squared. */
   surfaceArea: number;
   jnd: number;
   /** Scales, S_0 first. */
@@ -91,14 +92,15 @@ export interface Manifest {
   steps: ManifestStep[];
   /** Number of texture planes, mips included. */
   planeCount: number;
-  firstPicture: ByteRange & { sha256: Uint8Array };
-  previews: ByteRange[];
   index: PagedRef;
   tables: PagedRef;
   textures: EntryRef;
   quality: EntryRef;
   provenance: EntryRef;
+  about: EntryRef;
   stream?: StreamRef;
+  /** thesis.bin, which this client does not read. */
+  thesis?: EntryRef;
   poster?: PosterRef;
 }
 
@@ -145,12 +147,16 @@ function readVector(at: JsonAt): Vector3 {
   return at.each(3, 3, (c) => c.number(-largest, largest)) as Vector3;
 }
 
+/** What a reader says that has found another major version. */
+export const otherMajor = (major: number): string =>
+  `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again' : 'a later reader is for'}`;
+
 function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'> {
   const format = at.at('format').text(100);
   if (format !== 'texmesh') at.at('format').fail('texmesh', format);
   const version = at.at('version');
   const [major, minor] = ['major', 'minor'].map((name) => version.at(name).integer(0, 1e6));
-  if (major !== formatMajor) version.at('major').fail(`${formatMajor}`, `${major}, which another reader is for`);
+  if (major !== formatMajor) version.at('major').fail(`${formatMajor}`, otherMajor(major));
   const requiredFeatures = at.at('requiredFeatures').each(0, 100, (feature) => {
     const name = feature.text(100);
     if (!knownFeatures.includes(name)) feature.fail('a feature that this reader knows', name);
@@ -162,7 +168,6 @@ function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'>
 /** Scales from an array for each field, all of one length. */
 function readScales(at: JsonAt): ManifestScale[] {
   const n = at.at('scale').array(1, 100);
-  const floors = at.has('floor');
   let before = -1;
   return at.at('scale').each(n, n, (scaleAt, i) => {
     const field = (name: string): JsonAt => {
@@ -183,7 +188,7 @@ function readScales(at: JsonAt): ManifestScale[] {
       major: field('major').boolean(),
       ...numbers(lengths, largest),
       ...numbers(heights, layout.anyDisplayPx),
-      floor: floors ? field('floor').text(100) : '',
+      floor: field('floor').text(100),
     };
   });
 }
@@ -202,26 +207,18 @@ function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   return steps;
 }
 
-function readFirstPicture(
-  at: JsonAt,
-  coarsest: EntryRef,
-  features: string[],
-): Pick<Manifest, 'planeCount' | 'firstPicture' | 'previews'> {
-  const planeCount = at.at('planeCount').integer(0, 10000);
-  const first = at.at('firstPicture');
-  const { path: _, ...firstPicture } = readRef(first, '');
-  const { offset, bytes } = firstPicture;
-  if (offset !== coarsest.offset) first.at('offset').fail(`the offset of the coarsest mesh, ${coarsest.offset}`, `${offset}`);
-  if (bytes < coarsest.bytes) first.at('bytes').fail(`a number from ${coarsest.bytes}`, `${bytes}`);
-  const most = Math.min(planeCount, mostManifestPreviews);
-  const previews = at.at('previews').each(features.includes('mips') ? Math.min(most, 1) : most, most, (pair) => {
-    pair.array(2, 2);
-    const range = { offset: readOffset(pair.at(0)), bytes: pair.at(1).integer(1) };
-    if (range.offset < offset + coarsest.bytes || range.offset + range.bytes > offset + bytes)
-      pair.fail('a range within the first picture, after the mesh', `${range.offset}`);
-    return range;
-  });
-  return { planeCount, firstPicture, previews };
+/** Gives the stream's path to scales whose place is that of the stream: they are prefixes of it. */
+function resolveStreamScales(at: JsonAt, scales: ManifestScale[], stream: StreamRef): void {
+  let before = stream.headBytes;
+  for (let i = scales.length - 1; i >= 0; --i) {
+    const { glb } = scales[i];
+    if (glb.offset !== stream.offset) continue;
+    if (i === 0 || i === scales.length - 1) at.at('offset').at(i).fail('a GLB of the finest and of the coarsest scale', 'the stream');
+    if (glb.bytes <= before || glb.bytes > stream.bytes)
+      at.at('bytes').at(i).fail(`more than ${before} bytes, at most the stream's`, `${glb.bytes}`);
+    before = glb.bytes;
+    glb.path = layout.splitStreamPath;
+  }
 }
 
 /**
@@ -237,6 +234,8 @@ export function readManifest(json: Uint8Array): Manifest {
     if (boundsMin[i] > most) bounds.at('max').at(i).fail('at least the minimum', 'less');
   });
   const scales = readScales(at.at('scales'));
+  const stream = at.has('stream') ? readStream(at.at('stream')) : undefined;
+  if (stream) resolveStreamScales(at.at('scales'), scales, stream);
   return {
     ...version,
     title: at.at('title').text(200),
@@ -244,17 +243,19 @@ export function readManifest(json: Uint8Array): Manifest {
     boundsMin,
     boundsMax,
     objectHeight: at.at('objectHeight').number(0, largest),
-    surfaceArea: at.has('surfaceArea') ? at.at('surfaceArea').number(0, largest) : 0,
+    surfaceArea: at.at('surfaceArea').number(0, largest),
     jnd: at.at('jnd').number(0, 1),
     scales,
     steps: readSteps(at.at('steps'), scales),
-    ...readFirstPicture(at, scales[scales.length - 1].glb, version.requiredFeatures),
+    planeCount: at.at('planeCount').integer(0, 10000),
     index: readPagedRef(at.at('index'), paths.indexPath),
     tables: readPagedRef(at.at('tables'), paths.tablesPath),
     textures: readRef(at.at('textures'), paths.texturesPath),
     quality: readRef(at.at('quality'), paths.qualityPath),
     provenance: readRef(at.at('provenance'), paths.provenancePath),
-    ...(at.has('stream') ? { stream: readStream(at.at('stream')) } : {}),
+    about: readRef(at.at('about'), paths.aboutPath),
+    ...(stream ? { stream } : {}),
+    ...(at.has('thesis') ? { thesis: readRef(at.at('thesis'), paths.thesisPath) } : {}),
     ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),
   };
 }

@@ -1,5 +1,7 @@
 import { qualityPath } from './entry_paths';
+import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
+import type { TextureInfo } from './textures';
 
 /** Planes whose loss shows in the same way. */
 export type PlaneGroup = 'colour' | 'normal' | 'data';
@@ -99,4 +101,11 @@ export function readQuality(json: Uint8Array): QualityTable {
       return { group: planeGroups[place], sizes: one.at('sizes').each(sizes, sizes, readTexture) };
     }),
   };
+}
+
+/** The groups of quality.json are those of the planes. */
+export function requireGroups({ groups }: QualityTable, planes: readonly TextureInfo[]): void {
+  const wanted = planeGroups.filter((group) => planes.some((t) => groupOf(t.role) === group));
+  if (groups.length !== wanted.length || groups.some((g, k) => g.group !== wanted[k]))
+    throw new FormatError(qualityPath, '/groups', 'the groups of the planes in textures.json', 'others');
 }

@@ -30,15 +30,22 @@ function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   return { json, bytes: glb.subarray(end + 8) };
 }
 
+/** What the GLBs of finer scales have for images: previews by their place in a tree. */
+const previewUri = /^\.\.\/preview\/\d{3,5}\.jpg$/;
+
 /**
- * Requires a GLB whose data is all in the file: a URI would make pages ask the host of that URI. Pictures in the GLB, which loaders
- * decode, must be no larger than previews. FormatError otherwise.
+ * Requires a GLB whose data is all in the file: a URI would make pages ask the host of that URI. With `placeholders` its images may be
+ * URIs of previews, since nobody asks for them. Pictures in the GLB, which loaders decode, must be no larger than previews. FormatError
+ * otherwise.
  */
-export function requireSelfContained(glb: Uint8Array): void {
+export function requireSelfContained(glb: Uint8Array, placeholders = false): void {
   const { json, bytes } = partsOfGlb(glb);
-  for (const list of [json.buffers ?? [], json.images ?? []])
-    require(Array.isArray(list) && list.every((item) => item && item.uri === undefined), 'buffers and images within the file');
-  for (const { bufferView = -1 } of json.images ?? []) {
+  const { buffers = [], images = [] } = json;
+  require(Array.isArray(buffers) && Array.isArray(images) && [...buffers, ...images].every((item) => item), 'lists of buffers and images');
+  const mayName = (uri: unknown): boolean => placeholders && typeof uri === 'string' && previewUri.test(uri);
+  const inside = images.filter(({ uri }) => !mayName(uri));
+  require([...buffers, ...inside].every(({ uri }) => uri === undefined), 'buffers and images within the file');
+  for (const { bufferView = -1 } of inside) {
     const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
     require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'pictures as they are');
     const [width, height] = imageSize(bytes.subarray(at, at + length));

@@ -1,15 +1,11 @@
-/** Values of Gamma for which D_i is stored. */
-export const gammaSteps = 21;
-
 /**
  * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising quality,
- * N = scales + 1 feature scales.
+ * N rows of feature scales: those of
+ * the manifest, in its order.
  */
 export interface PlaneTables {
   columns: number;
   rows: number;
-  /** Number of the coarsest scale, N - 1. */
-  scales: number;
   /** A rung's streams continue those of the rungs below. */
   incremental: boolean;
   /** [R] IJG quality, strictly rising. */
@@ -28,36 +24,23 @@ export interface PlaneTables {
   coveredTexels: Uint32Array;
   /** [F] share of the object's surface. */
   surfaceFraction: Float32Array;
-  /** [F] predictors. */
-  z: Float32Array;
-  i: Float32Array;
-  zeta: Float32Array;
-  m: Float32Array;
-  vqp: Float32Array;
-  /** Every stored fragment once, by falling importance. */
+  /** Every stored fragment once, by falling importance. A fragment is stored at every rung or at none; all else is 0 then. */
   order: Uint16Array;
-  /** [F] 1 - SSIM when the preview stands for the fragment; empty: format 1.0 did not say. */
+  /** [F] 1 - SSIM when the preview stands for the fragment. */
   skipDssim: Float32Array;
   /** Qualities between rungs, rising; and the share of the way from rung to rung that bytes have gone at each. */
   knotQuality: Uint8Array;
   knotPosition: Float32Array;
-  /** [N * F] feature points f_i, index scale * F + fragment. */
+  /** [N * F] feature points f_i, index row * F + fragment. */
   features: Uint32Array;
   /** [N] quality Q_i. */
   quality: Float32Array;
-  /** [N * 21] D_i(Gamma): bytes of the plane. */
-  totalBytes: Float64Array;
   /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1. */
   allocation: number;
   qualityWidth: number;
   logWidth: number;
   qualityMin: number;
   qualityMax: number;
-  modelA: number;
-  modelB: number;
-  modelR: number;
-  modelCorrelation: number;
-  modelError: number;
 }
 
 /** F: fragments of the plane. */

@@ -64,7 +64,7 @@ function readGrid(at: JsonAt) {
 
 const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
 
-/** Fields about the source itself; since 1.1. */
+/** Fields about the source itself. */
 function readSource(at: JsonAt, codec: CodecId, mip: number): { lossless: boolean; source: string } {
   const lossless = at.has('lossless') && at.at('lossless').boolean();
   if (lossless && (codec !== 'jpeg' || mip > 0)) at.at('lossless').fail('a full-size plane of codec jpeg', 'another');

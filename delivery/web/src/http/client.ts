@@ -39,13 +39,13 @@ export class HttpClient {
   /** One GET; network problems come back in the answer, only cancelling throws. */
   async get(url: string, get: GetOptions): Promise<Answer> {
     const { options } = this;
-    const { range, ifRange, maxBytes, kind, signal, stallTimeoutS = options.stallTimeoutS, onBytes, reload } = get;
+    const { range, maxBytes, kind, signal, stallTimeoutS = options.stallTimeoutS, onBytes, reload } = get;
     throwIfAborted(signal);
     if (this.active_ < this.limit_) ++this.active_;
     else await new Promise<void>((go) => this.waiting_.push(go));
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', complete: false, tooLong: false };
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', length: -1, complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
@@ -65,7 +65,6 @@ export class HttpClient {
       restartStallTimer();
       const headers: Record<string, string> = {};
       if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
-      if (ifRange) headers['If-Range'] = ifRange;
       const cache = reload ? 'reload' : range ? options.rangeCache : 'default';
       const response = await (options.fetch ?? globalThis.fetch)(url, { headers, signal: abort.signal, cache });
       restartStallTimer();
@@ -74,7 +73,8 @@ export class HttpClient {
       record.ok = status === (range ? 206 : 200);
       const header = (name: string): string => response.headers.get(name) ?? '';
       const etag = header('etag');
-      Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', range: contentRange(header('content-range')) });
+      const length = status === 200 && /^\d{1,15}$/.test(header('content-length')) ? Number(header('content-length')) : -1;
+      Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length, range: contentRange(header('content-range')) });
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();

@@ -5,7 +5,7 @@ import type { OpenedStore, StoreMode } from './store';
 
 /**
  * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside the container where the server
- * answers 200 to a range; the whole container where there is no tree.
+ * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
  */
 export async function openStore(
   url: string,
@@ -17,7 +17,8 @@ export async function openStore(
   const urls = [url, ...mirrors.filter((m) => m !== url)];
   const files = () => import('./without_ranges');
   if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
-  const store = new RangeStore(urls, client);
+  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) => (await files()).openSameTree(urls, client, manifest, aborted);
+  const store = new RangeStore(urls, client, mode === 'range' ? undefined : openTree);
   try {
     return { store, manifest: await store.manifest(signal) };
   } catch (error) {

@@ -1,7 +1,11 @@
+import { startBytes } from '../format/layout';
+
 /** Limits on servers: time, tries, bytes, requests at once. */
 export interface HttpOptions {
   /** Stands in for the browser's fetch; gets a URL and a RequestInit. */
   fetch?: typeof fetch;
+  /** Bytes of the first request, at least 16384: manifest, first picture, and what stands behind these. */
+  startBytes: number;
   /** Retries of one request, after cut connections, stalls and statuses 408, 429, 5xx. */
   retries: number;
   /** Pause before the first retry, doubled for each further one. */
@@ -24,6 +28,7 @@ export interface HttpOptions {
 }
 /** Options where the caller says nothing. */
 export const defaultHttpOptions: HttpOptions = {
+  startBytes,
   retries: 3,
   retryDelayS: 0.2,
   stallTimeoutS: 10,

@@ -1,3 +1,4 @@
+import type { About } from '../format/about';
 import { decodeHere, type Documents } from '../format/document_decoder';
 import type { PlaneDocument } from '../format/documents';
 import { planeOfPath } from '../format/entry_paths';
@@ -5,7 +6,7 @@ import { FormatError, InputError, isAbort } from '../format/errors';
 import type { FragmentFiles } from '../format/fragment_files';
 import type { ByteRange, EntryRef, Manifest, PagedRef, StreamRef } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
-import type { QualityTable } from '../format/quality_table';
+import { type QualityTable, requireGroups } from '../format/quality_table';
 import { requireDigest } from '../format/sha256';
 import type { PlaneTables } from '../format/tables';
 import type { TextureInfo } from '../format/textures';
@@ -106,7 +107,7 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality' | 'about'>(
     name: K,
     signal: AbortSignal | undefined,
     read: (m: Manifest) => Promise<Uint8Array>,
@@ -163,18 +164,29 @@ export class PackageDocuments {
     return this.document_('textures', signal, (m) => this.readChecked(m.textures, { kind: 'textures', signal }));
   }
   /** Measured quality of scales and rungs. */
-  quality(signal?: AbortSignal): Promise<QualityTable> {
-    return this.document_('quality', signal, (m) => this.readChecked(m.quality, { kind: 'quality', signal }));
+  async quality(signal?: AbortSignal): Promise<QualityTable> {
+    const read = (m: Manifest): Promise<Uint8Array> => this.readChecked(m.quality, { kind: 'quality', signal });
+    const [table, textures] = await Promise.all([this.document_('quality', signal, read), this.textures(signal)]);
+    requireGroups(table, textures);
+    return table;
   }
   /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
   }
-  /** Reads index, tables, textures.json and quality.json by one request where these documents are small; false where not. */
+  /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
+  about(signal?: AbortSignal): Promise<About> {
+    return this.document_('about', signal, (m) => this.readChecked(m.about, { kind: 'other', signal }));
+  }
+  /**
+   * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,
+   * quality.json, table streams, tables. False where not even the documents before the tables are small.
+   */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
-    const { index, quality } = this.manifest;
-    const bytes = quality.offset + quality.bytes - index.offset;
-    if (bytes > wholeDocumentBytes || bytes <= 0) return false;
+    const { index, tables } = this.manifest;
+    const ends = [tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
+    const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
+    if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.
     if (this.form === 'range') await this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
     return true;

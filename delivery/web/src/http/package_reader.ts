@@ -5,7 +5,7 @@ import { FormatError, InputError } from '../format/errors';
 import type { FragmentFiles } from '../format/fragment_files';
 import { joinFragment } from '../format/join_fragment';
 import { previewPath, rungPath } from '../format/layout';
-import type { ByteRange } from '../format/manifest';
+import { type ByteRange, hasGlb } from '../format/manifest';
 import { requireDigest } from '../format/sha256';
 import { fragmentCount, rungCount } from '../format/tables';
 import { HttpClient } from './client';
@@ -83,21 +83,14 @@ export class PackageReader extends PackageDocuments {
 
   // ---- meshes and previews
 
-  /** Reads the range of the first picture, so that the mesh and the previews in that range need no further request. */
-  firstPicture(how: Partial<ReadOptions> = {}): Promise<void> {
-    const read = async (): Promise<void> => {
-      if (this.form !== 'range') return;
-      const { firstPicture, previews } = this.manifest;
-      const got = await this.readChecked({ path: 'first picture', ...firstPicture }, { kind: 'first-picture', ...how });
-      // The digest of the first picture covers the previews.
-      previews.forEach(({ offset, bytes }, plane) => this.keepPreview(plane, got.subarray(offset - firstPicture.offset).subarray(0, bytes)));
-    };
-    return this.readOnce_('picture', read, how.signal);
-  }
-  /** The GLB of a scale; no index is needed. */
+  /**
+   * The GLB of a scale as it is stored; no index is needed. Images of all but the coarsest scale's may be relative URIs of previews.
+   * InputError where the scale has no file of its own: see hasGlb.
+   */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
+    if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own', 'one of the stream');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
   /** The preview of a full-size plane, preview/PPP.jpg. */
@@ -105,10 +98,6 @@ export class PackageReader extends PackageDocuments {
     const read = async (): Promise<Uint8Array> =>
       this.readChecked(await this.findWithoutPlane_(previewPath(plane), signal), { kind: 'preview', signal });
     return this.readOnce_(`preview/${plane}`, read, signal);
-  }
-  /** Keeps a preview that came with the first picture. */
-  keepPreview(plane: number, bytes: Uint8Array): void {
-    this.keepRead_(`preview/${plane}`, Promise.resolve(bytes));
   }
 
   // ---- fragments

@@ -1,12 +1,12 @@
 import { concat } from '../format/bytes';
 import { FormatError, InputError } from '../format/errors';
 import { bootstrapBytes } from '../format/layout';
-import type { ByteRange } from '../format/manifest';
+import { type ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors } from './mirrors';
-import { Answer, shownUrl, whatCame } from './requests';
+import { Answer, isSameFile, shownUrl, whatCame } from './requests';
 import { retriesOf } from './retries';
-import type { PackageStore, ReadOptions } from './store';
+import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
 /** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */
 function sameOrigin(url: string): boolean {
@@ -14,26 +14,56 @@ function sameOrigin(url: string): boolean {
   return !here || new URL(url, here.href).origin === here.origin;
 }
 
-/** Reads ranges of a container. Bytes that were read are not asked for again, unless they were read `once`. */
+/** A server that has answered ranges answers 200 for one, and the file is still the same. */
+class RangesEnded extends InputError {}
+
+/**
+ * Reads ranges of a container. Bytes that were read are not asked for again, unless they were read `once`. Where servers stop answering
+ * ranges of the same file, the tree beside the container is read, if `openTree` finds the same package there.
+ */
 export class RangeStore implements PackageStore {
-  readonly form = 'range';
   /** Error of a server that knows no ranges. */
   noRanges?: InputError;
+  private tree_?: Promise<PackageStore>;
+  private form_: PackageForm = 'range';
   private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
   private readonly mirrors_: Mirrors;
 
-  constructor(urls: readonly string[], client: HttpClient) {
+  constructor(
+    urls: readonly string[],
+    client: HttpClient,
+    private readonly openTree_?: (manifest: Uint8Array, signal?: AbortSignal) => Promise<PackageStore>,
+  ) {
     this.mirrors_ = new Mirrors(urls, client);
+  }
+  get form(): PackageForm {
+    return this.form_;
   }
   get name(): string {
     return shownUrl(this.mirrors_.all[0].url);
   }
 
-  manifest(signal?: AbortSignal): Promise<Uint8Array> {
-    return this.read(undefined, { offset: 0, bytes: bootstrapBytes }, { kind: 'manifest', signal });
+  async manifest(signal?: AbortSignal): Promise<Uint8Array> {
+    const bytes = Math.max(bootstrapBytes, this.mirrors_.client.options.startBytes);
+    const start = await this.readRange_({ offset: 0, bytes }, { kind: 'manifest', signal });
+    return start.subarray(0, bootstrapBytes);
   }
 
-  async read(_: unknown, { offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
+  async read(place: Place, range: ByteRange, how: ReadOptions): Promise<Uint8Array> {
+    if (this.tree_) return (await this.tree_).read(place, range, how);
+    try {
+      return await this.readRange_(range, how);
+    } catch (error) {
+      if (!(error instanceof RangesEnded) || !this.openTree_) throw error;
+      this.tree_ ??= this.openTree_(manifestOfContainer(await this.manifest(), this.name), how.signal);
+      this.tree_.then(() => (this.form_ = 'files'), () => (this.tree_ = undefined));
+      const tree = await this.tree_.catch((failure: unknown) => {
+        throw failure instanceof FormatError ? failure : error; // replaced; or no tree, or no part that reads trees
+      });
+      return tree.read(place, range, how);
+    }
+  }
+  private async readRange_({ offset: begin, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
     if (bytes === 0) return new Uint8Array(0); // WebP's tables are empty; no range header can say that
     const end = begin + bytes;
     const part = this.parts_.find((p) => p.begin <= begin && p.begin + p.bytes.length > begin);
@@ -73,12 +103,13 @@ export class RangeStore implements PackageStore {
       const range = { offset: offset + have, bytes: bytes - have };
       const a = await client.get(m.url, {
         range, kind, signal, maxBytes: range.bytes, ...asking,
-        ifRange: sameOrigin(m.at) ? m.etag : '', // to another origin the header would cost a preflight request
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
       if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
-      this.require_(m, a.status !== 200, offset, 'the file that reading began with', 'status 200: it was replaced, or the server no longer answers ranges');
+      if (a.status === 200 && isSameFile(a, m))
+        throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206', 'status 200: ranges are no longer answered');
+      if (a.status === 200 || a.status === 416) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
         this.checkRange_(m, a, range);
         chunks.push(a.body);
@@ -93,9 +124,12 @@ export class RangeStore implements PackageStore {
     if (!good) throw new FormatError(shownUrl(url), `byte ${offset}`, expected, `${found}`);
   }
 
+  private requireSame_(m: Mirror, same: boolean, offset: number, found: string): void {
+    this.require_(m, same, offset, 'the file that reading began with', `${found}: it was replaced, open it anew`);
+  }
   /** Requires an answer from the file that reading began with, and with the range that was asked for. */
   private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
-    this.require_(m, !m.etag || !etag || etag === m.etag, offset, 'the file that reading began with', 'another one (ETag)');
+    this.requireSame_(m, !m.etag || !etag || etag === m.etag, offset, 'another ETag');
     m.etag ||= etag;
     // Another origin may keep Content-Range to itself; then the length alone is checked.
     if (!range) {
@@ -103,7 +137,7 @@ export class RangeStore implements PackageStore {
       return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`, body.length);
     }
     const [first, last, total] = range;
-    this.require_(m, m.total < 0 || total === m.total, offset, `a file of ${m.total} bytes`, total);
+    this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
     this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset, 'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }

@@ -7,7 +7,6 @@ export type RequestKind =
   | 'tables'
   | 'textures'
   | 'quality'
-  | 'first-picture'
   | 'mesh'
   | 'preview'
   | 'texture'
@@ -41,6 +40,8 @@ export interface Answer {
   url: string;
   /** Strong ETag; '' = none. */
   etag: string;
+  /** Content-Length of a whole file; -1 = not said. */
+  length: number;
   /** Content-Range, when that header may be read: first and last byte, bytes of the file. */
   range?: number[];
   /** The body ended as it should. */
@@ -51,7 +52,6 @@ export interface Answer {
 /** Options of one GET. */
 export interface GetOptions {
   range?: { offset: number; bytes: number };
-  ifRange?: string;
   maxBytes: number;
   kind: RequestKind;
   signal?: AbortSignal;
@@ -65,6 +65,13 @@ export interface GetOptions {
 export function contentRange(text: string): Answer['range'] {
   const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
   return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
+}
+
+/** Whether an answer is about the file of this strong ETag ('' = none) and length (-1 = not known). What cannot be compared counts as same. */
+export function isSameFile({ etag, range, length }: Answer, known: { etag: string; total: number }): boolean {
+  if (etag && known.etag) return etag === known.etag;
+  const total = range ? range[2] : length;
+  return total < 0 || known.total < 0 || total === known.total;
 }
 
 /** A URL without user, password and query, for messages. */

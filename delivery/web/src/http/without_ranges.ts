@@ -1,4 +1,4 @@
-import { InputError } from '../format/errors';
+import { FormatError, InputError } from '../format/errors';
 import { FragmentFiles, readFragmentFiles } from '../format/fragment_files';
 import { bootstrapBytes } from '../format/layout';
 import type { HttpClient } from './client';
@@ -30,6 +30,16 @@ export function openTree(urls: readonly string[], client: HttpClient, signal?: A
   if (roots.length === 0)
     throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
   return opened(new TreeStore(roots, client), signal);
+}
+
+/** Opens the tree beside a container that ranges were read of, whose manifest must have these bytes. */
+export async function openSameTree(urls: readonly string[], client: HttpClient, manifest: Uint8Array, signal?: AbortSignal): Promise<PackageStore> {
+  const roots = treesOf(urls);
+  if (roots.length === 0) throw new InputError(shownUrl(urls[0]), '', 'an answer with status 206', 'status 200: ranges are no longer answered');
+  const { store, manifest: got } = await opened(new TreeStore(roots, client), signal);
+  if (got.length !== manifest.length || got.some((byte, i) => byte !== manifest[i]))
+    throw new FormatError(store.name, 'manifest.json', 'the package that reading began with', 'another: it was replaced, open it anew');
+  return store;
 }
 
 /** Opens the tree beside a container, or the whole container. */

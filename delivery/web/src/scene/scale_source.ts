@@ -1,5 +1,6 @@
 import type { Mesh, Object3D } from 'three';
 import { isAbort } from '../format/errors';
+import { type ManifestScale, hasGlb } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions } from './api';
@@ -26,7 +27,10 @@ export interface ScaleSourceParts {
   problem: (error: unknown, what: string) => void;
 }
 
-/** The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. */
+/**
+ * The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. A scale that the stream alone has is
+ * shown by the next finer GLB where the stream is not read.
+ */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
   private readonly underWay_ = new Map<number, ScaleLoad>();
@@ -85,8 +89,13 @@ export class ScaleSource {
     this.first_ = undefined;
   }
 
+  /** The coarsest scale with a file that is no coarser than this one. */
+  private fileFor_(scale: number): ManifestScale {
+    return this.parts_.reader.manifest.scales.filter((s) => s.scale <= scale && hasGlb(s)).at(-1)!;
+  }
   private glbBytes_(scale: number): number {
-    return this.parts_.reader.manifest.scales.find((s) => s.scale === scale)?.glb.bytes ?? 0;
+    const file = this.fileFor_(scale);
+    return this.shapes_.has(file.scale) ? 0 : file.glb.bytes;
   }
   private streamBytes_(scale: number): number {
     return this.streamUsable_ ? this.splits_!.bytesOf(scale) : Infinity;
@@ -118,13 +127,20 @@ export class ScaleSource {
   }
   private async readGlb_(scale: number, arrived: () => void): Promise<Object3D> {
     const { reader, options, materials, signal, added } = this.parts_;
-    const glb = await reader.scaleGlb(scale, { signal });
+    const file = this.fileFor_(scale).scale;
+    const known = this.shapes_.get(file);
+    if (known) {
+      this.shapes_.set(scale, known);
+      return known;
+    }
+    const glb = await reader.scaleGlb(file, { signal });
     arrived();
-    await reader.decoded(signal, 'requireSelfContained', glb);
-    const gltf = await parseScale(options.gltfLoader(), glb, this.first_ !== undefined);
+    const placeholders = this.first_ !== undefined;
+    await reader.decoded(signal, 'requireSelfContained', glb, placeholders);
+    const gltf = await parseScale(options.gltfLoader(), glb, placeholders);
     this.first_ ??= gltf;
     materials.shareMaterials(gltf, meshesOf(gltf.scene), added);
-    this.shapes_.set(scale, gltf.scene);
+    for (const s of [file, scale]) this.shapes_.set(s, gltf.scene);
     return gltf.scene;
   }
 }

@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import {
   FormatError, PackageReader, readIndex, readManifest, readQuality, readTablesHead, readTablesSection, readTextures,
 } from '../../src/reader';
+import { hasGlb } from '../../src/format/manifest';
 import { golden, goldenNames } from '../support/files';
 import { problem } from '../support/scan';
 
@@ -49,5 +50,35 @@ describe.each(goldenNames)('%s', (name) => {
       const error = await problem(() => documents[path](copy));
       if (error !== undefined) expect(error, `byte ${at}`).toBeInstanceOf(FormatError);
     }
+  });
+});
+
+describe('scales that the vertex-split stream alone has', () => {
+  /** The golden manifest with a scale between the finest and the coarsest. */
+  async function manifestWith(change: (scales: Record<string, unknown[]>, stream: { offset: number; bytes: number; headBytes: number }) => void = () => undefined) {
+    const json = JSON.parse(new TextDecoder().decode(await entryOf('v1.1-scan', 'manifest.json'))) as {
+      scales: Record<string, unknown[]>;
+      stream: { offset: number; bytes: number; headBytes: number };
+    };
+    for (const column of Object.values(json.scales)) column.splice(1, 0, column[0]);
+    json.scales.scale = [0, 1, 2];
+    json.scales.offset[1] = json.stream.offset;
+    json.scales.bytes[1] = json.stream.bytes;
+    change(json.scales, json.stream);
+    return readManifest(new TextEncoder().encode(JSON.stringify(json)));
+  }
+  it('are prefixes of the stream', async () => {
+    const { scales } = await manifestWith();
+    expect(scales.map(hasGlb)).toEqual([true, false, true]);
+    expect(scales[1].glb.path).toBe('mesh/stream.bin');
+  });
+  it('are neither the finest nor the coarsest, and lie in the stream', async () => {
+    const bad: Parameters<typeof manifestWith>[0][] = [
+      (s, { offset }) => (s.offset[0] = offset),
+      (s, { offset }) => (s.offset[2] = offset),
+      (s, { bytes }) => (s.bytes[1] = bytes + 1),
+      (s, { headBytes }) => (s.bytes[1] = headBytes),
+    ];
+    for (const change of bad) expect(await problem(() => manifestWith(change))).toBeInstanceOf(FormatError);
   });
 });

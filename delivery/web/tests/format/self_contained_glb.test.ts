@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { requireSelfContained } from '../../src/format/self_contained_glb';
+import { hasGlb } from '../../src/format/manifest';
 import { FormatError, PackageReader } from '../../src/reader';
 import { container } from '../support/scan';
 
@@ -70,6 +71,16 @@ describe('hostile answers', () => {
     for (let n = 0; n < whole.length; ++n) expect(() => requireSelfContained(whole.subarray(0, n))).toThrow(FormatError);
     expect(() => requireSelfContained(glb('{"images":'))).toThrow(FormatError);
     const reader = await PackageReader.openBytes(container, 'golden');
-    for (const { scale } of reader.manifest.scales) requireSelfContained(await reader.scaleGlb(scale));
+    const { scales } = reader.manifest;
+    for (const s of scales.filter(hasGlb)) requireSelfContained(await reader.scaleGlb(s.scale), s !== scales.at(-1));
+  });
+  it('images may be previews by their URI where nobody asks for images', () => {
+    const named = (uri: unknown, list = 'images'): Uint8Array => glb(JSON.stringify({ [list]: [{ uri }] }));
+    requireSelfContained(named('../preview/003.jpg'), true);
+    requireSelfContained(named('../preview/10000.jpg'), true);
+    expect(() => requireSelfContained(named('../preview/003.jpg'))).toThrow(FormatError);
+    expect(() => requireSelfContained(named('../preview/003.jpg', 'buffers'), true)).toThrow(FormatError);
+    for (const uri of ['http://evil.example/../preview/003.jpg', '../preview/3.jpg', '../preview/003.png', 'preview/003.jpg', '../../preview/003.jpg', '../preview/003.jpg?x', 7])
+      expect(() => requireSelfContained(named(uri), true)).toThrow(FormatError);
   });
 });

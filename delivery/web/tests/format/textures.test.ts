@@ -4,7 +4,7 @@ import { golden } from '../support/files';
 
 describe('small parts', () => {
   it('textures that keep their sources', async () => {
-    const entry = await (await PackageReader.openBytes(golden('v1.1-scan'), 'golden')).entry('textures.json');
+    const entry = await (await PackageReader.openBytes(golden('v2.0-scan'), 'golden')).entry('textures.json');
     const { textures } = JSON.parse(new TextDecoder().decode(entry));
     const withFirst = (more: object) => {
       const [first, ...others] = textures;

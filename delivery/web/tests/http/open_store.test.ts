@@ -10,11 +10,11 @@ vi.mock('../../src/http/without_ranges', () => {
   throw new Error('not there');
 });
 
-const container = golden('v1.1-scan');
+const container = golden('v2.0-scan');
 const url = 'http://host/a/scan.texmesh';
 const open = (fault?: FaultKind, from = 0, ranges = true): Promise<PackageReader> => {
   const server = fakeServer({ '/a/scan.texmesh': container }, { ranges, fault: ({ number }) => (number >= from && fault) || false });
-  return PackageReader.openUrl(url, { fetch: server.fetch, retryDelayS: 0.001, stallTimeoutS: 0.05 });
+  return PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, stallTimeoutS: 0.05 });
 };
 const rejection = (what: Promise<unknown>): Promise<Error> =>
   what.then(() => { throw new Error('it should have failed'); }, (error: Error) => error);
@@ -43,7 +43,7 @@ describe('without the part for servers without ranges', () => {
   });
   it('mirrors are read as long as the first one is well', async () => {
     const server = fakeServer({ '/a/scan.texmesh': container });
-    const reader = await PackageReader.openUrl(url, { fetch: server.fetch, retryDelayS: 0.001, mirrors: ['http://other/a/scan.texmesh'] });
+    const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, mirrors: ['http://other/a/scan.texmesh'] });
     expect((await reader.textures()).length).toBe(reader.manifest.planeCount);
   });
 });

@@ -114,7 +114,7 @@ describe.each(goldenNames)('%s', (name) => {
 });
 
 describe('places that do not exist', async () => {
-  const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+  const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
   it.each([
     ['a plane', () => reader.planeTables(99)],
     ['a rung', () => reader.fragmentRange(0, 99, 0)],

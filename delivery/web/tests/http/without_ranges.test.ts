@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { treeUrl } from '../../src/http/without_ranges';
 import { InputError, PackageReader } from '../../src/reader';
-import { fakeServer } from '../support/fake_server';
+import { fakeServer, treeFiles } from '../support/fake_server';
 import { expected, readSome, tree } from '../support/reading';
 import { container, openAt, openRetrying, range, rejection } from '../support/scan';
 
@@ -15,6 +15,30 @@ describe('hostile answers', () => {
   it('mode files wants a URL that has a tree', async () => {
     const opening = PackageReader.openUrl('http://host/a/scan.zip', { fetch: range().fetch, mode: 'files' });
     expect(await rejection(opening)).toBeInstanceOf(InputError);
+  });
+});
+
+describe('a server that stops answering ranges', () => {
+  /** Ranges at first, then whole files; the tree beside the container. */
+  const stopping = async (change?: (files: Record<string, Uint8Array>) => void) => {
+    const reader = await PackageReader.openBytes(container, 'golden');
+    const entries = [...(await reader.index()), reader.manifest.index];
+    const files = { '/a/scan.texmesh': container, ...treeFiles('/a/scan/', container, await reader.store.manifest(), entries) };
+    change?.(files);
+    return fakeServer(files, { fault: ({ number, range: asked }) => number > 0 && !!asked && 'whole' });
+  };
+  it('is read on from the tree of the same package', async () => {
+    const reader = await openRetrying(await stopping());
+    expect(reader.form).toBe('range');
+    expect(await readSome(reader)).toBe(expected);
+    expect(reader.form).toBe('files');
+  });
+  it('is not mixed with another package', async () => {
+    const server = await stopping((files) => (files['/a/scan/manifest.json'] = new Uint8Array([...files['/a/scan/manifest.json'], 32])));
+    expect((await rejection(openRetrying(server).then(readSome))).message).toContain('replaced, open it anew');
+  });
+  it('is no longer read where ranges are insisted on', async () => {
+    expect((await rejection(openRetrying(await stopping(), { mode: 'range' }).then(readSome))).message).toContain('ranges are no longer answered');
   });
 });
 

@@ -6,7 +6,7 @@ import { displayedHeightPx, Manifest, PackageReader, selectScale } from '../../s
 import { displayOf } from '../../src/scene/camera';
 import { golden } from '../support/files';
 
-const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
 const { manifest } = reader;
 const renderer = (width: number, height: number): WebGLRenderer =>
   ({ getDrawingBufferSize: (v: Vector2) => v.set(width, height) }) as unknown as WebGLRenderer;

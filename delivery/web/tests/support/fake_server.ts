@@ -3,7 +3,7 @@ export interface Fault {
   /** By number of the request, from 0 on; false: all is well. */
   (request: { number: number; url: string; range?: [number, number] }): FaultKind | false;
 }
-export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short' | 'long' | 'whole' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
+export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short' | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -33,10 +33,12 @@ export function fakeServer(files: Record<string, Uint8Array>, options: { ranges?
     if (kind === 'status-500') return new Response('', { status: 500 });
     if (kind === 'status-416') return new Response('', { status: 416 });
     if (!file || kind === 'status-404') return new Response('', { status: 404 });
-    const headers = new Headers({ ETag: kind === 'other-etag' ? '"other"' : `"${file.length}"` });
-    let body = file;
+    const headers = new Headers();
+    // The length alone tells a file that is longer now.
+    if (kind !== 'whole-longer') headers.set('ETag', kind === 'other-etag' || kind === 'whole-other' ? '"other"' : `"${file.length}"`);
+    let body = kind === 'whole-longer' ? new Uint8Array([...file, 0]) : file;
     let status = 200;
-    if (range && options.ranges !== false && kind !== 'whole') {
+    if (range && options.ranges !== false && !kind?.startsWith('whole')) {
       if (range[0] >= file.length) return new Response('', { status: 416 });
       const last = Math.min(range[1], file.length - 1);
       body = file.slice(range[0], last + 1);

@@ -13,7 +13,7 @@ export function readText(path: string): string {
 }
 /** A golden package (tests/golden). */
 export const golden = (name: string): Uint8Array => readBytes(`tests/golden/${name}.texmesh`);
-export const goldenNames = ['v1.0-scan', 'v1.1-scan'] as const;
+export const goldenNames = ['v2.0-scan'] as const;
 
 /** Doubles with the same bits, NaN and signed zeros told apart. */
 export function sameBits(a: number, b: number): boolean {

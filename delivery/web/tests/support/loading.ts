@@ -69,7 +69,7 @@ export interface Loading {
 
 /** Opens and loads a package of a fake server. */
 export async function loading(url: string, server: FakeServer, load: Partial<LoadOptions> = {}, open: OpenOptions = {}): Promise<Loading> {
-  const pkg = await TexmeshPackage.openUrl(url, { fetch: server.fetch, retries: 0, retryDelayS: 0.001, ...open });
+  const pkg = await TexmeshPackage.openUrl(url, { fetch: server.fetch, startBytes: 16384, retries: 0, retryDelayS: 0.001, ...open });
   const uploads: Uploads = [];
   const model = pkg.load(new Scene(), {
     renderer: fakeRenderer(uploads),

@@ -4,11 +4,11 @@ import { golden } from './files';
 
 // The golden scan on a server in memory, and what tests do with promises.
 
-export const container = golden('v1.1-scan');
+export const container = golden('v2.0-scan');
 export const url = 'http://host/a/scan.texmesh';
 export const files = { '/a/scan.texmesh': container };
-/** Options of a client that gives up soon. */
-export const quick: OpenOptions = { retryDelayS: 0.001, stallTimeoutS: 0.05, retries: 1 };
+/** Options of a client that gives up soon, and whose first request does not bring half of the scan. */
+export const quick: OpenOptions = { startBytes: 16384, retryDelayS: 0.001, stallTimeoutS: 0.05, retries: 1 };
 /** A server with ranges. */
 export const range = (fault?: Fault): FakeServer => fakeServer(files, { fault });
 export const openAt = (server: FakeServer, options: OpenOptions = {}): Promise<PackageReader> =>

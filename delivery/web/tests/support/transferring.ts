@@ -25,8 +25,8 @@ export async function decode(request: WorkerRequest): Promise<[unknown, Transfer
 
 /** Transfers whose planes are prepared, and what becomes of wishes. */
 export async function setUp(fault?: Fault) {
-  const server = fakeServer({ '/scan.texmesh': golden('v1.1-scan') }, { fault });
-  const reader = await PackageReader.openUrl(url, { fetch: server.fetch, retryDelayS: 0.001, retries: 1 });
+  const server = fakeServer({ '/scan.texmesh': golden('v2.0-scan') }, { fault });
+  const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, retries: 1 });
   await reader.prefetchDocuments();
   const data = await reader.data();
   const decoded: Wish[] = [];

@@ -1,4 +1,5 @@
 import { describe, expect, it } from 'vitest';
+import type { Manifest } from '../../src/format/manifest';
 import { WorkerPool } from '../../src/worker/pool';
 import type { WorkerRequest } from '../../src/worker/protocol';
 import { rejection, turns } from '../support/scan';
@@ -107,7 +108,7 @@ describe('documents', () => {
     const none = new Uint8Array(0);
     for (let i = 0; i < 30; ++i)
       void pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).catch(() => undefined);
-    void pool.decodeDocument('quality', none).catch(() => undefined);
+    void pool.decodeDocument('textures', none, {} as Manifest).catch(() => undefined);
     await new Promise((go) => setTimeout(go, 5));
     expect(posted.length).toBeLessThan(30);
     expect(posted).toContain('document');

@@ -54,6 +54,7 @@ export class Session {
       if (first) this.stage.frame(pkg.manifest.boundsMin, pkg.manifest.boundsMax);
       this.listener.hearPackage(pkg);
       const model = this.load(pkg, choices);
+      void model.firstPicture.then(() => this.readAbout(pkg, signal)).catch(() => {}); // `done` says what is wrong with the load
       await model.done;
       if (signal.aborted) return;
       await this.readTables(pkg, signal);
@@ -146,6 +147,18 @@ export class Session {
       if (signal.aborted) return;
       this.live.textures = textures;
       this.live.tables = tables;
+      this.listener.changed();
+    } catch (error) {
+      if (!signal.aborted) this.problem(error);
+    }
+  }
+
+  /** Whose the object is. */
+  private async readAbout(pkg: TexmeshPackage, signal: AbortSignal): Promise<void> {
+    try {
+      const about = await pkg.about(signal);
+      if (signal.aborted) return;
+      this.live.about = about;
       this.listener.changed();
     } catch (error) {
       if (!signal.aborted) this.problem(error);

@@ -15,7 +15,7 @@
 namespace texmesh {
 namespace {
 
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.0-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 TEST(QualityFor, ComesNearFromBelowInFewTries) {
   for (const double wanted : {900.0, 3000.0, 20000.0, 60000.0})

@@ -8,7 +8,7 @@
 namespace texmesh {
 namespace {
 
-const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v1.0-scan.texmesh";
+const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 TEST(LossCurves, MoreBytesLoseLess) {
   PackageReader package(open_store(kGolden));

@@ -2,7 +2,6 @@ import { samePrefix } from '../bytes';
 import { BytesIn } from '../bytes_in';
 import { FormatError } from '../errors';
 import { splitStreamPath as file } from '../layout';
-import { formatMajor } from '../manifest';
 import { sha256 } from '../sha256';
 import { SplitCodec } from './split_codec';
 import { ValueDecoder, valueModelCount } from './split_coder';
@@ -144,12 +143,15 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
   return blocks;
 }
 
+/** Major version of streams that this reader is for; they have a version of their own. */
+const streamMajor = 2;
+
 /** Reads the head of a stream; checks everything that can be checked without the blocks. */
 export function readSplitHead(bytes: Uint8Array): SplitStreamHead {
   const input = new BytesIn(bytes, file);
   input.expect('TXMS');
   const major = input.u16();
-  if (major !== formatMajor) input.fail('major version 1', `${major}`);
+  if (major !== streamMajor) input.fail(`major version ${streamMajor}`, `${major}`);
   input.u16();
   const positionBits = readBits(input, 1);
   const attributeCount = input.u8();

@@ -5,7 +5,7 @@ import { golden } from '../../support/files';
 import { problem } from '../../support/scan';
 
 describe('split stream', async () => {
-  const reader = await PackageReader.openBytes(golden('v1.1-scan'), 'golden');
+  const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
   const head = (await reader.splitStreamHead())!;
   it('every truncation of the head is told', async () => {
     for (let n = 0; n < head.length; ++n)

@@ -1,0 +1,189 @@
+#include "format/documents/thesis_tables.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <tuple>
+
+#include "format/base/bytes.h"
+#include "format/base/unit16.h"
+#include "format/container/format_version.h"
+#include "format/container/layout.h"
+
+namespace texmesh {
+namespace {
+
+const std::string kThesisFile = kThesisPath;
+constexpr std::string_view kThesisMagic = "TXTH";
+constexpr std::uint32_t kPredictorsId = 1, kSizeModelId = 2, kGammaTableId = 3, kPerceptualTableId = 4;
+constexpr std::uint32_t kMostFragments = 65535, kMostChainScales = 100;
+constexpr std::uint64_t kMostTotalBytes = std::uint64_t{1} << 53;
+constexpr std::size_t kSectionRecord = 12, kModelBytes = 20;
+constexpr float kLargestModelValue = 1e30f;
+// How far rounding may carry a predictor out of 0..1 before the writer calls it an error.
+constexpr float kPredictorRounding = 1e-4f;
+
+struct ThesisSection {
+  std::uint32_t id = 0, plane = 0;
+  Bytes bytes;
+};
+
+[[noreturn]] void fail_thesis(const std::string& place, const std::string& expected,
+                              const std::string& found) {
+  throw FormatError(kThesisFile, place, expected, found);
+}
+
+std::array<std::vector<float> PlaneThesis::*, 5> predictors() {
+  return {&PlaneThesis::z, &PlaneThesis::i, &PlaneThesis::zeta, &PlaneThesis::m, &PlaneThesis::vqp};
+}
+
+void require_values(const std::vector<float>& values, float lo, float hi, const std::string& place) {
+  for (const float v : values)
+    if (!(v >= lo && v <= hi))
+      fail_thesis(place, std::to_string(lo) + " to " + std::to_string(hi), std::to_string(v));
+}
+
+std::array<float SizeModel::*, 5> model_values() {
+  return {&SizeModel::a, &SizeModel::b, &SizeModel::r, &SizeModel::correlation, &SizeModel::error};
+}
+
+void check_thesis_plane(const PlaneThesis& t, float rounding, const std::string& place) {
+  for (const auto predictor : predictors()) {
+    if ((t.*predictor).size() != t.z.size() || t.z.size() > kMostFragments)
+      fail_thesis(place + "predictors", "five of each fragment", std::to_string((t.*predictor).size()));
+    require_values(t.*predictor, -rounding, 1 + rounding, place + "predictors");
+  }
+  for (const auto value : model_values())
+    require_values({t.model.*value}, -kLargestModelValue, kLargestModelValue, place + "size model");
+  if (t.quality.size() > kMostChainScales || t.total_bytes.size() != t.quality.size() * kGammaSteps)
+    fail_thesis(place + "Gamma table", "at most 100 scales of 21 sizes",
+                std::to_string(t.total_bytes.size()) + " sizes");
+  require_values(t.quality, 0, 100, place + "Gamma table");
+  for (const std::uint64_t bytes : t.total_bytes)
+    if (bytes > kMostTotalBytes) fail_thesis(place + "Gamma table", "at most 2^53", std::to_string(bytes));
+}
+
+int bytes_width(const std::vector<std::uint64_t>& values) {
+  const std::uint64_t largest = values.empty() ? 0 : *std::ranges::max_element(values);
+  int width = 1;
+  while (width < 8 && largest >> (8 * width) != 0) ++width;
+  return width;
+}
+
+Bytes predictors_section(const PlaneThesis& t) {
+  BytesOut out;
+  out.u32(t.z.size());
+  for (const auto predictor : predictors())
+    for (const float v : t.*predictor) out.u16(to_unit16(v));
+  return out.finish();
+}
+
+Bytes size_model_section(const PlaneThesis& t) {
+  BytesOut out;
+  for (const auto value : model_values()) out.f32(t.model.*value);
+  return out.finish();
+}
+
+Bytes gamma_table_section(const PlaneThesis& t) {
+  const int width = bytes_width(t.total_bytes);
+  BytesOut out;
+  out.u8(t.quality.size());
+  out.u8(static_cast<std::uint64_t>(width));
+  out.u16(0);
+  for (const float q : t.quality) out.f32(q);
+  for (const std::uint64_t v : t.total_bytes) out.number(v, width);
+  return out.finish();
+}
+
+void read_predictors(BytesIn& in, PlaneThesis& t) {
+  const std::uint32_t fragments = in.u32();
+  if (fragments == 0 || fragments > kMostFragments || in.left() < std::uint64_t{fragments} * 10)
+    in.fail("five predictors of 1 to 65535 fragments", std::to_string(fragments));
+  for (const auto predictor : predictors())
+    for (std::uint32_t f = 0; f < fragments; ++f) (t.*predictor).push_back(from_unit16(in.u16()));
+}
+
+void read_size_model(BytesIn& in, PlaneThesis& t) {
+  if (in.left() < kModelBytes) in.fail("20 bytes", std::to_string(in.left()));
+  for (const auto value : model_values()) t.model.*value = in.f32();
+  if (t.model == SizeModel{}) in.fail("a fitted model", "zeros");
+}
+
+void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
+  const std::uint32_t scales = in.u8();
+  const int width = in.u8();
+  if (in.u16() != 0 && minor <= kFormatMinor) in.fail("2 zero bytes", "others");
+  if (scales == 0 || scales > kMostChainScales || width < 1 || width > 8)
+    in.fail("1 to 100 scales and a width of 1 to 8", std::to_string(scales) + ", " + std::to_string(width));
+  for (std::uint32_t s = 0; s < scales; ++s) t.quality.push_back(in.f32());
+  for (std::size_t k = 0; k < scales * kGammaSteps; ++k) t.total_bytes.push_back(in.number(width));
+  if (width != bytes_width(t.total_bytes)) in.fail("the least width that holds the values", "another");
+}
+
+void read_thesis_section(const ThesisSection& section, int minor, ThesisTables& tables) {
+  const std::string place = "plane " + std::to_string(section.plane) + ", ";
+  if (section.plane >= kMaxPackagePlanes)
+    fail_thesis("section " + std::to_string(section.id), "a plane", std::to_string(section.plane));
+  if (tables.planes.size() <= section.plane) tables.planes.resize(section.plane + std::size_t{1});
+  PlaneThesis& plane = tables.planes[section.plane];
+  BytesIn in(section.bytes, kThesisFile + ": " + place + "section " + std::to_string(section.id));
+  if (section.id == kPredictorsId) read_predictors(in, plane);
+  if (section.id == kSizeModelId) read_size_model(in, plane);
+  if (section.id == kGammaTableId) read_gamma_table(in, minor, plane);
+  if (minor <= kFormatMinor) in.finish();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
+  std::vector<ThesisSection> sections;
+  for (std::uint32_t p = 0; p < tables.planes.size(); ++p) {
+    const PlaneThesis& t = tables.planes[p];
+    check_thesis_plane(t, kPredictorRounding, "plane " + std::to_string(p) + ", ");
+    if (!t.z.empty()) sections.push_back({kPredictorsId, p, predictors_section(t)});
+    if (t.model != SizeModel{}) sections.push_back({kSizeModelId, p, size_model_section(t)});
+    if (!t.quality.empty()) sections.push_back({kGammaTableId, p, gamma_table_section(t)});
+  }
+  std::ranges::sort(sections, {}, [](const ThesisSection& s) { return std::tuple(s.id, s.plane); });
+  BytesOut head, data;
+  write_entry_start(head, kThesisMagic);
+  head.u32(sections.size());
+  head.u32(0);
+  for (const ThesisSection& s : sections) {
+    head.u32(s.id);
+    head.u32(s.plane);
+    head.u32(s.bytes.size());
+    data.raw(s.bytes);
+  }
+  head.raw(data.finish());
+  return head.finish();
+}
+
+ThesisFile read_thesis(std::span<const std::uint8_t> bytes) {
+  BytesIn in(bytes, kThesisFile);
+  ThesisFile file;
+  file.minor = read_entry_start(in, kThesisMagic);
+  const std::uint64_t count = in.u32();
+  if (in.u32() != 0 && file.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
+  if (count > in.left() / kSectionRecord)
+    in.fail("a section count that fits the file", std::to_string(count));
+  BytesIn data(bytes, kThesisFile);
+  data.raw(in.at() + count * kSectionRecord);
+  std::tuple<std::uint32_t, std::uint32_t> last;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    ThesisSection section{in.u32(), in.u32(), {}};
+    const std::tuple now(section.id, section.plane);
+    if (section.id == 0 || (k > 0 && now <= last)) in.fail("sections by id and plane", "another order");
+    last = now;
+    const ByteSpan part = data.raw(in.u32());
+    if (section.id >= kPerceptualTableId) continue;
+    section.bytes.assign(part.begin(), part.end());
+    read_thesis_section(section, file.minor, file.tables);
+  }
+  data.finish();
+  for (std::size_t p = 0; p < file.tables.planes.size(); ++p)
+    check_thesis_plane(file.tables.planes[p], 0, "plane " + std::to_string(p) + ", ");
+  return file;
+}
+
+}  // namespace texmesh

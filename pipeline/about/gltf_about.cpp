@@ -1,0 +1,216 @@
+#include "pipeline/about/gltf_about.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/about/source_fields.h"
+#include "pipeline/about/xmp.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::json;
+using Ordered = nlohmann::ordered_json;
+constexpr const char* kXmpExtension = "KHR_xmp_json_ld";
+constexpr const char* kArrays[] = {"scenes",   "nodes",  "meshes",   "materials",
+                                   "textures", "images", "samplers", "cameras"};
+constexpr std::size_t kRoomForCuts = 4096;  // of About::source, for the list of what does not fit
+constexpr int kMaxKeptDepth = 48;           // of a value; about.json has 64 levels in all
+
+const Json* member(const Json& object, const char* name) {
+  if (!object.is_object()) return nullptr;
+  const auto it = object.find(name);
+  return it == object.end() ? nullptr : &*it;
+}
+
+std::string text_of(const Json* value) {
+  return value && value->is_string() ? value->get<std::string>() : std::string();
+}
+
+int depth_of(const Json& value) {
+  int deepest = 0;
+  if (value.is_structured())
+    for (const Json& child : value) deepest = std::max(deepest, depth_of(child));
+  return deepest + 1;
+}
+
+/// Keeps values until the room for them is used up.
+class KeptSource {
+ public:
+  explicit KeptSource(const std::string& format) { source_["format"] = format; }
+
+  void keep(const char* name, const Json& value, const std::string& pointer) {
+    if (fits(value, pointer)) source_[name] = Ordered::parse(value.dump());
+  }
+  void keep_in_list(const char* name, const char* key, const Json& value, const std::string& pointer,
+                    const std::string& path) {
+    if (fits(value, pointer)) source_[name].push_back({{"path", path}, {key, Ordered::parse(value.dump())}});
+  }
+  std::string finish(Notes& notes) {
+    if (cuts_ == 0) return source_.dump();
+    if (cuts_ > named_.size()) named_.push_back("and " + std::to_string(cuts_ - named_.size()) + " more");
+    source_["cut"] = named_;
+    add_info(notes, "metadata-cut", named_.front(),
+             "the source says more about itself than the " + std::to_string(kMaxAboutSourceBytes) +
+                 " bytes of about.json hold; " + std::to_string(cuts_) + " values are left out");
+    return source_.dump();
+  }
+
+ private:
+  bool fits(const Json& value, const std::string& pointer) {
+    const std::size_t bytes = value.dump().size(), with_names = bytes + pointer.size() + 64;
+    if (with_names <= room_ && depth_of(value) <= kMaxKeptDepth) {
+      room_ -= with_names;
+      return true;
+    }
+    if (++cuts_ < kMaxAboutList)
+      named_.push_back(clean_about_text(pointer, kMaxAboutNameBytes) + ": " + std::to_string(bytes) +
+                       " bytes");
+    return false;
+  }
+
+  Ordered source_;
+  std::size_t room_ = kMaxAboutSourceBytes - kRoomForCuts, cuts_ = 0;
+  std::vector<std::string> named_;
+};
+
+/// Calls f(object, JSON pointer) for the root and every element of the arrays that a model is made of.
+template <class F>
+void for_each_object(const Json& document, const F& f) {
+  f(document, std::string());
+  for (const char* name : kArrays) {
+    const Json* list = member(document, name);
+    if (!list || !list->is_array()) continue;
+    for (std::size_t i = 0; i < list->size(); ++i)
+      f((*list)[i], "/" + std::string(name) + "/" + std::to_string(i));
+  }
+}
+
+const Json* xmp_reference(const Json* object) {
+  const Json* extensions = object ? member(*object, "extensions") : nullptr;
+  const Json* extension = extensions ? member(*extensions, kXmpExtension) : nullptr;
+  const Json* packet = extension ? member(*extension, "packet") : nullptr;
+  return packet && packet->is_number_unsigned() ? packet : nullptr;
+}
+
+const Json* xmp_packets(const Json& document) {
+  const Json* extensions = member(document, "extensions");
+  const Json* extension = extensions ? member(*extensions, kXmpExtension) : nullptr;
+  const Json* packets = extension ? member(*extension, "packets") : nullptr;
+  return packets && packets->is_array() ? packets : nullptr;
+}
+
+const Json* shown_scene(const Json& document) {
+  const Json* scenes = member(document, "scenes");
+  const Json* number = member(document, "scene");
+  const std::size_t scene = number && number->is_number_unsigned() ? number->get<std::size_t>() : 0;
+  return scenes && scenes->is_array() && scene < scenes->size() ? &(*scenes)[scene] : nullptr;
+}
+
+/// Names that say what a coordinate is do not count: glTF has metres and y up.
+void apply_extras(About& about, const Json* extras, const std::string& place, Notes& notes) {
+  if (!extras || !extras->is_object()) return;
+  for (const auto& [name, value] : extras->items()) {
+    if (!value.is_string() && !value.is_number_unsigned()) continue;
+    set_source_field(about, name, value.is_string() ? value.get<std::string>() : value.dump(), place, notes);
+  }
+}
+
+std::string keep_source(const Json& document, const std::string& format, Notes& notes) {
+  KeptSource kept(format);
+  if (const Json* asset = member(document, "asset")) kept.keep("asset", *asset, "/asset");
+  const Json* packets = xmp_packets(document);
+  if (packets && !packets->empty()) kept.keep("xmpPackets", *packets, "/extensions/KHR_xmp_json_ld/packets");
+  for_each_object(document, [&](const Json& object, const std::string& path) {
+    if (const Json* packet = xmp_reference(&object))
+      kept.keep_in_list("xmp", "packet", *packet, path + "/extensions/KHR_xmp_json_ld", path);
+  });
+  for_each_object(document, [&](const Json& object, const std::string& path) {
+    if (const Json* extras = member(object, "extras"))
+      kept.keep_in_list("extras", "value", *extras, path + "/extras", path);
+  });
+  return kept.finish(notes);
+}
+
+}  // namespace
+
+About about_from_gltf(const Json& document, const std::string& format, Notes& notes) {
+  About about;
+  const Json* asset = member(document, "asset");
+  const Json* scene = shown_scene(document);
+  if (asset) {
+    about.attribution = clean_about_text(text_of(member(*asset, "copyright")), kMaxAboutTextBytes);
+    apply_extras(about, member(*asset, "extras"), "/asset/extras", notes);
+  }
+  apply_extras(about, member(document, "extras"), "/extras", notes);
+  if (scene) apply_extras(about, member(*scene, "extras"), "/scenes/extras", notes);
+  const Json* packets = xmp_packets(document);
+  const Json* reference = xmp_reference(asset) ? xmp_reference(asset) : xmp_reference(scene);
+  if (packets && reference && reference->get<std::size_t>() < packets->size())
+    apply_xmp(about, (*packets)[reference->get<std::size_t>()], "KHR_xmp_json_ld", notes);
+  about.unit = "metre";
+  about.metres_per_unit = 1;
+  about.up_axis = "y";
+  about.source = keep_source(document, format, notes);
+  return about;
+}
+
+/// glTF has metres and y up, and no place for anything else.
+static void write_coordinates(const About& about, Ordered& root) {
+  Ordered said = Ordered::object();
+  if (about.metres_per_unit > 0 && about.metres_per_unit != 1)
+    said["unit"] = {{"name", about.unit}, {"metres", about.metres_per_unit}};
+  if (!about.up_axis.empty() && about.up_axis != "y") said["upAxis"] = about.up_axis;
+  if (!about.crs.empty()) said["coordinateReference"]["text"] = about.crs;
+  if (about.epsg > 0) said["coordinateReference"]["epsg"] = about.epsg;
+  if (!said.empty()) root["extras"]["texmesh"] = said;
+}
+
+void write_gltf_about(const About& about, Ordered& root) {
+  write_coordinates(about, root);
+  const Ordered source = about.source.empty() ? Ordered::object() : Ordered::parse(about.source);
+  const Ordered from = source.value("asset", Ordered::object());
+  Ordered& asset = root["asset"];
+  if (const std::string line = copyright_line(about); !line.empty()) asset["copyright"] = line;
+  if (from.is_object() && from.contains("extras")) asset["extras"] = from["extras"];
+
+  Ordered packets = source.value("xmpPackets", Ordered::array());
+  if (!packets.is_array()) packets = Ordered::array();
+  const Json reference_in = Json::parse(from.dump());
+  const Json* reference = xmp_reference(&reference_in);
+  std::size_t shown = reference ? reference->get<std::size_t>() : packets.size();
+  const Ordered before = shown < packets.size() ? packets[shown] : Ordered::object();
+  const Ordered after = xmp_packet(about, before);
+  if (after != before) {
+    shown = packets.size();
+    packets.push_back(after);
+  }
+  if (packets.empty()) return;
+  root["extensions"][kXmpExtension]["packets"] = packets;
+  if (shown < packets.size()) asset["extensions"][kXmpExtension]["packet"] = shown;
+  Ordered used = root.value("extensionsUsed", Ordered::array());
+  if (std::find(used.begin(), used.end(), Ordered(kXmpExtension)) == used.end())
+    used.push_back(kXmpExtension);
+  root["extensionsUsed"] = used;
+}
+
+About about_within(const About& about, std::uint64_t bytes) {
+  const auto fits = [bytes](const About& candidate) {
+    Ordered root = Ordered::object();
+    write_gltf_about(candidate, root);
+    return root.dump().size() <= bytes;
+  };
+  if (fits(about)) return about;
+  About fields = about;
+  fields.source.clear();
+  if (fits(fields)) return fields;
+  About least;
+  least.title = about.title;
+  least.creator = about.creator;
+  least.attribution = about.attribution;
+  least.licence = about.licence;
+  least.licence_url = about.licence_url;
+  return least;
+}
+
+}  // namespace texmesh
