@@ -384,9 +384,8 @@ def read_about(data, m):
             for member, most in zip(members, (100, 500)):
                 take(item, member, "text", 1, most, "B01")
     if "unit" in about:
-        metres = take(check(about["unit"], "unit", "object", rule="B01"), "metres", "number", 0, 1e12, "B01")
-        require(metres > 0, "B01", "metres")
-        check(about["unit"].get("name", "m"), "name of the unit", "text", 1, 50, "B01")
+        take(check(about["unit"], "unit", "object", rule="B01"), "metres", "number", 1e-12, 1e12, "B01")
+        take(about["unit"], "name", "text", 1, 50, "B01")
     require(about.get("upAxis", "y") in ("x", "y", "z"), "B01", "upAxis")
     if "coordinateReference" in about:
         place = check(about["coordinateReference"], "coordinateReference", "object", rule="B01")
