@@ -75,7 +75,7 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
 }
 
 void read_mip(const JsonAt& at, TextureInfo& t) {
-  if (at.has("mip")) t.mip = u32(at["mip"], 0, kMaxMip);
+  if (at.has("mip")) t.mip = u32(at["mip"], 1, kMaxMip);  // 0 is said by leaving it out
   if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPackagePlanes);
 }
 

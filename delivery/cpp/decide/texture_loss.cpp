@@ -17,10 +17,6 @@ double surface_of(const Manifest& m) {
   return 2 * (x * y + y * z + z * x);
 }
 
-double skipped_dssim(const PlaneTables& t, std::size_t fragment) {
-  return t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[fragment]);
-}
-
 double signed_level(PackageReader& package, std::uint32_t base, double displayed_px) {
   const Manifest& m = package.manifest();
   return display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px);
@@ -91,7 +87,7 @@ double TextureLoss::preview_mean(std::uint32_t plane) {
   const std::vector<float> weights = surface_weights(t);
   double sum = 0, total = 0;
   for (const std::uint16_t f : t.order) {
-    sum += static_cast<double>(weights[f]) * curve.coded(skipped_dssim(t, f));
+    sum += static_cast<double>(weights[f]) * curve.coded(static_cast<double>(t.skip_dssim[f]));
     total += static_cast<double>(weights[f]);
   }
   return found->second = total > 0 ? sum / total : 0;

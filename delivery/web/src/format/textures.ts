@@ -80,7 +80,7 @@ function readTexture(at: JsonAt): TextureInfo {
   if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.at('colourSpace').fail('srgb or linear', colourSpace);
   const codec = at.at('codec').text(100);
   if (!isCodec(codec)) return at.at('codec').fail('jpeg, jpeg-progressive or webp', codec);
-  const mip = at.has('mip') ? at.at('mip').integer(0, 20) : 0;
+  const mip = at.has('mip') ? at.at('mip').integer(1, 20) : 0;
   const rungQuality: number[] = [];
   for (let i = 0, n = at.at('rungQuality').array(1, 100); i < n; ++i) {
     const quality = at.at('rungQuality').at(i).integer(1, 100);

@@ -4,7 +4,7 @@ import { RangeStore } from './range_store';
 import type { OpenedStore, StoreMode } from './store';
 
 /**
- * Finds out how the server can be read (SPEC.md, section 13): ranges of the container; the tree beside the container where the server
+ * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server
  * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
  */
 export async function openStore(

@@ -46,7 +46,7 @@ export interface SplitBlock {
   /** First 8 bytes of its SHA-256. */
   digest: Uint8Array;
 }
-/** Head of mesh/stream.bin (format/SPEC.md, section 10). */
+/** Head of mesh/stream.bin (format/SPEC.md, section 11). */
 export interface SplitStreamHead {
   position: SplitGrid;
   attributes: SplitAttribute[];

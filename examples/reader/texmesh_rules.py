@@ -1,0 +1,433 @@
+"""Rules of format/SPEC.md over the JSON documents of a package: what texmesh_reader.py refuses by. A breach raises
+Refused with the rule's name."""
+import json
+import re
+import struct
+
+import numpy as np
+
+MAX32 = 0xFFFFFFFF
+CODEC_FEATURE = {"jpeg": None, "jpeg-progressive": "codec-jpeg-progressive", "webp": "codec-webp"}
+CREDENTIAL = "META-INF/content_credential.c2pa"
+GROUPS = ("colour", "normal", "data")
+
+
+class Refused(Exception):
+    """A rule that the package breaks."""
+
+
+def require(good, rule, what):
+    if not good:
+        raise Refused(f"{rule}: {what}")
+
+
+class Cursor:
+    """Little-endian numbers, one after the other; what is missing breaks `rule`."""
+
+    def __init__(self, data, rule, what):
+        self.data, self.at, self.rule, self.what = data, 0, rule, what
+
+    def raw(self, count):
+        require(count <= len(self.data) - self.at, self.rule, f"{self.what} ends early")
+        self.at += count
+        return self.data[self.at - count : self.at]
+
+    def get(self, code):
+        values = struct.unpack("<" + code, self.raw(struct.calcsize("<" + code)))
+        return values[0] if len(values) == 1 else values
+
+    def array(self, dtype, count):
+        return np.frombuffer(self.raw(np.dtype(dtype).itemsize * count), dtype)
+
+    def whole(self, width, count):
+        """`count` numbers of `width` bytes."""
+        digits = self.array("u1", width * count).reshape(count, width).astype(np.uint64)
+        return (digits << (8 * np.arange(width, dtype=np.uint64))).sum(axis=1, dtype=np.uint64).astype(np.int64)
+
+    def varint(self):
+        value = shift = 0
+        while True:
+            byte = self.get("B")
+            value |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                require(value <= MAX32 and (byte or shift == 7), "S06", "a varint in its shortest form")
+                return value
+            require(shift < 35, "S06", "a varint below 2^32")
+
+    def finish(self):
+        require(self.at == len(self.data), self.rule, f"{self.what} has further bytes")
+
+
+# Section 4: JSON --------------------------------------------------------------------------------------
+
+
+def parse_json(data, most, what, free=()):
+    def unique(pairs):
+        names = [name for name, _ in pairs]
+        require(len(set(names)) == len(names), "J01", f"{what}: a name twice")
+        return dict(pairs)
+
+    def walk(value, depth, is_free):
+        require(depth <= 64, "J01", f"{what}: more than 64 levels")
+        if isinstance(value, str) and not is_free:
+            require(not re.search(r"[\x00-\x1f\x7f]", value), "J03", f"{what}: a control character")
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            require(abs(value) <= 2**53 if isinstance(value, int) else np.isfinite(value), "J02", f"{what}: {value}")
+        elif isinstance(value, dict):
+            for name, member in value.items():
+                walk(name, depth, is_free)
+                walk(member, depth + 1, is_free or name in ("extensions", "extras", *free))
+        elif isinstance(value, list):
+            for member in value:
+                walk(member, depth + 1, is_free)
+
+    require(len(data) <= most, "L09", f"{what}: more than {most} bytes")
+    try:
+        document = json.loads(data.decode("utf-8"), object_pairs_hook=unique,
+                              parse_constant=lambda name: require(False, "J01", name))
+        walk(document, 1, False)
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise Refused(f"J01: {what}: {error}") from error
+    require(isinstance(document, dict), "J01", f"{what}: not an object")
+    return document
+
+
+def check(value, name, kind, low=0, high=2**53, rule="J04"):
+    """`value`, if it is of the kind and in the range; of texts and lists the range is the length's."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    good = {
+        "int": lambda: isinstance(value, int) and not isinstance(value, bool) and low <= value <= high,
+        "number": lambda: number and low <= value <= high,
+        "text": lambda: isinstance(value, str) and low <= len(value.encode()) <= high,
+        "bool": lambda: isinstance(value, bool),
+        "list": lambda: isinstance(value, list) and low <= len(value) <= high,
+        "object": lambda: isinstance(value, dict),
+        "digest": lambda: isinstance(value, str) and re.fullmatch("[0-9a-f]{64}", value) is not None,
+    }[kind]()
+    shown = str(value)
+    require(good, rule, f"{name}: {shown if len(shown) < 60 else shown[:60] + '...'}")
+    return value
+
+
+def take(document, name, kind, low=0, high=2**53, rule="J04"):
+    require(isinstance(document, dict) and name in document, "J04", f"{name} is missing")
+    return check(document[name], name, kind, low, high, rule)
+
+
+def rises(values):
+    return all(a < b for a, b in zip(values, values[1:]))
+
+
+# Section 5: manifest ----------------------------------------------------------------------------------
+
+
+def read_manifest(data):
+    m = parse_json(data, 16384, "manifest.json")
+    require(m.get("format") == "texmesh", "M01", "format")
+    version = take(m, "version", "object", rule="M01")
+    major = take(version, "major", "int", rule="M01")
+    require(major == 2, "W03", f"format {major} is not known; a model of format 1 has to be compiled again")
+    take(version, "minor", "int", rule="M01")
+    for name in take(m, "requiredFeatures", "list", 0, 100):
+        require(name in CODEC_FEATURE.values() and name, "M02", f"unknown feature {name}")
+    take(m, "title", "text", 0, 200)
+    bounds = take(m, "bounds", "object")
+    for vector in (take(m, "origin", "list", 3, 3), take(bounds, "min", "list", 3, 3), take(bounds, "max", "list", 3, 3)):
+        for x in vector:
+            check(x, "a vector", "number", -1e300, 1e300)
+    extents = [b - a for a, b in zip(bounds["min"], bounds["max"])]
+    require(min(extents) >= 0, "M03", "bounds")
+    height = take(m, "objectHeight", "number", 0, 1e300)
+    require(abs(height - max(extents)) <= 1e-5 * max(height, max(extents)), "M04", "objectHeight")
+    take(m, "surfaceArea", "number", 0, 1e300)
+    take(m, "jnd", "number", 0, 1)
+    take(m, "planeCount", "int", 0, 10000)
+    for name in ("index", "tables", "textures", "quality", "provenance", "about", "stream", "thesis", "poster"):
+        if name in m or name not in ("stream", "thesis", "poster"):
+            check_reference(take(m, name, "object"), name)
+    check_scales(m)
+    check_steps(m)
+    return m
+
+
+def check_offset(offset):
+    check(offset, "offset", "int", 64, 2**53, "M05")
+    require(offset % 64 == 0, "M05", f"offset {offset}")
+
+
+def check_reference(ref, name):
+    check_offset(take(ref, "offset", "int"))
+    size = take(ref, "bytes", "int", 1)
+    if name != "stream":
+        take(ref, "sha256", "digest")
+    if name in ("index", "tables", "stream"):
+        take(ref, "headBytes", "int", 16, size)
+        take(ref, "headSha256", "digest")
+    if name == "poster":
+        require(size <= 1000000, "O01", "poster of more than 1,000,000 bytes")
+        take(ref, "widthPx", "int", 1, 4096, "O01")
+        take(ref, "heightPx", "int", 1, 4096, "O01")
+
+
+def check_scales(m):
+    columns = take(m, "scales", "object")
+    n = len(take(columns, "scale", "list", 1, 100))
+    kinds = {"scale": ("int", 0, 99), "triangles": ("int", 1, MAX32), "vertices": ("int", 1, MAX32),
+             "offset": ("int",), "bytes": ("int", 1), "sha256": ("digest",), "major": ("bool",),
+             "floor": ("text", 0, 100)}
+    kinds |= {name: ("number", 0, 1e300) for name in ("errorMax", "errorRms", "p95", "p99")}
+    for name in ("Jnd", "Error", "Edge", "Flip"):
+        kinds["displayPx" + name] = ("number", 0, 1e9, "M11")
+    for name, kind in kinds.items():
+        for value in take(columns, name, "list", n, n, "M10"):
+            check(value, name, *kind)
+    require(columns["scale"][0] == 0 and rises(columns["scale"]), "M10", "scale numbers")
+    require(columns["displayPxFlip"][0] == 1e9, "M12", "displayPxFlip of S_0")
+    for k in range(n):
+        check_offset(columns["offset"][k])
+        require(columns["errorRms"][k] <= columns["errorMax"][k], "M12", f"errorRms of element {k}")
+    stream = m.get("stream")
+    prefixes = [k for k in range(n) if stream and columns["offset"][k] == stream["offset"]]
+    require(not {0, n - 1} & set(prefixes), "M18", "the first and the last scale have a GLB")
+    sizes = [columns["bytes"][k] for k in reversed(prefixes)]
+    if sizes:
+        require(stream["headBytes"] < sizes[0] and sizes[-1] <= stream["bytes"] and rises(sizes), "M19", "prefixes")
+
+
+def check_steps(m):
+    steps, scales = take(m, "steps", "list", 1, 100, "M21"), m["scales"]
+    for step in steps:
+        check(step, "step", "list", 2, 2, "M21")
+        check(step[0], "upToPx", "number", 0, 1e9, "M21")
+        require(step[1] in scales["scale"], "M21", f"step to scale {step[1]}")
+        flip = scales["displayPxFlip"][scales["scale"].index(step[1])]
+        require(step[0] <= flip * (1 + 1e-5), "M22", f"step up to {step[0]} px")
+    require(rises([s[0] for s in steps]) and rises([-s[1] for s in steps]), "M21", "steps")
+    require(steps[-1][0] == 1e9 and steps[-1][1] == 0, "M21", "the last step")
+
+
+# Section 7: textures ---------------------------------------------------------------------------------
+
+
+def read_textures(data, m):
+    textures = take(parse_json(data, 32 << 20, "textures.json"), "textures", "list", 0, 10000)
+    require(len(textures) == m["planeCount"], "R04", "number of planes in textures.json")
+    full, before = [], (-1, 0)
+    for p, t in enumerate(textures):
+        check(t, "texture", "object")
+        take(t, "image", "int", 0, MAX32)
+        for name, most in (("role", 100), ("name", 1000), ("gridReason", 1000)):
+            take(t, name, "text", 0, most)
+        require(take(t, "colourSpace", "text") in ("srgb", "linear"), "X03", t["colourSpace"])
+        require(take(t, "codec", "text") in CODEC_FEATURE, "X03", f"codec {t['codec']}")
+        feature = CODEC_FEATURE[t["codec"]]
+        require(feature is None or feature in m["requiredFeatures"], "R05", f"{feature} is not required")
+        for name in ("width", "height", "fragmentWidth", "fragmentHeight", "previewWidth", "previewHeight"):
+            take(t, name + "Px", "int", 1, 2**20)
+        require(take(t, "channels", "int") in (1, 3), "J04", "channels")
+        for side, cells in (("Width", "columns"), ("Height", "rows")):
+            whole, part, n = t[side.lower() + "Px"], t[f"fragment{side}Px"], take(t, cells, "int", 1, 65535)
+            require(part % 16 == 0, "X04", f"fragment{side}Px {part}")
+            require((n - 1) * part < whole <= n * part, "X05", f"{cells} of plane {p}")
+        require(t["columns"] * t["rows"] <= 65535, "X05", f"fragments of plane {p}")
+        qualities = take(t, "rungQuality", "list", 1, 100)
+        require(rises([check(q, "rungQuality", "int", 1, 100) for q in qualities]), "J04", "rungQuality rises")
+        top, source = t.get("sourceRung", False), t.get("source")
+        check(top, "sourceRung", "bool")
+        require(source in (None, "jpg", "png", "tif", "webp", "exr"), "X03", f"source {source}")
+        if source:
+            take(t, "sourceColours", "bool")
+        if "mip" not in t:
+            require(before == (-1, 0), "X06", f"full-size plane {p} behind mips")
+            full.append(t)
+            require(not top or t["codec"] == "jpeg", "X11", f"sourceRung of plane {p}")
+            continue
+        here = (take(t, "base", "int", 0, len(full) - 1, "X06"), take(t, "mip", "int", 1, 20))
+        require(before < here, "X06", f"order of mip {p}")
+        require(not top and not source, "X11", f"sourceRung or source of mip {p}")
+        base, before = full[here[0]], here
+        require(all(t[s] == -(-base[s] >> here[1]) for s in ("widthPx", "heightPx")), "X07", f"sides of mip {p}")
+        same = ("image", "role", "channels", "colourSpace", "previewWidthPx", "previewHeightPx")
+        require(all(t[s] == base[s] for s in same), "X07", f"mip {p} and its base")
+    return textures
+
+
+def group_of(role):
+    return "normal" if role == "normal" else "colour" if role in (
+        "base-colour", "emissive", "alpha", "colour") else "data"
+
+
+
+
+# Section 3: entries ----------------------------------------------------------------------------------
+
+
+def needed_paths(m, textures):
+    paths = ["index.bin", "tables.bin", "textures.json", "quality.json", "about.json", "provenance.json"]
+    stream = m.get("stream", {}).get("offset")
+    paths += [f"mesh/s{s:02}.glb" for s, at in zip(m["scales"]["scale"], m["scales"]["offset"]) if at != stream]
+    paths += [path for name, path in OPTIONAL.items() if name in m]
+    for p, t in enumerate(textures):
+        paths += [f"preview/{p:03}.jpg"] if "mip" not in t else []
+        paths += [f"source/{p:03}.{t['source']}"] if "source" in t else []
+        paths += [f"texture/{p}/tables.pack"]
+        paths += [f"texture/{p}/r{r:02}.pack" for r in range(len(t["rungQuality"]))]
+    return paths
+
+
+OPTIONAL = {"stream": "mesh/stream.bin", "thesis": "thesis.bin", "poster": "poster.jpg"}
+FIXED = {"tables": "tables.bin", "textures": "textures.json", "quality": "quality.json", "about": "about.json",
+         "provenance": "provenance.json"}
+
+
+def check_entry_order(paths, m, textures):
+    columns = m["scales"]
+    coarsest = f"mesh/s{columns['scale'][-1]:02}.glb"
+    glbs = [p for p in (f"mesh/s{s:02}.glb" for s in reversed(columns["scale"])) if p in paths and p != coarsest]
+    meshes = [p for p in ["mesh/stream.bin"] + glbs if p in paths]
+    planes = range(len(textures))
+    most = max((len(t["rungQuality"]) for t in textures), default=0)
+    ladder, done = [], 0
+    for r in range(most):
+        ladder += [f"texture/{p}/r{r:02}.pack" for p in planes if r < len(textures[p]["rungQuality"])]
+        while done < len(meshes) and (r + 1) * len(meshes) >= (done + 1) * most:
+            ladder.append(meshes[done])
+            done += 1
+    order = ["manifest.json", coarsest, "index.bin", "textures.json", "quality.json"]
+    order += [f"texture/{p}/tables.pack" for p in planes] + ["tables.bin", "poster.jpg", "about.json"]
+    order += [f"preview/{p:03}.jpg" for p in planes] + ladder + meshes[done:]
+    others = set(paths) - set(order) - {"provenance.json", CREDENTIAL}
+    order += sorted(others) + ["provenance.json", CREDENTIAL]
+    expected = [p for p in order if p in paths]
+    require(paths == expected, "E04", "order of entries")
+
+
+# Sections 10, 12 to 14: meshes and the other documents ------------------------------------------------
+
+
+def check_glb(data, name, is_coarsest, textures, read):
+    """The JSON and the pictures of a GLB; meshes are not decoded. `read` gives an entry."""
+    c = Cursor(data, "G01", name)
+    magic, version, length, size, kind = c.get("IIIII")
+    require((magic, version, length, kind) == (0x46546C67, 2, len(data), 0x4E4F534A), "G01", f"the head of {name}")
+    try:
+        gltf = json.loads(c.raw(size).decode("utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise Refused(f"G01: {name}: {error}") from error
+    require(all("uri" not in b for b in gltf.get("buffers", [])), "G06", f"{name}: a buffer with a URI")
+    previews = {f"../preview/{t.get('base', p):03}.jpg" for p, t in enumerate(textures)}
+    images = {t["image"] for t in textures}
+    for image in gltf.get("images", []):
+        found = re.fullmatch(r"texture/(\d+)", image.get("name", ""))
+        require(found and int(found[1]) in images, "G04", f"{name}: image {image.get('name')}")
+        uri = image.get("uri")
+        require(uri is None or not is_coarsest, "G05", f"{name}: an image that is not embedded")
+        require(uri is None or uri in previews, "G06", f"{name}: an image's URI")
+        if is_coarsest and image.get("mimeType") == "image/jpeg":
+            view = gltf["bufferViews"][image["bufferView"]]
+            begin = 28 + size + view.get("byteOffset", 0)  # behind the head of the binary chunk
+            plane = next(p for p, t in enumerate(textures) if t["image"] == int(found[1]) and t["role"] != "alpha")
+            embedded = data[begin : begin + view["byteLength"]]
+            require(embedded == read(f"preview/{plane:03}.jpg"), "G05", f"{name}: not preview {plane}")
+
+
+def check_losses(losses, count, low_first=False):
+    for name in ("flip", "flipP95", "dssim"):
+        values = take(losses, name, "list", count, count, "Q01")
+        for value in values:
+            check(value, name, "number", 0, 1, "Q01")
+        require(not low_first or values[0] == 0, "Q02", "losses of S_0")
+
+
+def read_quality(data, m, textures):
+    q = parse_json(data, 4 << 20, "quality.json")
+    take(q, "views", "int", 1, 10000, "Q01")
+    sizes = take(q, "sizesPx", "list", 1, 8, "Q01")
+    require(rises([check(s, "sizesPx", "int", 1, 65536, "Q01") for s in sizes]), "Q01", "sizesPx rise")
+    take(q, "exponent", "number", 1, 4, "Q01")
+    take(q, "error", "number", 0, 1e6, "Q01")
+    require(take(q, "scales", "list", 1, 100, "Q01") == m["scales"]["scale"], "R14", "scales of quality.json")
+    for losses in take(q, "geometry", "list", len(sizes), len(sizes), "Q01"):
+        check_losses(losses, len(q["scales"]), True)
+    present = {group_of(t["role"]) for t in textures}
+    groups = take(q, "groups", "list", 0, 3, "Q01")
+    for group in groups:
+        require(take(group, "group", "text") in GROUPS, "W06", f"group {group['group']}")
+        for losses in take(group, "sizes", "list", len(sizes), len(sizes), "Q01"):
+            samples = take(losses, "texelDssim", "list", 1, 100, "Q01")
+            require(rises([0] + [check(s, "texelDssim", "number", 0, 2, "Q01") for s in samples]), "Q01", "texelDssim")
+            check_losses(take(losses, "coded", "object"), len(samples))
+            check_losses(take(losses, "preview", "object"), 1)
+            coarser = take(losses, "coarser", "object")
+            check_losses(coarser, len(take(coarser, "flip", "list", 0, 8, "Q01")))
+    names = [group["group"] for group in groups]
+    require(names == [g for g in GROUPS if g in present] or set(names) != present, "Q03", "order of groups")
+    require(set(names) == present, "R15", f"groups {names}")
+    return q
+
+
+ABOUT_TEXTS = {"title": 200, "description": 10000, "creator": 2000, "attribution": 2000, "licence": 2000,
+               "licenceUrl": 2000, "sourceUrl": 2000, "capture": 2000}
+ABOUT_PAIRS = {"identifiers": ("scheme", "value"), "dates": ("event", "text")}
+
+
+def read_about(data, m):
+    about = parse_json(data, 262144, "about.json", ("source",))
+    for name, most in ABOUT_TEXTS.items():
+        if name in about:
+            check(about[name], name, "text", 1, most, "B01")
+    for name in ("licenceUrl", "sourceUrl"):
+        require(re.match("https?://", about.get(name, "http://")), "B02", name)
+    for name, members in ABOUT_PAIRS.items():
+        for item in check(about[name], name, "list", 1, 32, "B01") if name in about else []:
+            for member, most in zip(members, (100, 500)):
+                take(item, member, "text", 1, most, "B01")
+    if "unit" in about:
+        take(check(about["unit"], "unit", "object", rule="B01"), "metres", "number", 1e-12, 1e12, "B01")
+        take(about["unit"], "name", "text", 1, 50, "B01")
+    require(about.get("upAxis", "y") in ("x", "y", "z"), "B01", "upAxis")
+    if "coordinateReference" in about:
+        place = check(about["coordinateReference"], "coordinateReference", "object", rule="B01")
+        require("text" in place or "epsg" in place, "B01", "coordinateReference")
+        check(place.get("text", "-"), "text", "text", 1, 2000, "B01")
+        check(place.get("epsg", 1), "epsg", "int", 1, 999999, "B01")
+    check(about.get("source", {}), "source", "object", rule="B01")
+    require(about.get("title", "") == m["title"], "B03", "title")
+    return about
+
+
+def check_thesis(data, m, textures):
+    c = Cursor(data, "O04", "thesis.bin")
+    require(c.raw(4) == b"TXTH", "O04", "magic")
+    version = c.get("HH")
+    require(version == (m["version"]["major"], m["version"]["minor"]), "R01", f"version {version} of thesis.bin")
+    count, zero = c.get("II")
+    require(zero == 0, "W05", "reserved bytes of thesis.bin")
+    require(count <= len(data) // 12, "O04", "number of sections")
+    directory = [c.get("III") for _ in range(count)]
+    require(rises([s[:2] for s in directory]), "O04", "order of sections")
+    for kind, plane, size in directory:
+        s = Cursor(c.raw(size), "O05", f"section {kind} of plane {plane}")
+        if kind not in (1, 2, 3):
+            continue
+        require(plane < len(textures), "R16", f"plane {plane}")
+        fragments = textures[plane]["columns"] * textures[plane]["rows"]
+        if kind == 1:
+            require(s.get("I") == fragments, "R16", f"fragments of plane {plane}")
+            s.array("<u2", 5 * fragments)
+        elif kind == 2:
+            model = s.array("<f4", 5)
+            require((np.abs(model) <= 1e30).all(), "O05", "size model")
+        else:
+            scales, width, zero = s.get("BBH")
+            require(zero == 0, "W05", "reserved bytes of a section")
+            require(1 <= scales <= 100 and 1 <= width <= 8, "O05", "counts of a section")
+            require(scales > m["scales"]["scale"][-1], "R16", f"{scales} scales")
+            middle = s.array("<f4", scales)
+            require(((middle >= 0) & (middle <= 100)).all(), "O05", "Q")
+            totals = s.whole(width, scales * 21)
+            require(width == max(1, (int(totals.max()).bit_length() + 7) // 8), "O05", "width of D")
+            require(totals.max() <= 2**53, "O05", "D")
+        s.finish()
+    c.finish()

@@ -1,0 +1,210 @@
+// The second reader (examples/reader, Python, written from format/SPEC.md alone) against the library over all
+// golden packages of format 2, and both against packages that break one rule each.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
+#include "format/split/split_reader.h"
+#include "pipeline/inspect/verify/verify.h"
+#include "stages/fragment_codec/fragment_codec.h"
+#include "stages/image/decode_image.h"
+#include "tests/support/command.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::CommandResult;
+using testing::TemporaryFolder;
+
+const fs::path kSource = TEXMESH_SOURCE_DIR;
+
+std::vector<std::string> golden_packages() {
+  std::vector<std::string> paths;
+  for (const auto& e : fs::directory_iterator(kSource / "tests" / "golden"))
+    if (e.path().extension() == ".texmesh" && e.path().filename().string().starts_with("v2."))
+      paths.push_back(e.path().string());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+/// A Python that has numpy and Pillow; "" where there is none.
+std::string find_python() {
+  for (const char* python : {"python3", "/usr/bin/python3"})
+    if (testing::run_command({python, "-c", "import numpy, PIL"}).exit_code == 0) return python;
+  return "";
+}
+
+struct SecondReader : ::testing::Test {
+  static void SetUpTestSuite() { python = find_python(); }
+  void SetUp() override {
+    if (python.empty()) GTEST_SKIP() << "no Python with numpy and Pillow (python3-numpy, python3-pil)";
+    if (golden_packages().empty()) GTEST_SKIP() << "no golden package of format 2";
+  }
+  static CommandResult run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {python, (kSource / "examples" / "reader" / "texmesh_reader.py").string()});
+    return testing::run_command(arguments, {"PYTHONDONTWRITEBYTECODE=1"});
+  }
+  static inline std::string python;
+  TemporaryFolder folder;
+};
+
+SplitStreamReader decode_stream(PackageReader& package) {
+  const std::vector<std::uint8_t> bytes = package.entry("mesh/stream.bin");
+  SplitStreamReader reader(read_split_head(bytes));
+  reader.read_to_scale(reader.head().scales.size() - 1, bytes);
+  return reader;
+}
+
+/// What `mesh --raw` writes: whole numbers of points, wedges and faces.
+std::string raw_numbers(const SplitMesh& mesh) {
+  std::ostringstream out;
+  for (const SplitMesh::Point& p : mesh.points()) out << "p " << p[0] << " " << p[1] << " " << p[2] << "\n";
+  for (std::size_t w = 0; w < mesh.wedge_point().size(); ++w) {
+    out << "w " << mesh.wedge_point()[w];
+    for (std::size_t k = 0; k < mesh.attributes(); ++k) {
+      const auto components = static_cast<std::size_t>(mesh.components(k));
+      for (std::size_t c = 0; c < components; ++c) out << " " << mesh.values(k)[w * components + c];
+    }
+    out << "\n";
+  }
+  for (std::size_t f = 0; f < mesh.faces().size(); ++f)
+    out << "f " << mesh.faces()[f][0] << " " << mesh.faces()[f][1] << " " << mesh.faces()[f][2] << " "
+        << mesh.face_group()[f] << "\n";
+  return out.str();
+}
+
+/// Numbers of the lines of an OBJ file that begin with `kind`.
+std::vector<float> numbers_of(const std::string& obj, const std::string& kind) {
+  std::istringstream lines(obj);
+  std::vector<float> numbers;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string word;
+    words >> word;
+    if (word != kind) continue;
+    while (words >> word) numbers.push_back(std::stof(word));
+  }
+  return numbers;
+}
+
+TEST_F(SecondReader, FindsNothingInGoldenPackages) {
+  for (const std::string& path : golden_packages()) {
+    const CommandResult result = run({"verify", path});
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+  }
+}
+
+TEST_F(SecondReader, DecodesVerticesBitForBit) {
+  for (const std::string& path : golden_packages()) {
+    PackageReader package(open_store(path));
+    if (!package.manifest().stream) continue;
+    const SplitStreamReader stream = decode_stream(package);
+    const SplitMesh& mesh = stream.mesh();
+    ASSERT_EQ(run({"mesh", path, "--raw", "-o", folder / "raw"}).exit_code, 0) << path;
+    EXPECT_EQ(testing::read_text(folder / "raw"), raw_numbers(mesh)) << path;
+    ASSERT_EQ(run({"mesh", path, "-o", folder / "mesh.obj"}).exit_code, 0) << path;
+    const std::string obj = testing::read_text(folder / "mesh.obj");
+    const std::vector<float> positions = numbers_of(obj, "v"), normals = numbers_of(obj, "vn");
+    const std::size_t wedges = mesh.wedge_point().size(), per_vertex = positions.size() / wedges;
+    ASSERT_EQ(positions.size(), wedges * per_vertex);
+    for (std::size_t w = 0; w < wedges; ++w)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(positions[w * per_vertex + axis],
+                  stream.head().position.value(mesh.points()[mesh.wedge_point()[w]][axis], int(axis)));
+    for (std::size_t k = 0; k < mesh.attributes(); ++k) {
+      const SplitAttribute& attribute = stream.head().attributes[k];
+      if (attribute.kind != SplitKind::kNormal) continue;
+      ASSERT_EQ(normals.size(), 3 * wedges);
+      for (std::size_t w = 0; w < wedges; ++w) {
+        const auto expected =
+            octahedral_normal(mesh.values(k)[2 * w], mesh.values(k)[2 * w + 1], attribute.grid.bits);
+        for (std::size_t axis = 0; axis < 3; ++axis) EXPECT_EQ(normals[3 * w + axis], expected[axis]);
+      }
+    }
+  }
+}
+
+TEST_F(SecondReader, DecodesTheSameTexels) {
+  for (const std::string& path : golden_packages()) {
+    PackageReader package(open_store(path));
+    for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
+      const TextureInfo& t = package.textures()[plane];
+      for (std::uint32_t rung = 0; rung < t.rungs.size(); ++rung) {
+        const std::string png = folder / "plane.png";
+        ASSERT_EQ(run({"picture", path, "--plane", std::to_string(plane), "--rung", std::to_string(rung),
+                       "-o", png})
+                      .exit_code,
+                  0);
+        const std::string text = testing::read_text(png);
+        const Pixels whole = decode_image(probe_image("plane.png", {text.begin(), text.end()}, {}));
+        ASSERT_EQ(whole.width_px, t.width_px);
+        for (const std::uint16_t f : package.tables().planes[plane].order) {
+          const Pixels part = decode_fragment_file(t.codec, package.complete_fragment(plane, rung, f),
+                                                   std::uint64_t{t.fragment_width_px} * t.fragment_height_px);
+          const std::uint32_t left = f % t.columns * t.fragment_width_px,
+                              top = f / t.columns * t.fragment_height_px;
+          std::size_t others = 0;
+          for (std::uint32_t y = 0; y < part.height_px && top + y < t.height_px; ++y)
+            for (std::uint32_t x = 0; x < part.width_px && left + x < t.width_px; ++x)
+              others += !std::equal(part.at(x, y), part.at(x, y) + t.channels, whole.at(left + x, top + y));
+          EXPECT_EQ(others, 0u) << path << " plane " << plane << " rung " << rung << " fragment " << f;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(SecondReader, TellsTheSameDigests) {
+  for (const std::string& path : golden_packages()) {
+    PackageReader package(open_store(path));
+    const std::string info = run({"info", path}).output;
+    EXPECT_NE(info.find("id " + to_hex(package.id()) + "\n"), std::string::npos) << path;
+    for (const EntryRef& e : package.index()) {
+      const std::string line = to_hex(e.digest) + " " + std::to_string(e.offset) + " " +
+                               std::to_string(e.bytes) + " " + e.path + "\n";
+      EXPECT_NE(info.find(line), std::string::npos) << line;
+    }
+  }
+}
+
+TEST_F(SecondReader, RefusesByTheRuleThatIsBrokenAndSoDoesVerify) {
+  const std::string golden = golden_packages().back();
+  const std::string script = (kSource / "tests" / "golden" / "make_invalid").string();
+  ASSERT_EQ(testing::run_command({python, script, golden, folder / "invalid"}).exit_code, 0);
+  std::vector<std::string> arguments{"verify"};
+  for (const auto& e : fs::directory_iterator(folder / "invalid")) arguments.push_back(e.path().string());
+  EXPECT_GT(arguments.size(), 100u);
+  const std::string told = run(arguments).output;
+  for (std::size_t k = 1; k < arguments.size(); ++k) {
+    const std::string& path = arguments[k];
+    const std::string rule = fs::path(path).filename().string().substr(0, 3);
+    const std::size_t line = told.find(path + ": ");
+    EXPECT_NE(told.find(path + ": refused: " + rule + ": "), std::string::npos)
+        << path << ": "
+        << (line == std::string::npos ? told : told.substr(line, told.find('\n', line) - line));
+    bool refused = false;
+    try {
+      refused = !verify_package(*open_store(path), {}).findings.empty();
+    } catch (const Error&) {
+      refused = true;
+    }
+    EXPECT_TRUE(refused) << path << " passes texmesh verify";
+  }
+}
+
+TEST_F(SecondReader, ReadsTheTreeAsWell) {
+  const std::string golden = golden_packages().back(), tree = folder / "tree";
+  const std::string texmesh = TEXMESH_BINARY;
+  ASSERT_EQ(testing::run_command({texmesh, "unpack", golden, "-o", tree}).exit_code, 0);
+  EXPECT_EQ(run({"verify", tree}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace texmesh
