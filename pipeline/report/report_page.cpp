@@ -73,13 +73,13 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
 
 /// Whose the object is; the licence as a link to where it can be read.
 std::string rights_line(const About& about) {
-  std::string out = html_escaped(about.attribution.empty() ? about.creator : about.attribution);
+  std::string out = markup_escaped(about.attribution.empty() ? about.creator : about.attribution);
   if (!about.licence.empty()) {
-    const std::string licence = html_escaped(about.licence);
+    const std::string licence = markup_escaped(about.licence);
     if (!out.empty()) out += ", ";
     out += about.licence_url.empty() ? licence
                                      : fmt::format("<a rel=\"license\" href=\"{}\">{}</a>",
-                                                   html_escaped(about.licence_url), licence);
+                                                   markup_escaped(about.licence_url), licence);
   }
   return out.empty() ? out : "<p class=\"quiet\">" + out + "</p>\n";
 }

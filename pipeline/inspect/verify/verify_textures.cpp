@@ -82,7 +82,6 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
                     Findings& findings) {
   findings.require_equal<std::uint64_t>(m.plane_count, textures.size(), "textures", kTexturesPath, "");
   findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), "tables", kTablesPath, "planes");
-  const std::size_t full = full_size_planes(textures);
   std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
   for (std::size_t k = 0; k < std::min(textures.size(), tables.planes.size()); ++k) {
     const TextureInfo& info = textures[k];
