@@ -8,11 +8,11 @@
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
+#include "stages/fragment_codec/requantised_jpeg.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/jpeg/jpeg_coder.h"
-#include "stages/jpeg/requantised_jpeg.h"
 #include "stages/jpeg/source_jpeg.h"
 #include "stages/ladder/fragment_windows.h"
 
@@ -20,7 +20,7 @@ namespace texmesh {
 namespace {
 
 // Bytes of the rungs below, as parts of the top's.
-constexpr double kByteShares[] = {0.065, 0.16, 0.4};
+constexpr double kByteShares[] = {0.065, 0.16, 0.35};
 // A quality is taken for a part that it misses by this factor at most, and not when it costs nearly the
 // top's.
 constexpr double kMostOff = 1.6, kMostShare = 0.75;

@@ -30,7 +30,7 @@ TEST(SizeModel, FitsAndIsAbsentForOneRung) {
   }
   EXPECT_NEAR(t.model_error, error, 1e-3);
 
-  LadderOptions one;
+  LadderOptions one = testing::all_rungs();
   one.rungs = {50};
   const PlaneTables single = build(make_scene(one)).planes[0];
   EXPECT_EQ(single.model_a, 0);

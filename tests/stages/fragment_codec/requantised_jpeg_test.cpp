@@ -1,4 +1,4 @@
-#include "stages/jpeg/requantised_jpeg.h"
+#include "stages/fragment_codec/requantised_jpeg.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/jpeg/requantised_jpeg.h"
+#include "stages/fragment_codec/requantised_jpeg.h"
 
 #include <algorithm>
 #include <bit>
@@ -15,7 +15,7 @@ namespace {
 // which is what baseline JPEG has symbols for (ISO/IEC 10918-1, F.1.2).
 constexpr int kLeastDc = -1024, kMostDc = 1023, kMostAcBits = 10;
 // Of coefficients that samples of 8 bits can have. A hostile file says more, and no decoder shows it.
-constexpr float kLargest = 1023;
+constexpr float kLargestCoefficient = 1023;
 
 int bits_of(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
 
@@ -120,8 +120,8 @@ RequantisedJpeg::Seen RequantisedJpeg::look(std::size_t component, std::uint32_t
   }
   const auto& quantisers = source_.components()[component].quantisers;
   for (std::size_t k = 0; k < 64; ++k)
-    out.coefficients[k] =
-        std::clamp(static_cast<float>(coefficients[k] * quantisers[k]), -kLargest, kLargest);
+    out.coefficients[k] = std::clamp(static_cast<float>(coefficients[k] * quantisers[k]),
+                                     -kLargestCoefficient, kLargestCoefficient);
   if (out.coverage == BlockCoverage::kAll || exact_only_) return out;
   BlockValues samples = block_inverse_dct(out.coefficients);
   const BlockValues filled = filled_[component].block(left, top);
