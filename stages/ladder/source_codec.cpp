@@ -200,13 +200,16 @@ std::vector<double> bits_by_quality(const SourcePlane& source, int top, const Ru
   const std::uint32_t rows = std::max(source.layout.mcu_height_px, kSampleRows);
   const auto sample = size_sample(source.plane, source.pixels, source.options.uncovered, rows);
   if (sample.empty()) return {};
+  // Colours have knots at every quality; choosing rungs takes fewer.
+  const int step = is_colour(source.plane.role) ? 1 : 4;
   std::vector<QuantiserSet> sets;
-  for (int q = 1; q < top; ++q) sets.push_back({standard_rung(source, q).quantisers});
+  for (int q = 1; q < top; q += step) sets.push_back({standard_rung(source, q).quantisers});
   sets.push_back({source.layout.quantisers, true});
   const std::vector<double> bits =
       requantised_bits(source.coefficients, source.layout, source.kinds, sample, sets, context);
   std::vector<double> out(101);
-  std::ranges::copy(bits, out.begin() + 1);
+  for (std::size_t k = 0; k + 1 < bits.size(); ++k) out[1 + k * static_cast<std::size_t>(step)] = bits[k];
+  out[static_cast<std::size_t>(top)] = bits.back();
   return out;
 }
 

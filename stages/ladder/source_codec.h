@@ -18,7 +18,7 @@ struct SourceCodec {
   std::unique_ptr<TextureCodec> codec;  // of codec id jpeg; none: the plane is coded from its pixels
   std::string why_not;                  // of a JPEG without codec
   /// What a sample of the plane takes at each whole quality, [0..100], and at the top rung's what that takes;
-  /// 0 above it. Empty for an empty sample.
+  /// 0 above it, and of data at most qualities. Empty for an empty sample.
   std::vector<double> bits;
 };
 

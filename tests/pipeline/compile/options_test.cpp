@@ -83,6 +83,20 @@ TEST(Options, ADefaultFollowsFromOtherOptionsAndWhatTheUserSetsDoesNot) {
   EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kFree);
 }
 
+TEST(Options, RungsThatAreGivenAreAllStored) {
+  EXPECT_TRUE(resolve_options({}).ladder.prune);
+  for (const char* name :
+       {"ladder.rungs", "ladder.normal_rungs", "ladder.data_rungs", "ladder.alpha_rungs"}) {
+    CompileOptions o;
+    auto fields = list_options(o);
+    const std::string usual = "18,30,53,75,86,93,97";  // the default of two of them, but chosen
+    set_option(field(fields, name), usual, name);
+    EXPECT_FALSE(resolve_options(o).ladder.prune) << name;
+    set_option(field(fields, "ladder.prune"), "true", "--ladder.prune");
+    EXPECT_TRUE(resolve_options(o).ladder.prune) << name;
+  }
+}
+
 TEST(Options, ResolvedOptionsTravelAsAProfile) {
   CompileOptions o, back;
   o.ladder.mode = LadderMode::kProgressive;
