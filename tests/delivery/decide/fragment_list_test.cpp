@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "delivery/cpp/client/delivery_plan.h"
+#include "format/base/errors.h"
+#include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
 #include "tests/support/packages.h"
 
@@ -71,11 +73,19 @@ TEST(FragmentList, OffersAddUpToWhatTheGroupLoses) {
       << "weights change what is bought, not what is lost";
 }
 
-TEST(FragmentList, HasAllFragmentsWherePreviewsAreNotMeasured) {
-  PackageReader package = open_with({});
-  const FragmentList list = fragment_list(package, full_size(package), {});
-  EXPECT_EQ(list.fragments.size(), 3u);
-  EXPECT_EQ(list.preview_loss, PerGroup{});
+TEST(FragmentList, TakesTheRowOfTheScalesNumber) {
+  PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
+  ListOptions options;
+  options.scale = 5;  // the second of the manifest
+  const FragmentList list = fragment_list(package, full_size(package), options);
+  const std::vector<float> eta = eta_of(package.tables().planes[0], 1);
+  ASSERT_EQ(list.offers.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::vector<double>& loss = list.offers[i].loss;
+    EXPECT_NEAR(list.offers[i].eta, eta[list.fragments[i].fragment] * (loss[0] - loss[1]), 1e-9) << i;
+  }
+  options.scale = 1;  // a row, but no scale
+  EXPECT_THROW(fragment_list(package, full_size(package), options), InputError);
 }
 
 TEST(FragmentList, NothingIsFetchedWhereThePreviewsShowMost) {
