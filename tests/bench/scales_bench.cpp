@@ -35,6 +35,7 @@ void print(const char* path) {
               "previews", "JSON", "B/tri");
   Bytes sum, finest;
   for (const auto& scale : reader.manifest().scales) {
+    if (!scale.has_glb()) continue;  // the stream alone has it
     const Bytes b = bytes_of(reader.scale_glb(scale.scale));
     if (scale.scale == 0) finest = b;
     sum += b;

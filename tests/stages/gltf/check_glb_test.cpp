@@ -240,6 +240,22 @@ TEST(CheckGlb, Nodes) {
   EXPECT_TRUE(finds([](json& j) { j["nodes"][0]["scale"] = {1, 2}; }, "glb-node", "/nodes/0/scale"));
 }
 
+TEST(CheckGlb, ImagesOfAPackageMayBePreviewsByTheirPlace) {
+  const auto with_uri = [](const json& uri) {
+    GlbParts g = good();
+    json& image = g.json["images"][0];
+    image.erase("bufferView");
+    image["uri"] = uri;
+    return g;
+  };
+  const Checked c = check(with_uri("../preview/012.jpg").glb());
+  EXPECT_EQ(c.facts.image_uris, std::vector<std::string>{"../preview/012.jpg"});
+  EXPECT_TRUE(c.findings.empty());
+  for (const json& uri : std::vector<json>{"../preview/12.jpg", "preview/012.jpg", "../poster.jpg", "../../preview/012.jpg",
+                                           "http://host/preview/012.jpg", 7})
+    EXPECT_TRUE(finds(with_uri(uri).glb(), "glb-image", "/images/0/uri")) << uri;
+}
+
 TEST(CheckGlb, Images) {
   EXPECT_TRUE(
       finds([](json& j) { j["images"][0]["mimeType"] = "image/png"; }, "glb-image", "/images/0/mimeType"));
