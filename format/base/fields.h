@@ -20,7 +20,7 @@ namespace texmesh {
 //
 // Names are snake_case. Field types: bool, int, double, std::string, std::vector<int>, std::vector<double>,
 // and enums that have EnumNames. The Range (inclusive) is given for numbers and for the elements of
-// vectors, never otherwise.
+// vectors; of a text it is that of its bytes, 0 to 200 where none is given.
 
 struct Range {
   double lo, hi;
