@@ -162,7 +162,9 @@ PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
   for (const PlaneChoice& p : planes) {
     const auto group = static_cast<std::size_t>(group_of(p.plane));
     if (!(weights[group] > 0)) continue;
-    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(growth(p.plane));
+    TexelGrowth halvings = growth(p.plane);  // a plane of full size has lost none
+    for (double& h : halvings) h = std::min(h, static_cast<double>(package_.textures()[p.plane].mip));
+    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(halvings);
   }
   return loss;
 }

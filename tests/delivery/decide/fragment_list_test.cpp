@@ -38,15 +38,15 @@ PackageReader open_with(const std::vector<float>& skipped) {
 }
 
 TEST(FragmentList, LeavesToThePreviewWhatNoRungShowsBetter) {
-  PackageReader package = open_with({0.5f, 0.125f, 0.25f, 0});
+  PackageReader package = open_with({0.5f, 0.125f, 0.1875f, 0});
   const FragmentList list = fragment_list(package, full_size(package), {});
-  ASSERT_EQ(list.fragments.size(), 1u);  // of 1 the preview shows more, of 2 as much
+  ASSERT_EQ(list.fragments.size(), 1u);  // of 1 the preview shows more, of 2, too
   EXPECT_EQ(list.fragments[0].fragment, 0u);
   const PlaneTables& t = package.tables().planes[0];
   const std::vector<float> w = surface_weights(t);
   const GroupCurve curve(package.quality(), PlaneGroup::kColour, 1000);
   const double all = static_cast<double>(w[0]) + w[1] + w[2];
-  EXPECT_NEAR(list.preview_loss[0], kLarger * (curve.coded(0.125) * w[1] + curve.coded(0.25) * w[2]) / all,
+  EXPECT_NEAR(list.preview_loss[0], kLarger * (curve.coded(0.125) * w[1] + curve.coded(0.1875) * w[2]) / all,
               1e-6);
   EXPECT_NEAR(list.offers[0].loss[0], kLarger * curve.coded(0.5) * w[0] / all, 1e-6);
   EXPECT_NEAR(list.offers[0].loss[1], kLarger * curve.coded(0.25) * w[0] / all, 1e-6);

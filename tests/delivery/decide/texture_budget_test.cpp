@@ -28,6 +28,7 @@ PackageReader open_pair(float normal_part, float exponent = 1) {
     parts.streams[to] = parts.streams[from];
   parts.manifest.plane_count = 2;
   parts.quality.exponent = exponent;
+  parts.quality.sizes_px = {1000};
   const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), {}};
   const TextureLosses normal{
       {0.0625f, 0.5f}, losses({0.05f * normal_part, 0.4f * normal_part}), losses({0.4f * normal_part}), {}};

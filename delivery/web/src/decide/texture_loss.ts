@@ -190,7 +190,9 @@ export class TextureLoss {
     const weights = this.weights(planes);
     for (const { plane } of planes) {
       const group = groupIndex(this.data, plane);
-      if (weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser(this.growth_(plane));
+      const { mip } = this.data.textures[plane];
+      const [first, second] = this.growth_(plane).map((growth) => Math.min(growth, mip)); // a plane of full size has lost none
+      if (weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser([first, second]);
     }
     return loss;
   }
