@@ -20,8 +20,8 @@ inline constexpr std::uint64_t kBootstrapBytes = 16384;
 inline constexpr double kAnyDisplayPx = 1e9;
 /// Longest title in bytes of UTF-8; control characters are not allowed in it.
 inline constexpr std::size_t kMaxTitleBytes = 200;
-/// What a client asks for in its first request. A container whose first picture ends within these bytes is shown
-/// after one round trip (see start_bytes()).
+/// What a client asks for in its first request. A container whose first picture ends within these bytes is
+/// shown after one round trip (see start_bytes()).
 inline constexpr std::uint64_t kStartBytes = 65536;
 
 /// The measured figures (errors, p95, p99, display_px_*) are written with six significant digits.

@@ -118,7 +118,6 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
 std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
                                         const std::vector<PackageEntry>& entries) {
   check_entries(manifest, textures, entries);
-  const std::size_t full = full_size_planes(textures);
   const Bytes textures_json = to_bytes(write_textures(textures));
   Bytes index;
   std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};

@@ -31,6 +31,7 @@ Json group_json(const GroupLosses& group) {
   for (const TextureLosses& t : group.sizes)
     sizes.push_back({{"texelDssim", floats_json(t.texel_dssim)},
                      {"coded", losses_json(t.coded)},
+                     {"preview", losses_json(t.preview)},
                      {"coarser", losses_json(t.coarser)}});
   return {{"group", enum_name(group.group)}, {"sizes", std::move(sizes)}};
 }
@@ -68,6 +69,7 @@ TextureLosses read_texture_losses(const JsonAt& at) {
     t.texel_dssim.push_back(v);
   }
   t.coded = read_losses(at["coded"], t.texel_dssim.size());
+  t.preview = read_losses(at["preview"], 1);
   t.coarser = read_losses(at["coarser"], at["coarser"]["flip"].array(0, kMaxCoarserLevels));
   return t;
 }

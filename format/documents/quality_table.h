@@ -40,15 +40,16 @@ struct PictureLosses {
 
 /// What a group's textures lose at one displayed height, on S_0, with all other groups as in the source.
 struct TextureLosses {
-  /// Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; one per sampled rung, and
-  /// last the previews. Of the planes that a client shows at that height (mip_choice.h).
+  /// Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; one per sampled rung. Of
+  /// the planes that a client shows at that height (mip_choice.h).
   std::vector<float> texel_dssim;
-  PictureLosses coded;  // per texel_dssim
+  PictureLosses coded;    // per texel_dssim
+  PictureLosses preview;  // one: with the previews of all the group's textures
   /// With the source's texels of mips that are 1, 2 .. levels coarser than the planes shown at that height.
   PictureLosses coarser;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.texel_dssim, s.coded, s.coarser);
+    a(s.texel_dssim, s.coded, s.preview, s.coarser);
   }
   friend bool operator==(const TextureLosses&, const TextureLosses&) = default;
 };

@@ -40,7 +40,7 @@ Json texture_json(const TextureInfo& t) {
   j["previewWidthPx"] = t.preview_width_px;
   j["previewHeightPx"] = t.preview_height_px;
   j["rungQuality"] = t.rung_quality;
-  if (t.lossless) j["lossless"] = true;
+  if (t.source_rung) j["sourceRung"] = true;
   if (!t.source_extension.empty()) {
     j["source"] = t.source_extension;
     j["sourceColours"] = t.source_colours;
@@ -80,9 +80,9 @@ void read_mip(const JsonAt& at, TextureInfo& t) {
 }
 
 void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
-  if (at.has("lossless")) t.lossless = at["lossless"].boolean();
-  if (t.lossless && (t.codec != Codec::kJpeg || t.mip > 0))
-    at["lossless"].fail("a full-size plane of codec jpeg", "another");
+  if (at.has("sourceRung")) t.source_rung = at["sourceRung"].boolean();
+  if (t.source_rung && (t.codec != Codec::kJpeg || t.mip > 0))
+    at["sourceRung"].fail("a full-size plane of codec jpeg", "another");
   if (!at.has("source")) return;
   t.source_extension = at["source"].text(100);
   if (std::ranges::find(kSourceExtensions, t.source_extension) == std::end(kSourceExtensions))

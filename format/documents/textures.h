@@ -31,15 +31,13 @@ struct TextureInfo {
   // texture/<plane>/rNN.pack by rising quality: fragments in PlaneTables::order.
   std::vector<EntryRef> rungs;
   std::vector<int> rung_quality;
-  bool lossless = false;  // the last rung holds the coefficients of the source, a JPEG
+  bool source_rung = false;  // the last rung holds the coefficients of the source, a JPEG
   // jpg, png, tif, webp or exr where the package holds the source image; "" = it does not.
   std::string source_extension;
   bool source_colours = true;  // its numbers are the plane's; false: import has converted them
   EntryRef source;             // source/NNN.<extension>
   friend bool operator==(const TextureInfo&, const TextureInfo&) = default;
 };
-/// Quality that textures.json gives a rung without loss; no other rung of its plane has it.
-inline constexpr int kLosslessQuality = 100;
 /// How many of the planes have full size; they stand first.
 std::size_t full_size_planes(const std::vector<TextureInfo>& textures);
 std::string write_textures(const std::vector<TextureInfo>& textures);

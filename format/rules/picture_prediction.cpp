@@ -36,9 +36,24 @@ Between size_at(const QualityTable& table, double displayed_px) {
       [](double px) { return portable::log(px); });
 }
 
+/// How much more a picture of a fixed number of texels loses than at the nearest height of the table.
+double beyond_sizes(const QualityTable& table, double displayed_px) {
+  constexpr double kLn2 = 0.693147180559945309417;
+  const double px = std::max(displayed_px, 1.0);
+  const double nearest =
+      std::clamp(px, static_cast<double>(table.sizes_px.front()), static_cast<double>(table.sizes_px.back()));
+  return px == nearest ? 1 : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / kLn2);
+}
+
 double mixed(double a, double b, double part) { return (1 - part) * a + part * b; }
 
 }  // namespace
+
+SizesAround sizes_around(const QualityTable& table, double displayed_px) {
+  if (table.sizes_px.empty()) return {1, 1};
+  const Between size = size_at(table, displayed_px);
+  return {static_cast<double>(table.sizes_px[size.first]), static_cast<double>(table.sizes_px[size.second])};
+}
 
 GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px) {
   const auto found = std::ranges::find(table.groups, group, &GroupLosses::group);
@@ -55,6 +70,8 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
       curve.log_flip.push_back(portable::log(least));
     }
     curve.coarser = losses.coarser.flip;
+    curve.preview =
+        std::min(kMostFlip, static_cast<double>(losses.preview.flip[0]) * beyond_sizes(table, displayed_px));
     curves_.push_back(std::move(curve));
   }
 }
@@ -79,15 +96,23 @@ double GroupCurve::Curve::at_level(double levels) const {
   return mixed(value(i), value(i + 1), std::clamp(levels - whole, 0.0, 1.0));
 }
 
-double GroupCurve::coded(double texel_dssim) const {
+double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
   if (!(texel_dssim > kLeastDssim)) return 0;
   if (curves_.empty()) return std::min(texel_dssim, kMostFlip);
-  return std::min(kMostFlip, mixed(curves_[0].at(texel_dssim), curves_[1].at(texel_dssim), part_));
+  const auto at = [&](std::size_t i) {
+    const double grown = growth[i] == 0 ? 1 : portable::pow(kLossPerDoubling, growth[i]);
+    return curves_[i].at(texel_dssim) * grown;
+  };
+  return std::min(kMostFlip, mixed(at(0), at(1), part_));
 }
 
-double GroupCurve::coarser(double levels) const {
-  if (curves_.empty() || !(levels > 0)) return 0;
-  return mixed(curves_[0].at_level(levels), curves_[1].at_level(levels), part_);
+double GroupCurve::preview() const {
+  return curves_.empty() ? kMostFlip : mixed(curves_[0].preview, curves_[1].preview, part_);
+}
+
+double GroupCurve::coarser(const TexelGrowth& growth) const {
+  if (curves_.empty()) return 0;
+  return mixed(curves_[0].at_level(growth[0]), curves_[1].at_level(growth[1]), part_);
 }
 
 double geometry_flip(const QualityTable& table, double displayed_px, double scale) {

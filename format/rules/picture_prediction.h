@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <span>
 #include <vector>
 
@@ -10,22 +11,36 @@ namespace texmesh {
 // quality table. Values at displayed heights between two of the table's are linear in the height's logarithm;
 // outside of them the nearest height counts. Same bits on every machine.
 
+/// The two displayed heights of a table around one, px; twice the same where the table has one. 1 px for a
+/// table without any.
+using SizesAround = std::array<double, 2>;
+SizesAround sizes_around(const QualityTable& table, double displayed_px);
+
+/// How many times larger the texels of a plane are on the screen than those that were sampled at each of
+/// sizes_around(): a logarithm of base 2, 0 = as large, below 0 = smaller.
+using TexelGrowth = std::array<double, 2>;
+
 /// What textures of one group lose at one displayed height. A group that the table does not have loses its
 /// texels' 1 - SSIM, and nothing by coarser mips.
 class GroupCurve {
  public:
   GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px);
   /// FLIP where the texels lose `texel_dssim` >= 0: 0 for 0, along straight lines through the samples'
-  /// logarithms, which go on before the first and behind the last sample. 0..1, not falling.
-  double coded(double texel_dssim) const;
-  /// FLIP with mips that are `levels` >= 0 coarser than those for this display, between whole levels linear.
-  /// Behind the last sampled level its value.
-  double coarser(double levels) const;
+  /// logarithms, which go on before the first and behind the last sample. Twice as large texels lose
+  /// kLossPerDoubling times as much. 0..1, not falling.
+  double coded(double texel_dssim, const TexelGrowth& growth = {}) const;
+  /// FLIP where all textures of the group show their previews. Without the group 1.
+  double preview() const;
+  /// FLIP of the source's texels in mips with so much larger texels, between whole levels linear. 0 where
+  /// they are not larger; behind the last sampled level its value.
+  double coarser(const TexelGrowth& growth) const;
+  static constexpr double kLossPerDoubling = 1.6;
 
  private:
   struct Curve {
     std::vector<double> log_dssim, log_flip;
     std::vector<float> coarser;
+    double preview = 0;
     double at(double texel_dssim) const;
     double at_level(double levels) const;
   };

@@ -23,27 +23,19 @@ constexpr std::array<int, 64> kLumaQuantisers{
 /// fitted best. Strictly rising.
 double measure_fineness(int quality) {
   const int percent = quality < 50 ? 5000 / quality : 200 - 2 * quality;
-  double sum = 0;
-  for (const int q : kLumaQuantisers) sum += 1.0 / (std::clamp((q * percent + 50) / 100, 1, 255) + 1);
-  return portable::log(sum / 64);
+  std::array<std::uint16_t, 64> steps;
+  std::ranges::transform(kLumaQuantisers, steps.begin(), [&](int q) {
+    return static_cast<std::uint16_t>(std::clamp((q * percent + 50) / 100, 1, 255));
+  });
+  return fineness_of(steps);
 }
 
-/// Looked up: every fragment's every rung asks.
-double fineness_at(int quality) {
-  static const std::array<double, 101> by_quality = [] {
-    std::array<double, 101> out{};
-    for (int q = 1; q <= 100; ++q) out[static_cast<std::size_t>(q)] = measure_fineness(q);
-    return out;
-  }();
-  return by_quality[static_cast<std::size_t>(quality)];
-}
-
-/// The same for any quality: linear between the whole ones.
+/// Of any quality: linear between the whole ones.
 double fineness(double quality) {
   const double q = quality > 1 ? std::min(quality, 100.0) : 1.0;
   const int below = static_cast<int>(q);
-  const double low = fineness_at(below), part = q - below;
-  return part > 0 ? low + part * (fineness_at(below + 1) - low) : low;
+  const double low = fineness_at_quality(below), part = q - below;
+  return part > 0 ? low + part * (fineness_at_quality(below + 1) - low) : low;
 }
 
 /// Slope of the monotone cubic (Fritsch and Butland 1984) at an inner knot, from the secants on both sides.
@@ -92,6 +84,22 @@ double axis_at(const PlaneTables& t, double quality) {
 }
 
 }  // namespace
+
+double fineness_of(std::span<const std::uint16_t> quantisers) {
+  double sum = 0;
+  for (const std::uint16_t q : quantisers) sum += 1.0 / (q + 1);
+  return portable::log(sum / static_cast<double>(quantisers.size()));
+}
+
+double fineness_at_quality(int quality) {
+  // Looked up: every fragment's every rung asks.
+  static const std::array<double, 101> by_quality = [] {
+    std::array<double, 101> out{};
+    for (int q = 1; q <= 100; ++q) out[static_cast<std::size_t>(q)] = measure_fineness(q);
+    return out;
+  }();
+  return by_quality[static_cast<std::size_t>(quality)];
+}
 
 double interpolated_bytes(const PlaneTables& tables, std::size_t fragment, double quality) {
   std::vector<double> x, y;  // fineness, ln bytes

@@ -1,10 +1,16 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "format/documents/tables.h"
 
 namespace texmesh {
+
+/// How finely quantisers (> 0) quantise: the logarithm of the mean of 1 / (step + 1). Higher is finer.
+double fineness_of(std::span<const std::uint16_t> quantisers);
+/// That of the luma quantisers of a whole quality 1..100 of IJG's scale. Strictly rising.
+double fineness_at_quality(int quality);
 
 /// Bytes that the fragment's stream would have at a quality that no rung has: monotone cubic interpolation
 /// of log bytes between the rungs (exact there) along the plane's knots, constant outside them; 0 when it

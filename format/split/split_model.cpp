@@ -37,7 +37,8 @@ void add_attribute(const SplitAttribute& a, const std::vector<std::int32_t>& val
       const auto part = [&](std::size_t k) { return static_cast<float>(v[k]) / one; };
       out.colours.push_back({part(0), part(1), part(2), part(3)});
     } else {
-      (a.kind == SplitKind::kUv1 ? out.uv1 : out.uv0).push_back({a.grid.value(v[0], 0), a.grid.value(v[1], 1)});
+      (a.kind == SplitKind::kUv1 ? out.uv1 : out.uv0)
+          .push_back({a.grid.value(v[0], 0), a.grid.value(v[1], 1)});
     }
   }
 }
@@ -60,8 +61,8 @@ Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
   for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
   for (const std::uint32_t p : points.used()) {
     const SplitMesh::Point& place = mesh.points()[p];
-    out.positions.push_back(
-        {head.position.value(place[0], 0), head.position.value(place[1], 1), head.position.value(place[2], 2)});
+    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
+                             head.position.value(place[2], 2)});
   }
   for (std::size_t k = 0; k < head.attributes.size(); ++k)
     add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);

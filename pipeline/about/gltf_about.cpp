@@ -155,6 +155,14 @@ About about_from_gltf(const Json& document, const std::string& format, Notes& no
   return about;
 }
 
+/// The member, made an object where it is none. Not to be kept: an ordered_json moves its members when one is
+/// added.
+static Ordered& member_object(Ordered& parent, const char* name) {
+  Ordered& found = parent[name];
+  if (!found.is_object()) found = Ordered::object();
+  return found;
+}
+
 /// glTF has metres and y up, and no place for anything else.
 static void write_coordinates(const About& about, Ordered& root) {
   Ordered said = Ordered::object();
@@ -163,16 +171,16 @@ static void write_coordinates(const About& about, Ordered& root) {
   if (!about.up_axis.empty() && about.up_axis != "y") said["upAxis"] = about.up_axis;
   if (!about.crs.empty()) said["coordinateReference"]["text"] = about.crs;
   if (about.epsg > 0) said["coordinateReference"]["epsg"] = about.epsg;
-  if (!said.empty()) root["extras"]["texmesh"] = said;
+  if (!said.empty()) member_object(root, "extras")["texmesh"] = said;
 }
 
 void write_gltf_about(const About& about, Ordered& root) {
   write_coordinates(about, root);
   const Ordered source = about.source.empty() ? Ordered::object() : Ordered::parse(about.source);
   const Ordered from = source.value("asset", Ordered::object());
-  Ordered& asset = root["asset"];
-  if (const std::string line = copyright_line(about); !line.empty()) asset["copyright"] = line;
-  if (from.is_object() && from.contains("extras")) asset["extras"] = from["extras"];
+  if (const std::string line = copyright_line(about); !line.empty())
+    member_object(root, "asset")["copyright"] = line;
+  if (from.is_object() && from.contains("extras")) member_object(root, "asset")["extras"] = from["extras"];
 
   Ordered packets = source.value("xmpPackets", Ordered::array());
   if (!packets.is_array()) packets = Ordered::array();
@@ -186,9 +194,11 @@ void write_gltf_about(const About& about, Ordered& root) {
     packets.push_back(after);
   }
   if (packets.empty()) return;
-  root["extensions"][kXmpExtension]["packets"] = packets;
-  if (shown < packets.size()) asset["extensions"][kXmpExtension]["packet"] = shown;
+  member_object(member_object(root, "extensions"), kXmpExtension)["packets"] = packets;
+  if (shown < packets.size())
+    member_object(member_object(member_object(root, "asset"), "extensions"), kXmpExtension)["packet"] = shown;
   Ordered used = root.value("extensionsUsed", Ordered::array());
+  if (!used.is_array()) used = Ordered::array();
   if (std::find(used.begin(), used.end(), Ordered(kXmpExtension)) == used.end())
     used.push_back(kXmpExtension);
   root["extensionsUsed"] = used;

@@ -7,40 +7,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/io/markup.h"
+
 namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 std::string dump(const Json& j) { return j.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"; }
-
-/// XML 1.0 has no way to write most control characters.
-std::string xml(const std::string& text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\n':
-        out += "&#10;";
-        break;
-      case '\t':
-        out += "&#9;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
-    }
-  return out;
-}
 
 /// Bytes that are no UTF-8 (a file name may hold any) become U+FFFD.
 std::string utf8(const std::string& text) {
@@ -135,19 +109,19 @@ std::string write_junit(const std::vector<PlannedModel>& models, const std::vect
   for (std::size_t i = 0; i < models.size(); ++i) {
     const WorkerReport& r = reports[i];
     out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"",
-                       xml(utf8(models[i].name)), r.seconds);
+                       markup_escaped(utf8(models[i].name)), r.seconds);
     out += fmt::format(
         ">\n<properties><property name=\"result\" value=\"{}\"/><property name=\"output\" value=\"{}\"/>"
         "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
         "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
         "</properties>\n",
-        enum_name(r.result), xml(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes, r.stages_ran,
-        r.stages_hit);
+        enum_name(r.result), markup_escaped(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes,
+        r.stages_ran, r.stages_hit);
     if (r.result == ModelResult::kCancelled)
       out += "<skipped message=\"not reached\"/>\n";
     else if (!r.ok())
-      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", xml(r.error_kind),
-                         xml(utf8(r.error_message)));
+      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(r.error_kind),
+                         markup_escaped(utf8(r.error_message)));
     out += "</testcase>\n";
   }
   return out + "</testsuite>\n</testsuites>\n";

@@ -37,7 +37,7 @@ const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title",
                                                    {"import.up", {"--up", true}},
                                                    {"ladder.rungs", {"--rungs", true}},
                                                    {"ladder.mode", {"--ladder", true}},
-                                                   {"ladder.lossless_top", {"--lossless-top", true}},
+                                                   {"ladder.keep_source", {"--keep-source", true}},
                                                    {"ladder.subsampling", {"--subsampling", true}},
                                                    {"scales.mesh_codec", {"--mesh-codec", true}},
                                                    {"perceptual_values.jnd", {"--jnd", true}},
@@ -65,7 +65,8 @@ std::string help_of(const OptionField& f) {
   const bool is_name = first.ends_with(':') || help.compare(first.size(), 2, " =") == 0;
   if (!is_name && std::islower(static_cast<unsigned char>(first[first.size() > 1 ? 1 : 0])))
     help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
-  if (f.range) help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
+  if (f.range && !std::holds_alternative<std::string*>(f.value))
+    help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
   if (const auto* e = std::get_if<EnumField>(&f.value))
     help += fmt::format(" {{{}}}", fmt::join(e->names, "|"));
   std::string text = option_text(f);

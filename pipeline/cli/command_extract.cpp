@@ -111,7 +111,8 @@ void add_extract_command(Command& app) {
       "Meshes stay Draco coded (KHR_draco_mesh_compression), and WebP needs EXT_texture_webp. For viewers "
       "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
-      "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then).");
+      "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then), "
+      "unless the file has all that the package holds of a source of JPEGs.");
   c.on_run([args] { return run_extract(*args); });
 }
 

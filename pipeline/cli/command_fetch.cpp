@@ -107,7 +107,8 @@ struct Moved {
   }
 };
 
-/// Everything that is needed to decide: one round trip, with what the first answer lacks of the coarsest mesh.
+/// Everything that is needed to decide: one round trip, with what the first answer lacks of the coarsest
+/// mesh.
 void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Moved& moved) {
   const Manifest& m = package.manifest();
   const auto start = Clock::now();

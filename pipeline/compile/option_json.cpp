@@ -27,6 +27,13 @@ std::string range_text(const Range& r, const char* kind) {
   return std::string(kind) + " in " + option_text(r.lo) + " .. " + option_text(r.hi);
 }
 
+/// Of a text without a Range.
+constexpr int kMostTextBytes = 200;
+
+int most_text_bytes(const OptionField& field) {
+  return field.range ? static_cast<int>(field.range->hi) : kMostTextBytes;
+}
+
 /// Reads JSON values into fields and says what was wrong where.
 class FieldReader {
  public:
@@ -39,8 +46,9 @@ class FieldReader {
             [&](int* v) { *v = static_cast<int>(integer(json, *field.range)); },
             [&](double* v) { *v = number(json, *field.range); },
             [&](std::string* v) {
-              if (!json.is_string() || json.get_ref<const std::string&>().size() > 200)
-                fail<int>("a text of at most 200 bytes", json);
+              const auto most = static_cast<std::size_t>(most_text_bytes(field));
+              if (!json.is_string() || json.get_ref<const std::string&>().size() > most)
+                fail<int>("a text of at most " + std::to_string(most) + " bytes", json);
               *v = json.get<std::string>();
             },
             [&](std::vector<int>* v) {
@@ -119,7 +127,7 @@ Json option_schema(const OptionField& f) {
                  [&](const int*) { s = numeric("integer"); },
                  [&](const double*) { s = numeric("number"); },
                  [&](const std::string*) {
-                   s = Json{{"type", "string"}, {"maxLength", 200}};
+                   s = Json{{"type", "string"}, {"maxLength", most_text_bytes(f)}};
                  },
                  [&](const std::vector<int>*) { s = list_of("integer"); },
                  [&](const std::vector<double>*) { s = list_of("number"); },

@@ -37,6 +37,12 @@ CompileOptions resolve_options(CompileOptions o) {
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
+  const LadderOptions usual;
+  if (is_default("ladder.prune", o.ladder.prune, usual.prune))
+    o.ladder.prune = is_default("ladder.rungs", o.ladder.rungs, usual.rungs) &&
+                     is_default("ladder.normal_rungs", o.ladder.normal_rungs, usual.normal_rungs) &&
+                     is_default("ladder.data_rungs", o.ladder.data_rungs, usual.data_rungs) &&
+                     is_default("ladder.alpha_rungs", o.ladder.alpha_rungs, usual.alpha_rungs);
   return o;
 }
 

@@ -67,6 +67,7 @@ struct CompileOptions {
 /// - fragmentation.min_fragment_px is kLeastProgressiveSide with ladder.mode progressive.
 /// - ladder.uncovered is kept with fragmentation.fill none: the source's own texels stay, at any cost.
 /// - package.meta gets its canonical text.
+/// - ladder.prune is false where rungs of any role are given: every rung that is asked for is stored.
 /// A field that the user has set stays as it is, and so does a field that differs from its default. Resolved
 /// options resolve to themselves. Keys, provenance and workers' jobs hold resolved options.
 CompileOptions resolve_options(CompileOptions options);

@@ -139,7 +139,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
-      stage({"scales", kScalesVersion, "kept scales -> standalone GLB files"},
+      stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),

@@ -8,7 +8,9 @@
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
+#include "pipeline/extract/glb/joined_jpeg.h"
 #include "pipeline/extract/glb/scale_file.h"
+#include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
 
 namespace texmesh {
@@ -62,12 +64,27 @@ Pixels fragment_texels(PackageReader& package, std::uint32_t base, std::uint32_t
                  kind == Averaging::kLight ? kSharpening : 0.f);
 }
 
-/// A plane of full size is coded anew at the quality that it was stored with, on the same blocks, so that a
-/// JPEG's numbers hardly change.
-FileImageData image_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
-                         const std::map<std::uint32_t, std::uint32_t>& planes, const RunContext& context,
-                         ExtractedImage& row) {
-  const std::uint32_t plane = planes.at(image.plane);
+/// Whether a file's image can be the coefficients that the package has of a plane.
+bool takes_coefficients(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+                        std::uint32_t plane) {
+  return plane == image.plane && !image.alpha_plane && format_of(request, false) == FileImage::kJpeg &&
+         package.textures()[plane].codec == Codec::kJpeg;
+}
+
+FileImageData coefficient_file(PackageReader& package, const ExtractRequest& request, std::uint32_t plane,
+                               const RunContext& context, ExtractedImage& row) {
+  const std::size_t rung =
+      std::min<std::size_t>(request.rung, package.tables().planes.at(plane).rung_count() - 1);
+  const JoinedJpeg joined(package, plane, rung, context);
+  row.width_px = joined.width_px();
+  row.height_px = joined.height_px();
+  row.quality = quality_of_rung(package, plane, request.rung);
+  return {FileImage::kJpeg, joined.file()};
+}
+
+/// From texels: at the quality of the package where the size is the package's.
+FileImageData coded_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+                         std::uint32_t plane, const RunContext& context, ExtractedImage& row) {
   Pixels pixels = fragment_texels(package, image.plane, plane, request.rung, image.averaging(), context);
   if (image.alpha_plane) {
     const Pixels alpha = read_plane(package, *image.alpha_plane, request.rung, context);
@@ -76,15 +93,24 @@ FileImageData image_file(PackageReader& package, const ExtractRequest& request, 
     pixels = with_alpha(pixels, reduced(alpha, alpha.width_px, alpha.height_px, pixels.width_px,
                                         pixels.height_px, Averaging::kNumbers));
   }
-  row.image = image.image;
-  row.role = image.role;
-  row.format = format_of(request, image.alpha_plane.has_value());
   row.width_px = pixels.width_px;
   row.height_px = pixels.height_px;
   row.quality = row.format == FileImage::kPng ? 100
                 : plane != image.plane        ? kDisplayQuality
                                               : quality_of_rung(package, plane, request.rung);
-  FileImageData file{row.format, encode_image(pixels, {row.format, row.quality, !image.colours, false})};
+  return {row.format, encode_image(pixels, {row.format, row.quality, !image.colours, false})};
+}
+
+FileImageData image_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+                         const std::map<std::uint32_t, std::uint32_t>& planes, const RunContext& context,
+                         ExtractedImage& row) {
+  const std::uint32_t plane = planes.at(image.plane);
+  row.image = image.image;
+  row.role = image.role;
+  row.format = format_of(request, image.alpha_plane.has_value());
+  FileImageData file = takes_coefficients(package, request, image, plane)
+                           ? coefficient_file(package, request, plane, context, row)
+                           : coded_file(package, request, image, plane, context, row);
   row.bytes = file.bytes.size();
   return file;
 }

@@ -42,7 +42,8 @@ class NewTree {
   NewFolder folder_;
 };
 
-/// Everything that belongs into the container, in order: manifest and index, then what the index names.
+/// Everything behind the manifest that belongs into the container, in order: what the index names, and
+/// itself.
 std::vector<EntryRef> container_order(PackageReader& package) {
   std::vector<EntryRef> entries = package.index();
   entries.push_back(package.manifest().index);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "format/rules/allocation.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/report/flip_colours.h"
 #include "pipeline/report/html.h"
 
@@ -47,8 +48,8 @@ std::string fragment_map(PackageReader& package, std::uint32_t plane, const Frag
       "viewBox=\"0 0 {:.1f} {:.1f}\"><image href=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" "
       "preserveAspectRatio=\"none\"/>\n",
       heat.value.empty() ? "" : " heat",
-      html_escaped("Map of texture " + std::to_string(plane) + ": " + heat.name), width, height, width,
-      height, html_escaped(preview), width, height);
+      markup_escaped("Map of texture " + std::to_string(plane) + ": " + heat.name), width, height, width,
+      height, markup_escaped(preview), width, height);
   const double w = t.fragment_width_px * shrink, h = t.fragment_height_px * shrink;
   for (std::size_t f = 0; f < std::size_t{t.columns} * t.rows; ++f) {
     const std::size_t column = f % t.columns, row = f / t.columns;

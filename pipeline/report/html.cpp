@@ -1,5 +1,7 @@
 #include "pipeline/report/html.h"
 
+#include "pipeline/io/markup.h"
+
 namespace texmesh {
 namespace {
 
@@ -59,30 +61,6 @@ h2,h3{break-after:avoid}img,svg,.verdict{print-color-adjust:exact;-webkit-print-
 
 }  // namespace
 
-std::string html_escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  return out;
-}
-
 std::string HtmlTable::html() const {
   std::string out = "<div class=\"scroll\"><table>\n<caption>" + caption + "</caption>\n<thead><tr>";
   for (const std::string& cell : header) out += "<th scope=\"col\">" + cell + "</th>";
@@ -110,7 +88,7 @@ std::string html_page(const std::string& title, const std::string& body) {
 <meta name="color-scheme" content="light dark">
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'">
 <title>)";
-  out += html_escaped(title);
+  out += markup_escaped(title);
   out += "</title>\n<style>";
   out += kStyle;
   out += "</style>\n</head>\n<body>\n";

@@ -5,9 +5,6 @@
 
 namespace texmesh {
 
-/// Text as it may stand in an element or in an attribute between double quotes.
-std::string html_escaped(std::string_view text);
-
 /// A table with a caption; cells are HTML. The first column holds row headers, the others numbers.
 struct HtmlTable {
   std::string caption;

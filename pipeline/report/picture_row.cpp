@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/io/markup.h"
 #include "pipeline/report/flip_colours.h"
 #include "pipeline/report/html.h"
 #include "stages/image/png_writer.h"
@@ -60,9 +61,9 @@ std::string picture_row(const PictureRow& row, const Picture& reference, const P
     files.push_back({row.name + ending + ".png", write_png(cut(pixels, part))});
     out += fmt::format(
         "<div><p class=\"quiet\">{}</p><img{} src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\"></div>\n",
-        name, times > 1 ? " class=\"enlarged\"" : "", html_escaped(files.back().path),
+        name, times > 1 ? " class=\"enlarged\"" : "", markup_escaped(files.back().path),
         width * static_cast<std::uint32_t>(times), height * static_cast<std::uint32_t>(times),
-        html_escaped(alt));
+        markup_escaped(alt));
   };
   add("-reference", row.reference_name, row.alt + ", the reference", encode_srgb(reference));
   add("-tested", row.tested_name, row.alt, encode_srgb(tested));

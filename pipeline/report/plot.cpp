@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/report/html.h"
 
 namespace texmesh {
@@ -52,7 +53,7 @@ class Canvas {
           x(v), kTop, kPlotHeight + 5, kTop + kPlotHeight + 20,
           bytes ? short_bytes(v) : fmt::format("{:.0f}", v));
     return svg + fmt::format("<text class=\"quiet end\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft + kPlotWidth,
-                             kHeight - 8, html_escaped(plot_.x_name));
+                             kHeight - 8, markup_escaped(plot_.x_name));
   }
   std::string path(const PlotSeries& s) const {
     std::string d;
@@ -97,7 +98,7 @@ std::string legend(const std::vector<PlotSeries>& series, double top) {
     svg += fmt::format(
         "<path class=\"line {} {} {}\" d=\"M{:.1f} {:.1f}h20\"/><text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
         s.colour, s.strong ? "strong" : "", s.dashed ? "dash" : "", x, y - 4, x + 26, y,
-        html_escaped(s.name));
+        markup_escaped(s.name));
     x += width;
   }
   return svg;
@@ -123,10 +124,10 @@ std::string Plot::svg() const {
   const double height = kHeight + legend_height(series) + 8;
   std::string out =
       fmt::format("<svg role=\"img\" aria-label=\"{}\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {} {}\">\n",
-                  html_escaped(title), kWidth, height, kWidth, height);
+                  markup_escaped(title), kWidth, height, kWidth, height);
   out += canvas.axes(x_name.find("bytes") != std::string::npos);
   out += fmt::format("<text class=\"quiet\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft, kTop - 12,
-                     html_escaped(y_name));
+                     markup_escaped(y_name));
   for (const PlotSeries& s : series) {
     if (!s.dots)
       out += fmt::format("<path class=\"line {} {} {}\" d=\"{}\"/>\n", s.colour, s.strong ? "strong" : "",

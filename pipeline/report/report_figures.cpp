@@ -7,6 +7,7 @@
 
 #include "format/container/layout.h"
 #include "pipeline/inspect/dump/package_figures.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/report/fragment_maps.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/plot.h"
@@ -76,7 +77,7 @@ std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
     const double width = kWidth * static_cast<double>(kinds[k].bytes) / sum;
     out += fmt::format(
         "<rect class=\"{}\" x=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\"><title>{}: {}</title></rect>\n",
-        kind_class(k), x, width, kHeight, html_escaped(kinds[k].kind),
+        kind_class(k), x, width, kHeight, markup_escaped(kinds[k].kind),
         short_bytes(static_cast<double>(kinds[k].bytes)));
     x += width;
   }
@@ -93,7 +94,7 @@ HtmlTable plane_table(PackageReader& package) {
     for (const EntryRef& rung : t.rungs) all += rung.bytes;
     const auto bytes = [](std::uint64_t n) { return short_bytes(static_cast<double>(n)); };
     table.rows.push_back({t.mip == 0 ? std::to_string(p) : fmt::format("{} (mip {} of {})", p, t.mip, t.base),
-                          html_escaped(t.role), fmt::format("{} x {}", t.width_px, t.height_px),
+                          markup_escaped(t.role), fmt::format("{} x {}", t.width_px, t.height_px),
                           std::to_string(stored_fragments(package.tables().planes[p])),
                           std::to_string(t.rungs.size()), t.rungs.empty() ? "" : bytes(t.rungs.front().bytes),
                           t.rungs.empty() ? "" : bytes(t.rungs.back().bytes), bytes(all)});
@@ -155,7 +156,7 @@ std::string bytes_section(PackageReader& package) {
   for (std::size_t i = 0; i < kinds.size(); ++i)
     table.rows.push_back(
         {"<svg class=\"swatch\" aria-hidden=\"true\" width=\"12\" height=\"12\"><rect class=\"" +
-             kind_class(i) + "\" width=\"12\" height=\"12\"/></svg>" + html_escaped(kinds[i].kind),
+             kind_class(i) + "\" width=\"12\" height=\"12\"/></svg>" + markup_escaped(kinds[i].kind),
          std::to_string(kinds[i].entries), thin_grouped(kinds[i].bytes),
          fmt::format("{:.1f} %", 100 * static_cast<double>(kinds[i].bytes) / sum)});
   std::string body = kinds_bar(kinds, sum) + table.html();
@@ -176,11 +177,11 @@ std::string fragment_section(PackageReader& package, Report& report) {
     body += fmt::format(
         "<figure>\n<figcaption><h3>Texture {}: {}</h3>{} x {} px in {} x {} fragments</figcaption>\n"
         "<div class=\"row\">\n",
-        p, html_escaped(t.role), t.width_px, t.height_px, t.columns, t.rows);
+        p, markup_escaped(t.role), t.width_px, t.height_px, t.columns, t.rows);
     std::vector<FragmentHeat> heats = fragment_heats(package, p);
     heats.insert(heats.begin(), FragmentHeat{"the preview and its grid", {}});
     for (const FragmentHeat& heat : heats)
-      body += "<div><p class=\"quiet\">" + html_escaped(heat.name) + "</p>" +
+      body += "<div><p class=\"quiet\">" + markup_escaped(heat.name) + "</p>" +
               fragment_map(package, p, heat, preview) + "</div>\n";
     body += "</div>\n</figure>\n";
   }

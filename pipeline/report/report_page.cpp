@@ -6,6 +6,7 @@
 
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/report/flip_colours.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/plot.h"
@@ -90,9 +91,9 @@ std::string header_section(PackageReader& package, Report& report) {
   const Vec3d size = m.bounds_max - m.bounds_min;
   std::uint64_t bytes = 0;
   for (const EntryRef& e : package.index()) bytes = std::max(bytes, e.offset + e.bytes);
-  std::string out = "<header>\n<div>\n<h1>" + html_escaped(report.title) + "</h1>\n";
+  std::string out = "<header>\n<div>\n<h1>" + markup_escaped(report.title) + "</h1>\n";
   out += fmt::format("<p class=\"verdict{}\">{}</p>\n", report.holds ? "" : " bad",
-                     html_escaped(report.verdict));
+                     markup_escaped(report.verdict));
   out += fmt::format(
       "<p class=\"quiet\">A texmesh package of {}: {} scales, S_0 with {} triangles, {} texture planes; "
       "{:.4g} x {:.4g} x {:.4g} object units.</p>\n",
@@ -113,7 +114,7 @@ std::string header_section(PackageReader& package, Report& report) {
   if (m.poster) {
     report.files.push_back({kPosterPath, package.entry(*m.poster)});
     out += fmt::format("<img src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\">\n", kPosterPath,
-                       m.poster->width_px, m.poster->height_px, html_escaped(report.title));
+                       m.poster->width_px, m.poster->height_px, markup_escaped(report.title));
   }
   return out + "</header>\n";
 }
@@ -142,7 +143,7 @@ std::string source_section(PackagePictures& pictures, const RenderedModel& sourc
       "<p>The model file <strong>{}</strong> beside S_0 with its textures at the highest rung, {:.0f} px high: "
       "mean FLIP {:.3f} and 95th percentile {:.3f} in the worst of {} views. That is what coding costs.</p>\n"
       "<figure>\n<figcaption class=\"quiet\">The worst view, and one of the front.</figcaption>\n",
-      html_escaped(c.file), c.displayed_px, c.views.worst_mean(), c.views.worst_p95(), c.views.mean.size());
+      markup_escaped(c.file), c.displayed_px, c.views.worst_mean(), c.views.worst_p95(), c.views.mean.size());
   for (const ViewNumber view :
        {ViewNumber{static_cast<int>(c.views.worst()), report.options.views}, ViewNumber{0, 1}})
     body += picture_row({view.count == 1 ? "source-front" : "source-worst", "Source", "S_0, highest rung",

@@ -35,7 +35,7 @@ enum class SourceFile : std::uint8_t { kNone, kSameColours, kOtherColours };
 
 struct PlaneLadder {
   Codec codec = Codec::kJpeg;
-  bool lossless = false;  // the last rung holds the coefficients of the source
+  bool source_rung = false;  // the last rung holds the coefficients of the source, a JPEG
   SourceFile source = SourceFile::kNone;
   std::vector<LadderRung> rungs;  // rising quality
   // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
@@ -43,7 +43,7 @@ struct PlaneLadder {
   SizeKnots knots;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.codec, s.lossless, s.source, s.rungs, s.knots);
+    a(s.codec, s.source_rung, s.source, s.rungs, s.knots);
   }
 };
 

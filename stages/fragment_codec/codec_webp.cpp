@@ -100,7 +100,7 @@ class WebpCodec : public TextureCodec {
 
 std::unique_ptr<TextureCodec> make_webp_codec(const PlaneCoding& plane) {
   // Lossy WebP is always 4:2:0 YCbCr, which data do not bear, and knows no grey.
-  if (plane.channels != 3 || !plane.colour)
+  if (plane.channels != 3 || plane.apart)
     throw StageError("ladder", "WebP", "a plane of colours", "data or a single channel");
   return std::make_unique<WebpCodec>(plane);
 }

@@ -12,8 +12,8 @@ JpegKind jpeg_kind(const PlaneCoding& plane, int quality) {
   JpegKind kind;
   kind.channels = plane.channels;
   kind.quality = quality;
-  kind.subsampling = plane.colour ? plane.subsampling : Subsampling::k444;
-  kind.rgb = plane.channels == 3 && !plane.colour;
+  kind.subsampling = plane.apart ? Subsampling::k444 : plane.subsampling;
+  kind.rgb = plane.channels == 3 && plane.apart;
   return kind;
 }
 

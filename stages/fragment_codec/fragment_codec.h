@@ -16,8 +16,8 @@ namespace texmesh {
 struct PlaneCoding {
   std::uint32_t channels = 3;                                   // 1 or 3
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
-  bool colour = true;                           // sRGB colours; otherwise data, whose channels are kept apart
-  Subsampling subsampling = Subsampling::k420;  // of colours
+  bool apart = false;                           // three channels are coded as they are; otherwise as YCbCr
+  Subsampling subsampling = Subsampling::k420;  // of YCbCr
   std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
 };
 

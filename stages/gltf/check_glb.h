@@ -28,12 +28,13 @@ struct GlbFacts {
 /// WebP images (EXT_texture_webp) and levels of detail (MSFT_lod).
 enum class GlbRules : std::uint8_t { kPackage, kStandalone };
 
-/// Checks that a GLB is structurally valid glTF 2.0 that stands alone, or with the previews: header and chunks, JSON, every index
-/// in range, buffer views and accessors within the binary chunk, Draco and meshopt data that decodes to what
-/// the accessors say, indices within the vertices, finite positions, a node tree without cycles, images that
-/// decode. The Khronos validator checks more (tests/node); this one needs no JavaScript and also decodes.
-/// Adds a finding per fault, with checks "glb-container", "glb-json", "glb-reference", "glb-accessor",
-/// "glb-decode", "glb-index", "glb-position", "glb-node", "glb-image". Never throws for what the bytes hold.
+/// Checks that a GLB is structurally valid glTF 2.0 that stands alone, or with the previews: header and
+/// chunks, JSON, every index in range, buffer views and accessors within the binary chunk, Draco and meshopt
+/// data that decodes to what the accessors say, indices within the vertices, finite positions, a node tree
+/// without cycles, images that decode. The Khronos validator checks more (tests/node); this one needs no
+/// JavaScript and also decodes. Adds a finding per fault, with checks "glb-container", "glb-json",
+/// "glb-reference", "glb-accessor", "glb-decode", "glb-index", "glb-position", "glb-node", "glb-image". Never
+/// throws for what the bytes hold.
 GlbFacts check_glb(std::span<const std::uint8_t> bytes, const std::string& entry, Findings& findings,
                    GlbRules rules = GlbRules::kPackage);
 

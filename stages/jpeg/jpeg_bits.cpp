@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <mutex>
 
 #include "format/base/vec.h"
@@ -58,10 +59,11 @@ std::vector<float> halved_samples(const std::vector<float>& samples, std::uint32
   return out;
 }
 
-bool any_covered(const CoverageWindow& coverage, std::uint32_t left, std::uint32_t top, std::uint32_t side) {
+bool any_covered(const CoverageWindow& coverage, std::uint32_t left, std::uint32_t top, std::uint32_t width,
+                 std::uint32_t height) {
   if (coverage.mask.empty()) return true;
-  for (std::uint32_t y = top; y < top + side; ++y)
-    for (std::uint32_t x = left; x < left + side; ++x)
+  for (std::uint32_t y = top; y < top + height; ++y)
+    for (std::uint32_t x = left; x < left + width; ++x)
       if (coverage.covered(x, y)) return true;
   return false;
 }
@@ -79,11 +81,40 @@ Blocks blocks_of(const PixelWindow& image, const JpegKind& kind, std::size_t com
     for (std::uint32_t left = 0; left < width; left += side)
       for (std::uint32_t b = 0; b < side * side / 64; ++b) {
         const std::uint32_t x = left + b % 2 * 8, y = top + b / 2 * 8;
-        if (!any_covered(image.coverage, x * scale, y * scale, 8 * scale)) continue;
+        if (!any_covered(image.coverage, x * scale, y * scale, 8 * scale, 8 * scale)) continue;
         BlockValues block;
         for (std::size_t row = 0; row < 8; ++row)
           std::memcpy(block.data() + 8 * row, samples.data() + (y + row) * width + x, 8 * sizeof(float));
         add_block(block, out);
+      }
+  return out;
+}
+
+/// What a window into a source's image has of one component.
+Blocks source_blocks(const JpegCoefficients& source, const SourceLayout& layout, const PixelWindow& window,
+                     std::size_t component) {
+  const SourceLayout::Component& of = layout.components[component];
+  const auto& quantisers = source.components()[component].quantisers;
+  const std::uint32_t width = layout.mcu_width_px / of.across, height = layout.mcu_height_px / of.down;
+  const std::uint32_t first_column = window.coverage.left_px / layout.mcu_width_px * of.across;
+  const std::uint32_t first_row = window.coverage.top_px / layout.mcu_height_px * of.down;
+  constexpr int kLargest = 1023;
+  Blocks out;
+  for (std::uint32_t y = 0; y < window.height_px; y += layout.mcu_height_px)
+    for (std::uint32_t x = 0; x < window.width_px; x += layout.mcu_width_px)
+      for (std::uint32_t b = 0; b < of.across * of.down; ++b) {
+        const std::uint32_t left = x + b % of.across * width, top = y + b / of.across * height;
+        const std::uint32_t column = first_column + left / width, row = first_row + top / height;
+        if (column >= of.blocks_across || row >= of.blocks_down) continue;
+        if (!any_covered(window.coverage, left, top, width, height)) continue;
+        const std::int16_t* block = source.block(component, row, column);
+        const auto value = [&](std::size_t n) {
+          return kParts * std::clamp(block[n] * quantisers[n], -kLargest, kLargest);
+        };
+        Magnitudes& magnitudes = out.ac.emplace_back();
+        for (std::size_t k = 1; k < 64; ++k)
+          magnitudes[place_of(k)] = static_cast<std::uint16_t>(std::abs(value(kNaturalOfZigzag[k])));
+        out.dc.push_back(value(0));
       }
   return out;
 }
@@ -201,18 +232,6 @@ void count_blocks(const Blocks& blocks, const Quantiser& quantiser, Counts& dc, 
   }
 }
 
-void count_window(const PixelWindow& window, const JpegKind& kind, std::span<const Quantisers> quantisers,
-                  std::span<TableCounts> counts) {
-  for (std::size_t c = 0; c < kind.channels; ++c) {
-    const Blocks blocks = blocks_of(window, kind, c);
-    const std::size_t table = 2 * table_pair(kind, c);
-    for (std::size_t q = 0; q < quantisers.size(); ++q) {
-      const auto& set = window.coverage.mask.empty() ? quantisers[q].plain : quantisers[q].masked;
-      count_blocks(blocks, set[c], counts[q][table], counts[q][table + 1]);
-    }
-  }
-}
-
 /// Of the codes, with the best table for them, and of what follows them.
 double entropy_bits(const Counts& counts) {
   std::vector<std::uint8_t> symbols;
@@ -232,17 +251,15 @@ double entropy_bits(const Counts& counts) {
   return static_cast<double>(bits);
 }
 
-}  // namespace
-
-std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow> windows,
-                              std::span<const int> qualities, const RunContext& context) {
-  std::vector<Quantisers> quantisers;
-  for (const int quality : qualities) quantisers.push_back(quantisers_at(kind, quality));
-  std::vector<TableCounts> counts(qualities.size());
+/// Bits of all windows at each of `sets`. count(window, counts by set) counts the symbols of one.
+std::vector<double> bits_of_windows(
+    std::span<const PixelWindow> windows, std::size_t sets, const RunContext& context,
+    const std::function<void(const PixelWindow&, std::span<TableCounts>)>& count) {
+  std::vector<TableCounts> counts(sets);
   std::mutex mutex;
   parallel_for(context, windows.size(), kWindowsPerTask, [&](std::size_t begin, std::size_t end) {
-    std::vector<TableCounts> part(qualities.size());
-    for (std::size_t w = begin; w < end; ++w) count_window(windows[w], kind, quantisers, part);
+    std::vector<TableCounts> part(sets);
+    for (std::size_t w = begin; w < end; ++w) count(windows[w], part);
     const std::lock_guard lock(mutex);  // sums of whole numbers: in any order
     for (std::size_t q = 0; q < part.size(); ++q)
       for (std::size_t t = 0; t < part[q].size(); ++t)
@@ -255,6 +272,44 @@ std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow>
     out.push_back(bits);
   }
   return out;
+}
+
+}  // namespace
+
+std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow> windows,
+                              std::span<const int> qualities, const RunContext& context) {
+  std::vector<Quantisers> quantisers;
+  for (const int quality : qualities) quantisers.push_back(quantisers_at(kind, quality));
+  return bits_of_windows(
+      windows, qualities.size(), context, [&](const PixelWindow& window, std::span<TableCounts> counts) {
+        for (std::size_t c = 0; c < kind.channels; ++c) {
+          const Blocks blocks = blocks_of(window, kind, c);
+          const std::size_t table = 2 * table_pair(kind, c);
+          for (std::size_t q = 0; q < quantisers.size(); ++q) {
+            const auto& set = window.coverage.mask.empty() ? quantisers[q].plain : quantisers[q].masked;
+            count_blocks(blocks, set[c], counts[q][table], counts[q][table + 1]);
+          }
+        }
+      });
+}
+
+std::vector<double> requantised_bits(const JpegCoefficients& source, const SourceLayout& layout,
+                                     std::span<const BlockKind> kinds, std::span<const PixelWindow> windows,
+                                     std::span<const QuantiserSet> sets, const RunContext& context) {
+  std::vector<std::vector<Quantiser>> quantisers(sets.size());
+  for (std::size_t q = 0; q < sets.size(); ++q)
+    for (std::size_t c = 0; c < layout.components.size(); ++c)
+      quantisers[q].emplace_back(sets[q].steps[c],
+                                 sets[q].exact ? 0.0f : bit_cost_of(kinds[c], sets[q].steps[c]));
+  return bits_of_windows(windows, sets.size(), context,
+                         [&](const PixelWindow& window, std::span<TableCounts> counts) {
+                           for (std::size_t c = 0; c < layout.components.size(); ++c) {
+                             const Blocks blocks = source_blocks(source, layout, window, c);
+                             const std::size_t table = 2 * layout.pairs[c];
+                             for (std::size_t q = 0; q < quantisers.size(); ++q)
+                               count_blocks(blocks, quantisers[q][c], counts[q][table], counts[q][table + 1]);
+                           }
+                         });
 }
 
 }  // namespace texmesh

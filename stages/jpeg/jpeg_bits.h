@@ -4,7 +4,10 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
+#include "stages/image/decode_jpeg.h"
+#include "stages/jpeg/block_scan.h"
 #include "stages/jpeg/jpeg_coder.h"
+#include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {
 
@@ -18,5 +21,17 @@ namespace texmesh {
 /// Same result for any thread count.
 std::vector<double> jpeg_bits(const JpegKind& kind, std::span<const PixelWindow> windows,
                               std::span<const int> qualities, const RunContext& context);
+
+/// Quantisers of all components, by component.
+struct QuantiserSet {
+  std::vector<SourceLayout::Quantisers> steps;
+  bool exact = false;  // they are the source's: nothing is left out
+};
+
+/// The same of windows into the image of a source JPEG, from its coefficients: a model of RequantisedJpeg.
+/// `kinds` by component. Windows begin at borders of its MCUs and hold whole ones.
+std::vector<double> requantised_bits(const JpegCoefficients& source, const SourceLayout& layout,
+                                     std::span<const BlockKind> kinds, std::span<const PixelWindow> windows,
+                                     std::span<const QuantiserSet> sets, const RunContext& context);
 
 }  // namespace texmesh

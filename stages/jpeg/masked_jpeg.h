@@ -5,14 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "stages/jpeg/block_scan.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/masked_block.h"
 
 namespace texmesh {
-
-/// How one rung's blocks are coded, by component.
-using MaskedRung = std::vector<BlockCoding>;
 
 /// `quantisers` by component, zigzag order; tables as JpegCoder::use_tables() takes them.
 MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::uint16_t, 64>>& quantisers,
@@ -42,14 +40,9 @@ class MaskedJpeg {
                      std::span<SymbolCounts> counts);
 
  private:
-  /// Samples of a component, level shift taken off.
-  struct Component {
-    std::uint32_t width = 0, height = 0;
-    std::vector<float> values;
-  };
   void load(const PixelWindow& image);
-  void weigh_halved(std::uint32_t width, std::uint32_t height);
-  void halve(Component& chroma) const;
+  void weigh_halved();
+  void halve(SamplePlane& chroma) const;
   template <class Sink>
   void code(const PixelWindow& image, std::span<const MaskedRung> rungs, std::span<Sink> sinks);
   template <class Sink>
@@ -57,10 +50,11 @@ class MaskedJpeg {
                   std::span<const MaskedRung> rungs, std::span<Sink> sinks);
 
   JpegKind kind_;
-  bool halved_;  // chroma
-  std::vector<Component> components_;
-  std::vector<float> weights_, halved_weights_;  // of samples; of those of halved chroma
-  std::vector<std::array<int, 3>> dc_before_;    // [rung][component]
+  bool halved_;                                // chroma
+  std::vector<std::size_t> pairs_;             // of Huffman tables, by component
+  std::vector<SamplePlane> components_;        // level shift taken off
+  SamplePlane weights_, halved_weights_;       // of samples; of those of halved chroma
+  std::vector<std::array<int, 3>> dc_before_;  // [rung][component]
   MaskedBlock block_;
 };
 

@@ -10,14 +10,18 @@
 #include "stages/data/pixels.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"
+#include "stages/ladder/source_codec.h"
 
 namespace texmesh {
 
 /// A plane's codec after its training, and what the training gave.
 struct TrainedPlane {
+  PlaneCoding coding;
   std::unique_ptr<TextureCodec> codec;
   std::vector<CodecRung> rungs;
   SizeKnots knots;
+  SourceCodec source;        // without its codec, which is the one above
+  bool source_rung = false;  // the last rung has the source's coefficients
 };
 
 /// What is encoded of one plane.

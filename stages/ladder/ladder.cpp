@@ -1,16 +1,20 @@
 #include "stages/ladder/ladder.h"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 #include <utility>
 
+#include "stages/fragment_codec/coding_space.h"
 #include "stages/image/check_pixels.h"
+#include "stages/image/decode_image.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
 #include "stages/ladder/fragment_windows.h"
-#include "stages/ladder/lossless_top.h"
 #include "stages/ladder/rung_loss.h"
 #include "stages/ladder/size_knots.h"
+#include "stages/ladder/source_codec.h"
+#include "stages/ladder/source_difference.h"
 
 namespace texmesh {
 namespace {
@@ -23,12 +27,6 @@ constexpr double kTrained = 0.15, kSampled = 0.85, kChosen = 0.9;
 
 [[noreturn]] void fail(std::string place, std::string expected, std::string found) {
   throw StageError("ladder", std::move(place), std::move(expected), std::move(found));
-}
-
-const std::vector<int>& rungs_of(TextureRole role, const LadderOptions& options) {
-  if (is_colour(role)) return options.rungs;
-  if (role == TextureRole::kNormal) return options.normal_rungs;
-  return role == TextureRole::kAlpha ? options.alpha_rungs : options.data_rungs;
 }
 
 void check_rungs(const std::vector<int>& rungs, const char* name) {
@@ -54,10 +52,10 @@ void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const 
     if (plane.covered_texels.size() != plane.fragment_count())
       fail(place + ": covered texels", std::to_string(plane.fragment_count()) + " fragments",
            std::to_string(plane.covered_texels.size()));
-    if (plane.mip > 0 && options.hull_gain >= 0 &&
-        (plane.base >= previews.planes.size() || previews.planes[plane.base].file.empty()))
+    const std::size_t base = plane.mip > 0 ? plane.base : p;
+    if (options.prune && (base >= previews.planes.size() || previews.planes[base].file.empty()))
       fail(place, "a preview of the full size", "none");
-    if (options.lossless_top && plane.image >= images.size())
+    if (!images.empty() && plane.image >= images.size())
       fail(place, "its source image", std::to_string(images.size()) + " images");
   }
 }
@@ -89,44 +87,113 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   coding.channels = plane.channels;
   coding.fragment_width_px = plane.fragment_width_px;
   coding.fragment_height_px = plane.fragment_height_px;
-  coding.colour = is_colour(plane.role);
-  coding.subsampling = options.subsampling;
-  coding.qualities = rungs_of(plane.role, options);
-  if (codec == Codec::kJpegProgressive && coding.colour) coding.qualities = {options.progressive_quality};
+  coding.subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
+  coding.qualities = ladder_rungs(plane.role, options);
+  if (codec == Codec::kJpegProgressive && is_colour(plane.role))
+    coding.qualities = {options.progressive_quality};
   return coding;
+}
+
+/// The space of three channels of data, by what a sample of their pixels shows.
+void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, PlaneCoding& coding,
+                  const RunContext& context) {
+  if (is_colour(plane.role) || plane.channels != 3) return;
+  const CodingSpace space =
+      measure_coding_space(plane.role == TextureRole::kNormal ? DataKind::kVectors : DataKind::kNumbers,
+                           size_sample(plane, pixels, uncovered), context);
+  coding.apart = space.apart;
+  coding.subsampling = space.subsampling;
 }
 
 /// The codecs of all planes, trained on samples of their pixels.
 std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                       const LadderOptions& options, Notes& notes,
-                                       const RunContext& context) {
+                                       const std::vector<Image>& images, const LadderOptions& options,
+                                       Notes& notes, const RunContext& context) {
   std::vector<TrainedPlane> out;
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     const Codec codec = codec_of(plane, p, options.mode, notes);
-    const PlaneCoding coding = coding_of(plane, codec, options);
     TrainedPlane& trained = out.emplace_back();
-    trained.codec = make_texture_codec(codec, coding);
+    trained.coding = coding_of(plane, codec, options);
+    if (codec == Codec::kJpeg && options.mode == LadderMode::kJpeg && !images.empty())
+      trained.source = make_source_codec(plane, pixels[p], images[plane.image], options, context);
+    if (trained.source.codec) {
+      trained.codec = std::move(trained.source.codec);
+      trained.source_rung = true;
+    } else {
+      choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
+      trained.codec = make_texture_codec(codec, trained.coding);
+    }
     trained.rungs = trained.codec->train(
         training_sample(plane, pixels[p], options.uncovered, options.training_fragments), context);
-    if (codec == Codec::kJpeg && is_colour(plane.role) && plane.mip == 0)
-      trained.knots = measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
     context.report(kTrained * static_cast<double>(p + 1) / static_cast<double>(fragments.planes.size()));
   }
   return out;
 }
 
-/// What choosing the rungs takes, at every rung: all of full-size planes, of mips a few fragments.
+std::vector<std::vector<std::size_t>> all_rungs(const std::vector<TrainedPlane>& trained) {
+  std::vector<std::vector<std::size_t>> out;
+  for (const TrainedPlane& plane : trained) {
+    std::vector<std::size_t>& rungs = out.emplace_back(plane.rungs.size());
+    std::iota(rungs.begin(), rungs.end(), std::size_t{0});
+  }
+  return out;
+}
+
+/// Knots of full-size colours, between the rungs that are kept.
+void measure_knots(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                   const LadderOptions& options, const std::vector<std::vector<std::size_t>>& kept,
+                   std::vector<TrainedPlane>& trained, const RunContext& context) {
+  for (std::size_t p = 0; p < trained.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    if (trained[p].codec->id() != Codec::kJpeg || !is_colour(plane.role) || plane.mip > 0) continue;
+    PlaneCoding coding = trained[p].coding;
+    coding.qualities.clear();
+    for (const std::size_t r : kept[p]) coding.qualities.push_back(trained[p].rungs[r].quality);
+    trained[p].knots =
+        trained[p].source_rung
+            ? size_knots(coding.qualities, trained[p].source.bits)
+            : measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
+  }
+}
+
+/// What choosing the rungs takes, at every rung: a few fragments, or all where there is no choice.
 std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector<TrainedPlane>& trained,
-                                   double hull_gain) {
+                                   bool prune) {
   std::vector<PlaneWork> work(trained.size());
-  std::vector<std::vector<std::uint8_t>> sample = hull_sample(fragments);
+  std::vector<std::vector<std::uint8_t>> sample;
+  if (prune) sample = choice_sample(fragments);
   for (std::size_t p = 0; p < work.size(); ++p) {
-    if (hull_gain < 0) sample[p].assign(sample[p].size(), 1);
-    work[p].wanted = std::move(sample[p]);
+    if (prune)
+      work[p].wanted = std::move(sample[p]);
+    else
+      work[p].wanted.assign(fragments.planes[p].fragment_count(), 1);
     for (std::size_t r = 0; r < trained[p].rungs.size(); ++r) work[p].rungs.push_back(r);
   }
   return work;
+}
+
+/// Of the fragments that the rung holds.
+double bytes_per_texel(const TexturePlane& plane, const LadderRung& rung) {
+  double texels = 0;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    if (!fragment_stream(rung, f).empty()) texels += plane.covered_texels[f];
+  return texels > 0 ? static_cast<double>(rung.data.size()) / texels : 0;
+}
+
+/// Takes rungs out of mips that pay much more for a texel than the source does, whose own coefficients are
+/// there to be shown. Scans whose mips went up to quality 97 took 0.6 to 1.6 times the bytes of their source
+/// for mips alone. The lowest rungs are left, one of each plane at least.
+void leave_heavy_mips_out(const Fragments& fragments, std::vector<PlaneLadder>& sample) {
+  constexpr double kMost = 1.4, kMoreByMip = 1.4;  // of the top's bytes .35, .12 and .04
+  for (std::size_t p = 0; p < sample.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    if (plane.mip == 0 || !sample[plane.base].source_rung) continue;
+    double most = kMost * bytes_per_texel(fragments.planes[plane.base], sample[plane.base].rungs.back());
+    for (std::uint32_t m = 1; m < plane.mip; ++m) most *= kMoreByMip;
+    std::vector<LadderRung>& of_mip = sample[p].rungs;
+    while (of_mip.size() > 1 && bytes_per_texel(plane, of_mip.back()) > most) of_mip.pop_back();
+  }
 }
 
 bool holds_all(const TexturePlane& plane, const PlaneLadder& ladder) {
@@ -148,27 +215,56 @@ std::vector<PlaneWork> whole_work(const Fragments& fragments, std::vector<PlaneL
   return work;
 }
 
+std::string hundredths(double x) {
+  const auto whole = static_cast<std::uint64_t>(x * 100 + 0.5);
+  const std::string rest = std::to_string(whole % 100);
+  return std::to_string(whole / 100) + "." + (rest.size() < 2 ? "0" : "") + rest;
+}
+
+/// What a plane's ladder says of its source.
+void finish_plane(const TexturePlane& plane, const Pixels& pixels, const std::vector<Image>& images,
+                  const TrainedPlane& trained, const LadderOptions& options, PlaneLadder& ladder,
+                  Notes& notes) {
+  if (plane.mip > 0 || plane.role == TextureRole::kAlpha || images.empty()) return;
+  const Image& image = images[plane.image];
+  if (!trained.source.why_not.empty())
+    add_info(notes, "jpeg-coded-anew", image.name,
+             "it is coded from its pixels, since " + trained.source.why_not + "; the last rung is " +
+                 hundredths(source_difference(plane, pixels, ladder)) + " of 255 off on average");
+  if (!options.keep_source) return;
+  const bool changed =
+      changes_colours(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
+  ladder.source = changed ? SourceFile::kOtherColours : SourceFile::kSameColours;
+}
+
 }  // namespace
+
+const std::vector<int>& ladder_rungs(TextureRole role, const LadderOptions& options) {
+  if (is_colour(role)) return options.rungs;
+  if (role == TextureRole::kNormal) return options.normal_rungs;
+  return role == TextureRole::kAlpha ? options.alpha_rungs : options.data_rungs;
+}
 
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
                      const std::vector<Image>& images, const LadderOptions& options,
                      const RunContext& context) {
   check(fragments, pixels, previews, images, options);
   Ladder ladder;
-  const std::vector<TrainedPlane> trained = train_planes(fragments, pixels, options, ladder.notes, context);
+  std::vector<TrainedPlane> trained = train_planes(fragments, pixels, images, options, ladder.notes, context);
   const auto encode = [&](std::vector<PlaneWork> work, ProgressPart progress) {
     return encode_rungs(fragments, pixels, options.uncovered, trained, std::move(work), progress, context);
   };
   std::vector<PlaneLadder> sample =
-      encode(sample_work(fragments, trained, options.hull_gain), {kTrained, kSampled});
-  auto kept = choose_rungs(fragments, pixels, sample, previews, options.hull_gain, context);
+      encode(sample_work(fragments, trained, options.prune), {kTrained, kSampled});
+  auto kept = all_rungs(trained);
+  if (options.prune) {
+    leave_heavy_mips_out(fragments, sample);
+    kept = choose_rungs(fragments, pixels, sample, previews, context);
+  }
+  measure_knots(fragments, pixels, options, kept, trained, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
-  if (options.lossless_top)
-    for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-      const TexturePlane& plane = fragments.planes[p];
-      ladder.planes[p] =
-          with_lossless_top(std::move(ladder.planes[p]), plane, images[plane.image], ladder.notes, context);
-    }
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p)
+    finish_plane(fragments.planes[p], pixels[p], images, trained[p], options, ladder.planes[p], ladder.notes);
   return ladder;
 }
 

@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 11;
+inline constexpr int kLadderVersion = 13;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.
@@ -40,19 +40,21 @@ struct LadderOptions {
   std::vector<int> data_rungs{18, 30, 53, 75, 86, 93, 97};
   std::vector<int> alpha_rungs{18, 30, 53, 75, 86, 93, 97};
   int progressive_quality = 92;                 // of a colour plane's whole progressive files
-  Subsampling subsampling = Subsampling::k420;  // of sRGB planes; data planes are never subsampled
+  Subsampling subsampling = Subsampling::k420;  // of sRGB planes
   Uncovered uncovered = Uncovered::kFree;
   int training_fragments = 64;
   int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
-  double hull_gain = 0.05;
-  bool lossless_top = false;
+  bool prune = true;
+  bool keep_source = false;
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
       "jpeg = baseline JPEGs; progressive = one progressive JPEG per fragment, of which each rung is a "
       "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "
       "colours");
-    v("rungs", s.rungs, Range{1, 100}, "JPEG qualities of colour textures, strictly rising, at most 16");
+    v("rungs", s.rungs, Range{1, 100},
+      "JPEG qualities of colour textures, strictly rising, at most 16; textures that come as JPEGs have the file's "
+      "own as their last rung, and below it these only when they are given");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "JPEG qualities of normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "JPEG qualities of occlusion, roughness, metalness");
     v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "JPEG qualities of alpha channels");
@@ -65,14 +67,15 @@ struct LadderOptions {
     v("training_fragments", s.training_fragments, Range{1, 256},
       "fragments that a rung's Huffman tables are trained on");
     v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
-    v("hull_gain", s.hull_gain, Range{-1.0, 1e9},
-      "a mip's rung is stored when the hull of 1 - SSIM over bytes, of all rungs and mips, would rise by "
-      "more than this share without the rung, or when displays of the mip's size need the rung; -1 = store "
-      "all rungs");
-    v("lossless_top", s.lossless_top,
-      "keep source images without loss: the coefficients of JPEGs as a last rung, other files as they are");
+    v("prune", s.prune,
+      "store only the rungs, of full size and mips, that simulated loads choose and that are worth their bytes; "
+      "false = store all of them");
+    v("keep_source", s.keep_source, "keep the source images in the package as the files they are");
   }
 };
+
+/// The qualities that `options` has for planes of a role.
+const std::vector<int>& ladder_rungs(TextureRole role, const LadderOptions& options);
 
 /// Whether the encoder knows which texels are uncovered and makes them cheap itself, so that their fill need
 /// not.
@@ -80,19 +83,25 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
   return mode == LadderMode::kJpeg && uncovered == Uncovered::kFree;
 }
 
-/// Encodes every covered fragment at the rungs of its plane's role.
-/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data
-///   with their channels apart. Fragments with uncovered texels go through stages/jpeg/masked_jpeg.h where
-///   such texels are free, so that only covered texels cost bytes.
+/// Encodes every covered fragment at rungs of its plane's role.
+/// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data in
+///   the space that has the least error for its bytes (stages/fragment_codec/coding_space.h). Fragments with
+///   uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only covered
+///   texels cost bytes.
 /// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
 ///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
-/// - Of mips a few fragments are encoded at every rung. They decide which rungs are worth storing
+/// - A few fragments are encoded at every rung. With `prune` they decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
-/// - With `lossless_top` full-size planes keep their source without loss (stages/ladder/lossless_top.h).
-/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read where planes have mips; `images`
-/// are the model's and read with `lossless_top`. Beside the result it takes some fragments' streams per
-/// thread. Throws StageError for rungs that do not rise or lie outside 1..100 and for inputs that do not fit
-/// each other. Same bytes for any thread count.
+/// - Mode jpeg: full-size planes whose source is a JPEG keep its coefficients as their last rung, and the
+/// rungs
+///   below are made from these (stages/ladder/source_codec.h). A note says why a JPEG's plane is coded from
+///   pixels instead, and how far its last rung is off.
+/// - With `keep_source` full-size planes but alpha name their image's file for the package: an alpha plane
+///   relies on its image's colour plane.
+/// `pixels` are fill_planes()'s. `previews` are make_previews()'s and read with `prune`; `images`
+/// are the model's; empty: no plane has a source. Beside the result it takes some fragments' streams per
+/// thread, and two bytes for every sample of the source JPEGs. Throws StageError for rungs that do not rise
+/// or lie outside 1..100 and for inputs that do not fit each other. Same bytes for any thread count.
 Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixels, const Previews& previews,
                      const std::vector<Image>& images, const LadderOptions& options,
                      const RunContext& context);

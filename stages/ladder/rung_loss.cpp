@@ -1,6 +1,7 @@
 #include "stages/ladder/rung_loss.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -13,8 +14,8 @@ namespace {
 
 constexpr std::size_t kWindows = 6;
 constexpr std::uint32_t kWindowPx = 128;
-// Mips show their source's windows interpolated. A window so far from the border of its fragment shows one of
-// a mip's fragments, which covers four of the source's: fewer to encode and to decode.
+// Coarser mips show a window interpolated. A window so far from the border of its fragment shows one of a
+// mip's fragments, which covers four of the source's: fewer to encode and to decode.
 constexpr std::uint32_t kInsetPx = 16;
 
 /// A rectangle of the plane's padded pixels, within one fragment.
@@ -42,25 +43,21 @@ Window window_in(const TexturePlane& plane, std::size_t fragment, std::uint32_t 
   return best;
 }
 
-/// In every `sparseness`-th covered fragment, up to kWindows.
-std::vector<Window> sample_windows(const TexturePlane& plane, std::size_t sparseness, std::uint32_t inset) {
+/// In covered fragments evenly spread in index order.
+std::vector<Window> sample_windows(const TexturePlane& plane) {
   std::vector<std::size_t> covered;
   for (std::size_t f = 0; f < plane.covered_texels.size(); ++f)
     if (plane.covered_texels[f] > 0) covered.push_back(f);
-  const std::size_t count = std::min(kWindows, (covered.size() + sparseness - 1) / sparseness);
+  const std::size_t count = std::min(kWindows, covered.size());
   std::vector<Window> out;
   for (std::size_t k = 0; k < count; ++k) {
-    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)], inset);
+    const Window w = window_in(plane, covered[(2 * k + 1) * covered.size() / (2 * count)], kInsetPx);
     if (w.covered > 0) out.push_back(w);
   }
   return out;
 }
 
-/// Of a full-size plane, to be shown by its mips, and of a mip for itself.
-std::vector<Window> chain_windows(const TexturePlane& full) { return sample_windows(full, 4, kInsetPx); }
-std::vector<Window> own_windows(const TexturePlane& mip) { return sample_windows(mip, 1, 0); }
-
-/// What of a level a window of the full size shows.
+/// What of a coarser level a window shows.
 struct Support {
   std::vector<BilinearPlace> across, down;
   Support(const TexturePlane& full, const TexturePlane& level, const TexelRectangle& window)
@@ -105,19 +102,19 @@ SamplePatch decode_patch(const TexturePlane& plane, const Pixels& pixels, const 
   return patch;
 }
 
-/// The window of `full` as a level's rung shows it, scaled up to the full size.
-Samples show(const TexturePlane& full, const TexturePlane& level, const Pixels& pixels,
+/// The window of `wanted` as a rung of the same or a coarser level shows it, scaled up.
+Samples show(const TexturePlane& wanted, const TexturePlane& level, const Pixels& pixels,
              const PlaneLadder& ladder, std::size_t rung, const TexelRectangle& window) {
-  const Support support(full, level, window);
+  const Support support(wanted, level, window);
   return scaled_up(decode_patch(level, pixels, ladder, rung, support.rectangle()), support.across,
                    support.down);
 }
 
-/// Marks the mip's fragments that windows of a full-size plane, or its own, show.
-void mark_shown(const TexturePlane& full, const TexturePlane& mip, const std::vector<Window>& windows,
+/// Marks the fragments of the same or a coarser level that the windows show.
+void mark_shown(const TexturePlane& wanted, const TexturePlane& level, const std::vector<Window>& windows,
                 std::vector<std::uint8_t>& marks) {
   for (const Window& window : windows)
-    for_each_fragment(mip, Support(full, mip, window.rectangle).rectangle(),
+    for_each_fragment(level, Support(wanted, level, window.rectangle).rectangle(),
                       [&](std::size_t f) { marks[f] = 1; });
 }
 
@@ -144,8 +141,8 @@ std::vector<std::uint64_t> bytes_by_rung(const TexturePlane& plane, const PlaneL
   return out;
 }
 
-/// 1 - SSIM of `ways` to show the plane, by way: the mean over the windows, each of which weighs as much as
-/// its fragment's surface. shown(window, way) gives the samples of a window.
+/// 1 - SSIM of `ways` to show the plane, by way, 0 where nothing is covered: the mean over the windows, each
+/// of which weighs as much as its fragment's surface. shown(window, way) gives the samples of a window.
 std::vector<double> mean_losses(
     const TexturePlane& plane, const Pixels& pixels, const std::vector<Window>& windows, std::size_t ways,
     const std::function<Samples(const TexelRectangle& window, std::size_t way)>& shown,
@@ -171,6 +168,19 @@ std::vector<double> mean_losses(
   return mean;
 }
 
+/// TextureWays::surface and texels_across.
+void measure_size(const TexturePlane& full, TextureWays& out) {
+  // Surface of a ball over its height squared. What an object really has is not known here, and a factor of
+  // two moves the level of a display by half a step.
+  constexpr double kBallSurface = 3.14159265358979323846;
+  double texels = 0;
+  for (std::size_t f = 0; f < full.fragment_count(); ++f) {
+    texels += full.covered_texels[f];
+    out.surface += static_cast<double>(full.surface_fraction[f]);
+  }
+  if (out.surface > 0) out.texels_across = std::sqrt(texels / (out.surface * kBallSurface));
+}
+
 }  // namespace
 
 std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base) {
@@ -180,55 +190,57 @@ std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base) 
   return chain;
 }
 
-std::vector<std::vector<std::uint8_t>> hull_sample(const Fragments& fragments) {
+std::vector<std::vector<std::uint8_t>> choice_sample(const Fragments& fragments) {
   std::vector<std::vector<std::uint8_t>> out;
-  for (const TexturePlane& plane : fragments.planes) {
-    std::vector<std::uint8_t>& marks = out.emplace_back(plane.fragment_count(), plane.mip == 0);
-    if (plane.mip == 0) continue;
-    const TexturePlane& full = fragments.planes[plane.base];
-    mark_shown(full, plane, chain_windows(full), marks);
-    mark_shown(plane, plane, own_windows(plane), marks);
+  for (const TexturePlane& plane : fragments.planes) out.emplace_back(plane.fragment_count());
+  for (std::size_t base = 0; base < fragments.planes.size() && fragments.planes[base].mip == 0; ++base) {
+    const std::vector<std::size_t> chain = chain_of(fragments, base);
+    for (std::size_t wanted = 0; wanted < chain.size(); ++wanted) {
+      const std::vector<Window> windows = sample_windows(fragments.planes[chain[wanted]]);
+      for (std::size_t level = wanted; level < chain.size(); ++level)
+        mark_shown(fragments.planes[chain[wanted]], fragments.planes[chain[level]], windows,
+                   out[chain[level]]);
+    }
+  }
+  for (std::size_t p = 0; p < out.size(); ++p) {
     std::uint64_t covered = 0;
-    for (std::size_t f = 0; f < marks.size(); ++f) covered += marks[f] ? plane.covered_texels[f] : 0;
-    if (covered == 0) marks.assign(marks.size(), 1);
+    for (std::size_t f = 0; f < out[p].size(); ++f)
+      covered += out[p][f] ? fragments.planes[p].covered_texels[f] : 0;
+    if (covered == 0) out[p].assign(out[p].size(), 1);
   }
   return out;
 }
 
-std::vector<RungPair> measure_pairs(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                                    const std::vector<PlaneLadder>& planes, std::size_t base,
-                                    const RunContext& context) {
-  const TexturePlane& full = fragments.planes[base];
+TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& pixels,
+                         const std::vector<PlaneLadder>& planes, std::size_t base,
+                         const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
   const std::vector<std::size_t> chain = chain_of(fragments, base);
-  std::vector<RungPair> pairs;
+  TextureWays out;
+  measure_size(fragments.planes[base], out);
   for (std::size_t level = 0; level < chain.size(); ++level) {
-    const std::vector<std::uint64_t> bytes =
-        bytes_by_rung(fragments.planes[chain[level]], planes[chain[level]]);
-    for (std::size_t r = 0; r < bytes.size(); ++r) pairs.push_back({level, r, bytes[r], 0});
+    const PlaneLadder& ladder = planes[chain[level]];
+    const std::vector<std::uint64_t> bytes = bytes_by_rung(fragments.planes[chain[level]], ladder);
+    for (std::size_t r = 0; r < bytes.size(); ++r)
+      out.pairs.push_back({level, r, bytes[r], {}, ladder.source_rung && r + 1 == bytes.size()});
   }
-  const auto shown = [&](const TexelRectangle& window, std::size_t k) {
-    const std::size_t p = chain[pairs[k].level];
-    return show(full, fragments.planes[p], pixels[p], planes[p], pairs[k].rung, window);
-  };
-  const std::vector<double> losses =
-      mean_losses(full, pixels[base], chain_windows(full), pairs.size(), shown, context);
-  for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss = losses[k];
-  return pairs;
-}
-
-std::vector<MipChoice> measure_mip(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
-                                   const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
-  const std::vector<Window> windows = own_windows(plane);
-  if (windows.empty()) return {};
-  const SamplePatch preview = preview_samples(plane, preview_file);
-  std::vector<MipChoice> choices(1);
-  for (const std::uint64_t bytes : bytes_by_rung(plane, ladder)) choices.push_back({bytes, 0});
-  const auto shown = [&](const TexelRectangle& window, std::size_t k) {
-    return k == 0 ? show_preview(plane, preview, window) : show(plane, plane, pixels, ladder, k - 1, window);
-  };
-  const std::vector<double> losses = mean_losses(plane, pixels, windows, choices.size(), shown, context);
-  for (std::size_t k = 0; k < choices.size(); ++k) choices[k].loss = losses[k];
-  return choices;
+  for (std::size_t wanted = 0; wanted < chain.size(); ++wanted) {
+    const TexturePlane& plane = fragments.planes[chain[wanted]];
+    const SamplePatch preview = preview_samples(plane, preview_file);
+    const auto first =
+        static_cast<std::size_t>(std::ranges::find(out.pairs, wanted, &RungPair::level) - out.pairs.begin());
+    const auto shown = [&](const TexelRectangle& window, std::size_t way) {
+      if (way == 0) return show_preview(plane, preview, window);
+      const RungPair& pair = out.pairs[first + way - 1];
+      const std::size_t p = chain[pair.level];
+      return show(plane, fragments.planes[p], pixels[p], planes[p], pair.rung, window);
+    };
+    const std::size_t ways = out.pairs.size() - first + 1;
+    const std::vector<double> losses =
+        mean_losses(plane, pixels[chain[wanted]], sample_windows(plane), ways, shown, context);
+    out.preview_loss.push_back(losses[0]);
+    for (std::size_t way = 1; way < ways; ++way) out.pairs[first + way - 1].loss.push_back(losses[way]);
+  }
+  return out;
 }
 
 }  // namespace texmesh

@@ -1,5 +1,7 @@
 #include "stages/ladder/size_knots.h"
 
+#include <algorithm>
+
 #include "format/rules/size_curve.h"
 #include "stages/jpeg/jpeg_bits.h"
 
@@ -7,20 +9,26 @@ namespace texmesh {
 
 SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWindow> sample,
                              const RunContext& context) {
-  SizeKnots out;
-  if (sample.empty() || plane.qualities.size() < 2) return out;
+  if (sample.empty() || plane.qualities.size() < 2) return {};
   std::vector<int> qualities;
   for (int q = plane.qualities.front(); q <= plane.qualities.back(); ++q) qualities.push_back(q);
   JpegKind kind;
   kind.channels = plane.channels;
   kind.subsampling = plane.subsampling;
-  const std::vector<double> bits = jpeg_bits(kind, sample, qualities, context);
+  std::vector<double> bits(101);
+  std::ranges::copy(jpeg_bits(kind, sample, qualities, context), bits.begin() + qualities.front());
+  return size_knots(plane.qualities, bits);
+}
+
+SizeKnots size_knots(const std::vector<int>& rungs, const std::vector<double>& bits) {
+  SizeKnots out;
+  if (bits.empty() || rungs.size() < 2) return out;
   std::vector<std::uint8_t> rung_quality;
   std::vector<double> rung_bits, knot_bits;
-  for (std::size_t k = 0; k < bits.size(); ++k) {
-    const bool rung = qualities[k] == plane.qualities[rung_quality.size()];
-    (rung ? rung_quality : out.quality).push_back(static_cast<std::uint8_t>(qualities[k]));
-    (rung ? rung_bits : knot_bits).push_back(bits[k]);
+  for (int q = rungs.front(); q <= rungs.back(); ++q) {
+    const bool rung = q == rungs[rung_quality.size()];
+    (rung ? rung_quality : out.quality).push_back(static_cast<std::uint8_t>(q));
+    (rung ? rung_bits : knot_bits).push_back(bits[static_cast<std::size_t>(q)]);
   }
   out.position = knot_positions(rung_quality, rung_bits, out.quality, knot_bits);
   return out;

@@ -18,4 +18,7 @@ namespace texmesh {
 SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWindow> sample,
                              const RunContext& context);
 
+/// The same from what a sample takes at every whole quality, `bits` [0..100]; none for empty `bits`.
+SizeKnots size_knots(const std::vector<int>& rungs, const std::vector<double>& bits);
+
 }  // namespace texmesh

@@ -85,13 +85,8 @@ PlaneTables start_plane(const TexturePlane& plane, const PlaneLadder& ladder, st
     out.rung_quality.push_back(static_cast<std::uint8_t>(rung.quality));
     out.table_bytes.push_back(static_cast<std::uint32_t>(rung.table_stream.size()));
   }
-  // A lossless last rung came after the knots were measured, perhaps instead of another one.
-  const std::size_t measured = out.rung_quality.size() - (ladder.lossless ? 1 : 0);
-  for (std::size_t k = 0; k < ladder.knots.quality.size(); ++k)
-    if (measured > 0 && ladder.knots.quality[k] < out.rung_quality[measured - 1]) {
-      out.knot_quality.push_back(ladder.knots.quality[k]);
-      out.knot_position.push_back(ladder.knots.position[k]);
-    }
+  out.knot_quality = ladder.knots.quality;
+  out.knot_position = ladder.knots.position;
   const std::size_t cells = ladder.rungs.size() * plane.fragment_count();
   out.size_bytes.resize(cells);
   out.digest.resize(cells);

@@ -44,11 +44,12 @@ double blocks_of(std::span<const std::uint8_t> tables, std::uint32_t width_px, s
 
 /// The rungs that the model is fitted on. Not those whose quantisers stand at an end of their range: steps of
 /// 255 below quality 10 and of 1 above 95 do not follow the exponential, and with them the mean error of
-/// scans' textures is half again as large. Nor one without loss, whose bytes are not a quality's.
+/// scans' textures is half again as large. Nor that of a source's coefficients, whose bytes are not a
+/// quality's.
 std::vector<std::size_t> modelled_rungs(const PlaneLadder& ladder) {
   constexpr int kLeast = 10, kMost = 95;
   std::vector<std::size_t> all, within;
-  for (std::size_t r = 0; r + (ladder.lossless ? 1 : 0) < ladder.rungs.size(); ++r) {
+  for (std::size_t r = 0; r + (ladder.source_rung ? 1 : 0) < ladder.rungs.size(); ++r) {
     all.push_back(r);
     if (ladder.rungs[r].quality >= kLeast && ladder.rungs[r].quality <= kMost) within.push_back(r);
   }

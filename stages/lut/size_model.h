@@ -18,7 +18,8 @@ double constant_bytes(const PlaneLadder& ladder, std::uint32_t width_px, std::ui
 
 /// The size model (thesis 8.6 to 8.8) of a plane whose sizes, qualities and order are there: S = A R^Q + c by
 /// least squares on ln(S - c), c = constant_bytes() of all stored fragments, over the rungs of quality
-/// 10 to 95, or all where those are fewer than three; a lossless one never takes part. B makes R = (100 p)^B
+/// 10 to 95, or all where those are fewer than three; that of a source's coefficients never takes part. B
+/// makes R = (100 p)^B
 /// for the mean VQP p, not below 0.02. Correlation is that of Q and ln(S - c), error the mean of |model - S|
 /// / S. `vqp` [F] are the plane's. All 0 for fewer than two rungs and for planes of which nothing is stored.
 SizeModel fit_size_model(const PlaneLadder& ladder, std::uint32_t width_px, std::uint32_t height_px,

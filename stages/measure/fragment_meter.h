@@ -13,8 +13,8 @@ namespace texmesh {
 /// Values of 8 bits by channel, then texel.
 using Samples = std::vector<std::vector<std::uint8_t>>;
 
-/// 1: luma of colours, as JPEG defines it, or the grey of a single channel. Else all of them: data have their
-/// channels coded apart, and none stands for another.
+/// 1: luma of colours, as JPEG defines it, or the grey of a single channel. Else all of them: no channel of
+/// data stands for another.
 std::size_t measured_channels(const TexturePlane& plane);
 
 /// Channel `c` of `measured` of a texel with `channels`.

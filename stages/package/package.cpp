@@ -155,7 +155,7 @@ TextureInfo describe_texture(const TexturePlane& plane, const PlaneLadder& ladde
   t.preview_width_px = preview.width_px;
   t.preview_height_px = preview.height_px;
   for (const LadderRung& rung : ladder.rungs) t.rung_quality.push_back(rung.quality);
-  t.lossless = ladder.lossless;
+  t.source_rung = ladder.source_rung;
   if (ladder.source != SourceFile::kNone) t.source_extension = image_extension(images[plane.image].format);
   t.source_colours = ladder.source != SourceFile::kOtherColours;
   return t;

@@ -28,12 +28,11 @@ std::size_t nearest_rung(const PlaneLadder& plane, int quality) {
   return best;
 }
 
-void add_texels(const PlaneTables& tables, std::optional<std::size_t> rung, Knot& knot) {
+void add_texels(const PlaneTables& tables, std::size_t rung, Knot& knot) {
   const std::vector<float> weights = surface_weights(tables);
   const std::size_t fragments = tables.fragment_count();
   for (std::size_t f = 0; f < fragments; ++f) {
-    knot.dssim.push_back(
-        static_cast<double>(rung ? tables.dssim[*rung * fragments + f] : tables.skip_dssim[f]));
+    knot.dssim.push_back(static_cast<double>(tables.dssim[rung * fragments + f]));
     knot.weight.push_back(static_cast<double>(weights[f]));
   }
 }
@@ -83,6 +82,20 @@ std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, cons
   return plane_at_level(data.infos, full_size, std::min(level, static_cast<double>(last)));
 }
 
+double texel_level(const TextureData& data, const PlanesOfGroup& group, const Display& display) {
+  double sum = 0, total = 0;
+  for (const std::uint32_t p : group.planes) {
+    const PlaneTables& tables = data.tables.planes[p];
+    double surface = 0;
+    for (const float s : tables.surface_fraction) surface += static_cast<double>(s);
+    const double level =
+        display_level(tables, display.surface_area, display.object_height, display.displayed_px);
+    sum += surface * (data.fragments.planes[shown_plane(data, p, display)].mip - level);
+    total += surface;
+  }
+  return total > 0 ? sum / total : 0;
+}
+
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
                                const Display& display) {
   std::vector<std::uint32_t> planes;
@@ -97,12 +110,6 @@ std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& gro
       add_texels(data.tables.planes[p], knot.rungs.back().rung, knot);
     }
   }
-  Knot& previews = knots.emplace_back();
-  previews.previews = true;
-  for (const std::uint32_t p : planes) {
-    previews.rungs.push_back({p, 0});
-    add_texels(data.tables.planes[p], {}, previews);
-  }
   for (Knot& knot : knots) weigh(knot);
   return knots;
 }
@@ -111,13 +118,18 @@ std::optional<RenderTexture> texture_at(const TextureData& data, const ShownText
                                         std::uint32_t source_first_level, const RunContext& context) {
   const std::optional<PlaneRung> colour = rung_of(data, knot, shown.plane);
   if (!colour) return std::nullopt;
-  if (knot.previews) return preview_texture(data, shown, context);
   std::optional<PlaneRung> alpha;
   std::uint32_t level = std::max(source_first_level, data.fragments.planes[colour->plane].mip);
   if (shown.alpha) alpha = rung_of(data, knot, *shown.alpha);
   // Both stand in one texture: the coarser of them decides.
   if (alpha) level = std::max(level, data.fragments.planes[alpha->plane].mip);
   return coded_texture(data, shown, *colour, alpha, level, context);
+}
+
+std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
+                                        const PlanesOfGroup& group, const RunContext& context) {
+  if (std::ranges::find(group.planes, shown.plane) == group.planes.end()) return std::nullopt;
+  return preview_texture(data, shown, context);
 }
 
 }  // namespace texmesh::quality

@@ -15,10 +15,9 @@ struct PlanesOfGroup {
 /// Groups that the model has, rising.
 std::vector<PlanesOfGroup> find_groups(const ShownTextures& shown, const Fragments& fragments);
 
-/// One way to show all planes of a group: a rung of each, or the previews.
+/// One way to show all planes of a group: a rung of each.
 struct Knot {
-  std::vector<PlaneRung> rungs;  // per plane of the group; the plane is that of the displayed height
-  bool previews = false;
+  std::vector<PlaneRung> rungs;       // per plane of the group; the plane is that of the displayed height
   std::vector<double> dssim, weight;  // per fragment of all planes: 1 - SSIM, and its part of the surface
   double mean_dssim = 0;              // weighted
 };
@@ -33,7 +32,11 @@ struct Display {
 /// with whole texels along both axes.
 std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
 
-/// From the highest rung to the lowest, and last the previews. `samples` rungs of the first plane's ladder,
+/// The size of texels on the screen, as a logarithm of base 2 of pixels: mean over the planes that clients
+/// show of the group, by their surface.
+double texel_level(const TextureData& data, const PlanesOfGroup& group, const Display& display);
+
+/// From the highest rung to the lowest. `samples` rungs of the first plane's ladder,
 /// first and last among them (one: the last); the others have the rung whose quality is nearest.
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
                                const Display& display);
@@ -41,5 +44,8 @@ std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& gro
 /// The texture at that knot, which must have the texture's planes; nothing where it has not.
 std::optional<RenderTexture> texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
                                         std::uint32_t source_first_level, const RunContext& context);
+/// The same with the previews of the group's planes.
+std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
+                                        const PlanesOfGroup& group, const RunContext& context);
 
 }  // namespace texmesh::quality

@@ -96,9 +96,9 @@ bool passes(const Losses& losses, const QualityOptions& options, double share) {
   });
 }
 
-/// Below a quarter of the largest height all views count.
+/// Up to a quarter of the largest height all views count.
 bool is_small(double displayed_px, const QualityOptions& options) {
-  return displayed_px < options.largest_px / 4.0 * 0.999;
+  return displayed_px < options.largest_px / 4.0 * 1.001;
 }
 
 /// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
@@ -141,7 +141,7 @@ std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint
   for (std::size_t k = 1; k < n; ++k) {
     if (alive[k]) out[k] = is_small(height.displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
     if (alive[k] || !height.rank) continue;
-    if (*height.rank == 0) out[k] = ViewPart::kLarge;
+    if (*height.rank == 0) out[k] = ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
     if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
   }
@@ -168,14 +168,15 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
   PictureLosses geometry;
-  std::vector<PictureLosses> coded, coarser;  // per group
+  std::vector<PictureLosses> coded, preview, coarser;  // per group
 };
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller) {
+    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller,
+                            bool first_follows = false) {
       if (!smaller_cells) return losses_of(cells, nullptr);
-      const SmallerSize below{*smaller_cells, std::move(smaller)};
+      const SmallerSize below{*smaller_cells, std::move(smaller), first_follows};
       return losses_of(cells, &below);
     };
     const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
@@ -184,9 +185,11 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
                           below ? out[i - 1].geometry : PictureLosses{});
     for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
       const GroupCells& group = sizes[i].groups[g];
-      raw.coded.push_back(losses(
-          group.coded, below ? &below->groups[g].coded : nullptr,
-          below ? along_curve(group.knots, below->groups[g].knots, out[i - 1].coded[g]) : PictureLosses{}));
+      raw.coded.push_back(
+          losses(group.coded, below ? &below->groups[g].coded : nullptr,
+                 below ? along_curve(group, below->groups[g], out[i - 1].coded[g]) : PictureLosses{}, true));
+      raw.preview.push_back(losses(group.preview, below ? &below->groups[g].preview : nullptr,
+                                   below ? out[i - 1].preview[g] : PictureLosses{}));
       raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
                                    below ? out[i - 1].coarser[g] : PictureLosses{}));
     }
@@ -205,7 +208,7 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
     table.geometry.push_back(raw[i].geometry);
     for (std::size_t g = 0; g < groups.size(); ++g)
       table.groups[g].sizes.push_back(
-          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].coarser[g]));
+          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].preview[g], raw[i].coarser[g]));
     for (const TogetherCell& cell : sizes[i].together) {
       TogetherLoss& sample = together.emplace_back();
       sample.measured = pooled(cell.losses).flip.mean();

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 7;
+inline constexpr int kQualityVersion = 9;
 
 struct QualityOptions {
   int views = 4;
@@ -23,7 +23,7 @@ struct QualityOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("views", s.views, Range{1, 64},
-      "directions in which a scale must pass at displayed heights below a quarter of the largest");
+      "directions in which a scale must pass at displayed heights up to a quarter of the largest");
     v("large_views", s.large_views, Range{1, 64},
       "as many of the views show scales at larger heights, and all else");
     v("largest_px", s.largest_px, Range{128, 2048},
@@ -50,21 +50,23 @@ struct QualityOptions {
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
 ///   and all lower ones; 0 = it passes nowhere. FLIP publishes no thresholds: these are our own. S_0 has
 ///   kAnyDisplayPx.
-/// - Views: all for scales that still pass, at heights below a quarter of the largest; `large_views` of them
-///   for other scales and heights, and for textures at the least size; every second one of these for textures
-///   at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak, 0.8 where fewer than 6
-///   do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views than at the size below
-///   are corrected by what these views were among all there.
+/// - Views: all at heights up to a quarter of the largest, which the table's least size is; `large_views` of
+///   them for scales at larger heights, for coarser mips and for samples of everything together; every second
+///   one of these for textures at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak,
+///   0.8 where fewer than 6 do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views
+///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
 ///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
 ///   the ratio to the size below, linear between the neighbours in the list of scales.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
-///   `rung_samples` of the ladder are rendered, first and last among them, the previews, and mips that are 1
-///   to 3 levels coarser; at the half the first and the last rung, and one coarser level; at the largest the
-///   lowest rung. The others follow along the curve of the size below, by the ratio to it where both were
-///   rendered. Planes are those that a client shows at the size (format/rules/mip_choice.h). Planes of one
-///   group have the rung whose quality is nearest to that of the group's first plane. FLIP of knots is scaled
-///   so that the mean over fragments of GroupCurve::coded() is what was measured for whole planes.
+///   `rung_samples` of the ladder are rendered, first and last among them, and mips that are 1 and 2 levels
+///   coarser; at the half the lowest rung, and one coarser level of textures that have no finer plane for it.
+///   Previews are rendered at all sizes. Other rungs follow along the curve of the size below, by
+///   GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the ratio to it where both
+///   were rendered; the highest rung's ratio is 1. Planes are those that a client shows at the size
+///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
+///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
+///   what was measured for whole planes.
 /// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size and 1
 ///   at the half, the exponent that predicts best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size

@@ -9,46 +9,83 @@ namespace texmesh::quality {
 namespace {
 
 struct Reference {
-  Visibility seen;
   LumaPicture luma;
   FlipPicture flip;
 };
 
+/// The shots of one scale in one view.
+struct ScaleShots {
+  std::size_t scale = 0;
+  std::vector<std::size_t> shots;
+};
+std::vector<ScaleShots> by_scale(const std::vector<Shot>& shots, const std::vector<std::size_t>& taken) {
+  std::vector<ScaleShots> out;
+  for (const std::size_t i : taken) {
+    auto found = std::ranges::find(out, shots[i].scale, &ScaleShots::scale);
+    if (found == out.end()) found = out.insert(out.end(), {shots[i].scale, {}});
+    found->shots.push_back(i);
+  }
+  return out;
+}
+
 struct Task {
   const Studio& studio;
   const Materials& source;
+  const std::vector<Shot>& shots;
   double displayed_px;
   bool with_ssim;
 
-  RenderScene scene(std::size_t scale, const Materials& materials) const {
-    RenderScene out = studio.scenes[scale];
-    out.materials = &materials;
-    out.texture_count = studio.textures.size();
-    return out;
+  /// One picture per list of materials.
+  std::vector<Picture> pictures(std::size_t scale, const PicturePlace& place,
+                                const std::vector<const Materials*>& materials,
+                                const RunContext& context) const {
+    RenderScene scene = studio.scenes[scale];
+    scene.materials = materials.front();
+    scene.texture_count = studio.textures.size();
+    return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials,
+                          studio.textures, studio.environment, context);
   }
-  Picture picture(const RenderScene& scene, const Visibility& seen, const RunContext& context) const {
-    return shade(scene, seen, studio.textures, studio.environment, context);
+  std::vector<Picture> pictures(const ScaleShots& of, const PicturePlace& place, bool with_source,
+                                const RunContext& context) const {
+    std::vector<const Materials*> materials;
+    if (with_source) materials.push_back(&source);
+    for (const std::size_t i : of.shots) materials.push_back(shots[i].materials);
+    return pictures(of.scale, place, materials, context);
   }
-  Reference reference(const PicturePlace& place, const RunContext& context) const {
-    const RenderScene finest = scene(0, source);
-    Reference out{look(finest, place.camera, place.side_px, context), {}, {}};
-    const Picture shown = picture(finest, out.seen, context);
-    if (with_ssim) out.luma = prepare_luma(shown);
-    out.flip = prepare_flip(shown);
-    return out;
+  Reference reference(const Picture& shown) const {
+    return {with_ssim ? prepare_luma(shown) : LumaPicture{}, prepare_flip(shown)};
   }
-  Loss compare(const Reference& reference, const PicturePlace& place, const Shot& shot,
-               const RunContext& context) const {
-    const RenderScene shown = scene(shot.scale, *shot.materials);
-    const Visibility other =
-        shot.scale == 0 ? Visibility{} : look(shown, place.camera, place.side_px, context);
-    const Picture test = picture(shown, shot.scale == 0 ? reference.seen : other, context);
+  Loss compare(const Reference& reference, const Picture& test) const {
     Loss loss{compare_flip(reference.flip, prepare_flip(test)), 0};
     if (with_ssim) {
       const PictureDifference d = compare_luma(reference.luma, prepare_luma(test));
       loss.dssim = static_cast<double>(d.pixels) - d.ssim;
     }
     return loss;
+  }
+  /// Writes one loss of each shot that was taken.
+  void compare_view(std::size_t view, const PicturePlace& place, const std::vector<std::size_t>& taken,
+                    std::vector<Losses>& out, const RunContext& context) const {
+    std::vector<ScaleShots> groups = by_scale(shots, taken);
+    ScaleShots finest;
+    if (const auto found = std::ranges::find(groups, 0u, &ScaleShots::scale); found != groups.end()) {
+      finest = std::move(*found);
+      groups.erase(found);
+    }
+    const std::vector<Picture> first = pictures(finest, place, true, context);
+    const Reference seen = reference(first.front());
+    parallel_for(context, finest.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) out[finest.shots[i]][view] = compare(seen, first[i + 1]);
+    });
+    RunContext serial = context;
+    serial.threads = 1;
+    parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t g = begin; g < end; ++g) {
+        const std::vector<Picture> shown = pictures(groups[g], place, false, serial);
+        for (std::size_t i = 0; i < shown.size(); ++i)
+          out[groups[g].shots[i]][view] = compare(seen, shown[i]);
+      }
+    });
   }
 };
 
@@ -65,10 +102,8 @@ double Loss::mean_dssim() const {
 
 std::vector<Losses> take_shots(const Studio& studio, const Materials& source, double displayed_px,
                                const std::vector<Shot>& shots, bool with_ssim, const RunContext& context) {
-  const Task task{studio, source, displayed_px, with_ssim};
+  const Task task{studio, source, shots, displayed_px, with_ssim};
   std::vector<Losses> out(shots.size(), Losses(static_cast<std::size_t>(studio.views.views)));
-  RunContext serial = context;
-  serial.threads = 1;
   for (int v = 0; v < studio.views.views; ++v) {
     const auto view = static_cast<std::size_t>(v);
     std::vector<std::size_t> taken;
@@ -76,11 +111,7 @@ std::vector<Losses> take_shots(const Studio& studio, const Materials& source, do
       if (studio.views.has(view, shots[i].views)) taken.push_back(i);
     if (taken.empty()) continue;
     const PicturePlace place = place_picture(studio.frame, v, studio.views.views, displayed_px);
-    const Reference reference = task.reference(place, context);
-    parallel_for(context, taken.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        out[taken[i]][view] = task.compare(reference, place, shots[taken[i]], serial);
-    });
+    task.compare_view(view, place, taken, out, context);
   }
   return out;
 }

@@ -37,6 +37,14 @@ class SizeShots {
     return out;
   }
 
+  Replaced previews(const PlanesOfGroup& group) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      if (auto texture = preview_at(sampler_.data, sampler_.shown.textures[t], group, context_))
+        out[t] = add(std::move(*texture));
+    return out;
+  }
+
   /// The source's mips, `levels` coarser than those of the group's planes at this size.
   Replaced coarser(const GroupCells& group, std::uint32_t levels) {
     Replaced out(source_, -1);
@@ -87,18 +95,26 @@ class SizeShots {
 
 /// Short ladders have no other rung.
 bool repeats(const Knot& knot, const Knot& before) {
-  return knot.previews == before.previews &&
-         std::ranges::equal(knot.rungs, before.rungs,
+  return std::ranges::equal(knot.rungs, before.rungs,
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, the ends of the rungs, or the lowest rung.
+/// The knots that are rendered: all, at the half the lowest rung, at the largest none.
 bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
-  const std::size_t lowest = knots - 2;  // before the previews
-  return rank == 0 || knot == lowest || (rank == 1 && knot == 0);
+  return rank == 0 || (rank == 1 && knot + 1 == knots);
 }
 
-std::size_t coarser_samples(std::size_t rank) { return rank == 0 ? kCoarserLevels : rank == 1 ? 1 : 0; }
+/// Mips change as much by height as from plane to plane, so they are rendered once, and again where a texture
+/// has no finer plane for the larger height.
+std::size_t coarser_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
+                            const PlanesOfGroup& group) {
+  if (rank != 1) return rank == 0 ? kCoarserLevels : 0;
+  Display smaller = display;
+  smaller.displayed_px /= 2;
+  return std::ranges::any_of(group.planes, [&](std::uint32_t p) {
+    return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
+  });
+}
 
 /// Scales of the samples that tell how losses add up, and whether their textures have the lowest rung or one
 /// in the middle.
@@ -139,12 +155,15 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
   return (1 - part) * *values[below] + part * *values[above];
 }
 
-ViewPart texture_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
+ViewPart coded_views(std::size_t rank) { return rank == 0 ? ViewPart::kAll : ViewPart::kLargest; }
+/// Of what is compared with coded planes.
+ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
 
 void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
                const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded,
                SizeShots& shots) {
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
+  group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
   group.coded.resize(knots);
   coded.assign(knots, shots.none());
@@ -156,11 +175,13 @@ void add_group(const TextureSampler& sampler, std::size_t rank, const Display& d
     }
     if (!is_sampled(k, knots, rank)) continue;
     coded[k] = shots.coded(group, k);
-    shots.take(0, coded[k], group.coded[k], texture_views(rank));
+    shots.take(0, coded[k], group.coded[k], coded_views(rank));
   }
-  for (std::size_t l = 0; l < coarser_samples(rank); ++l)
+  group.preview.resize(1);
+  shots.take(0, shots.previews(planes), group.preview[0], coded_views(rank));
+  for (std::size_t l = 0; l < coarser_samples(sampler, rank, display, planes); ++l)
     shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l],
-               texture_views(rank));
+               other_views(rank));
 }
 
 void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
@@ -177,11 +198,11 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
     cell.scale = samples[i].scale;
     Replaced all = shots.none();
     for (std::size_t g = 0; g < cells.groups.size(); ++g) {
-      const std::size_t lowest = cells.groups[g].knots.size() - 2;
+      const std::size_t lowest = cells.groups[g].knots.size() - 1;
       cell.knots.push_back(samples[i].lowest ? lowest : lowest / 2);
       all = both(std::move(all), coded[g][cell.knots[g]]);
     }
-    shots.take(cell.scale, all, cell.losses, texture_views(rank));
+    shots.take(cell.scale, all, cell.losses, other_views(rank));
   }
 }
 
@@ -217,6 +238,8 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
       }
       if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }
+    // What was not rendered at all does not follow from its neighbours alone: little is lost alike.
+    if (smaller && smaller->first_follows && !ratio.empty() && !ratio[0]) ratio[0] = 1;
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const double rest = smaller && below(i) > kNothing ? below(i) * interpolated(ratio, i) : 0;
       const double value = found[i].value_or(rest);

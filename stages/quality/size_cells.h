@@ -20,8 +20,10 @@ struct TogetherCell {
 
 struct GroupCells {
   std::vector<Knot> knots;
-  Cells coded;    // per knot
-  Cells coarser;  // 1, 2 .. levels
+  double texel_level = 0;  // texel_level() of the planes
+  Cells coded;             // per knot
+  Cells preview;           // one
+  Cells coarser;           // 1, 2 .. levels
 };
 
 struct SizeCells {
@@ -31,7 +33,7 @@ struct SizeCells {
   std::vector<TogetherCell> together;
 };
 
-inline constexpr std::size_t kCoarserLevels = 3;
+inline constexpr std::size_t kCoarserLevels = 2;
 
 /// What the textures of one size are made from.
 struct TextureSampler {
@@ -56,7 +58,8 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
 /// Losses of a list of cells at the size below, and what they say of cells that were not rendered.
 struct SmallerSize {
   const Cells& cells;
-  PictureLosses losses;  // per cell of the larger size: what the smaller one would have
+  PictureLosses losses;        // per cell of the larger size: what the smaller one would have
+  bool first_follows = false;  // the first cell is as at the smaller size, where it was not rendered
 };
 /// Losses of a list of cells. Those with fewer views than at the size below are corrected by what these views
 /// were among all there. Those that were not rendered follow by the ratio of rendered neighbours.

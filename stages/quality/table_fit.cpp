@@ -25,7 +25,7 @@ void make_rising(std::vector<float>& values) {
   for (std::size_t i = 1; i < values.size(); ++i) values[i] = std::max(values[i], values[i - 1]);
 }
 
-/// Indices of the knots that stay. Rungs may lose the same, and a preview may be better than the lowest rung.
+/// Indices of the knots that stay. Rungs may lose the same.
 std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < knots.size(); ++k) order.push_back(k);
@@ -44,32 +44,35 @@ std::vector<std::size_t> rising_knots(const std::vector<Knot>& knots) {
 GroupCurve curve_of(TextureLosses losses) {
   QualityTable table;
   table.sizes_px = {1};
+  losses.preview.flip = {0};  // not read
   table.groups = {{PlaneGroup::kColour, {std::move(losses)}}};
   return {table, PlaneGroup::kColour, 1};
 }
 
 }  // namespace
 
-PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
-                          const PictureLosses& smaller) {
-  const std::vector<std::size_t> kept = rising_knots(smaller_knots);
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses) {
+  const std::vector<std::size_t> kept = rising_knots(smaller.knots);
+  if (kept.empty()) return losses;
+  const double growth = larger.texel_level - smaller.texel_level;
   PictureLosses out;
-  if (kept.empty()) return smaller;
   for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
-    TextureLosses losses;
+    TextureLosses read;
     for (const std::size_t k : kept) {
-      losses.texel_dssim.push_back(static_cast<float>(smaller_knots[k].mean_dssim));
-      losses.coded.flip.push_back((smaller.*list)[k]);
+      read.texel_dssim.push_back(static_cast<float>(smaller.knots[k].mean_dssim));
+      read.coded.flip.push_back((losses.*list)[k]);
     }
-    const GroupCurve curve = curve_of(std::move(losses));
-    for (const Knot& knot : knots) (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim)));
+    const GroupCurve curve = curve_of(std::move(read));
+    for (const Knot& knot : larger.knots)
+      (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim, {growth, growth})));
   }
   return out;
 }
 
 TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses coarser) {
+                             PictureLosses preview, PictureLosses coarser) {
   TextureLosses out;
+  out.preview = std::move(preview);
   out.coarser = std::move(coarser);
   make_rising(out.coarser.flip);
   std::vector<std::size_t> kept = rising_knots(knots);

@@ -4,16 +4,15 @@
 
 namespace texmesh::quality {
 
-/// What `smaller`, the losses per knot at the size below, would be for the texels of other knots: along the
-/// curve that clients read.
-PictureLosses along_curve(const std::vector<Knot>& knots, const std::vector<Knot>& smaller_knots,
-                          const PictureLosses& smaller);
+/// What `losses`, those per knot of `smaller`, would be for the knots of a larger size: along the curve that
+/// clients read, for texels as large on the screen as those of the larger size.
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
 
 /// `coded` per knot of the group, `coarser` per level. Knots by rising 1 - SSIM, those that repeat one are
 /// left out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes
 /// as near as three steps of iteration bring it.
 TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses coarser);
+                             PictureLosses preview, PictureLosses coarser);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

@@ -14,6 +14,7 @@ struct Surface {
   float metallic = 0;
   float roughness = 1;  // kLeastRoughness..1
   float occlusion = 1;  // 1 = open to the environment
+  friend bool operator==(const Surface&, const Surface&) = default;
 };
 
 /// GGX distribution of half vectors; alpha = roughness^2.
@@ -38,6 +39,22 @@ Vec2f split_sum(float roughness, float n_dot_v);
 
 /// Reflected radiance for one direction of light, per irradiance on a surface that faces it: BRDF x (n.l).
 Vec3f reflected_by_brdf(const Surface& surface, Vec3f to_light, Vec3f to_viewer);
+
+/// What reaches a viewer by a surface of that normal and roughness, whatever its colours.
+struct Lighting {
+  float n_dot_v = 0;
+  float n_dot_l = 0;   // of the key light
+  float mirrored = 0;  // specular BRDF of the key light, without Fresnel's part
+  float schlick = 0;   // weight of the key light
+  Vec2f split;         // split_sum
+  Vec3f diffuse;       // diffuse_light
+  Vec3f glossy;        // specular_light
+};
+/// `same_normal`, where there is one, has been found with the same normal.
+Lighting lighting_of(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment,
+                     const Lighting* same_normal);
+/// radiance_towards() with the surface's lighting.
+Vec3f radiance_of(const Surface& surface, const Lighting& lighting, const RenderEnvironment& environment);
 
 /// Radiance that leaves a surface towards a unit direction: the key light, the environment and emission.
 Vec3f radiance_towards(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment);

@@ -13,42 +13,59 @@ constexpr float kNone = 1e-20f;  // squares below this are no length
 
 Vec3f xyz(Vec4f v) { return {v.x, v.y, v.z}; }
 
-bool same_read(const TextureSlot& a, const TextureSlot& b) {
-  return a.texture == b.texture && a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
+bool same_place(const TextureSlot& a, const TextureSlot& b) {
+  return a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
          a.mag_filter == b.mag_filter && a.min_filter == b.min_filter && a.transform == b.transform;
 }
+
+std::size_t index_of(TextureUse use) { return static_cast<std::size_t>(use); }
 
 }  // namespace
 
 FragmentShader::FragmentShader(const RenderScene& scene, const Visibility& visibility,
-                               const std::vector<RenderTexture>& textures,
+                               MaterialVariants variants, const std::vector<RenderTexture>& textures,
                                const RenderEnvironment& environment)
     : scene_(scene),
       camera_(visibility.camera),
       environment_(environment),
       frame_(visibility.camera, visibility.side_px),
       side_px_(visibility.side_px) {
-  for (const RenderMaterial& material : *scene.materials) {
-    Prepared prepared;
-    prepared.material = &material;
-    for (std::size_t use = 0; use < kTextureUses; ++use)
-      prepared.slots[use] = prepared_slot(material.textures[use], textures);
-    prepared.occlusion_with_roughness =
-        same_read(material.slot(TextureUse::kOcclusion), material.slot(TextureUse::kMetallicRoughness));
-    materials_.push_back(prepared);
-  }
+  for (const std::vector<RenderMaterial>* materials : variants)
+    if (materials->size() != scene.materials->size())
+      throw std::invalid_argument("shade: variants have as many materials as the scene");
+  for (std::size_t m = 0; m < scene.materials->size(); ++m)
+    materials_.push_back(prepared_material(m, variants, textures));
 }
 
-FragmentShader::Slot FragmentShader::prepared_slot(const TextureSlot& use,
-                                                   const std::vector<RenderTexture>& textures) const {
-  Slot slot;
+FragmentShader::Prepared FragmentShader::prepared_material(std::size_t index, MaterialVariants variants,
+                                                           const std::vector<RenderTexture>& textures) const {
+  Prepared out;
+  out.material = &(*scene_.materials)[index];
+  for (const std::vector<RenderMaterial>* materials : variants) {
+    Reads& reads = out.variants.emplace_back();
+    for (std::size_t use = 0; use < kTextureUses; ++use)
+      reads[use] = prepared_read((*materials)[index].textures[use], textures, out.sites);
+  }
+  return out;
+}
+
+FragmentShader::Read FragmentShader::prepared_read(const TextureSlot& use,
+                                                   const std::vector<RenderTexture>& textures,
+                                                   std::vector<Site>& sites) const {
   const std::vector<Vec2f>& uv = use.uv_set == 1 ? scene_.mesh->uv1 : scene_.mesh->uv0;
-  if (use.texture < 0) return slot;
+  if (use.texture < 0) return {};
   if (static_cast<std::size_t>(use.texture) >= textures.size())
     throw std::invalid_argument("shade: a material's texture is not there");
   const RenderTexture& texture = textures[static_cast<std::size_t>(use.texture)];
-  if (texture.levels.empty() || uv.empty()) return slot;
-  return {&texture, &use, &uv, uv_matrix(use.transform)};
+  if (texture.levels.empty() || uv.empty()) return {};
+  const Vec2<std::uint32_t> size_px{texture.width_px, texture.height_px};
+  std::size_t site = 0;
+  while (site < sites.size() && !(sites[site].size_px == size_px && same_place(*sites[site].use, use)))
+    ++site;
+  if (site == sites.size())
+    sites.push_back({&use, size_px, texture.first_level, &uv, uv_matrix(use.transform)});
+  sites[site].first_level = std::min(sites[site].first_level, texture.first_level);
+  return {&texture, site};
 }
 
 FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment& fragment) const {
@@ -88,31 +105,13 @@ FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment
   return out;
 }
 
-Vec4f FragmentShader::read(const Slot& slot, const FragmentPlace& place) const {
-  const std::vector<Vec2f>& uv = *slot.uv;
-  const Vec2f first = uv[place.corner[0]];
-  const Vec2f along1 = uv[place.corner[1]] - first, along2 = uv[place.corner[2]] - first;
-  TextureFootprint footprint;
-  footprint.uv = slot.matrix.place(first + along1 * place.weight[1] + along2 * place.weight[2]);
-  footprint.uv_dx = slot.matrix.direction(along1 * place.weight_dx.x + along2 * place.weight_dx.y);
-  footprint.uv_dy = slot.matrix.direction(along1 * place.weight_dy.x + along2 * place.weight_dy.y);
-  return read_texture(*slot.texture, *slot.use, footprint);
-}
-
-Vec4f FragmentShader::base_colour(const Prepared& prepared, const FragmentPlace& place) const {
-  Vec4f c = prepared.material->base_colour;
-  auto multiply = [&c](Vec4f by) { c = {c.x * by.x, c.y * by.y, c.z * by.z, c.w * by.w}; };
-  const Slot& slot = prepared.slot(TextureUse::kBaseColour);
-  if (slot.texture) multiply(read(slot, place));
+Vec4f FragmentShader::vertex_colour(const FragmentPlace& place) const {
   const std::vector<Vec4f>& colours = scene_.mesh->colours;
-  if (!colours.empty()) {
-    const Vec4f a = colours[place.corner[0]], b = colours[place.corner[1]], d = colours[place.corner[2]];
-    auto mean = [&](float x, float y, float z) {
-      return x + (y - x) * place.weight[1] + (z - x) * place.weight[2];
-    };
-    multiply({mean(a.x, b.x, d.x), mean(a.y, b.y, d.y), mean(a.z, b.z, d.z), mean(a.w, b.w, d.w)});
-  }
-  return {saturated(c.x), saturated(c.y), saturated(c.z), saturated(c.w)};
+  const Vec4f a = colours[place.corner[0]], b = colours[place.corner[1]], d = colours[place.corner[2]];
+  auto mean = [&](float x, float y, float z) {
+    return x + (y - x) * place.weight[1] + (z - x) * place.weight[2];
+  };
+  return {mean(a.x, b.x, d.x), mean(a.y, b.y, d.y), mean(a.z, b.z, d.z), mean(a.w, b.w, d.w)};
 }
 
 // The unit normal between those of the wedges, and how much it turns within a pixel: the largest change of
@@ -160,12 +159,12 @@ bool FragmentShader::vertex_frame(const FragmentPlace& place, Vec3f frame[2]) co
 // Across the texture's axes on the triangle, seen from the normal (Schueler 2013). glTF's maps have +Y up
 // where its coordinates grow downwards. Without an area of the texture the frame is zero, and the map has no
 // effect.
-void FragmentShader::derivative_frame(const Slot& slot, const FragmentPlace& place, Vec3f normal,
+void FragmentShader::derivative_frame(const Site& site, const FragmentPlace& place, Vec3f normal,
                                       Vec3f frame[2]) const {
-  const std::vector<Vec2f>& uv = *slot.uv;
+  const std::vector<Vec2f>& uv = *site.uv;
   const Vec2f first = uv[place.corner[0]];
-  const Vec2d along1 = to_double(slot.matrix.direction(uv[place.corner[1]] - first)),
-              along2 = to_double(slot.matrix.direction(uv[place.corner[2]] - first));
+  const Vec2d along1 = to_double(site.matrix.direction(uv[place.corner[1]] - first)),
+              along2 = to_double(site.matrix.direction(uv[place.corner[2]] - first));
   const Vec3d n = to_double(normal);
   const Vec3d u = cross(n, place.edge1 * along2.x - place.edge2 * along1.x);
   const Vec3d v = cross(n, place.edge2 * along1.y - place.edge1 * along2.y);
@@ -175,66 +174,154 @@ void FragmentShader::derivative_frame(const Slot& slot, const FragmentPlace& pla
   frame[1] = to_float(v * scale);
 }
 
-Vec3f FragmentShader::mapped_normal(const Prepared& prepared, const FragmentPlace& place,
-                                    Vec3f normal) const {
-  const Slot& slot = prepared.slot(TextureUse::kNormal);
-  if (!slot.texture) return normal;
-  const Vec4f texel = read(slot, place);
-  const float scale = prepared.material->normal_scale;
-  Vec3f frame[2];
-  if (!vertex_frame(place, frame)) derivative_frame(slot, place, normal, frame);
-  const Vec3f sum = frame[0] * ((texel.x * 2 - 1) * scale) + frame[1] * ((texel.y * 2 - 1) * scale) +
-                    normal * (texel.z * 2 - 1);
-  const float square = dot(sum, sum);
-  return square > kNone && square < 1e20f ? sum * (1 / std::sqrt(square)) : normal;
-}
-
-Surface FragmentShader::surface_of(const Prepared& prepared, const FragmentPlace& place, Vec4f base,
-                                   bool back) const {
-  const RenderMaterial& material = *prepared.material;
-  Surface out;
-  out.base_colour = xyz(base);
-  float geometry_roughness = 0;
-  const Vec3f normal = interpolated_normal(place, geometry_roughness);
-  out.normal = mapped_normal(prepared, place, normal) * (back ? -1.f : 1.f);
-  out.metallic = material.metallic;
-  out.roughness = material.roughness;
-  float occlusion = 1;
-  if (const Slot& slot = prepared.slot(TextureUse::kMetallicRoughness); slot.texture) {
-    const Vec4f texel = read(slot, place);
-    out.roughness *= texel.y;
-    out.metallic *= texel.z;
-    if (prepared.occlusion_with_roughness) occlusion = texel.x;
+/// One fragment with its variants, each of which takes over what an earlier one has found of the same texels.
+class FragmentShader::Fragment {
+ public:
+  Fragment(const FragmentShader& shader, const Prepared& prepared, const FragmentPlace& place, bool back,
+           Scratch& scratch)
+      : shader_(shader), prepared_(prepared), place_(place), back_(back), scratch_(scratch) {
+    if (scratch_.sites.size() < prepared.sites.size()) scratch_.sites.resize(prepared.sites.size());
+    scratch_.known.assign(prepared.sites.size(), 0);
   }
-  if (const Slot& slot = prepared.slot(TextureUse::kOcclusion);
-      slot.texture && !prepared.occlusion_with_roughness)
-    occlusion = read(slot, place).x;
-  out.occlusion = saturated(1 + (occlusion - 1) * material.occlusion_strength);
-  out.roughness = clamped(out.roughness, kLeastRoughness, 1) + geometry_roughness;
-  if (!(out.roughness < 1)) out.roughness = 1;
-  out.emission = material.emissive;
-  if (const Slot& slot = prepared.slot(TextureUse::kEmissive); slot.texture && largest(out.emission) > 0)
-    out.emission = product(out.emission, xyz(read(slot, place)));
-  return out;
-}
 
-FragmentColour FragmentShader::colour_of(std::uint32_t pixel, const RenderFragment& fragment) const {
+  FragmentColour colour(const Reads& reads) {
+    const RenderMaterial& material = *prepared_.material;
+    const Vec4f base = base_colour(reads);
+    FragmentColour out;
+    out.alpha = 1;
+    if (material.alpha_mode == AlphaMode::kMask && base.w < material.alpha_cutoff) return {};
+    if (material.alpha_mode == AlphaMode::kBlend) out.alpha = base.w;
+    if (out.alpha == 0) return {};
+    out.linear = material.unlit ? tone_mapped(xyz(base)) : lit(reads, base);
+    return out;
+  }
+
+ private:
+  /// Of the first variant that was lit.
+  struct Known {
+    Vec4f normal_texel;
+    Surface surface;
+    Lighting lighting;
+    Vec3f linear;
+  };
+
+  Vec4f texel(const Reads& reads, TextureUse use) {
+    const std::size_t i = index_of(use);
+    if (read_[i] == reads[i]) return texel_[i];
+    const Vec4f texel = site(reads[i].site).read(*reads[i].texture);
+    if (!read_[i].texture) read_[i] = reads[i], texel_[i] = texel;
+    return texel;
+  }
+
+  const TextureSite& site(std::size_t index) {
+    TextureSite& out = scratch_.sites[index];
+    if (scratch_.known[index]) return out;
+    scratch_.known[index] = 1;
+    const Site& site = prepared_.sites[index];
+    const std::vector<Vec2f>& uv = *site.uv;
+    const Vec2f first = uv[place_.corner[0]];
+    const Vec2f along1 = uv[place_.corner[1]] - first, along2 = uv[place_.corner[2]] - first;
+    TextureFootprint footprint;
+    footprint.uv = site.matrix.place(first + along1 * place_.weight[1] + along2 * place_.weight[2]);
+    footprint.uv_dx = site.matrix.direction(along1 * place_.weight_dx.x + along2 * place_.weight_dx.y);
+    footprint.uv_dy = site.matrix.direction(along1 * place_.weight_dy.x + along2 * place_.weight_dy.y);
+    return out = TextureSite(site.size_px, site.first_level, *site.use, footprint);
+  }
+
+  static bool has(const Reads& reads, TextureUse use) { return reads[index_of(use)].texture != nullptr; }
+
+  Vec4f base_colour(const Reads& reads) {
+    Vec4f c = prepared_.material->base_colour;
+    auto multiply = [&c](Vec4f by) { c = {c.x * by.x, c.y * by.y, c.z * by.z, c.w * by.w}; };
+    if (has(reads, TextureUse::kBaseColour)) multiply(texel(reads, TextureUse::kBaseColour));
+    if (!shader_.scene_.mesh->colours.empty()) multiply(shader_.vertex_colour(place_));
+    return {saturated(c.x), saturated(c.y), saturated(c.z), saturated(c.w)};
+  }
+
+  void find_frame(const Site& site) {
+    if (!shader_.vertex_frame(place_, frame_)) shader_.derivative_frame(site, place_, normal_, frame_);
+    has_frame_ = true;
+  }
+
+  Vec3f mapped_normal(const Reads& reads, Vec4f texel) {
+    const Read& read = reads[index_of(TextureUse::kNormal)];
+    if (!read.texture) return normal_;
+    if (!has_frame_) find_frame(prepared_.sites[read.site]);
+    const float scale = prepared_.material->normal_scale;
+    const Vec3f sum = frame_[0] * ((texel.x * 2 - 1) * scale) + frame_[1] * ((texel.y * 2 - 1) * scale) +
+                      normal_ * (texel.z * 2 - 1);
+    const float square = dot(sum, sum);
+    return square > kNone && square < 1e20f ? sum * (1 / std::sqrt(square)) : normal_;
+  }
+
+  /// All but the normal.
+  Surface surface_of(const Reads& reads, Vec4f base) {
+    const RenderMaterial& material = *prepared_.material;
+    Surface out;
+    out.base_colour = xyz(base);
+    out.metallic = material.metallic;
+    out.roughness = material.roughness;
+    float occlusion = 1;
+    const bool shared =
+        reads[index_of(TextureUse::kOcclusion)] == reads[index_of(TextureUse::kMetallicRoughness)];
+    if (has(reads, TextureUse::kMetallicRoughness)) {
+      const Vec4f texel_here = texel(reads, TextureUse::kMetallicRoughness);
+      out.roughness *= texel_here.y;
+      out.metallic *= texel_here.z;
+      if (shared) occlusion = texel_here.x;
+    }
+    if (has(reads, TextureUse::kOcclusion) && !shared) occlusion = texel(reads, TextureUse::kOcclusion).x;
+    out.occlusion = saturated(1 + (occlusion - 1) * material.occlusion_strength);
+    out.roughness = clamped(out.roughness, kLeastRoughness, 1) + geometry_roughness_;
+    if (!(out.roughness < 1)) out.roughness = 1;
+    out.emission = material.emissive;
+    if (has(reads, TextureUse::kEmissive) && largest(out.emission) > 0)
+      out.emission = product(out.emission, xyz(texel(reads, TextureUse::kEmissive)));
+    return out;
+  }
+
+  Vec3f lit(const Reads& reads, Vec4f base) {
+    const bool first = !has_known_;
+    if (first) normal_ = shader_.interpolated_normal(place_, geometry_roughness_);
+    Surface surface = surface_of(reads, base);
+    const Vec4f normal_texel =
+        has(reads, TextureUse::kNormal) ? texel(reads, TextureUse::kNormal) : Vec4f{0, 0, 0, -1};
+    const bool same_normal = !first && normal_texel == known_.normal_texel;
+    surface.normal =
+        same_normal ? known_.surface.normal : mapped_normal(reads, normal_texel) * (back_ ? -1.f : 1.f);
+    const bool same_lighting = same_normal && surface.roughness == known_.surface.roughness;
+    if (same_lighting && surface == known_.surface) return known_.linear;
+    const RenderEnvironment& environment = shader_.environment_;
+    const Lighting lighting = same_lighting ? known_.lighting
+                                            : lighting_of(surface, place_.to_viewer, environment,
+                                                          same_normal ? &known_.lighting : nullptr);
+    const Vec3f linear = tone_mapped(radiance_of(surface, lighting, environment));
+    if (first) known_ = {normal_texel, surface, lighting, linear};
+    has_known_ = true;
+    return linear;
+  }
+
+  const FragmentShader& shader_;
+  const Prepared& prepared_;
+  const FragmentPlace& place_;
+  const bool back_;
+  Scratch& scratch_;
+  Reads read_{};
+  std::array<Vec4f, kTextureUses> texel_{};
+  Vec3f normal_;  // between those of the wedges
+  float geometry_roughness_ = 0;
+  Vec3f frame_[2];
+  bool has_frame_ = false, has_known_ = false;
+  Known known_;
+};
+
+void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragment, Scratch& scratch,
+                                std::span<FragmentColour> out) const {
   const RenderMaterial& material = scene_.material_of(fragment.triangle);
   const Prepared& prepared = materials_[static_cast<std::size_t>(&material - scene_.materials->data())];
   const FragmentPlace place = place_of(pixel, fragment);
-  const Vec4f base = base_colour(prepared, place);
-  FragmentColour out;
-  out.alpha = 1;
-  if (material.alpha_mode == AlphaMode::kMask && base.w < material.alpha_cutoff) return {};
-  if (material.alpha_mode == AlphaMode::kBlend) out.alpha = base.w;
-  if (out.alpha == 0) return {};
-  if (material.unlit) {
-    out.linear = tone_mapped(xyz(base));
-    return out;
-  }
-  const Surface surface = surface_of(prepared, place, base, fragment.back != 0);
-  out.linear = tone_mapped(radiance_towards(surface, place.to_viewer, environment_));
-  return out;
+  Fragment here(*this, prepared, place, fragment.back != 0, scratch);
+  for (std::size_t v = 0; v < out.size(); ++v) out[v] = here.colour(prepared.variants[v]);
 }
 
 }  // namespace texmesh::render

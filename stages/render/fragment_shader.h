@@ -1,6 +1,7 @@
 #pragma once
-// Inside the room only: the colour of a triangle within a pixel.
+// Inside the room only: the colours of a triangle within a pixel.
 #include <array>
+#include <span>
 #include <vector>
 
 #include "stages/render/brdf.h"
@@ -32,36 +33,58 @@ struct FragmentColour {
   float alpha = 0;  // 0 = nothing is there
 };
 
-/// Shades the fragments of one picture.
+/// Lists of materials that differ in the textures of their slots alone.
+using MaterialVariants = std::span<const std::vector<RenderMaterial>* const>;
+
+/// Shades the fragments of one view with every variant of the materials. What variants have in common is
+/// worked out once.
 class FragmentShader {
  public:
-  /// All must outlive the shader. std::invalid_argument when a material names a texture that is not there.
-  FragmentShader(const RenderScene& scene, const Visibility& visibility,
+  /// All must outlive the shader. std::invalid_argument when a material names a texture that is not there,
+  /// and for variants that differ in more than textures.
+  FragmentShader(const RenderScene& scene, const Visibility& visibility, MaterialVariants variants,
                  const std::vector<RenderTexture>& textures, const RenderEnvironment& environment);
-  FragmentColour colour_of(std::uint32_t pixel, const RenderFragment& fragment) const;
+
+  /// Memory of one thread.
+  struct Scratch {
+    std::vector<TextureSite> sites;
+    std::vector<std::uint8_t> known;  // per site
+  };
+  /// One colour per variant.
+  void colours_of(std::uint32_t pixel, const RenderFragment& fragment, Scratch& scratch,
+                  std::span<FragmentColour> out) const;
 
  private:
-  struct Slot {
-    const RenderTexture* texture = nullptr;  // null: white, or flat
+  /// Where some slots of a material read textures of one size.
+  struct Site {
     const TextureSlot* use = nullptr;
+    Vec2<std::uint32_t> size_px;
+    std::uint32_t first_level = 0;
     const std::vector<Vec2f>* uv = nullptr;
     UvMatrix matrix;
   };
+  struct Read {
+    const RenderTexture* texture = nullptr;  // null: white, or flat
+    std::size_t site = 0;
+    friend bool operator==(const Read&, const Read&) = default;
+  };
+  using Reads = std::array<Read, kTextureUses>;
   struct Prepared {
     const RenderMaterial* material = nullptr;
-    std::array<Slot, kTextureUses> slots;
-    bool occlusion_with_roughness = false;  // one read serves both
-    const Slot& slot(TextureUse use) const { return slots[static_cast<std::size_t>(use)]; }
+    std::vector<Site> sites;
+    std::vector<Reads> variants;
   };
-  Slot prepared_slot(const TextureSlot& use, const std::vector<RenderTexture>& textures) const;
+  class Fragment;
+
+  Prepared prepared_material(std::size_t index, MaterialVariants variants,
+                             const std::vector<RenderTexture>& textures) const;
+  Read prepared_read(const TextureSlot& use, const std::vector<RenderTexture>& textures,
+                     std::vector<Site>& sites) const;
   FragmentPlace place_of(std::uint32_t pixel, const RenderFragment& fragment) const;
-  Vec4f read(const Slot& slot, const FragmentPlace& place) const;
-  Vec4f base_colour(const Prepared& prepared, const FragmentPlace& place) const;
-  Surface surface_of(const Prepared& prepared, const FragmentPlace& place, Vec4f base, bool back) const;
+  Vec4f vertex_colour(const FragmentPlace& place) const;
   Vec3f interpolated_normal(const FragmentPlace& place, float& roughness) const;
-  Vec3f mapped_normal(const Prepared& prepared, const FragmentPlace& place, Vec3f normal) const;
   bool vertex_frame(const FragmentPlace& place, Vec3f frame[2]) const;
-  void derivative_frame(const Slot& slot, const FragmentPlace& place, Vec3f normal, Vec3f frame[2]) const;
+  void derivative_frame(const Site& site, const FragmentPlace& place, Vec3f normal, Vec3f frame[2]) const;
 
   const RenderScene& scene_;
   const RenderCamera& camera_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -24,11 +25,8 @@ const ByteCurve& numbers_of_bytes() {
   return table;
 }
 
-/// A coordinate in texels before the middle of the first one, and how many there are.
-struct Axis {
-  std::int32_t first = 0, second = 0;  // texels
-  float part = 0;                      // of the way from first to second
-};
+using Axis = TextureSite::Axis;
+using Place = TextureSite::Place;
 
 /// 0..1 inside the image, with mirrors and repetitions folded back.
 float folded(float u, Wrap wrap) {
@@ -73,8 +71,9 @@ Vec4f rgba(const float* v) {
 }
 
 template <std::size_t N>
-Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Axis& x, const Axis& y) {
+Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Place& place) {
   const ByteCurve& number = numbers_of_bytes();
+  const Axis &x = place.x, &y = place.y;
   auto texel = [&](std::int32_t column, std::int32_t row) {
     return level.data.data() +
            (static_cast<std::size_t>(row) * level.width_px + static_cast<std::size_t>(column)) * N;
@@ -90,40 +89,22 @@ Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Axis& x, cons
   return rgba<N>(value);
 }
 
-Vec4f read_bilinear(const Pixels& level, bool srgb, const TextureSlot& slot, Vec2f uv) {
-  const Axis x = bilinear_axis(uv.x, level.width_px, slot.wrap_s),
-             y = bilinear_axis(uv.y, level.height_px, slot.wrap_t);
+Vec4f read_bilinear(const Pixels& level, bool srgb, const Place& place) {
   const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
   switch (level.channels) {
     case 1:
-      return bilinear<1>(level, colour, x, y);
+      return bilinear<1>(level, colour, place);
     case 2:
-      return bilinear<2>(level, colour, x, y);
+      return bilinear<2>(level, colour, place);
     case 3:
-      return bilinear<3>(level, colour, x, y);
+      return bilinear<3>(level, colour, place);
     default:
-      return bilinear<4>(level, colour, x, y);
+      return bilinear<4>(level, colour, place);
   }
 }
 
-Vec4f read_nearest(const Pixels& level, bool srgb, Vec2f uv) {
-  const std::int32_t x = nearest_texel(uv.x, level.width_px), y = nearest_texel(uv.y, level.height_px);
-  const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
-  const Axis ax{x, x, 0}, ay{y, y, 0};
-  switch (level.channels) {
-    case 1:
-      return bilinear<1>(level, colour, ax, ay);
-    case 2:
-      return bilinear<2>(level, colour, ax, ay);
-    case 3:
-      return bilinear<3>(level, colour, ax, ay);
-    default:
-      return bilinear<4>(level, colour, ax, ay);
-  }
-}
-
-float level_of(const RenderTexture& texture, const TextureFootprint& footprint) {
-  const auto w = static_cast<float>(texture.width_px), h = static_cast<float>(texture.height_px);
+float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {
+  const auto w = static_cast<float>(size_px.x), h = static_cast<float>(size_px.y);
   const Vec2f dx{footprint.uv_dx.x * w, footprint.uv_dx.y * h},
       dy{footprint.uv_dy.x * w, footprint.uv_dy.y * h};
   const float longer = std::max(dot(dx, dx), dot(dy, dy));
@@ -134,23 +115,52 @@ float level_of(const RenderTexture& texture, const TextureFootprint& footprint) 
 
 }  // namespace
 
-Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
-  const float level = level_of(texture, footprint);
+TextureSite::TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
+                         const TextureFootprint& footprint)
+    : uv_{folded(footprint.uv.x, slot.wrap_s), folded(footprint.uv.y, slot.wrap_t)},
+      wrap_s_(slot.wrap_s),
+      wrap_t_(slot.wrap_t) {
+  const float level = level_of(size_px, footprint);
+  nearest_ = level <= 0 ? slot.mag_filter == MagFilter::kNearest : slot.min_filter == MinFilter::kNearest;
+  if (nearest_) return;
+  const int last = std::bit_width(std::max(size_px.x, size_px.y)) - 1;
+  level_ = static_cast<float>(first_level);
+  if (slot.min_filter == MinFilter::kTrilinear)
+    level_ = std::max(level_, std::min(level, static_cast<float>(last)));
+  fine_ = static_cast<std::size_t>(level_);
+  for (std::size_t k = 0; k < 2; ++k)
+    places_[k] = place_in(std::max(size_px.x >> (fine_ + k), 1u), std::max(size_px.y >> (fine_ + k), 1u));
+}
+
+Place TextureSite::place_in(std::uint32_t width_px, std::uint32_t height_px) const {
+  return {bilinear_axis(uv_.x, width_px, wrap_s_), bilinear_axis(uv_.y, height_px, wrap_t_)};
+}
+
+Vec4f TextureSite::read_level(const RenderTexture& texture, std::size_t level) const {
+  const Pixels& texels = texture.levels[level - texture.first_level];
+  const bool known = level == fine_ || level == fine_ + 1;
+  return read_bilinear(texels, texture.srgb,
+                       known ? places_[level - fine_] : place_in(texels.width_px, texels.height_px));
+}
+
+Vec4f TextureSite::read(const RenderTexture& texture) const {
   const Pixels& finest = texture.levels.front();
-  const Vec2f uv{folded(footprint.uv.x, slot.wrap_s), folded(footprint.uv.y, slot.wrap_t)};
-  if (level <= 0 ? slot.mag_filter == MagFilter::kNearest : slot.min_filter == MinFilter::kNearest)
-    return read_nearest(finest, texture.srgb, uv);
-  const auto first = static_cast<float>(texture.first_level);
-  if (level <= first || slot.min_filter != MinFilter::kTrilinear)
-    return read_bilinear(finest, texture.srgb, slot, uv);
-  const float at = std::min(level - first, static_cast<float>(texture.levels.size() - 1));
-  const auto fine = static_cast<std::size_t>(at);
-  const float part = at - static_cast<float>(fine);
-  const Vec4f a = read_bilinear(texture.levels[fine], texture.srgb, slot, uv);
+  if (nearest_) {
+    const std::int32_t x = nearest_texel(uv_.x, finest.width_px), y = nearest_texel(uv_.y, finest.height_px);
+    return read_bilinear(finest, texture.srgb, {{x, x, 0}, {y, y, 0}});
+  }
+  if (level_ <= static_cast<float>(texture.first_level)) return read_level(texture, texture.first_level);
+  const float part = level_ - static_cast<float>(fine_);
+  const Vec4f a = read_level(texture, fine_);
   if (part == 0) return a;
-  const Vec4f b = read_bilinear(texture.levels[fine + 1], texture.srgb, slot, uv);
+  const Vec4f b = read_level(texture, fine_ + 1);
   return {a.x + (b.x - a.x) * part, a.y + (b.y - a.y) * part, a.z + (b.z - a.z) * part,
           a.w + (b.w - a.w) * part};
+}
+
+Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
+  return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
+      .read(texture);
 }
 
 UvMatrix uv_matrix(const UvTransform& t) {

@@ -38,6 +38,37 @@ struct TextureFootprint {
   Vec2f uv, uv_dx, uv_dy;
 };
 
+/// Where textures of one size are read: all of it that does not depend on their texels, so that it is worked
+/// out once for several textures.
+class TextureSite {
+ public:
+  TextureSite() = default;
+  /// `size_px` of level 0. Textures that are read keep no level finer than `first_level`.
+  TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
+              const TextureFootprint& footprint);
+  /// What read_texture() gives of a texture of that size.
+  Vec4f read(const RenderTexture& texture) const;
+
+  /// Two texels and the part of the way from the first to the second.
+  struct Axis {
+    std::int32_t first = 0, second = 0;
+    float part = 0;
+  };
+  struct Place {
+    Axis x, y;
+  };
+
+ private:
+  Place place_in(std::uint32_t width_px, std::uint32_t height_px) const;
+  Vec4f read_level(const RenderTexture& texture, std::size_t level) const;
+  Vec2f uv_;  // folded into 0..1
+  Wrap wrap_s_ = Wrap::kRepeat, wrap_t_ = Wrap::kRepeat;
+  bool nearest_ = false;  // of the first level kept
+  float level_ = 0;       // the first that is kept .. the last
+  std::size_t fine_ = 0;  // level_ rounded down
+  Place places_[2];       // in levels fine_ and fine_ + 1
+};
+
 /// RGBA as a shader reads it: linear light for sRGB colours, else 0..1; grey in all three channels; alpha 1
 /// where there is none. The level is log2 of the longer of the two derivatives in texels (OpenGL 4.6, 8.14,
 /// anisotropy 1), at least the first level kept. Not finite coordinates read the texture's corner.

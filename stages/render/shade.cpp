@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <span>
+#include <utility>
 
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
@@ -56,66 +57,102 @@ class Samples {
   std::array<float, kSamples> left_{};  // of the light from behind
 };
 
-struct Pixel {
-  Vec3f linear;
-  bool covered = false;
+/// The fragments of one pixel at a time, in all variants.
+class PixelShader {
+ public:
+  PixelShader(const render::FragmentShader& shader, std::vector<Picture>& pictures, Vec3f background)
+      : shader_(shader),
+        pictures_(pictures),
+        background_(background),
+        colours_(pictures.size() * (kMaxLayers + kSamples)) {}
+
+  void shade(std::size_t at, std::span<const RenderFragment> fragments) {
+    const std::size_t variants = pictures_.size();
+    for (std::size_t i = 0; i < fragments.size(); ++i)
+      shader_.colours_of(static_cast<std::uint32_t>(at), fragments[i], scratch_,
+                         {colours_.data() + i * variants, variants});
+    const bool layers = fragments.front().layer != 0;
+    for (std::size_t v = 0; v < variants; ++v) {
+      if (layers)
+        put_layers(at, fragments, v);
+      else
+        put_opaque(at, fragments, v);
+    }
+  }
+
+ private:
+  const FragmentColour& colour(std::size_t fragment, std::size_t variant) const {
+    return colours_[fragment * pictures_.size() + variant];
+  }
+
+  /// Nothing can be seen through what the pixel shows.
+  void put_opaque(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
+    Vec3f sum;
+    float left = 1;
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      const float share = share_of(fragments[i]);
+      sum = sum + colour(i, variant).linear * share;
+      left -= share;
+    }
+    pictures_[variant].linear[at] = sum + background_ * left;
+    pictures_[variant].covered[at] = 1;
+  }
+
+  void put_layers(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
+    bool mixes = false, covered = false;
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      const float alpha = colour(i, variant).alpha;
+      mixes = mixes || (alpha > 0 && alpha < 1);
+      covered = covered || alpha > 0;
+    }
+    Samples samples(mixes);
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      const FragmentColour& c = colour(i, variant);
+      if (c.alpha > 0) samples.put_behind(fragments[i].mask, c.linear, c.alpha);
+    }
+    samples.put_behind((1u << kSamples) - 1, background_, 1);
+    pictures_[variant].linear[at] = samples.mean();
+    pictures_[variant].covered[at] = covered;
+  }
+
+  const render::FragmentShader& shader_;
+  std::vector<Picture>& pictures_;
+  Vec3f background_;
+  render::FragmentShader::Scratch scratch_;
+  std::vector<FragmentColour> colours_;  // [fragment][variant]
 };
 
-/// Nothing can be seen through what the pixel shows.
-Pixel opaque_pixel(const render::FragmentShader& shader, std::uint32_t at,
-                   std::span<const RenderFragment> fragments, Vec3f background) {
-  Vec3f sum;
-  float left = 1;
-  for (const RenderFragment& fragment : fragments) {
-    const float share = share_of(fragment);
-    sum = sum + shader.colour_of(at, fragment).linear * share;
-    left -= share;
-  }
-  return {sum + background * left, true};
-}
+}  // namespace
 
-Pixel layered_pixel(const render::FragmentShader& shader, std::uint32_t at,
-                    std::span<const RenderFragment> fragments, Vec3f background) {
-  std::array<FragmentColour, kMaxLayers + kSamples> colours;
-  bool mixes = false;
-  Pixel out;
-  for (std::size_t i = 0; i < fragments.size(); ++i) {
-    colours[i] = shader.colour_of(at, fragments[i]);
-    mixes = mixes || (colours[i].alpha > 0 && colours[i].alpha < 1);
-    out.covered = out.covered || colours[i].alpha > 0;
+std::vector<Picture> shade_variants(const RenderScene& scene, const Visibility& visibility,
+                                    std::span<const std::vector<RenderMaterial>* const> variants,
+                                    const std::vector<RenderTexture>& textures,
+                                    const RenderEnvironment& environment, const RunContext& context) {
+  const render::FragmentShader shader(scene, visibility, variants, textures, environment);
+  const std::size_t pixels = static_cast<std::size_t>(visibility.side_px) * visibility.side_px;
+  std::vector<Picture> out(variants.size());
+  for (Picture& picture : out) {
+    picture.side_px = visibility.side_px;
+    picture.linear.assign(pixels, environment.background);
+    picture.covered.assign(pixels, 0);
   }
-  Samples samples(mixes);
-  for (std::size_t i = 0; i < fragments.size(); ++i)
-    if (colours[i].alpha > 0) samples.put_behind(fragments[i].mask, colours[i].linear, colours[i].alpha);
-  samples.put_behind((1u << kSamples) - 1, background, 1);
-  out.linear = samples.mean();
+  if (out.empty()) return out;
+  parallel_for(context, pixels, 1024, [&](std::size_t begin, std::size_t end) {
+    PixelShader pixel(shader, out, environment.background);
+    for (std::size_t i = begin; i < end; ++i)
+      if (visibility.first[i] < visibility.first[i + 1])
+        pixel.shade(i, {visibility.fragments.data() + visibility.first[i],
+                        visibility.first[i + 1] - visibility.first[i]});
+  });
   return out;
 }
-
-}  // namespace
 
 Picture shade(const RenderScene& scene, const Visibility& visibility,
               const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
               const RunContext& context) {
-  const render::FragmentShader shader(scene, visibility, textures, environment);
-  const std::size_t pixels = static_cast<std::size_t>(visibility.side_px) * visibility.side_px;
-  Picture out;
-  out.side_px = visibility.side_px;
-  out.linear.assign(pixels, environment.background);
-  out.covered.assign(pixels, 0);
-  parallel_for(context, pixels, 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::span<const RenderFragment> fragments(visibility.fragments.data() + visibility.first[i],
-                                                      visibility.first[i + 1] - visibility.first[i]);
-      if (fragments.empty()) continue;
-      const bool layers = fragments.front().layer != 0;
-      const Pixel pixel = (layers ? layered_pixel : opaque_pixel)(shader, static_cast<std::uint32_t>(i),
-                                                                  fragments, environment.background);
-      out.linear[i] = pixel.linear;
-      out.covered[i] = pixel.covered;
-    }
-  });
-  return out;
+  const std::vector<RenderMaterial>* const materials = scene.materials;
+  return std::move(
+      shade_variants(scene, visibility, {&materials, 1}, textures, environment, context).front());
 }
 
 Vec3f tone_mapped(Vec3f linear) {

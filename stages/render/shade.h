@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "stages/data/pixels.h"
@@ -21,6 +22,14 @@ namespace texmesh {
 Picture shade(const RenderScene& scene, const Visibility& visibility,
               const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
               const RunContext& context);
+
+/// shade() with each of several lists of materials, which differ from the scene's in the textures of their
+/// slots alone. Costs less, since what the pictures have in common is worked out once.
+/// std::invalid_argument for a list of another length.
+std::vector<Picture> shade_variants(const RenderScene& scene, const Visibility& visibility,
+                                    std::span<const std::vector<RenderMaterial>* const> variants,
+                                    const std::vector<RenderTexture>& textures,
+                                    const RenderEnvironment& environment, const RunContext& context);
 
 /// Khronos PBR Neutral of linear RGB >= 0, cut to 0..1.
 Vec3f tone_mapped(Vec3f linear);

@@ -57,9 +57,10 @@ struct ScalesOptions {
   }
 };
 
-/// Writes all kept scales as a stream of vertex splits, and S_0 and the coarsest as GLBs. Every kept scale is a
-/// GLB where there is no stream, and where parts are merged, whose feature ids the stream does not have.
-/// - Node k is part k, without a mesh where the scale has no triangle of the part; a primitive per material in
+/// Writes all kept scales as a stream of vertex splits, and S_0 and the coarsest as GLBs. Every kept scale is
+/// a GLB where there is no stream, and where parts are merged, whose feature ids the stream does not have.
+/// - Node k is part k, without a mesh where the scale has no triangle of the part; a primitive per material
+/// in
 ///   it. Above 256 parts there is one node for all: its mesh lists the names of those that are left in
 ///   extras.partNames, and its vertices have feature ids.
 /// - The source's materials, with the previews of the planes as images (RGBA PNG where a material needs

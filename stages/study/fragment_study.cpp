@@ -96,6 +96,7 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   const TexturePlane& plane = cut.fragments.planes[0];
   LadderOptions ladder_options;
   ladder_options.rungs = options.qualities;
+  ladder_options.prune = false;
   ladder_options.subsampling = options.subsampling;
   RunContext quiet = context;
   quiet.progress = nullptr;

@@ -20,6 +20,7 @@
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/allocation_curves.h"
 
 namespace texmesh {
@@ -79,10 +80,10 @@ void print_sizes(const std::string& path) {
   BenchModel model = load_bench_model(path, context);
   const std::vector<std::size_t> shown = colour_planes(model.fragments);
   const std::vector<Pixels> pixels = fill_planes(model.fragments, model.images, Fill::kPushPull, context);
-  LadderOptions between;
+  LadderOptions between = testing::all_rungs();
   between.rungs = {6, 9, 12, 15, 22, 27, 32, 38, 43, 48, 57, 63, 69, 80, 90, 94};  // none of the ladder's
   const Previews previews = make_previews(model.fragments, pixels, {}, context);
-  const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, {}, context);
+  const Ladder ladder = encode_ladder(model.fragments, pixels, previews, {}, testing::all_rungs(), context);
   const Ladder other = encode_ladder(model.fragments, pixels, previews, {}, between, context);
   const Predictors predictors = predict_quality(model.fragments, pixels, {}, context);
   const auto [tables, thesis] =

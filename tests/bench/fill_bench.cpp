@@ -16,6 +16,7 @@
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_model.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/fill_curves.h"
 
 namespace texmesh {
@@ -122,7 +123,7 @@ struct Measured {
 
 Measured measure(const Fragments& fragments, const std::vector<std::size_t>& shown,
                  const std::vector<Pixels>& pixels, Uncovered uncovered, const RunContext& context) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.uncovered = uncovered;
   const Predictors predictors = predict_quality(fragments, pixels, {}, context);
   const Previews previews = make_previews(fragments, pixels, {}, context);

@@ -20,6 +20,7 @@
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
 #include "tests/bench/bench_texture.h"
+#include "tests/support/all_rungs.h"
 
 namespace texmesh {
 namespace {
@@ -44,7 +45,7 @@ Cost best(Cost so_far, const Work& work) {
 
 void encode_ladder_bench(benchmark::State& state) {
   const Scene scene = made_scene(state);
-  const LadderOptions options;
+  const LadderOptions options = testing::all_rungs();
   Cost plain, one, two;
   std::size_t plain_bytes = 0, our_bytes = 0;
   for (auto _ : state) {
@@ -78,7 +79,8 @@ BENCHMARK(encode_ladder_bench)
 void build_tables_bench(benchmark::State& state) {
   const Scene scene = made_scene(state);
   const Previews previews = make_previews(scene.fragments, scene.pixels, {}, threads(2));
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, previews, {}, {}, threads(2));
+  const Ladder ladder =
+      encode_ladder(scene.fragments, scene.pixels, previews, {}, testing::all_rungs(), threads(2));
   const Predictors predictors = predict_quality(scene.fragments, scene.pixels, {}, threads(2));
   Cost plain, one, two;
   const auto build = [&](int count) {

@@ -16,10 +16,12 @@
 #include <string>
 
 #include "stages/image/decode_image.h"
+#include "stages/ladder/fragment_windows.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/lossless_top.h"
+#include "stages/ladder/source_codec.h"
 #include "stages/previews/previews.h"
 #include "tests/bench/bench_texture.h"
+#include "tests/support/all_rungs.h"
 
 namespace texmesh {
 namespace {
@@ -38,9 +40,18 @@ double status_mb(const std::string& field) {
 
 /// The least that any tables make of fragments with the file's coefficients: tables made for exactly them.
 std::size_t least_bytes(const std::vector<std::uint8_t>& file, const TexturePlane& plane) {
-  std::string why_not;
-  const auto rung = cut_coefficients(plane, probe_image("whole", file, {}), why_not, threads(2));
-  return rung ? rung->data.size() + rung->table_stream.size() : 0;
+  const Image image = probe_image("whole", file, {});
+  const Pixels pixels = decode_image(image);
+  const LadderOptions options;
+  const SourceCodec source = make_source_codec(plane, pixels, image, options, threads(2));
+  if (!source.codec) return 0;
+  const std::vector<CodecRung> rungs = source.codec->train({}, threads(2));
+  const std::size_t top = rungs.size() - 1;
+  const auto encoder = source.codec->encoder(std::span(&top, 1));
+  std::vector<std::uint8_t> streams;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    encoder->encode(fragment_window(plane, pixels, options.uncovered, f), std::span(&streams, 1));
+  return streams.size() + rungs[top].table_stream.size();
 }
 
 double percent(std::size_t part, std::size_t whole) {
@@ -48,7 +59,7 @@ double percent(std::size_t part, std::size_t whole) {
 }
 
 void print_sizes(const std::string& name, const Scene& scene) {
-  const LadderOptions options;
+  const LadderOptions options = testing::all_rungs();
   const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, {}, {}, options, threads(2));
   const TexturePlane& plane = scene.fragments.planes[0];
   std::printf("%s: %zu fragments of %u px\n  quality      ", name.c_str(), plane.fragment_count(),
@@ -80,7 +91,8 @@ void print_memory(const Scene& scene, int count) {
   std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
   const double before = status_mb("VmRSS");
   const Previews previews = make_previews(scene.fragments, scene.pixels, {}, threads(count));
-  const Ladder ladder = encode_ladder(scene.fragments, scene.pixels, previews, {}, {}, threads(count));
+  const Ladder ladder =
+      encode_ladder(scene.fragments, scene.pixels, previews, {}, testing::all_rungs(), threads(count));
   const double peak = status_mb("VmHWM") - before;
   double result = static_cast<double>(previews.planes[0].file.size());
   for (const LadderRung& rung : ladder.planes[0].rungs)
@@ -100,11 +112,11 @@ void print_time(const Scene& scene) {
     plain = std::min(plain, cpu_seconds() - cpu);
     cpu = cpu_seconds();
     double wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(1));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, testing::all_rungs(), threads(1));
     ours = std::min(ours, cpu_seconds() - cpu);
     one = std::min(one, wall_seconds() - wall);
     wall = wall_seconds();
-    encode_ladder(scene.fragments, scene.pixels, {}, {}, {}, threads(2));
+    encode_ladder(scene.fragments, scene.pixels, {}, {}, testing::all_rungs(), threads(2));
     two = std::min(two, wall_seconds() - wall);
   }
   std::printf(

@@ -11,8 +11,8 @@ const kPackages = {
   // Enough bytes for a link of 2 Mbit/s to have something to do.
   large: {scan: ['--triangles', '30000', '--texture', '2048', '--charts', '30'], options: ['--rungs', '10,20,35,50,70,85,95']},
   progressive: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'progressive']},
-  // The source's own coefficients on top, other sources as files.
-  lossless: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--lossless-top']},
+  // Sources stay in the package, too.
+  kept: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--keep-source']},
   webp: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'webp', '--rungs', '20,60']},
   // Meshes that three.js decodes without a worker.
   meshopt: {scan: ['--triangles', '3000', '--texture', '512', '--charts', '8'], options: ['--rungs', '20,60,85', '--mesh-codec', 'meshopt']},
@@ -24,6 +24,14 @@ const kPackages = {
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
+
+/** Every scale as a file of its own, scales/NAME-sNN.glb, wherever the package has the scale. */
+function extractScales(file, name) {
+  fs.mkdirSync(path.join(packages, 'scales'), {recursive: true});
+  const {scales} = JSON.parse(fs.readFileSync(path.join(packages, name, 'manifest.json')));
+  for (const scale of scales.scale)
+    run(env.texmesh, 'extract', file, '--scale', `${scale}`, '--recentre', '-o', path.join(packages, 'scales', `${name}-s${scale}.glb`));
+}
 
 export function makePackages() {
   fs.mkdirSync(packages, {recursive: true});
@@ -37,6 +45,7 @@ export function makePackages() {
     run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
     if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');
+    if (name === 'maps') extractScales(file, name);
     // Elsewhere, so that a server without ranges finds each kind of tree alone.
     fs.mkdirSync(path.join(packages, 'files'), {recursive: true});
     fs.copyFileSync(file, path.join(packages, 'files', `${name}.texmesh`));

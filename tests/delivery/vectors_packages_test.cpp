@@ -70,8 +70,9 @@ Json viewing(PackageReader& package) {
           {"scale_error_p95_rms_max_at_700_px", errors}};
 }
 
-/// Sizes along knots between every two rungs, which the golden packages do not have.
+/// Sizes along knots between every two rungs, instead of the plane's own.
 Json sizes_along_knots(PlaneTables t) {
+  t.knot_quality.clear(), t.knot_position.clear();
   for (std::size_t r = 0; r + 1 < t.rung_count(); ++r)
     for (const int k : {1, 2})
       if (t.rung_quality[r] + k < t.rung_quality[r + 1]) {
@@ -145,9 +146,11 @@ Json curves(const QualityTable& table, double displayed_px) {
     const GroupCurve curve(table, group, displayed_px);
     Json coded = Json::array(), coarser = Json::array();
     for (const double dssim : {0.0, 1e-5, 0.001, 0.01, 0.07, 0.4, 1.9})
-      coded.push_back({dssim, curve.coded(dssim)});
-    for (const double levels : {0.0, 0.25, 1.0, 2.5, 7.0}) coarser.push_back({levels, curve.coarser(levels)});
-    groups.push_back({{"group", enum_name(group)}, {"dssim_flip", coded}, {"levels_flip", coarser}});
+      for (const double growth : {0.0, -0.5, 1.25})
+        coded.push_back({dssim, growth, curve.coded(dssim, {growth, growth / 2})});
+    for (const double growth : {-0.5, 0.0, 0.25, 1.0, 2.5, 7.0})
+      coarser.push_back({growth, curve.coarser({growth, growth / 2})});
+    groups.push_back({{"group", enum_name(group)}, {"dssim_growth_flip", coded}, {"growth_flip", coarser}});
   }
   for (const double scale : {0.0, 1.5, 4.0, 30.0})
     scales.push_back({scale, geometry_flip(table, displayed_px, scale)});

@@ -11,6 +11,7 @@
 #include "format/base/errors.h"
 #include "format/documents/about.h"
 #include "format/documents/index.h"
+#include "format/documents/thesis_tables.h"
 #include "format/rules/allocation.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_writer.h"
@@ -209,7 +210,14 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
     corpus.push_back(tagged(5, reader.entry(kQualityPath)));
   }
   corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
-  corpus.push_back(tagged(10, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
+  ThesisTables thesis;
+  PlaneThesis& said = thesis.planes.emplace_back();
+  said.z = said.i = said.zeta = said.m = said.vqp = {0.5f, 1};
+  said.model = {300, 0.5f, 1.02f, 0.98f, 0.05f};
+  said.quality = {80, 40};
+  said.total_bytes.assign(2 * kGammaSteps, 70000);
+  corpus.push_back(tagged(10, write_thesis(thesis)));
+  corpus.push_back(tagged(11, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
     "identifiers":[{"scheme":"doi","value":"1"}],"unit":{"name":"m","metres":1},"upAxis":"y",
     "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")));
   for (const std::uint32_t n : {3u, 9u})

@@ -1,4 +1,5 @@
 #include "tests/support/packages.h"
+#include "tests/support/all_rungs.h"
 
 #include <zlib.h>
 
@@ -84,7 +85,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
   t.covered_texels = plane.covered_texels;
   t.surface_fraction = plane.surface_fraction;
   t.features = plane.features;
-  t.skip_dssim = {0.75f, 0.75f, 0.75f, 0};
+  t.skip_dssim = {1, 1, 1, 0};
   t.order = {1, 2, 0};  // eta_0 = 0, 1, 0.5
   t.quality = {80, 40};
   for (const LadderRung& rung : ladder.rungs) {
@@ -131,7 +132,7 @@ void add_texture(PackageParts& p) {
   Fragments fragments;
   fragments.scales = 1;
   fragments.planes = {plane};
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = {20, 70};
   const std::vector<Pixels> pixels{picture(64, 64)};
   const PlaneLadder ladder = encode_ladder(fragments, pixels, {}, {}, options, {}).planes.at(0);
@@ -269,8 +270,10 @@ PackageParts make_package_parts() {
   p.manifest.steps = {{200, 5}, {kAnyDisplayPx, 0}};
   p.manifest.plane_count = 1;
   const PictureLosses scales{{0, 0.1f}, {0, 0.2f}, {0, 0.05f}};
-  const TextureLosses colours{
-      {0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{0.1f}, {0.2f}, {0.05f}}};
+  const TextureLosses colours{{0.125f, 0.5f},
+                              {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}},
+                              {{0.2f}, {0.4f}, {0.1f}},
+                              {{0.1f}, {0.2f}, {0.05f}}};
   p.quality = {2, {256}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
   p.provenance = make_provenance();
   return p;

@@ -66,7 +66,8 @@ void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
 }
 
-/// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that one.
+/// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that
+/// one.
 double shown_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_s) {
   const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
   if (moved == 0) return static_cast<double>(plan.bootstrap_bytes) / std::max(1e-9, manifest_s - rtt_s);

@@ -17,10 +17,17 @@ double surface_of(const Manifest& m) {
   return 2 * (x * y + y * z + z * x);
 }
 
-double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
+double skipped_dssim(const PlaneTables& t, std::size_t fragment) {
+  return t.skip_dssim.empty() ? 1.0 : static_cast<double>(t.skip_dssim[fragment]);
+}
+
+double signed_level(PackageReader& package, std::uint32_t base, double displayed_px) {
   const Manifest& m = package.manifest();
-  return std::max(0.0,
-                  display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px));
+  return display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px);
+}
+
+double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
+  return std::max(0.0, signed_level(package, base, displayed_px));
 }
 
 double combined(const QualityTable& table, double geometry, const TextureParts& parts) {
@@ -74,6 +81,41 @@ PlaneGroup TextureLoss::group_of(std::uint32_t plane) const {
   return texmesh::group_of(package_.textures()[plane].role);
 }
 
+/// What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says
+/// of their texels.
+double TextureLoss::preview_mean(std::uint32_t plane) {
+  const auto [found, is_new] = preview_means_.try_emplace(plane, 0.0);
+  if (!is_new) return found->second;
+  const PlaneTables& t = package_.tables().planes[plane];
+  const GroupCurve& curve = curves_[static_cast<std::size_t>(group_of(plane))];
+  const std::vector<float> weights = surface_weights(t);
+  double sum = 0, total = 0;
+  for (const std::uint16_t f : t.order) {
+    sum += static_cast<double>(weights[f]) * curve.coded(skipped_dssim(t, f));
+    total += static_cast<double>(weights[f]);
+  }
+  return found->second = total > 0 ? sum / total : 0;
+}
+
+/// FLIP of the plane's preview, which is the same for all mips of a texture.
+double TextureLoss::preview_loss(std::uint32_t plane) {
+  const std::vector<TextureInfo>& textures = package_.textures();
+  const PlaneGroup group = group_of(plane);
+  const std::uint32_t base = textures[plane].mip > 0 ? textures[plane].base : plane;
+  double sum = 0, total = 0;
+  for (const PlaneChoice& p : full_size(package_)) {
+    if (group_of(p.plane) != group) continue;
+    double weight = 0;
+    const PlaneTables& t = package_.tables().planes[p.plane];
+    const std::vector<float> weights = surface_weights(t);
+    for (const std::uint16_t f : t.order) weight += static_cast<double>(weights[f]);
+    sum += weight * preview_mean(p.plane);
+    total += weight;
+  }
+  const double share = sum > 0 ? preview_mean(base) * total / sum : 1;
+  return curves_[static_cast<std::size_t>(group)].preview() * share;
+}
+
 const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   if (plane >= package_.tables().planes.size())
     throw InputError(package_.store().name(), "texture plane " + std::to_string(plane),
@@ -83,14 +125,18 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   if (!is_new) return out;
   const PlaneTables& t = package_.tables().planes[plane];
   const GroupCurve& curve = curves_[static_cast<std::size_t>(group_of(plane))];
+  const TexelGrowth growth = this->growth(plane);
   const std::size_t fragments = t.fragment_count();
   out.weights = surface_weights(t);
   out.coded.resize((t.rung_count() + 1) * fragments);
+  const double mean = preview_mean(plane), preview = preview_loss(plane);
   for (const std::uint16_t f : t.order) {
     out.weight += static_cast<double>(out.weights[f]);
-    out.coded[f] = curve.coded(static_cast<double>(t.skip_dssim[f]));
+    out.coded[f] =
+        mean > 0 ? std::min(1.0, preview * (curve.coded(static_cast<double>(t.skip_dssim[f])) / mean)) : 0;
     for (std::size_t r = 0; r < t.rung_count(); ++r)
-      out.coded[(r + 1) * fragments + f] = curve.coded(static_cast<double>(t.dssim[r * fragments + f]));
+      out.coded[(r + 1) * fragments + f] =
+          curve.coded(static_cast<double>(t.dssim[r * fragments + f]), growth);
   }
   return out;
 }
@@ -102,16 +148,25 @@ PerGroup TextureLoss::weights(const std::vector<PlaneChoice>& planes) {
   return weights;
 }
 
-PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
+TexelGrowth TextureLoss::growth(std::uint32_t plane) {
   const std::vector<TextureInfo>& textures = package_.textures();
+  const std::uint32_t mip = textures[plane].mip, base = mip > 0 ? textures[plane].base : plane;
+  const double here = mip - signed_level(package_, base, displayed_px_);
+  TexelGrowth out{};
+  const SizesAround sizes = sizes_around(package_.quality(), displayed_px_);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double level = signed_level(package_, base, sizes[i]);
+    out[i] = here - (textures[plane_at_level(textures, base, level)].mip - level);
+  }
+  return out;
+}
+
+PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
   PerGroup loss{}, weights = this->weights(planes);
   for (const PlaneChoice& p : planes) {
     const auto group = static_cast<std::size_t>(group_of(p.plane));
-    const std::uint32_t for_display =
-        plane_at_level(textures, p.base, level_for_display(package_, p.base, displayed_px_));
-    const double levels = static_cast<double>(textures[p.plane].mip) - textures[for_display].mip;
-    if (!(levels > 0) || !(weights[group] > 0)) continue;
-    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(levels);
+    if (!(weights[group] > 0)) continue;
+    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(growth(p.plane));
   }
   return loss;
 }

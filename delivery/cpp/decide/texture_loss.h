@@ -57,6 +57,8 @@ class TextureLoss {
   PerGroup weights(const std::vector<PlaneChoice>& planes);
   /// TextureParts::coarser, as the mean over each group's surface.
   PerGroup coarser(const std::vector<PlaneChoice>& planes);
+  /// How much larger the plane's texels are at this height than those that the quality table sampled.
+  TexelGrowth growth(std::uint32_t plane);
   double displayed_px() const { return displayed_px_; }
   PackageReader& package() { return package_; }
 
@@ -65,6 +67,10 @@ class TextureLoss {
   double displayed_px_ = 0;
   std::array<GroupCurve, kPlaneGroups> curves_;
   std::map<std::uint32_t, Plane> planes_;
+  std::map<std::uint32_t, double> preview_means_;
+
+  double preview_mean(std::uint32_t plane);
+  double preview_loss(std::uint32_t plane);
 };
 
 }  // namespace texmesh

@@ -38,9 +38,9 @@ struct HttpAnswer {
   double retry_after_s = 0;  // as the server says, 0 = not
   double first_byte_s = 0, received_s = 0;  // from the request's last byte to the answer's first and last
 };
-/// Whether an answer is about the file that an answer with this strong ETag ("" = none) and total length (0 = not
-/// known) was about. ETags decide where both have one, otherwise lengths; what cannot be compared counts as
-/// the same.
+/// Whether an answer is about the file that an answer with this strong ETag ("" = none) and total length (0 =
+/// not known) was about. ETags decide where both have one, otherwise lengths; what cannot be compared counts
+/// as the same.
 bool is_same_file(const HttpAnswer& answer, const std::string& etag, std::uint64_t total);
 /// Whether the request is worth another try.
 bool may_retry(const HttpAnswer& answer);

@@ -151,13 +151,15 @@ bool HttpSource::accept(Piece& p, HttpAnswer& a) {
     return false;
   }
   if (a.status == 200 && is_same_file(a, etag_, *total_))
-    throw RangesEnded(name(), place, "an answer with status 206", "status 200: ranges are no longer answered");
+    throw RangesEnded(name(), place, "an answer with status 206",
+                      "status 200: ranges are no longer answered");
   if (a.status == 200 || a.status == 416) fail_replaced("status " + std::to_string(a.status));
   throw InputError(name(), place, "an answer with status 206", describe_answer(a));
 }
 
 void HttpSource::fail_replaced(const std::string& found) const {
-  throw FormatError(name(), "", "the file that reading began with", found + ": it was replaced, read it anew");
+  throw FormatError(name(), "", "the file that reading began with",
+                    found + ": it was replaced, read it anew");
 }
 
 void HttpSource::check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {

@@ -117,7 +117,6 @@ const std::vector<TextureInfo>& PackageReader::textures() {
         !feature.empty() &&
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
       throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
-  const std::size_t full = full_size_planes(textures);
   resolve_textures(textures, index());
   textures_ = std::move(textures);
   return *textures_;
@@ -241,9 +240,10 @@ Bytes PackageReader::scale_glb(int scale) {
 Bytes PackageReader::split_prefix(int scale) {
   const ManifestScale& s = manifest_.scales[scale_index(scale)];
   if (s.has_glb() || !manifest_.stream)
-    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file", "scale " + std::to_string(scale));
-  Bytes bytes = store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0,
-                             s.glb.bytes);
+    throw InputError(store_->name(), kSplitStreamPath, "a scale without a file",
+                     "scale " + std::to_string(scale));
+  Bytes bytes =
+      store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0, s.glb.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != s.glb.digest)
     throw FormatError(store_->name(), std::string("prefix of ") + kSplitStreamPath,

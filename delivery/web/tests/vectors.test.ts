@@ -131,10 +131,11 @@ function checkTables(table: t.PlaneTables, v: Json): void {
 }
 
 function checkCurves(quality: t.QualityTable, displayedPx: number, v: Json): void {
-  for (const { group, dssim_flip, levels_flip } of v.groups) {
+  for (const { group, dssim_growth_flip, growth_flip } of v.groups) {
     const curve = new t.GroupCurve(quality, group, displayedPx);
-    for (const [dssim, flip] of dssim_flip) expectBits([curve.coded(dssim)], [flip], `${group} of ${dssim}`);
-    for (const [levels, flip] of levels_flip) expectBits([curve.coarser(levels)], [flip], `${group}, ${levels} levels`);
+    for (const [dssim, growth, flip] of dssim_growth_flip)
+      expectBits([curve.coded(dssim, [growth, growth / 2])], [flip], `${group} of ${dssim}, ${growth} doublings`);
+    for (const [growth, flip] of growth_flip) expectBits([curve.coarser([growth, growth / 2])], [flip], `${group}, ${growth} doublings`);
   }
   for (const [scale, flip] of v.scale_flip) expectBits([t.geometryFlip(quality, displayedPx, scale)], [flip], `scale ${scale}`);
 }

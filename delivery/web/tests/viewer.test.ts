@@ -1,6 +1,6 @@
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { type Manifest, PackageReader, type PlaneTables } from '../src/reader';
+import { type About, type Manifest, PackageReader, type PlaneTables } from '../src/reader';
 import { golden, readText, root } from './support/files';
 
 interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number | null; rung: number | null }
@@ -15,7 +15,17 @@ const { capsWith, choicesFromAddress, kPolicies, readable } = (await viewer('cho
 const { stepData } = (await viewer('panel/scale_plot.ts')) as { stepData(m: Manifest): number[][] };
 const { ladderData } = (await viewer('panel/ladder_plot.ts')) as { ladderData(t: PlaneTables): number[][] };
 const { turnData } = (await viewer('panel/time_plots.ts')) as { turnData(turns: Turn[], of: (t: Turn) => (number | null)[]): (number | null)[][] | null };
+const { rightsOf } = (await viewer('rights.ts')) as { rightsOf(about: About | null): { by: string; licence: string; url: string } };
 const at = (query: string): Choices => choicesFromAddress(new URLSearchParams(query));
+
+describe("the viewer's line about rights", () => {
+  it('says whose the object is, and links the licence', () => {
+    expect(rightsOf({ creator: 'A', attribution: 'B', licence: 'MIT', licenceUrl: 'https://a.b/' })).toEqual({ by: 'B', licence: 'MIT', url: 'https://a.b/' });
+    expect(rightsOf({ creator: 'A', licence: 'ask' })).toEqual({ by: 'A', licence: 'ask', url: '' });
+    expect(rightsOf({ licenceUrl: 'https://a.b/' })).toEqual({ by: '', licence: '', url: '' });
+    expect(rightsOf(null)).toEqual({ by: '', licence: '', url: '' });
+  });
+});
 
 describe("the viewer's choices", () => {
   it('are policies that the library has', () => {

@@ -3,6 +3,7 @@ import type { About } from 'texmesh';
 import { byId, make } from './dom';
 import * as format from './format';
 import type { Live } from './live';
+import { rightsOf } from './rights';
 
 const kPhases: Record<string, string> = {
   opening: 'Opening', 'first-picture': 'First picture', tables: 'Tables', mesh: 'Mesh', textures: 'Textures', refining: 'Refining', done: '',
@@ -32,15 +33,13 @@ function showRights(about: About | null): void {
   if (about === shownRights) return;
   shownRights = about;
   const line = byId('rights');
-  const by = about?.attribution ?? about?.creator ?? '';
-  line.replaceChildren();
-  if (by !== '') line.append(by);
-  if (about?.licence) {
-    // Only http and https: the library has refused any other URL.
-    const licence = about.licenceUrl ? make('a', { href: about.licenceUrl, rel: 'license noopener noreferrer', target: '_blank' }, about.licence) : about.licence;
-    line.append(...(by === '' ? [licence] : [' · ', licence]));
-  }
-  line.hidden = line.childNodes.length === 0;
+  const { by, licence, url } = rightsOf(about);
+  line.replaceChildren(by);
+  if (by !== '' && licence !== '') line.append(' · ');
+  // Only http and https: the library has refused any other URL.
+  if (url !== '') line.append(make('a', { href: url, rel: 'license noopener noreferrer', target: '_blank' }, licence));
+  else line.append(licence);
+  line.hidden = by === '' && licence === '';
 }
 
 function showTitle({ manifest, textures: planes, packageBytes, about }: Live, name: string): void {

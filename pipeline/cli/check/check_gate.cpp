@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/io/text_table.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/switch_sizes.h"
@@ -53,16 +54,16 @@ std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_fl
 std::string gate_junit(const std::string& package, const std::vector<GateResult>& results) {
   const auto failures =
       std::ranges::count_if(results, [](const GateResult& r) { return !r.failure.empty(); });
-  const std::string name = html_escaped(printable(package));
+  const std::string name = markup_escaped(printable(package));
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"texmesh check\" "
       "tests=\"{}\" failures=\"{}\">\n",
       results.size(), failures);
   for (const GateResult& r : results) {
-    out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, html_escaped(r.name));
+    out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, markup_escaped(r.name));
     out += r.failure.empty()
                ? "/>\n"
-               : fmt::format("><failure message=\"{}\"/></testcase>\n", html_escaped(r.failure));
+               : fmt::format("><failure message=\"{}\"/></testcase>\n", markup_escaped(r.failure));
   }
   return out + "</testsuite>\n</testsuites>\n";
 }

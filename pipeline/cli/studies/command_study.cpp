@@ -10,6 +10,7 @@ void add_study_command(Command& app) {
   add_fragments_study(c);
   add_quality_study(c);
   add_prediction_study(c);
+  add_rungs_study(c);
 }
 
 }  // namespace texmesh

@@ -5,8 +5,9 @@ namespace texmesh {
 class Command;
 
 // Each adds one study to texmesh study.
-void add_fragments_study(Command& study);   // study_fragments.cpp
-void add_quality_study(Command& study);     // study_quality.cpp
-void add_prediction_study(Command& study);  // study_prediction.cpp
+void add_fragments_study(Command& study);  // study_fragments.cpp
+void add_quality_study(Command& study);    // study_quality.cpp
+void add_prediction_study(Command& study);
+void add_rungs_study(Command& study);  // study_prediction.cpp
 
 }  // namespace texmesh

@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/json_fields.h"
-#include "format/base/portable_math.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/units.h"
+#include "pipeline/cli/studies/random_plans.h"
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/extract/plan_pictures.h"
 #include "pipeline/io/exit_codes.h"
@@ -30,12 +30,12 @@ struct PredictionArguments {
   int plans = 20, views = 4, jobs = 0;
   double display_px = 512;
   std::uint64_t seed = 1;
-  bool json = false;
+  bool every_scale = false, json = false;
 };
 
 /// A plan, and what it looks like.
 struct Row {
-  std::string package;
+  std::string package, kind;
   double displayed_px = 0;
   int scale = 0;
   std::uint64_t bytes = 0;
@@ -46,66 +46,20 @@ struct Row {
   }
 };
 
-/// Numbers in 0..1 by SplitMix64 (Steele, Lea, Flood 2014): the same on every machine.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  double next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
-  }
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(next() * static_cast<double>(n)); }
-
- private:
-  std::uint64_t state_;
-};
-
-/// One plan that was asked for.
-struct Wish {
-  double displayed_px = 0;
-  int scale = -1;  // -1 = the one that looks best
-  std::uint64_t bytes = 0;
-};
-
-/// Scales, heights and budgets of any size between the least that a package needs and all that it has.
-std::vector<Wish> random_wishes(PackageReader& package, const PredictionArguments& args) {
-  constexpr double kLeastBytes = 50e3;
-  static constexpr std::array<double, 5> kHeights{256, 362, 512, 724, 1024};
-  Random random(args.seed);
-  double all = kLeastBytes;
-  for (const EntryRef& e : package.index()) all += static_cast<double>(e.bytes);
-  std::vector<Wish> wishes;
-  for (int i = 0; i < args.plans; ++i) {
-    const double height = kHeights[random.below(kHeights.size())];
-    const std::vector<ManifestScale>& scales = package.manifest().scales;
-    const int scale = scales[random.below(scales.size())].scale;
-    const double bytes =
-        kLeastBytes * portable::exp(random.next() * portable::log(std::min(all, 8e6) / kLeastBytes));
-    wishes.push_back({height, scale, static_cast<std::uint64_t>(bytes)});
-  }
-  // Pictures of the source are shared by plans of one height.
-  std::ranges::stable_sort(wishes, {}, &Wish::displayed_px);
-  return wishes;
-}
-
-Row measured(PackageReader& package, PlanPictures& pictures, const Wish& wish) {
-  DeliveryRequest request;
-  request.displayed_px = wish.displayed_px;
-  request.scale = wish.scale;
-  const DeliveryPlan plan = plan_budget(package, request, wish.bytes);
-  const FragmentList list = list_of(package, request, plan);
+Row measured(PackageReader& package, PlanPictures& pictures, const DrawnPlan& drawn, std::string kind) {
+  const DeliveryPlan& plan = drawn.plan;
+  const double px = drawn.request.displayed_px;
   Row row{package.store().name(),
-          wish.displayed_px,
+          std::move(kind),
+          px,
           plan.scale,
           plan.bytes(),
           plan.flip,
           0,
           plan.texture_flip,
           {}};
-  row.predicted_geometry = picture_flip(package.quality(), wish.displayed_px, plan.scale, {});
-  row.rendered = pictures.measure(shown_by(package, plan, list), wish.displayed_px);
+  row.predicted_geometry = picture_flip(package.quality(), px, plan.scale, {});
+  row.rendered = pictures.measure(shown_by(package, plan, list_of(package, drawn.request, plan)), px);
   return row;
 }
 
@@ -126,6 +80,12 @@ ShownPackage read_plan(const std::string& path, PackageReader& package) {
   return shown;
 }
 
+std::vector<int> scales_of(PackageReader& package) {
+  std::vector<int> numbers;
+  for (const ManifestScale& s : package.manifest().scales) numbers.push_back(s.scale);
+  return numbers;
+}
+
 std::vector<Row> rows_of(const PredictionArguments& args, const std::string& path) {
   PackageReader package(open_store(path));
   PlanPictures pictures(package, args.against, args.views, context_of(args.jobs));
@@ -133,14 +93,20 @@ std::vector<Row> rows_of(const PredictionArguments& args, const std::string& pat
   if (!args.plan.empty()) {
     const ShownPackage shown = read_plan(args.plan, package);
     rows.push_back(
-        {path, args.display_px, shown.scale, 0, 0, 0, 0, pictures.measure(shown, args.display_px)});
+        {path, "plan", args.display_px, shown.scale, 0, 0, 0, 0, pictures.measure(shown, args.display_px)});
     return rows;
   }
-  std::vector<Wish> wishes;
   for (const std::string& budget : args.budgets)
-    wishes.push_back({args.display_px, -1, parse_bytes(budget, "--budget")});
-  for (const Wish& wish : wishes.empty() ? random_wishes(package, args) : wishes)
-    rows.push_back(measured(package, pictures, wish));
+    for (const int scale : args.every_scale ? scales_of(package) : std::vector<int>{-1}) {
+      DrawnPlan given{DrawnKind::kBudget, {}, {}};
+      given.request.displayed_px = args.display_px;
+      given.request.scale = scale;
+      given.plan = plan_budget(package, given.request, parse_bytes(budget, "--budget"));
+      rows.push_back(measured(package, pictures, given, "budget"));
+    }
+  if (rows.empty())
+    for (const DrawnPlan& drawn : draw_plans(package, args.plans, args.seed))
+      rows.push_back(measured(package, pictures, drawn, name_of(drawn.kind)));
   return rows;
 }
 
@@ -185,6 +151,7 @@ Json prediction_json(const std::vector<Row>& rows) {
   Json list = Json::array();
   for (const Row& r : rows)
     list.push_back({{"package", r.package},
+                    {"kind", r.kind},
                     {"displayed_px", r.displayed_px},
                     {"scale", r.scale},
                     {"bytes", r.bytes},
@@ -193,18 +160,20 @@ Json prediction_json(const std::vector<Row>& rows) {
                     {"predicted_textures", r.predicted_textures},
                     {"rendered", r.rendered.whole},
                     {"rendered_geometry", r.rendered.geometry},
-                    {"rendered_textures", r.rendered.textures}});
+                    {"rendered_textures", r.rendered.textures},
+                    {"error", r.error()}});
   return {{"plans", list}, {"mean_error", mean_error(rows)}, {"rank_correlation", rank_correlation(rows)}};
 }
 
 std::string prediction_text(const std::vector<Row>& rows) {
   TextTable table;
   table.column("package", Align::kLeft);
+  table.column("kind", Align::kLeft);
   for (const char* header :
        {"px", "S", "bytes", "predicted", "scale", "textures", "rendered", "scale", "textures", "error %"})
     table.column(header);
   for (const Row& r : rows)
-    table.row({r.package, fixed(r.displayed_px, 0), std::to_string(r.scale), grouped(r.bytes),
+    table.row({r.package, r.kind, fixed(r.displayed_px, 0), std::to_string(r.scale), grouped(r.bytes),
                fixed(r.predicted, 4), fixed(r.predicted_geometry, 4), fixed(r.predicted_textures, 4),
                fixed(r.rendered.whole, 4), fixed(r.rendered.geometry, 4), fixed(r.rendered.textures, 4),
                fixed(100 * r.error(), 1)});
@@ -228,13 +197,18 @@ void add_prediction_study(Command& study) {
   auto args = std::make_shared<PredictionArguments>();
   Command c = study.add("prediction", "Does a plan look as quality.json predicts? FLIP of plans, rendered");
   c.option("PKG", args->packages, "Packages").required();
-  c.option("--plans", args->plans, "Random plans per package: a scale, a budget of bytes, a displayed height")
+  c.option(
+       "--plans", args->plans,
+       "Random plans per package, in turn: what clients choose for a number of bytes, for a link and a time, "
+       "and drawn mips and rungs")
       .integer_in(1, 10000)
       .shows_default();
   c.option("--seed", args->seed, "Seed of the plans").shows_default();
   c.option("--budget", args->budgets,
            "What plan --budget chooses, instead of random plans; may be given again")
       .value_name("SIZE");
+  c.flag("--every-scale", args->every_scale,
+         "With --budget: the best of every scale, not only of the best one");
   c.option("--plan", args->plan, "What plan --json printed, instead of random plans").value_name("FILE");
   c.option("--display", args->display_px, "Displayed height with --budget and --plan, px")
       .number_in(16, 2048)

@@ -49,6 +49,7 @@ Choices study_model(const QualityArguments& args) {
                  derived(kStudy), options(), {}, study);
   CompileRequest request;
   request.input = args.model;
+  request.options.ladder.prune = false;  // qualities to choose from, also those that no load would take
   const std::unique_ptr<Store> store = args.cache.off
                                            ? std::make_unique<NullStore>()
                                            : open_disk_store(default_cache_folder(args.cache.folder));

@@ -50,13 +50,25 @@ BudgetFiller::Draft BudgetFiller::draft_of(const std::vector<ImagePlan>& plans) 
   return draft;
 }
 
+/// Stored coefficients need no more than their sides.
+void BudgetFiller::set_pixels(Draft& draft, std::size_t image) {
+  if (draft.plans[image].coding.stored) {
+    coder_.load_stored(image);
+    draft.pixels[image] = {source_.image(image).width_px, source_.image(image).height_px, 0, {}};
+  } else {
+    draft.pixels[image] = coder_.texels_of_share(image, draft.plans[image].share);
+  }
+}
+
 /// The plans with sides so many times as long, at most whole.
 void BudgetFiller::resize(Draft& draft, const std::vector<ImagePlan>& plans, double times) {
   draft.plans = plans;
   draft.pixels.resize(plans.size());
   for (std::size_t i = 0; i < plans.size(); ++i) {
-    draft.plans[i].share = std::min(plans[i].share * times, 1.0);
-    draft.pixels[i] = coder_.texels_of_share(i, draft.plans[i].share);
+    ImagePlan& plan = draft.plans[i];
+    plan.share = std::min(plans[i].share * times, 1.0);
+    if (plan.coding.stored && plan.share < 1) plan.coding = coder_.codings(i).front();
+    set_pixels(draft, i);
   }
   encode(draft, all_of(plans.size()));
 }
@@ -71,6 +83,7 @@ BudgetFile BudgetFiller::file_of(const MeshCandidate& mesh, const Draft& draft) 
     file.images[image.image] = draft.files[i];
   }
   file.glb = mesh.file_with(file.images);
+  file.has_sources = !draft.plans.empty() && std::ranges::all_of(draft.plans, &ImagePlan::is_source);
   return file;
 }
 
@@ -84,10 +97,37 @@ void BudgetFiller::by_level(double start, int tries, const std::function<BudgetF
   });
 }
 
+/// Bytes that are left go into the source's own coefficients, of the images first that lose most.
+void BudgetFiller::by_source(const MeshCandidate& mesh, const Allocation& allocation, Draft& draft,
+                             BudgetFile& best) {
+  std::vector<std::size_t> images = all_of(draft.plans.size());
+  std::stable_sort(images.begin(), images.end(), [&](std::size_t a, std::size_t b) {
+    return allocation.images[a].loss > allocation.images[b].loss;
+  });
+  for (const std::size_t i : images) {
+    const auto stored = coder_.stored_bytes(i);
+    const double others =
+        static_cast<double>(best.glb.size()) - static_cast<double>(draft.files[i].bytes.size());
+    // What nobody sees takes next to nothing in the file, so half of the package's bytes is a chance.
+    if (!stored || draft.plans[i].is_source() ||
+        others + 0.5 * *stored > static_cast<double>(source_.request.bytes))
+      continue;
+    Draft other = draft;
+    other.plans[i] = {{FileImage::kJpeg, false, true}, 1, kHighestQuality};
+    set_pixels(other, i);
+    encode(other, {i});
+    BudgetFile file = file_of(mesh, other);
+    if (!fits(file)) continue;
+    draft = std::move(other);
+    best = std::move(file);
+  }
+}
+
 /// The image that got the last bytes takes up what the prediction missed.
 void BudgetFiller::by_last_image(const MeshCandidate& mesh, std::size_t last, Draft& draft,
                                  BudgetFile& best) {
-  if (!is_lossy(draft.plans[last])) return;
+  const ImagePlan& plan = draft.plans[last];
+  if (!is_lossy(plan) || (plan.is_source() && fits(best))) return;  // larger there is nothing
   by_level(
       draft.plans[last].quality, 10,
       [&](double quality) {
@@ -132,7 +172,7 @@ void BudgetFiller::by_sizes(const MeshCandidate& mesh, Draft& draft, BudgetFile&
 void BudgetFiller::by_codings(const MeshCandidate& mesh, Draft& draft, BudgetFile& best) {
   for (std::size_t i = 0; i < draft.plans.size(); ++i)
     for (const TextureCoding& coding : coder_.codings(i)) {
-      if (fills(best) || !is_lossy(draft.plans[i])) break;
+      if (fills(best) || !is_lossy(draft.plans[i]) || draft.plans[i].is_source()) break;
       draft.plans[i].coding = coding;
       draft.plans[i].quality = kHighestQuality;
       by_last_image(mesh, i, draft, best);
@@ -152,6 +192,8 @@ BudgetFile BudgetFiller::fill(const MeshCandidate& mesh, const Allocation& alloc
   Draft draft = draft_of(plans);
   BudgetFile best = file_of(mesh, draft);
   if (plans.empty() || fills(best)) return best;
+  if (fits(best)) by_source(mesh, allocation, draft, best);
+  if (fills(best) || (fits(best) && best.has_sources)) return best;
   by_last_image(mesh, allocation.last, draft, best);
   if (fills(best)) return best;
   by_all_qualities(mesh, draft, best);

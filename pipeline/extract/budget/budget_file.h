@@ -14,6 +14,7 @@ struct BudgetFile {
   std::map<std::uint32_t, FileImageData> images;  // by source image
   std::vector<ExtractedImage> rows;               // by image
   std::vector<std::uint8_t> glb;
+  bool has_sources = false;  // all images are the source's, as the package holds them
 };
 
 /// Fills the bytes asked for: the largest file within them by quality, then by size of the textures.
@@ -35,6 +36,8 @@ class BudgetFiller {
   Draft draft_of(const std::vector<ImagePlan>& plans);
   void encode(Draft& draft, const std::vector<std::size_t>& images) const;
   void resize(Draft& draft, const std::vector<ImagePlan>& plans, double times);
+  void set_pixels(Draft& draft, std::size_t image);
+  void by_source(const MeshCandidate& mesh, const Allocation& allocation, Draft& draft, BudgetFile& best);
   BudgetFile file_of(const MeshCandidate& mesh, const Draft& draft) const;
   /// Makes the file that fills best of those with level 1 .. 100 of `at`, which grow with it.
   void by_level(double start, int tries, const std::function<BudgetFile(double level)>& at, BudgetFile& best);

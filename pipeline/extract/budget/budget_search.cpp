@@ -35,7 +35,7 @@ class BudgetSearch {
     const MeshKey best = choose_mesh();
     BudgetFile file = filler_.fill(meshes_.at(best), curves_.allocate(bytes_left(meshes_.at(best))));
     const MeshKey filled = filler_.fits(file) && !filler_.fills(file) ? fill_by_mesh(best, file) : best;
-    return finish(meshes_.at(filled), std::move(file));
+    return finish(filled, std::move(file));
   }
 
  private:
@@ -141,8 +141,7 @@ class BudgetSearch {
   /// finer scale.
   MeshKey fill_by_mesh(const MeshKey& from, BudgetFile& best) {
     MeshKey chosen = from;
-    const bool stored = from.scale == 0 && from.coding + 1 == kMeshCodings;  // there is no finer one
-    if (stored || !meshes_.at(from).file->has_draco()) return from;
+    if (is_finest(from) || !meshes_.at(from).file->has_draco()) return from;
     const auto measure = [&](const MeshKey& key) {
       BudgetFile file = best;
       file.glb = meshes_.at(key).file_with(best.images);
@@ -166,24 +165,32 @@ class BudgetSearch {
     }
   }
 
-  Extracted finish(const MeshCandidate& mesh, BudgetFile file) {
+  /// S_0 as it is stored.
+  static bool is_finest(const MeshKey& key) { return key.scale == 0 && key.coding + 1 == kMeshCodings; }
+
+  Extracted finish(const MeshKey& key, BudgetFile file) {
+    const MeshCandidate& mesh = meshes_.at(key);
     Extracted out;
     out.scale = mesh.scale;
     out.levels = mesh.levels;
     out.triangles = mesh.triangles;
-    out.within = filler_.fills(file);
+    out.within = filler_.fills(file) || (filler_.fits(file) && file.has_sources && is_finest(key));
     out.views = static_cast<int>(source_.cameras.size());
     out.side_px = source_.side_px;
     out.images = file.rows;
     out.mesh_bytes = file.glb.size();
     for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
-    std::vector<RenderTexture> textures = source_.best_textures;
+    OtherTextures textures;
     for (std::size_t i = 0; i < source_.image_count(); ++i)
-      coder_.show(i, file.images.at(source_.image(i).image), textures, source_.context);
-    const LitMeter& meter = source_.whole_pictures();
+      textures.merge(coder_.shown_by(i, file.images.at(source_.image(i).image), source_.context));
     const LitViews views(mesh.mesh, source_.cameras, source_.context);
-    out.mesh_difference = meter.difference(views, source_.best_textures, source_.context);
-    out.difference = meter.difference(views, textures, source_.context);
+    std::vector<OtherTextures> changes;
+    changes.emplace_back();  // none: what the mesh alone costs
+    changes.push_back(std::move(textures));
+    const std::vector<double> differences = source_.whole_pictures().differences(
+        views, source_.best_textures, std::move(changes), source_.context);
+    out.mesh_difference = differences[0];
+    out.difference = differences[1];
     out.glb = std::move(file.glb);
     return out;
   }

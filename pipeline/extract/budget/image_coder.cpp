@@ -27,6 +27,25 @@ std::vector<TextureCoding> ImageCoder::codings(std::size_t image) const {
   return out;
 }
 
+std::optional<double> ImageCoder::stored_bytes(std::size_t image) const {
+  const PackageImage& from = source_.image(image);
+  const ExtractImages wanted = source_.request.images;
+  const TextureInfo& info = source_.package.textures().at(from.plane);
+  if (from.alpha_plane || !holds_source(info) ||
+      (wanted != ExtractImages::kAuto && wanted != ExtractImages::kJpeg))
+    return std::nullopt;
+  return static_cast<double>(info.rungs.back().bytes);
+}
+
+void ImageCoder::load_stored(std::size_t image) {
+  if (stored_.contains(image)) return;
+  const PackageImage& from = source_.image(image);
+  const std::size_t last = source_.package.textures().at(from.plane).rungs.size() - 1;
+  JoinedJpeg& joined =
+      stored_.emplace(image, JoinedJpeg(source_.package, from.plane, last, source_.context)).first->second;
+  joined.flatten(shown_texels(source_, image, joined.width_px(), joined.height_px()));
+}
+
 /// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes
 /// allow: measured on lossless textures the best is .12 at half a texel per pixel, more with fewer.
 float ImageCoder::sharpening(std::size_t image, double share) const {
@@ -51,16 +70,19 @@ const Pixels& ImageCoder::texels(std::size_t image, int step) {
 
 FileImageData ImageCoder::encoded(std::size_t image, const Pixels& pixels, const TextureCoding& coding,
                                   double quality, bool quick) const {
+  if (coding.stored) return {FileImage::kJpeg, stored_.at(image).file(quality)};
   return {coding.format, encode_image(pixels, {coding.format, quality, !source_.image(image).colours, quick,
                                                coding.full_chroma})};
 }
 
-void ImageCoder::show(std::size_t image, const FileImageData& file, std::vector<RenderTexture>& textures,
-                      const RunContext& context) const {
+OtherTextures ImageCoder::shown_by(std::size_t image, const FileImageData& file,
+                                   const RunContext& context) const {
+  OtherTextures out;
   for (std::size_t t = 0; t < source_.shown.size(); ++t)
     if (source_.shown[t].image == image)
-      textures[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})),
-                                   source_.shown[t].srgb, 0, context);
+      out[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})), source_.shown[t].srgb, 0,
+                              context);
+  return out;
 }
 
 }  // namespace texmesh

@@ -29,6 +29,18 @@ LitCamera window_at(const Visibility& view, std::size_t pixel, std::uint32_t sid
   return out;
 }
 
+using Materials = std::vector<RenderMaterial>;
+
+/// The materials with slots that read other textures: place[t] instead of t, where it is not negative.
+Materials with_textures(Materials materials, const std::vector<std::int32_t>& place) {
+  for (RenderMaterial& m : materials)
+    for (TextureSlot& slot : m.textures) {
+      const std::int32_t other = slot.texture < 0 ? -1 : place[static_cast<std::size_t>(slot.texture)];
+      if (other >= 0) slot.texture = other;
+    }
+  return materials;
+}
+
 }  // namespace
 
 std::vector<LitCamera> cameras_around(const BoundingSphere& bounds, int count, std::uint32_t side_px) {
@@ -57,6 +69,14 @@ Picture LitViews::picture(std::size_t view, const std::vector<RenderTexture>& te
                           const RenderEnvironment& environment, const RunContext& context) const {
   return shade(render_scene(mesh_->mesh, mesh_->materials, mesh_->texture_count), views_[view], textures,
                environment, context);
+}
+
+std::vector<Picture> LitViews::pictures(std::size_t view, const std::vector<const Materials*>& materials,
+                                        const std::vector<RenderTexture>& textures,
+                                        const RenderEnvironment& environment,
+                                        const RunContext& context) const {
+  return shade_variants(render_scene(mesh_->mesh, mesh_->materials, textures.size()), views_[view], materials,
+                        textures, environment, context);
 }
 
 std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint32_t side_px) {
@@ -104,6 +124,33 @@ double LitMeter::difference(const LitViews& views, const std::vector<RenderTextu
   double sum = 0;
   for (std::size_t v = 0; v < parts.size(); ++v) sum += weights_[v] * parts[v];
   return sum;
+}
+
+std::vector<double> LitMeter::differences(const LitViews& views, const std::vector<RenderTexture>& textures,
+                                          std::vector<OtherTextures>&& changes,
+                                          const RunContext& context) const {
+  std::vector<RenderTexture> all = textures;
+  // First the one that most textures of the others are of: they take over what was found of it.
+  std::vector<Materials> materials(1, views.mesh().materials);
+  for (OtherTextures& change : changes) {
+    std::vector<std::int32_t> place(textures.size(), -1);
+    for (auto& [t, texture] : change) {
+      place.at(t) = static_cast<std::int32_t>(all.size());
+      all.push_back(std::move(texture));
+    }
+    materials.push_back(with_textures(views.mesh().materials, place));
+  }
+  std::vector<const Materials*> lists;
+  for (const Materials& m : materials) lists.push_back(&m);
+  std::vector<double> sums(changes.size());
+  for (std::size_t v = 0; v < reference_.size(); ++v) {
+    const std::vector<Picture> pictures = views.pictures(v, lists, all, environment_, context);
+    parallel_for(context, sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k)
+        sums[k] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures[k + 1]));
+    });
+  }
+  return sums;
 }
 
 }  // namespace texmesh

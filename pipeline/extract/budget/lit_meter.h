@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "format/base/box.h"
@@ -34,8 +35,14 @@ class LitViews {
   std::size_t count() const { return views_.size(); }
   std::uint64_t covered_px(std::size_t view) const;
   const Visibility& visibility(std::size_t view) const { return views_[view]; }
+  const LitMesh& mesh() const { return *mesh_; }
   Picture picture(std::size_t view, const std::vector<RenderTexture>& textures,
                   const RenderEnvironment& environment, const RunContext& context) const;
+  /// One per list of materials, which differ from the mesh's in the textures of their slots alone.
+  std::vector<Picture> pictures(std::size_t view,
+                                const std::vector<const std::vector<RenderMaterial>*>& materials,
+                                const std::vector<RenderTexture>& textures,
+                                const RenderEnvironment& environment, const RunContext& context) const;
 
  private:
   const LitMesh* mesh_;
@@ -45,6 +52,9 @@ class LitViews {
 /// Parts of the pictures as they were taken, `per_view` of each view: squares of `side_px` around pixels that
 /// show the mesh, spread over all that do. Their pixels are as large as those of the pictures.
 std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint32_t side_px);
+
+/// Textures that stand for others, by the place of those in the list.
+using OtherTextures = std::map<std::size_t, RenderTexture>;
 
 /// Mean FLIP between lit pictures (stages/render, the studio's light) over the pixels that show the object;
 /// all pictures count by the pixels that the reference covers there.
@@ -56,6 +66,9 @@ class LitMeter {
   /// 0 = equal. `views` are of the same cameras. Same bits for any number of threads.
   double difference(const LitViews& views, const std::vector<RenderTexture>& textures,
                     const RunContext& context) const;
+  /// The same of each of several changes of the textures, all pictures of a view at once.
+  std::vector<double> differences(const LitViews& views, const std::vector<RenderTexture>& textures,
+                                  std::vector<OtherTextures>&& changes, const RunContext& context) const;
 
  private:
   const RenderEnvironment& environment_;

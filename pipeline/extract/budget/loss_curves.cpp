@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "pipeline/extract/budget/quality_search.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh {
@@ -16,6 +17,8 @@ constexpr double kFewBytes = 16000;                    // of an image: other cod
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
+constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
+constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
 
 /// Files that lie on the lower convex border, by rising bytes.
 std::vector<CodedImage> convex(std::vector<CodedImage> files) {
@@ -85,6 +88,13 @@ class LossCurves::Trials {
       if (same(c.plan.coding, c.plan.share, c.plan.quality)) return;
     if (likely(bounded, quality) < 1.1 * bytes_) list_.push_back({image_, bounded, coding, quality});
   }
+  /// The source's own coefficients, and some less of them, where they are not far from `chosen` bytes.
+  void add_stored(double stored_bytes, double chosen_bytes) {
+    const TextureCoding stored{FileImage::kJpeg, false, true};
+    if (stored_bytes < 1.1 * bytes_) list_.push_back({image_, 0, stored, kHighestQuality});
+    if (stored_bytes < kFarAbove * chosen_bytes)
+      for (const double quality : {80.0, 92.0}) list_.push_back({image_, 0, stored, quality});
+  }
   void append_to(std::vector<Trial>& all) const { all.insert(all.end(), list_.begin(), list_.end()); }
 
  private:
@@ -96,25 +106,36 @@ class LossCurves::Trials {
 };
 
 void LossCurves::render(const std::vector<Trial>& trials) {
+  for (std::size_t first = 0; first < trials.size(); first += kTrialsAtOnce)
+    render_part({trials.data() + first, std::min(kTrialsAtOnce, trials.size() - first)});
+}
+
+void LossCurves::render_part(std::span<const Trial> trials) {
   std::vector<CodedImage> found(trials.size());
+  std::vector<OtherTextures> textures(trials.size());
   std::vector<const Pixels*> pixels;
-  for (const Trial& t : trials) pixels.push_back(&coder_.texels(t.image, t.step));
+  static const Pixels none;
+  for (const Trial& t : trials) {
+    if (t.coding.stored) coder_.load_stored(t.image);
+    pixels.push_back(t.coding.stored ? &none : &coder_.texels(t.image, t.step));
+  }
   RunContext serial = source_.context;
   serial.threads = 1;
-  parallel_for(source_.context, trials.size(), 4, [&](std::size_t begin, std::size_t end) {
-    std::vector<RenderTexture> textures = source_.best_textures;
+  parallel_for(source_.context, trials.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const Trial& t = trials[k];
       const FileImageData file = coder_.encoded(t.image, *pixels[k], t.coding, t.quality, true);
-      coder_.show(t.image, file, textures, serial);
+      textures[k] = coder_.shown_by(t.image, file, serial);
       found[k] = {{t.coding, size_step(t.step), t.quality},
-                  static_cast<double>((file.bytes.size() + 3) / 4 * 4),
-                  joined(source_.window_meter->difference(*source_.finest_windows, textures, serial))};
-      for (std::size_t s = 0; s < source_.shown.size(); ++s)
-        if (source_.shown[s].image == t.image) textures[s] = source_.best_textures[s];
+                  static_cast<double>((file.bytes.size() + 3) / 4 * 4)};
     }
   });
-  for (std::size_t k = 0; k < trials.size(); ++k) seen_[trials[k].image].push_back(found[k]);
+  const std::vector<double> losses = source_.window_meter->differences(
+      *source_.finest_windows, source_.best_textures, std::move(textures), source_.context);
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    found[k].loss = joined(losses[k]);
+    seen_[trials[k].image].push_back(found[k]);
+  }
 }
 
 double LossCurves::likely_bytes(std::size_t image, double bytes) const {
@@ -186,6 +207,7 @@ std::vector<LossCurves::Trial> LossCurves::trials_around(const Allocation& chose
       trials.add(middle, codings[k], kWebpQuality);
       trials.add(middle + 2, codings[k], kWebpQuality);
     }
+    if (const auto stored = coder_.stored_bytes(i)) trials.add_stored(*stored, chosen.images[i].bytes);
     trials.append_to(out);
   }
   return out;

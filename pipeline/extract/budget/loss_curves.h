@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "pipeline/extract/budget/image_coder.h"
@@ -46,6 +47,7 @@ class LossCurves {
   /// The trials that are of use and new.
   class Trials;
   void render(const std::vector<Trial>& trials);
+  void render_part(std::span<const Trial> trials);
   void find_curves();
   double likely_bytes(std::size_t image, double bytes) const;
   std::vector<Trial> first_trials(double bytes) const;

@@ -42,8 +42,8 @@ DracoSteps MeshCandidates::steps_of(const MeshKey& key) const {
 }
 
 std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, const MeshKey& key) const {
-  auto file = std::make_unique<StandaloneGlb>(scale_file(source_.package, scale, source_.context,
-                                                         StreamedNormals::kStreamed));
+  auto file = std::make_unique<StandaloneGlb>(
+      scale_file(source_.package, scale, source_.context, StreamedNormals::kStreamed));
   const bool lit_anew = scale > 0 && !source_.light.places.empty();
   if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
     file->recode(steps_of(key), lit_anew ? &source_.light : nullptr, source_.context);

@@ -48,8 +48,8 @@ struct Extracted {
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
   int views = 0;
   std::uint32_t side_px = 0;
-  /// With `bytes`: whether the file has at most `bytes` and at least 98 % of them. If not, it is the nearest
-  /// that the package can give.
+  /// With `bytes`: whether the file has at most `bytes`, and at least 98 % of them or all that the package
+  /// has of the source. If not, it is the nearest that the package can give.
   bool within = true;
   std::vector<std::string> notes;
 };

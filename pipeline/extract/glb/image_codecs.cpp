@@ -4,45 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include "format/base/errors.h"
+#include "pipeline/extract/glb/jpeg_writer.h"
 #include "stages/image/png_writer.h"
-#include "stages/jpeg/jpeg_guard.h"
 
 namespace texmesh {
 namespace {
 
 [[noreturn]] void fail(std::string expected, std::string found) {
   throw StageError("extract", "image", std::move(expected), std::move(found));
-}
-
-/// libjpeg's compressor; everything it owns is freed whatever happens.
-struct JpegWriter {
-  jpeg_compress_struct info{};
-  JpegErrors errors;
-  unsigned char* data = nullptr;  // of jpeg_mem_dest, which allocates by malloc
-  unsigned long size = 0;
-
-  JpegWriter() {
-    info.err = &errors.base;
-    if (!jpeg_guarded(errors, [this] { jpeg_create_compress(&info); })) fail("a JPEG coder", errors.message);
-  }
-  ~JpegWriter() {
-    jpeg_destroy_compress(&info);
-    std::free(data);
-  }
-  JpegWriter(const JpegWriter&) = delete;
-  JpegWriter& operator=(const JpegWriter&) = delete;
-};
-
-/// Steps of an 8 x 8 block for pictures of models, where textures are shown smaller, turned and filtered:
-/// what is coarse in a block shows everywhere, what is fine hardly. 4 at quality 50 and rising with the
-/// square of the frequency, the same for chroma. At equal bytes FLIP was 2 % (turtle) to 33 % (yurt) less
-/// than with libjpeg's tables.
-double step_of(std::size_t row, std::size_t column) {
-  return 4 * (1 + static_cast<double>(row * row + column * column));
 }
 
 /// Where a step is rounded up. The same for all of them, many would change at one quality, and the bytes with
@@ -53,18 +25,18 @@ double rounding_of(std::size_t i) {
   return 0.2 + 0.6 * (spread - std::floor(spread));
 }
 
-/// Qualities as libjpeg's, but they need not be whole: whole ones are some percent of bytes apart.
+std::uint16_t step_of(double step, double quality, double rounding) {
+  return static_cast<std::uint16_t>(
+      std::clamp(std::floor(step * percent_of_steps(quality) / 100 + rounding), 1.0, 255.0));
+}
+
 void set_quality(jpeg_compress_struct& info, const ImageCoding& coding) {
   const double quality = std::clamp(coding.quality, 1.0, 100.0);
-  const double percent = quality < 50 ? 5000 / quality : 200 - 2 * quality;
   jpeg_set_linear_quality(&info, 100, TRUE);
   for (JQUANT_TBL* table : info.quant_tbl_ptrs)
-    for (std::size_t i = 0; table && i < DCTSIZE2; ++i) {
-      const double step = coding.full_chroma ? step_of(i / DCTSIZE, i % DCTSIZE) : table->quantval[i];
-      const double round = coding.full_chroma ? rounding_of(i) : 0.5;
+    for (std::size_t i = 0; table && i < DCTSIZE2; ++i)
       table->quantval[i] =
-          static_cast<UINT16>(std::clamp(std::floor(step * percent / 100 + round), 1.0, 255.0));
-    }
+          coding.full_chroma ? texture_step(i, quality) : step_of(table->quantval[i], quality, 0.5);
 }
 
 void set_up_jpeg(jpeg_compress_struct& info, const Pixels& pixels, const ImageCoding& coding) {
@@ -98,7 +70,7 @@ std::vector<std::uint8_t> encode_jpeg_file(const Pixels& pixels, const ImageCodi
     jpeg_finish_compress(&info);
   });
   if (!ok) fail("an image that JPEG can hold", writer.errors.message);
-  return {writer.data, writer.data + writer.size};
+  return writer.file();
 }
 
 struct WebpWriter {
@@ -149,6 +121,13 @@ std::vector<std::uint8_t> encode_webp_file(const Pixels& pixels, const ImageCodi
 }
 
 }  // namespace
+
+double percent_of_steps(double quality) { return quality < 50 ? 5000 / quality : 200 - 2 * quality; }
+
+std::uint16_t texture_step(std::size_t i, double quality) {
+  const std::size_t row = i / DCTSIZE, column = i % DCTSIZE;
+  return step_of(4 * (1 + static_cast<double>(row * row + column * column)), quality, rounding_of(i));
+}
 
 const char* mime_type_of(FileImage format) {
   if (format == FileImage::kWebp) return "image/webp";

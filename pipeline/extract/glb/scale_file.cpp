@@ -25,7 +25,7 @@ Mesh mesh_at(SplitStreamReader& reader, int scale, std::span<const std::uint8_t>
   return split_model(reader.head(), reader.mesh());
 }
 
-void light_as(const Mesh& finest, Mesh& mesh, const RunContext& context) {
+void fit_to_finest(const Mesh& finest, Mesh& mesh, const RunContext& context) {
   if (mesh.normals.empty()) return;
   std::vector<Vec3d> points;
   for (const std::uint32_t p : mesh.wedge_position) points.push_back(to_double(mesh.positions[p]));
@@ -51,7 +51,7 @@ StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& co
   const Bytes stream = fitted ? package.entry(kSplitStreamPath) : package.split_prefix(scale);
   SplitStreamReader reader(read_split_head(stream));
   Mesh mesh = mesh_at(reader, scale, stream);
-  if (fitted) light_as(mesh_at(reader, 0, stream), mesh, context);
+  if (fitted) fit_to_finest(mesh_at(reader, 0, stream), mesh, context);
   ScalesOptions options;
   options.mesh_codec = first.codec();
   first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale)});

@@ -11,9 +11,9 @@ namespace texmesh {
 /// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them.
 enum class StreamedNormals : std::uint8_t { kFitted, kStreamed };
 
-/// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream gets
-/// materials, images and node names of the coarsest scale's GLB, and that file's mesh codec. InputError for
-/// a scale that is not there; FormatError when the package is damaged. Same result for any thread count.
+/// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream
+/// gets materials, images and node names of the coarsest scale's GLB, and that file's mesh codec. InputError
+/// for a scale that is not there; FormatError when the package is damaged. Same result for any thread count.
 StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& context,
                          StreamedNormals normals = StreamedNormals::kFitted);
 

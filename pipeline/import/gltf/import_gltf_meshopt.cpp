@@ -16,11 +16,10 @@ void check_layout(const Source& source, const std::string& place, std::uint64_t 
     return std::to_string(count) + " elements of " + std::to_string(stride) + " bytes";
   };
   if (mode == MeshoptMode::kAttributes) {
-    const bool fits = filter == MeshoptFilter::kOctahedral || filter == MeshoptFilter::kColour
-                          ? stride == 4 || stride == 8
-                      : filter == MeshoptFilter::kQuaternion
-                          ? stride == 8
-                          : stride % 4 == 0 && stride >= 4 && stride <= 256;
+    const bool fits =
+        filter == MeshoptFilter::kOctahedral || filter == MeshoptFilter::kColour ? stride == 4 || stride == 8
+        : filter == MeshoptFilter::kQuaternion                                   ? stride == 8
+                                               : stride % 4 == 0 && stride >= 4 && stride <= 256;
     if (!fits) source.fail(place, "a byteStride that mode and filter allow", found());
     return;
   }
@@ -33,13 +32,15 @@ void check_layout(const Source& source, const std::string& place, std::uint64_t 
 /// out before anything is allocated. Attributes: 2 bits per 16 bytes of one column; triangles and
 /// indices: a byte each.
 std::uint64_t fewest_bytes(ByteSpan data, std::uint64_t count, std::uint64_t stride, MeshoptMode mode) {
-  if (mode == MeshoptMode::kAttributes && is_attributes_v1(data)) return fewest_attribute_bytes_v1(count, stride);
+  if (mode == MeshoptMode::kAttributes && is_attributes_v1(data))
+    return fewest_attribute_bytes_v1(count, stride);
   if (mode == MeshoptMode::kAttributes) return count / 64 * stride;
   return mode == MeshoptMode::kTriangles ? count / 3 : count;
 }
 
-// The filters are those of EXT_meshopt_compression and KHR_meshopt_compression, in scalar code: meshoptimizer's own use _mm_rsqrt_ps,
-// whose last bits differ between processors, and convert what hostile data makes infinite.
+// The filters are those of EXT_meshopt_compression and KHR_meshopt_compression, in scalar code:
+// meshoptimizer's own use _mm_rsqrt_ps, whose last bits differ between processors, and convert what hostile
+// data makes infinite.
 
 template <class T>
 T rounded(float value, float limit) {
@@ -91,8 +92,8 @@ void decode_exponential(std::uint8_t* at) {
   std::memcpy(at, &value, sizeof value);
 }
 
-/// Luma, two differences of colours and alpha, all of as many bits as alpha's highest one says: that bit is no
-/// part of alpha, which has one bit less than the others.
+/// Luma, two differences of colours and alpha, all of as many bits as alpha's highest one says: that bit is
+/// no part of alpha, which has one bit less than the others.
 template <class Unsigned, class Signed>
 void decode_colour(std::uint8_t* at) {
   constexpr float kLargest = std::numeric_limits<Unsigned>::max();

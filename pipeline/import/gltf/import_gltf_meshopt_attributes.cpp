@@ -75,8 +75,8 @@ T unzigzag(T v) {
   return static_cast<T>((v >> 1) ^ static_cast<T>(0 - (v & 1)));
 }
 
-/// Undoes the differences of one word: `bytes` are its four bytes, each of all elements. `last` is the word of
-/// the element before the block, and then that of the block's last one.
+/// Undoes the differences of one word: `bytes` are its four bytes, each of all elements. `last` is the word
+/// of the element before the block, and then that of the block's last one.
 template <class T>
 void add_differences(const std::uint8_t* bytes, std::size_t row, std::size_t count, unsigned mode,
                      std::uint8_t* last, std::uint8_t* out, std::size_t stride) {
@@ -142,7 +142,8 @@ bool is_attributes_v1(ByteSpan data) { return !data.empty() && data[0] == kVersi
 
 std::uint64_t fewest_attribute_bytes_v1(std::uint64_t count, std::uint64_t stride) {
   const std::uint64_t block = block_elements(stride);
-  return 1 + (count / block + (count % block > 0)) * (stride / 4) + std::max<std::uint64_t>(stride + stride / 4, kLeastTail);
+  return 1 + (count / block + (count % block > 0)) * (stride / 4) +
+         std::max<std::uint64_t>(stride + stride / 4, kLeastTail);
 }
 
 bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride,

@@ -100,9 +100,10 @@ std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string
 bool is_attributes_v1(ByteSpan data);
 /// Fewest bytes that so many elements take.
 std::uint64_t fewest_attribute_bytes_v1(std::uint64_t count, std::uint64_t stride);
-/// Fills `out`, which has count * stride bytes; `stride` is a multiple of 4 from 4 to 256. False when the data
-/// are broken.
-bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride, std::vector<std::uint8_t>& out);
+/// Fills `out`, which has count * stride bytes; `stride` is a multiple of 4 from 4 to 256. False when the
+/// data are broken.
+bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride,
+                          std::vector<std::uint8_t>& out);
 
 // import_gltf_accessors.cpp
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "format/container/layout.h"
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
@@ -72,7 +74,7 @@ Json summary_json(PackageReader& p) {
                         {"channels", t.channels},
                         {"fragments", stored_fragments(p.tables().planes[k])},
                         {"rungs", t.rungs.size()}});
-    if (t.lossless) textures.back()["lossless"] = true;
+    if (t.source_rung) textures.back()["source_rung"] = true;
     if (!t.source_extension.empty()) textures.back()["source"] = t.source.path;
   }
   const Provenance provenance = read_provenance(p.entry(p.manifest().provenance));
@@ -257,9 +259,10 @@ Json entries_json(PackageReader& p) {
   Json list = Json::array();
   for (const ContainerEntry& e : p.store().list())
     if (e.path == kManifestPath) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(p.id())));
+  std::vector<EntryRef> entries = p.index();
   const EntryRef& index = p.manifest().index;
-  list.push_back(entry_json(index.path, index.offset, index.bytes, to_hex(index.digest)));
-  for (const EntryRef& e : p.index()) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
+  entries.insert(std::ranges::upper_bound(entries, index.offset, {}, &EntryRef::offset), index);
+  for (const EntryRef& e : entries) list.push_back(entry_json(e.path, e.offset, e.bytes, to_hex(e.digest)));
   return {{"entries", list}};
 }
 

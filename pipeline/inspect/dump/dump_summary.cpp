@@ -130,17 +130,19 @@ std::string options_text(const Provenance& provenance) {
 
 std::string scales_text(PackageReader& p) {
   TextTable table;
-  for (const char* header : {"scale", "triangles", "vertices", "kB", "from", "major", "max error", "rms error",
-                             "p95 [%]", "p99 [%]", "flip [px]", "jnd [px]", "error [px]", "edge [px]"})
+  for (const char* header :
+       {"scale", "triangles", "vertices", "kB", "from", "major", "max error", "rms error", "p95 [%]",
+        "p99 [%]", "flip [px]", "jnd [px]", "error [px]", "edge [px]"})
     table.column(header);
   std::string floors;
   for (const ManifestScale& s : p.manifest().scales)
     if (!s.floor.empty()) floors += fmt::format("S_{} is no coarser: {}\n", s.scale, printable(s.floor));
   for (const ManifestScale& s : p.manifest().scales)
     table.row({fmt::format("S_{}", s.scale), grouped(s.triangles), grouped(s.vertices),
-               kilobytes(s.glb.bytes), s.has_glb() ? "file" : "stream", s.major ? "yes" : "", shortest(s.error_max), shortest(s.error_rms),
-               percent(s.p95, 2), percent(s.p99, 2), pixels(s.display_px_flip), pixels(s.display_px_jnd),
-               pixels(s.display_px_error), pixels(s.display_px_edge)});
+               kilobytes(s.glb.bytes), s.has_glb() ? "file" : "stream", s.major ? "yes" : "",
+               shortest(s.error_max), shortest(s.error_rms), percent(s.p95, 2), percent(s.p99, 2),
+               pixels(s.display_px_flip), pixels(s.display_px_jnd), pixels(s.display_px_error),
+               pixels(s.display_px_edge)});
   return "scales (errors in object units; px = displayed height up to which the scale is enough, by lit "
          "pictures, by the\n"
          "just-noticeable difference, by an error of one pixel, by its edges)\n" +
@@ -178,10 +180,9 @@ std::string summary_text(PackageReader& p) {
   if (m.poster)
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
-  s += fmt::format(
-      "start     {} bytes from byte 0 show the object{}\n\n", grouped(start_bytes(m)),
-      start_bytes(m) <= kStartBytes ? ": one request of 64 KiB does"
-                                    : "; a client's first request, of 64 KiB, does not");
+  s += fmt::format("start     {} bytes from byte 0 show the object{}\n\n", grouped(start_bytes(m)),
+                   start_bytes(m) <= kStartBytes ? ": one request of 64 KiB does"
+                                                 : "; a client's first request, of 64 KiB, does not");
   return s + scales_text(p) + "\n" + stream_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" +
          kinds_text(kinds) + "\n" + options_text(provenance);
 }

@@ -115,6 +115,7 @@ std::string groups_text(const QualityTable& q) {
       const TextureLosses& t = group.sizes[i];
       for (std::size_t k = 0; k < t.texel_dssim.size(); ++k)
         add(group, q.sizes_px[i], {"coded", fraction(t.texel_dssim[k])}, t.coded, k);
+      add(group, q.sizes_px[i], {"previews", ""}, t.preview, 0);
       for (std::size_t l = 0; l < t.coarser.size(); ++l)
         add(group, q.sizes_px[i], {fmt::format("{} mips coarser", l + 1), ""}, t.coarser, l);
     }
@@ -188,7 +189,7 @@ std::string ladder_text(PackageReader& p) {
                  texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
     const TextureInfo& info = p.textures()[k];
     s += plane_title(info, k) + table.text();
-    if (info.lossless) s += "  the last rung holds the source's coefficients: lossless\n";
+    if (info.source_rung) s += "  the last rung holds the source's coefficients\n";
     if (!info.source_extension.empty())
       s += fmt::format("  {}: the source as it was, {} B{}\n", info.source.path, info.source.bytes,
                        info.source_colours ? "" : ", whose colours were converted for this plane");

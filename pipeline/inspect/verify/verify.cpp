@@ -22,7 +22,7 @@ class Verifier {
   VerifyReport run() {
     store_.list_entries();
     if (read_bootstrap() && read_index_entry()) {
-      store_.check_entry_set(package_.index);
+      store_.check_entry_set(package_.index, package_.manifest.index);
       check_manifest(package_.manifest, findings_);
       check_references(package_.manifest, package_.index, findings_);
       read_documents();

@@ -47,8 +47,8 @@ void check_about(const Manifest& manifest, const About& about, Findings& finding
 void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& textures,
                       const Provenance& provenance, Findings& findings);
 
-/// A GLB and what manifest and index say about it and about the previews that it shows. Returns its positions,
-/// sorted; none when the GLB is broken. Textures without refs have not been found in the index.
+/// A GLB and what manifest and index say about it and about the previews that it shows. Returns its
+/// positions, sorted; none when the GLB is broken. Textures without refs have not been found in the index.
 std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
                               Findings& findings);

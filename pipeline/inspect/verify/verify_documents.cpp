@@ -167,9 +167,8 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     const std::string name = rungs_option(textures[k]);
     const auto rungs = option("ladder", name.c_str());
     if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
+    if (textures[k].source_rung) continue;  // its qualities follow from the source
     for (const int q : textures[k].rung_quality) {
-      // No option asks for the rung without loss; one of 100 below it has made room.
-      if (textures[k].lossless && q >= kLosslessQuality - 1) continue;
       findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), "provenance", kProvenancePath,
                        "/options/ladder/" + name,
                        "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());

@@ -69,9 +69,10 @@ void CheckedStore::check_content_credential(const ContainerEntry& entry) {
                     std::to_string(entry.bytes));
 }
 
-void CheckedStore::check_entry_set(const std::vector<EntryRef>& index) {
+void CheckedStore::check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry) {
   if (listed_.empty()) return;  // "container" says why
-  std::vector<std::string> named{kManifestPath, kIndexPath};
+  index.insert(std::ranges::upper_bound(index, index_entry.offset, {}, &EntryRef::offset), index_entry);
+  std::vector<std::string> named{kManifestPath};
   for (const EntryRef& e : index) named.push_back(e.path);
   for (const std::string& path : named)
     findings_.require(contains(path), "entry-set", path, "", "an entry of the package, as the index says",

@@ -25,7 +25,7 @@ class CheckedStore {
   /// FormatError when the bytes are not there.
   Bytes read(const EntryRef& ref);
   /// The index names exactly what is there, in the order that the format prescribes.
-  void check_entry_set(const std::vector<EntryRef>& index);
+  void check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry);
 
   PackageStore& store() { return store_; }
   const std::vector<ContainerEntry>& listed() const { return listed_; }

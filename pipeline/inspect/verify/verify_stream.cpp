@@ -25,7 +25,8 @@ void check_head(const Manifest& m, std::span<const std::uint8_t> bytes, const Sp
 void check_scale(const ManifestScale& scale, const SplitScale& s, std::span<const std::uint8_t> stream,
                  std::uint64_t prefix_bytes, Findings& findings) {
   const std::string place = "scale " + std::to_string(s.scale);
-  findings.require_equal(scale.triangles, s.triangles, "split-stream", kSplitStreamPath, place + ", triangles");
+  findings.require_equal(scale.triangles, s.triangles, "split-stream", kSplitStreamPath,
+                         place + ", triangles");
   if (scale.has_glb()) return;
   findings.require_equal(scale.vertices, s.wedges, "split-stream", kSplitStreamPath, place + ", vertices");
   if (!findings.require_equal(scale.glb.bytes, prefix_bytes, "reference", kManifestPath,

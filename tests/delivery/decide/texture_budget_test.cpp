@@ -28,8 +28,9 @@ PackageReader open_pair(float normal_part, float exponent = 1) {
     parts.streams[to] = parts.streams[from];
   parts.manifest.plane_count = 2;
   parts.quality.exponent = exponent;
-  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), {}};
-  const TextureLosses normal{{0.0625f, 0.5f}, losses({0.05f * normal_part, 0.4f * normal_part}), {}};
+  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), {}};
+  const TextureLosses normal{
+      {0.0625f, 0.5f}, losses({0.05f * normal_part, 0.4f * normal_part}), losses({0.4f * normal_part}), {}};
   parts.quality.groups = {{PlaneGroup::kColour, {colour}}, {PlaneGroup::kNormal, {normal}}};
   return PackageReader(open_container(memory_source(parts.build())));
 }

@@ -15,7 +15,8 @@ namespace {
 
 using namespace testing;  // the server
 const std::string& package() {
-  static const std::string bytes = text_of(make_package(2, 80000));  // the start is not all of the first picture
+  static const std::string bytes =
+      text_of(make_package(2, 80000));  // the start is not all of the first picture
   return bytes;
 }
 
@@ -82,8 +83,7 @@ TEST(HttpStore, BrokenTransfersAreResumedWhereTheyBroke) {
   EXPECT_GT(read_all(reader), 0u);
   const std::vector<Request> requests = server.requests();
   ASSERT_GE(requests.size(), 2u);
-  EXPECT_EQ(requests[1].last, requests[0].last);
-  EXPECT_GT(requests[1].first, requests[0].first);
+  EXPECT_TRUE(std::ranges::any_of(requests, [](const Request& r) { return r.first == kStartBytes - 10; }));
   for (const Request& r : requests) EXPECT_EQ(r.if_range, "");
 }
 
@@ -111,7 +111,7 @@ TEST(HttpStore, SilentServersAreGivenUp) {
   once.retries = 0;
   RawServer stalls([](const Request& r) {
     const std::string bytes = ranged(package(), r);
-    return Reply{bytes.substr(0, bytes.size() / 2)};  // and then nothing
+    return Reply{bytes.substr(0, 5000)};  // and then nothing
   });
   EXPECT_THROW(PackageReader(open_url(stalls.url("/a.texmesh"), once)), InputError);
   EXPECT_THROW(PackageReader(open_url("http://127.0.0.1:1/a.texmesh", once)), InputError);

@@ -48,8 +48,8 @@ TEST(Layout, StreamingOrder) {
   // The stream is the first of the other meshes.
   EXPECT_EQ(streaming_order({"mesh/s00.glb", "mesh/s09.glb", "mesh/stream.bin", "texture/0/r00.pack",
                              "texture/0/r01.pack", "manifest.json"}),
-            (std::vector<std::string>{"manifest.json", "mesh/s09.glb", "texture/0/r00.pack", "mesh/stream.bin",
-                                      "texture/0/r01.pack", "mesh/s00.glb"}));
+            (std::vector<std::string>{"manifest.json", "mesh/s09.glb", "texture/0/r00.pack",
+                                      "mesh/stream.bin", "texture/0/r01.pack", "mesh/s00.glb"}));
   // Untextured: meshes from coarse to fine.
   EXPECT_EQ(
       streaming_order({"mesh/s00.glb", "mesh/s02.glb", "mesh/s01.glb", "provenance.json", "manifest.json"}),

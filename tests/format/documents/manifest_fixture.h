@@ -21,6 +21,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   m.bounds_min = {-0.12345678901234567, -1.2345678901234567e-5, -9.8765432109876543e-5};
   m.bounds_max = {0.12345678901234567, 1.2345678901234567e-5, 9.8765432109876543e-5};
   m.object_height = 0.24691357802469134;
+  m.surface_area = 0.123457;
   m.jnd = 0.1;
   Sha256 digest{};
   digest.fill(0xab);
@@ -56,6 +57,7 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   m.provenance = {kProvenancePath, far, 4000, digest};
   m.about = {kAboutPath, far, 4000, digest};
   if (long_numbers) m.poster = PosterRef{{kPosterPath, far, 1'000'000, digest}, 4096, 4096};
+  if (long_numbers) m.thesis = EntryRef{kThesisPath, far, 4'000'000, digest};
   if (long_numbers) m.stream = StreamRef{far, 4'000'000'000u, 400'000, digest};
   return m;
 }

@@ -1,5 +1,4 @@
 #include "format/documents/manifest.h"
-#include "format/documents/textures.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +6,7 @@
 
 #include "format/base/errors.h"
 #include "format/container/container.h"
+#include "format/container/layout.h"
 #include "tests/format/documents/manifest_fixture.h"
 
 namespace texmesh {
@@ -107,7 +107,8 @@ TEST(Manifest, FlippedBitsAreRefusedOrStayInRange) {
 
 TEST(Manifest, Versions) {
   EXPECT_EQ(place_after([](Json& j) { j["version"]["minor"] = 7; }), "");
-  EXPECT_EQ(place_after([](Json& j) { j["version"]["major"] = 2; }), "/version/major");
+  EXPECT_EQ(place_after([](Json& j) { j["version"]["major"] = 3; }), "/version/major");
+  EXPECT_EQ(place_after([](Json& j) { j["version"]["major"] = 1; }), "/version/major");
   EXPECT_EQ(place_after([](Json& j) { j["version"]["major"] = 0; }), "/version/major");
   EXPECT_EQ(place_after([](Json& j) { j["format"] = "other"; }), "/format");
   EXPECT_EQ(place_after([](Json& j) { j["requiredFeatures"] = {"x-rays"}; }), "/requiredFeatures/0");
@@ -139,15 +140,33 @@ TEST(Manifest, APosterMayStandInIt) {
   refused([](PosterRef& p) { p.offset = 63; });
 }
 
+TEST(Manifest, OldPackagesAreToBeCompiledAgain) {
+  Json j = Json::parse(write_manifest(make_manifest(3, 2)));
+  j["version"]["major"] = 1;
+  try {
+    read(j.dump());
+    FAIL() << "was read";
+  } catch (const FormatError& e) {
+    EXPECT_EQ(e.found(), "1, which is no longer read: compile the model again");
+  }
+}
+
+TEST(Manifest, TablesOfTheThesisMayStandInIt) {
+  Manifest m = make_manifest(3, 2);
+  EXPECT_FALSE(m.thesis);
+  m.thesis = EntryRef{kThesisPath, 640, 3900, m.quality.digest};
+  EXPECT_EQ(read(write_manifest(m)), m);
+  m.thesis->bytes = 0;
+  EXPECT_THROW(write_manifest(m), FormatError);
+}
+
 TEST(Manifest, EveryFieldIsRequired) {
   const Json whole = Json::parse(write_manifest(make_manifest(3, 2)));
   for (const auto& [name, value] : whole.items()) {
     EXPECT_EQ(place_after([&, n = name](Json& j) { j.erase(n); }), "/" + name);
     if (!value.is_object()) continue;
     for (const auto& [inner, unused] : value.items()) {
-      const bool optional = name == "scales" && inner == "floor";
-      EXPECT_EQ(place_after([&, n = name, i = inner](Json& j) { j[n].erase(i); }),
-                optional ? "" : "/" + name + "/" + inner);
+      EXPECT_EQ(place_after([&, n = name, i = inner](Json& j) { j[n].erase(i); }), "/" + name + "/" + inner);
     }
   }
 }

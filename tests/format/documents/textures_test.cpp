@@ -104,9 +104,9 @@ TEST(Textures, MipsRoundTripAndTheirRulesAreChecked) {
   refused("4", [](Json& j) { j[4]["previewWidthPx"] = 7; });
 }
 
-TEST(Textures, TheLosslessTopRoundTripsAndItsRulesAreChecked) {
+TEST(Textures, TheSourceRungRoundTripsAndItsRulesAreChecked) {
   std::vector<TextureInfo> textures = with_mips();
-  textures[0].lossless = true;
+  textures[0].source_rung = true;
   textures[1].source_extension = "exr";
   textures[1].source_colours = false;
   textures[1].source.path = "source/001.exr";
@@ -123,9 +123,9 @@ TEST(Textures, TheLosslessTopRoundTripsAndItsRulesAreChecked) {
       EXPECT_EQ(e.place(), std::string("/textures/") + place);
     }
   };
-  refused("0/lossless", [](Json& j) { j[0]["lossless"] = 1; });
-  refused("0/lossless", [](Json& j) { j[0]["codec"] = "webp"; });
-  refused("2/lossless", [](Json& j) { j[2]["lossless"] = true; });
+  refused("0/sourceRung", [](Json& j) { j[0]["sourceRung"] = 1; });
+  refused("0/sourceRung", [](Json& j) { j[0]["codec"] = "webp"; });
+  refused("2/sourceRung", [](Json& j) { j[2]["sourceRung"] = true; });
   refused("1/source", [](Json& j) { j[1]["source"] = "../png"; });
   refused("1/sourceColours", [](Json& j) { j[1].erase("sourceColours"); });
   refused("1/sourceColours", [](Json& j) { j[1]["sourceColours"] = "no"; });

@@ -29,7 +29,8 @@ TEST(ThesisTables, RoundTrip) {
   EXPECT_EQ(write_thesis(back.tables), bytes);
   ASSERT_EQ(back.tables.planes.size(), 3u);
   EXPECT_TRUE(back.tables.planes[1].z.empty() && back.tables.planes[1].quality.empty());
-  const PlaneThesis &a = small_thesis().planes[2], &b = back.tables.planes[2];
+  const PlaneThesis a = small_thesis().planes[2];
+  const PlaneThesis& b = back.tables.planes[2];
   EXPECT_EQ(b.model, a.model);
   EXPECT_EQ(b.quality, a.quality);
   EXPECT_EQ(b.total_bytes, a.total_bytes);

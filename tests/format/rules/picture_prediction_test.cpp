@@ -13,8 +13,10 @@ PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 QualityTable make_table(float exponent = 1) {
   QualityTable t{1, {64, 1024}, {0, 4, 8}, {}, {}, exponent, 0};
   t.geometry = {losses({0, 0.125f, 0.25f}), losses({0, 0.25f, 0.5f})};
-  const TextureLosses small{{0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.0625f, 0.125f})};
-  const TextureLosses large{{0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.125f, 0.25f})};
+  const TextureLosses small{
+      {0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.125f}), losses({0.0625f, 0.125f})};
+  const TextureLosses large{
+      {0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.375f}), losses({0.125f, 0.25f})};
   t.groups = {{PlaneGroup::kColour, {small, large}}};
   return t;
 }
@@ -26,15 +28,17 @@ TEST(GroupCurve, GoesThroughTheSamples) {
   EXPECT_NEAR(at64.coded(0.25), 0.125, 1e-12);
   EXPECT_NEAR(at1024.coded(0.25), 0.25, 1e-12);
   EXPECT_NEAR(at64.coded(0.0625), 0.0625, 1e-12) << "half the way in logarithms";
-  EXPECT_EQ(at64.coarser(1), 0.0625);
-  EXPECT_EQ(at64.coarser(1.5), 0.09375);
-  EXPECT_EQ(at64.coarser(3), 0.125) << "the last level's";
+  EXPECT_EQ(at64.coarser({1, 1}), 0.0625);
+  EXPECT_EQ(at64.coarser({1.5, 1.5}), 0.09375);
+  EXPECT_EQ(at64.coarser({3, 3}), 0.125) << "the last level's";
 }
 
 TEST(GroupCurve, NothingLostIsNothing) {
   const GroupCurve curve(make_table(), PlaneGroup::kColour, 300);
   EXPECT_EQ(curve.coded(0), 0);
-  EXPECT_EQ(curve.coarser(0), 0);
+  EXPECT_EQ(curve.coarser({0, 0}), 0);
+  EXPECT_EQ(curve.coarser({-1, -2}), 0) << "finer mips lose nothing";
+  EXPECT_EQ(curve.coded(0, {3, 3}), 0);
 }
 
 TEST(GroupCurve, RisesWithDssimAndLevels) {
@@ -50,8 +54,8 @@ TEST(GroupCurve, RisesWithDssimAndLevels) {
     }
     before = 0;
     for (double level = 0; level < 10; level += 0.125) {
-      EXPECT_GE(curve.coarser(level), before);
-      before = curve.coarser(level);
+      EXPECT_GE(curve.coarser({level, level}), before);
+      before = curve.coarser({level, level});
     }
   }
 }
@@ -59,21 +63,54 @@ TEST(GroupCurve, RisesWithDssimAndLevels) {
 TEST(GroupCurve, HeightsBetweenAreLinearInTheLogarithm) {
   const QualityTable t = make_table();
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coded(0.25), (0.125 + 0.25) / 2, 1e-12);
-  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coarser(1), (0.0625 + 0.125) / 2, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coarser({1, 1}), (0.0625 + 0.125) / 2, 1e-12);
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 8).coded(0.25), 0.125, 1e-12) << "the nearest height";
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 9999).coded(0.25), 0.25, 1e-12);
+}
+
+TEST(GroupCurve, LargerTexelsLoseMore) {
+  const QualityTable t = make_table();
+  constexpr double k = GroupCurve::kLossPerDoubling;
+  const GroupCurve at64(t, PlaneGroup::kColour, 64), between(t, PlaneGroup::kColour, 256);
+  EXPECT_NEAR(at64.coded(0.015625, {1, 1}), k * 0.03125, 1e-12);
+  EXPECT_NEAR(at64.coded(0.015625, {-1, -1}), 0.03125 / k, 1e-12);
+  EXPECT_NEAR(at64.coded(0.015625, {2, 2}), k * k * 0.03125, 1e-12);
+  EXPECT_EQ(at64.coded(0.25, {20, 20}), 1) << "as different as can be";
+  EXPECT_NEAR(between.coded(0.25, {1, 0}), (k * 0.125 + 0.25) / 2, 1e-12) << "each height has its own";
+  EXPECT_NEAR(between.coarser({1, 0}), 0.0625 / 2, 1e-12);
+}
+
+TEST(GroupCurve, PreviewsAreThoseOfTheHeight) {
+  const QualityTable t = make_table();
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kColour, 64).preview(), 0.125);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).preview(), 0.25, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 32).preview(), 0.125 / GroupCurve::kLossPerDoubling, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 2048).preview(), 0.375 * GroupCurve::kLossPerDoubling,
+              1e-12);
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kColour, 1e6).preview(), 1);
+  EXPECT_EQ(GroupCurve(t, PlaneGroup::kNormal, 64).preview(), 1) << "no such group";
+}
+
+TEST(SizesAround, AreTheTablesNearest) {
+  const QualityTable t = make_table();
+  EXPECT_EQ(sizes_around(t, 300), (SizesAround{64, 1024}));
+  EXPECT_EQ(sizes_around(t, 5), (SizesAround{64, 1024}));
+  EXPECT_EQ(sizes_around({}, 300), (SizesAround{1, 1}));
+  QualityTable one = t;
+  one.sizes_px = {64};
+  EXPECT_EQ(sizes_around(one, 300), (SizesAround{64, 64}));
 }
 
 TEST(GroupCurve, GroupsThatTheTableDoesNotHaveLoseTheirTexels) {
   const GroupCurve curve(make_table(), PlaneGroup::kNormal, 300);
   EXPECT_EQ(curve.coded(0.375), 0.375);
   EXPECT_EQ(curve.coded(1.5), 1);
-  EXPECT_EQ(curve.coarser(2), 0);
+  EXPECT_EQ(curve.coarser({2, 2}), 0);
 }
 
 TEST(GroupCurve, OneSampleIsALine) {
   QualityTable t = make_table();
-  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), {}};
+  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), losses({0}), {}};
   const GroupCurve curve(t, PlaneGroup::kColour, 64);
   EXPECT_NEAR(curve.coded(0.25), 0.125, 1e-12);
   EXPECT_NEAR(curve.coded(0.125), 0.0625, 1e-12);

@@ -36,12 +36,12 @@ TEST(GltfAbout, RisingPriority) {
   EXPECT_EQ(a.licence_url, "https://a.b/by");
   EXPECT_EQ(a.description, "of the root");
   EXPECT_EQ(a.capture, "of the scene");
-  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0;
+  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0u;
   EXPECT_EQ(about_of(d).title, "of XMP");
   d["asset"].erase("extensions");
-  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 1;
+  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 1u;
   EXPECT_EQ(about_of(d).title, "of a node");
-  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 7;
+  d["scenes"][1]["extensions"]["KHR_xmp_json_ld"]["packet"] = 7u;
   EXPECT_EQ(about_of(d).title, "of extras");
 }
 
@@ -97,7 +97,7 @@ TEST(GltfAbout, AnythingMayBeShapedWrongly) {
 
 TEST(GltfAbout, WrittenBackAndReadAgain) {
   json d = document();
-  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0;
+  d["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"] = 0u;
   About a = about_of(d);
   ordered_json root = ordered_json::parse(R"({"asset":{"version":"2.0","generator":"texmesh"}})");
   write_gltf_about(a, root);
@@ -116,6 +116,20 @@ TEST(GltfAbout, WrittenBackAndReadAgain) {
   write_gltf_about(a, root);
   EXPECT_EQ(about_of(json::parse(root.dump())).title, "of the museum");
   EXPECT_EQ(root["extensions"]["KHR_xmp_json_ld"]["packets"][0]["dc:title"], "of XMP");
+}
+
+TEST(GltfAbout, WritesOverWhatIsShapedWrongly) {
+  About a = about_of(document());
+  a.metres_per_unit = 2;
+  ordered_json root =
+      ordered_json::parse(R"({"asset":{"extensions":3},"extensions":[],"extensionsUsed":"x","extras":1})");
+  write_gltf_about(a, root);
+  EXPECT_EQ(root["extras"]["texmesh"]["unit"]["metres"], 2);
+  EXPECT_EQ(root["asset"]["extensions"]["KHR_xmp_json_ld"]["packet"], 2);
+  a.source = R"({"asset":3,"xmpPackets":{"a":1}})";
+  EXPECT_NO_THROW(write_gltf_about(a, root));
+  a.source = R"({"xmpPackets":[3,[]],"asset":{"extensions":{"KHR_xmp_json_ld":{"packet":0}}}})";
+  EXPECT_NO_THROW(write_gltf_about(a, root));
 }
 
 TEST(GltfAbout, NothingKnownWritesNothing) {

@@ -62,10 +62,12 @@ TEST_F(CompileAbout, TheCuratorsWordsStandOverTheModels) {
   EXPECT_EQ(about()["creator"], "A. Smith");
   EXPECT_EQ(about()["unit"]["metres"], 0.01);
   EXPECT_FALSE(about().contains("upAxis"));
-  const CommandResult made =
-      compile({"--title", "Tent", "--meta", meta(R"({"title":"-","licence":"cc0-1.0","unit":"mm"})")});
+  const CommandResult made = compile({"--title", "Tent", "--meta",
+                                      meta(R"({"title":"-","licence":"cc0-1.0","unit":"mm","description":")" +
+                                           std::string(10000, 'd') + "\"}")});
   ASSERT_EQ(made.exit_code, 0) << made.errors;
   EXPECT_EQ(about()["title"], "Tent");
+  EXPECT_EQ(about()["description"].get<std::string>().size(), 10000u);
   EXPECT_EQ(about()["licence"], "CC0-1.0");
   EXPECT_EQ(about()["unit"]["metres"], 0.001);
   EXPECT_EQ(about()["source"]["comments"], Json::array({"Author: A. Smith", "unit: cm"}));

@@ -98,105 +98,100 @@ struct Kind {
   std::function<void(GltfBuilder&)> change;
 };
 
-const std::vector<Kind>& kinds() {
-  static const std::vector<Kind> all{
-      {"none", [](GltfBuilder&) {}},
-      {"normal only",
-       [](GltfBuilder& b) {
-         use(b, {{"normalTexture", texture(b, 3)}});
-       }},
-      {"metallic-roughness only",
-       [](GltfBuilder& b) {
-         use(b, {{"pbrMetallicRoughness", {{"metallicRoughnessTexture", texture(b, 3)}}}});
-       }},
-      {"occlusion only",
-       [](GltfBuilder& b) {
-         use(b, {{"occlusionTexture", texture(b, 1)}});
-       }},
-      {"alpha only",
-       [](GltfBuilder& b) {
-         Json m = coloured(texture(b, 2));
-         m["alphaMode"] = "MASK";
-         use(b, m);
-       }},
-      {"emissive only",
-       [](GltfBuilder& b) {
-         use(b, {{"emissiveTexture", texture(b, 3)}, {"emissiveFactor", {1, 1, 1}}});
-       }},
-      {"emission without light",
-       [](GltfBuilder& b) {
-         use(b, {{"emissiveTexture", texture(b, 3)}});
-       }},
-      {"of an extension only",
-       [](GltfBuilder& b) {
-         use(b, {{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatTexture", texture(b, 3)}}}}}});
-       }},
-      {"vertex colours only",
-       [](GltfBuilder& b) {
-         std::vector<float> colours;
-         for (std::size_t v = 0; v < vertices(b); ++v)
-           colours.insert(colours.end(),
-                          {static_cast<float>(v % 3) / 2, 0.5f, static_cast<float>(v % 7) / 6});
-         primitive(b)["attributes"]["COLOR_0"] = b.attribute(colours, "VEC3");
-       }},
-      {"two UV sets",
-       [](GltfBuilder& b) {
-         Json m = full_material(b);
-         m["occlusionTexture"]["texCoord"] = 1;
-         m["normalTexture"]["texCoord"] = 1;
-         use(b, m);
-       }},
-      {"unlit",
-       [](GltfBuilder& b) {
-         Json m = full_material(b);
-         m["extensions"]["KHR_materials_unlit"] = Json::object();
-         use(b, m);
-       }},
-      {"unlit, normal only",
-       [](GltfBuilder& b) {
-         use(b,
-             {{"normalTexture", texture(b, 3)}, {"extensions", {{"KHR_materials_unlit", Json::object()}}}});
-       }},
-      {"several materials",
-       [](GltfBuilder& b) {
-         const Json first = primitive(b);
-         use(b, full_material(b));
-         for (const Json& m : {blended_material(b), Json{{"normalTexture", texture(b, 3)}}, Json::object()}) {
-           Json more = first;
-           more["material"] = b.push("materials", m);
-           const int mesh = b.push("meshes", {{"primitives", {more}}});
-           b.node({{"mesh", mesh}, {"translation", {(kQuads + 1) * mesh, 0, 0}}});
-         }
-       }},
-      {"base colour, normal and data", [](GltfBuilder& b) { use(b, full_material(b)); }},
-      {"textures of 1 px", [](GltfBuilder& b) { use(b, blended_material(b, 1)); }},
-      {"all transparent",
-       [](GltfBuilder& b) {
-         Json m = blended_material(b);
-         m["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 0};
-         use(b, m);
-       }},
-      {"a single triangle",
-       [](GltfBuilder& b) {
-         use(b, full_material(b));
-         primitive(b)["indices"] = b.attribute<std::uint16_t>({0, 1, kQuads + 1}, "SCALAR");
-       }},
-      {"tangents of length 0",
-       [](GltfBuilder& b) {
-         use(b, full_material(b));
-         std::vector<float> normals, tangents(4 * vertices(b), 0.f);
-         for (std::size_t v = 0; v < vertices(b); ++v) normals.insert(normals.end(), {0, 0, 1});
-         primitive(b)["attributes"]["NORMAL"] = b.attribute(normals, "VEC3");
-         primitive(b)["attributes"]["TANGENT"] = b.attribute(tangents, "VEC4");
-       }},
-      {"negative scale of the node",
-       [](GltfBuilder& b) {
-         use(b, full_material(b));
-         b.json["nodes"][0]["scale"] = {-1, 2, 1};
-       }},
-  };
-  return all;
-}
+const std::vector<Kind> kKinds{
+    {"none", [](GltfBuilder&) {}},
+    {"normal only",
+     [](GltfBuilder& b) {
+       use(b, {{"normalTexture", texture(b, 3)}});
+     }},
+    {"metallic-roughness only",
+     [](GltfBuilder& b) {
+       use(b, {{"pbrMetallicRoughness", {{"metallicRoughnessTexture", texture(b, 3)}}}});
+     }},
+    {"occlusion only",
+     [](GltfBuilder& b) {
+       use(b, {{"occlusionTexture", texture(b, 1)}});
+     }},
+    {"alpha only",
+     [](GltfBuilder& b) {
+       Json m = coloured(texture(b, 2));
+       m["alphaMode"] = "MASK";
+       use(b, m);
+     }},
+    {"emissive only",
+     [](GltfBuilder& b) {
+       use(b, {{"emissiveTexture", texture(b, 3)}, {"emissiveFactor", {1, 1, 1}}});
+     }},
+    {"emission without light",
+     [](GltfBuilder& b) {
+       use(b, {{"emissiveTexture", texture(b, 3)}});
+     }},
+    {"of an extension only",
+     [](GltfBuilder& b) {
+       use(b, {{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatTexture", texture(b, 3)}}}}}});
+     }},
+    {"vertex colours only",
+     [](GltfBuilder& b) {
+       std::vector<float> colours;
+       for (std::size_t v = 0; v < vertices(b); ++v)
+         colours.insert(colours.end(), {static_cast<float>(v % 3) / 2, 0.5f, static_cast<float>(v % 7) / 6});
+       primitive(b)["attributes"]["COLOR_0"] = b.attribute(colours, "VEC3");
+     }},
+    {"two UV sets",
+     [](GltfBuilder& b) {
+       Json m = full_material(b);
+       m["occlusionTexture"]["texCoord"] = 1;
+       m["normalTexture"]["texCoord"] = 1;
+       use(b, m);
+     }},
+    {"unlit",
+     [](GltfBuilder& b) {
+       Json m = full_material(b);
+       m["extensions"]["KHR_materials_unlit"] = Json::object();
+       use(b, m);
+     }},
+    {"unlit, normal only",
+     [](GltfBuilder& b) {
+       use(b, {{"normalTexture", texture(b, 3)}, {"extensions", {{"KHR_materials_unlit", Json::object()}}}});
+     }},
+    {"several materials",
+     [](GltfBuilder& b) {
+       const Json first = primitive(b);
+       use(b, full_material(b));
+       for (const Json& m : {blended_material(b), Json{{"normalTexture", texture(b, 3)}}, Json::object()}) {
+         Json more = first;
+         more["material"] = b.push("materials", m);
+         const int mesh = b.push("meshes", {{"primitives", {more}}});
+         b.node({{"mesh", mesh}, {"translation", {(kQuads + 1) * mesh, 0, 0}}});
+       }
+     }},
+    {"base colour, normal and data", [](GltfBuilder& b) { use(b, full_material(b)); }},
+    {"textures of 1 px", [](GltfBuilder& b) { use(b, blended_material(b, 1)); }},
+    {"all transparent",
+     [](GltfBuilder& b) {
+       Json m = blended_material(b);
+       m["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 0};
+       use(b, m);
+     }},
+    {"a single triangle",
+     [](GltfBuilder& b) {
+       use(b, full_material(b));
+       primitive(b)["indices"] = b.attribute<std::uint16_t>({0, 1, kQuads + 1}, "SCALAR");
+     }},
+    {"tangents of length 0",
+     [](GltfBuilder& b) {
+       use(b, full_material(b));
+       std::vector<float> normals, tangents(4 * vertices(b), 0.f);
+       for (std::size_t v = 0; v < vertices(b); ++v) normals.insert(normals.end(), {0, 0, 1});
+       primitive(b)["attributes"]["NORMAL"] = b.attribute(normals, "VEC3");
+       primitive(b)["attributes"]["TANGENT"] = b.attribute(tangents, "VEC4");
+     }},
+    {"negative scale of the node",
+     [](GltfBuilder& b) {
+       use(b, full_material(b));
+       b.json["nodes"][0]["scale"] = {-1, 2, 1};
+     }},
+};
 
 CompileOptions cheap_options() {
   CompileOptions o;
@@ -248,7 +243,7 @@ TEST_P(Materials, CompileIntoSoundPackages) {
 }
 
 TEST(Prediction, WithoutColoursFollowsTheOtherMaps) {
-  for (const Kind& kind : kinds()) {
+  for (const Kind& kind : kKinds) {
     if (kind.name != "normal only" && kind.name != "emissive only") continue;
     const testing::TemporaryFolder folder;
     PackageReader package(open_store(compiled(kind, folder)));
@@ -262,7 +257,7 @@ std::string test_name(const ::testing::TestParamInfo<Kind>& kind) {
   for (const char c : kind.param.name) name += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
   return name;
 }
-INSTANTIATE_TEST_SUITE_P(All, Materials, ::testing::ValuesIn(kinds()), test_name);
+INSTANTIATE_TEST_SUITE_P(All, Materials, ::testing::ValuesIn(kKinds), test_name);
 
 }  // namespace
 }  // namespace texmesh

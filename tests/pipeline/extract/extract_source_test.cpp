@@ -9,6 +9,7 @@
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/extract/extract.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
@@ -22,7 +23,7 @@ using testing::GltfBuilder;
 constexpr int kSide = 8;
 
 /// A bumpy sheet of 0.1 object units a cell with a texture, which a node puts at `place`.
-GltfBuilder sheet(Vec3d place) {
+GltfBuilder sheet(Vec3d place, const Bytes& picture, const std::string& media_type) {
   GltfBuilder b;
   std::vector<float> positions, uvs;
   std::vector<std::uint16_t> indices;
@@ -41,13 +42,15 @@ GltfBuilder sheet(Vec3d place) {
           {"TEXCOORD_0", b.attribute(uvs, "VEC2")}},
          {{"indices", b.attribute(indices, "SCALAR")}, {"material", 0}});
   b.node({{"mesh", 0}, {"name", "sheet"}, {"translation", {place.x, place.y, place.z}}});
-  const Bytes picture =
-      testing::encode_image("png", 64, 64, 3, testing::test_picture(64, 64, 3), OIIO::TypeDesc::UINT8);
-  b.push("images", {{"bufferView", b.view_of(picture)}, {"mimeType", "image/png"}});
+  b.push("images", {{"bufferView", b.view_of(picture)}, {"mimeType", media_type}});
   b.push("textures", {{"source", 0}});
   b.push("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
   return b;
 }
+Bytes picture_file(const char* format) {
+  return testing::encode_image(format, 64, 64, 3, testing::test_picture(64, 64, 3), OIIO::TypeDesc::UINT8);
+}
+GltfBuilder sheet(Vec3d place) { return sheet(place, picture_file("png"), "image/png"); }
 
 class SourceToExtract : public ::testing::Test {
  protected:
@@ -58,6 +61,7 @@ class SourceToExtract : public ::testing::Test {
     request.input = folder_ / "a.glb";
     request.output = folder_ / "a.texmesh";
     request.options.scales.mesh_codec = codec;
+    request.options.ladder.lossless_top = true;
     NullStore store;
     compile_model(request, store, {}, {});
     return request.output;
@@ -157,6 +161,22 @@ TEST_F(SourceToExtract, SamplersAreTheSources) {
     EXPECT_EQ(samplers_of(PackageReader(open_store(package)).scale_glb(0)), b.json["samplers"]);
     for (const auto& [what, request] : every_kind_of_request())
       EXPECT_EQ(samplers_of(extract(package, request)), b.json["samplers"]) << what;
+  }
+}
+
+TEST_F(SourceToExtract, WithBytesEnoughTheMapsAreTheSourcesOwn) {
+  const Bytes source = picture_file("jpg");
+  const Pixels expected = decode_image(probe_image("source", source, {}));
+  const std::string package = compile(sheet({}, source, "image/jpeg"), MeshCodec::kDraco);
+  ExtractRequest whole, bytes;
+  bytes.bytes = 10'000'000, bytes.display_px = 64;
+  for (const ExtractRequest& request : {whole, bytes}) {
+    PackageReader reader(open_store(package));
+    const Extracted e = extract_model(reader, request, {});
+    EXPECT_TRUE(e.within);
+    ASSERT_EQ(e.images.size(), 1u);
+    const Pixels found = decode_image(import(e.glb).images.at(0));
+    EXPECT_EQ(found.data, expected.data);
   }
 }
 

@@ -8,8 +8,8 @@
 #include <map>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"

@@ -7,11 +7,6 @@
 namespace texmesh::testing {
 namespace {
 
-TEST(Html, TextStaysText) {
-  EXPECT_EQ(html_escaped("a<b>&\"c\"'d'"), "a&lt;b&gt;&amp;&quot;c&quot;&#39;d&#39;");
-  EXPECT_EQ(html_escaped("Figürchen"), "Figürchen");
-}
-
 TEST(Html, APageIsWellFormedWhateverItsTitle) {
   const std::string page =
       html_page("</title><script>alert(1)</script>", html_section("a", "A", "<p>x</p>\n"));

@@ -1,5 +1,6 @@
 // Reports of a small package: the page, what it shows, and its folder.
 #include "pipeline/report/report.h"
+#include "pipeline/io/markup.h"
 
 #include <gtest/gtest.h>
 
@@ -72,7 +73,7 @@ TEST(Report, ThePageIsWellFormedAndStandsAlone) {
 
 TEST(Report, TextOfThePackageIsEscaped) {
   const std::string page = page_of(report_of(sample()));
-  EXPECT_NE(page.find("<h1>" + html_escaped(kHostile) + "</h1>"), std::string::npos);
+  EXPECT_NE(page.find("<h1>" + markup_escaped(kHostile) + "</h1>"), std::string::npos);
   EXPECT_EQ(page.find("<img src=//"), std::string::npos);
 }
 
@@ -104,7 +105,7 @@ TEST(Report, SaysWhatTheSwitchSizesAre) {
   const Report failing = report_of(sample(), strict);
   EXPECT_FALSE(failing.holds);
   EXPECT_NE(failing.verdict.find("S_5 at 200 px"), std::string::npos) << failing.verdict;
-  EXPECT_NE(page_of(failing).find(html_escaped(failing.verdict)), std::string::npos);
+  EXPECT_NE(page_of(failing).find(markup_escaped(failing.verdict)), std::string::npos);
 }
 
 TEST(Report, CurvesFallWithBytes) {

@@ -13,6 +13,7 @@
 #include "stages/previews/previews.h"
 #include "stages/study/fragment_study.h"
 #include "stages/zim/zim.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/allocation_curves.h"
 #include "tests/support/fill_curves.h"
 #include "tests/support/made_texture.h"
@@ -93,7 +94,7 @@ TEST(TextureFigures, FreeTexelsAgainstTheBackgroundAtEqualErrorOfWhatIsCovered) 
   const Scene scene = half_covered_atlas();
   const RunContext context = threads(2);
   const auto curve = [&](const std::vector<Pixels>& pixels, Uncovered uncovered) {
-    LadderOptions options;
+    LadderOptions options = testing::all_rungs();
     options.uncovered = uncovered;
     const PackageTables tables =
         build_tables(scene.fragments, pixels, predict_quality(scene.fragments, pixels, {}, context),
@@ -118,11 +119,11 @@ TEST(TextureFigures, AllocationsAgainstOneQualityEverywhereAtEqualLossOfTheSurfa
   const Scene scene = half_covered_atlas();
   const RunContext context = threads(2);
   const auto pixels = filled(scene, context);
-  const testing::Planes planes{build_tables(scene.fragments, pixels,
-                                            predict_quality(scene.fragments, pixels, {}, context),
-                                            encode_ladder(scene.fragments, pixels, {}, {}, {}, context),
-                                            make_previews(scene.fragments, pixels, {}, context), {}, context)
-                                   .tables.planes};
+  const testing::Planes planes{
+      build_tables(scene.fragments, pixels, predict_quality(scene.fragments, pixels, {}, context),
+                   encode_ladder(scene.fragments, pixels, {}, {}, testing::all_rungs(), context),
+                   make_previews(scene.fragments, pixels, {}, context), {}, context)
+          .tables.planes};
   testing::Curve all;
   for (std::size_t r = 0; r < planes.tables[0].rung_count(); ++r) all.push_back(testing::uniform(planes, r));
   const testing::Curve inner(all.begin() + 1, all.end() - 1);

@@ -11,6 +11,7 @@
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/ladder/ladder.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -64,12 +65,12 @@ struct Coded {
   }
 };
 
-Coded code(Codec codec, const Pixels& pixels, bool colour = true) {
+Coded code(Codec codec, const Pixels& pixels, bool apart = false) {
   PlaneCoding plane;
   plane.channels = pixels.channels;
   plane.fragment_width_px = pixels.width_px;
   plane.fragment_height_px = pixels.height_px;
-  plane.colour = colour;
+  plane.apart = apart;
   plane.qualities = {20, 60, 90};
   const auto coder = make_texture_codec(codec, plane);
   const PixelWindow window = window_of(pixels);
@@ -120,10 +121,10 @@ TEST(TextureCodec, JoiningAndSplittingAreInverse) {
 
 TEST(TextureCodec, AProgressiveFilesLastRungIsTheBaselineImage) {
   for (const std::uint32_t channels : {1u, 3u})
-    for (const bool colour : {true, false}) {
+    for (const bool apart : {false, true}) {
       const Pixels pixels = picture(48, 32, channels);
-      const Coded progressive = code(Codec::kJpegProgressive, pixels, colour);
-      const Coded baseline = code(Codec::kJpeg, pixels, colour);
+      const Coded progressive = code(Codec::kJpegProgressive, pixels, apart);
+      const Coded baseline = code(Codec::kJpeg, pixels, apart);
       const Pixels a = decode_fragment_file(Codec::kJpegProgressive,
                                             progressive.file(progressive.rungs.size() - 1), 48 * 32);
       const Pixels b = decode_fragment_file(Codec::kJpeg, baseline.file(baseline.rungs.size() - 1), 48 * 32);
@@ -204,7 +205,7 @@ TEST(TextureCodec, ForeignStreamsAreRefused) {
   EXPECT_THROW(decode_fragment_file(Codec::kWebp, jpeg.file(0), 256), FormatError);
   EXPECT_THROW(decode_fragment_file(Codec::kJpeg, webp.file(0), 256), FormatError);
   EXPECT_THROW(code(Codec::kWebp, picture(16, 16, 1)), StageError);
-  EXPECT_THROW(code(Codec::kWebp, pixels, false), StageError);
+  EXPECT_THROW(code(Codec::kWebp, pixels, true), StageError);
   EXPECT_THROW(code(Codec::kJpeg, picture(16, 16, 2)), StageError);
 }
 
@@ -270,7 +271,7 @@ Plane plane_of(std::uint32_t side, TextureRole role) {
 }
 
 Ladder encode(const Plane& p, LadderMode mode, int threads = 1) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.mode = mode;
   RunContext context;
   context.threads = threads;

@@ -11,6 +11,7 @@
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/ladder/ladder.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -348,7 +349,7 @@ Scene scene() {
 }
 
 Ladder ladder_of(const Scene& s, Uncovered uncovered, int threads = 1) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.uncovered = uncovered;
   RunContext context;
   context.threads = threads;

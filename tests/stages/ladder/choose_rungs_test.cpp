@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 #include "stages/ladder/rung_loss.h"
@@ -14,23 +13,27 @@ namespace {
 
 using testing::Chain;
 using testing::encode;
-using testing::kKeepAll;
 using testing::make_chain;
+using testing::ways_of;
 
-TEST(ChooseRungs, NoiseThatAMipCannotShowLeavesItFewRungs) {
-  const Chain chain = make_chain(true);
-  const Ladder ladder = encode(chain, 0);
-  EXPECT_LT(ladder.planes[1].rungs.size(), 7u);
-  EXPECT_GE(ladder.planes[1].rungs.size(), 1u);
-  EXPECT_EQ(ladder.planes[0].rungs.size(), LadderOptions{}.rungs.size());
+constexpr std::size_t kAll = 10;  // rungs of colours by default
+
+TEST(ChooseRungs, EveryPlaneHasFewerRungsThanAreTriedAndAtLeastOne) {
+  for (const bool noise : {false, true})
+    for (const bool with_mip : {false, true}) {
+      const Ladder ladder = encode(make_chain(noise, with_mip), true);
+      for (const PlaneLadder& plane : ladder.planes) {
+        EXPECT_LT(plane.rungs.size(), kAll);
+        EXPECT_GE(plane.rungs.size(), 1u);
+      }
+    }
 }
 
 TEST(ChooseRungs, KeptRungsAreTheirWholeSelves) {
   const Chain chain = make_chain(false);
-  const Ladder all = encode(chain, kKeepAll), some = encode(chain, 0);
-  std::size_t dropped = 0;
+  const Ladder all = encode(chain, false), some = encode(chain, true);
   for (std::size_t p = 0; p < 2; ++p) {
-    dropped += all.planes[p].rungs.size() - some.planes[p].rungs.size();
+    ASSERT_EQ(all.planes[p].rungs.size(), kAll);
     for (const LadderRung& rung : some.planes[p].rungs) {
       const auto same = std::find_if(all.planes[p].rungs.begin(), all.planes[p].rungs.end(),
                                      [&](const LadderRung& r) { return r.quality == rung.quality; });
@@ -39,43 +42,60 @@ TEST(ChooseRungs, KeptRungsAreTheirWholeSelves) {
       EXPECT_EQ(same->table_stream, rung.table_stream);
     }
   }
-  EXPECT_GT(dropped, 0u);
 }
 
-TEST(ChooseRungs, AMipHasARungThatShowsItWellAndNoneWorseThanThePreview) {
+TEST(ChooseRungs, NoRungIsWorseThanThePreviewOrThanACheaperOne) {
   const Chain chain = make_chain(false);
-  const Ladder ladder = encode(chain, LadderOptions{}.hull_gain);
-  ASSERT_LT(ladder.planes[1].rungs.size(), LadderOptions{}.rungs.size());
-  const auto own = measure_mip(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1],
-                               chain.previews().planes[0].file, RunContext{});
-  ASSERT_EQ(own.size(), ladder.planes[1].rungs.size() + 1);
-  EXPECT_LE(own.back().loss, 0.02);
-  for (std::size_t k = 1; k < own.size(); ++k) EXPECT_LT(own[k].loss, own[0].loss);
-}
-
-TEST(ChooseRungs, ColoursAndDataHaveTheirOwnLimitOfWhatShowsAMipWell) {
-  for (const auto& [role, limit] :
-       {std::pair{TextureRole::kBaseColour, 0.02}, {TextureRole::kNormal, 0.03}}) {
-    Chain chain = make_chain(false);
-    for (TexturePlane& plane : chain.fragments.planes) plane.role = role;
-    const Ladder all = encode(chain, kKeepAll), some = encode(chain, 1e9);
-    const auto own = measure_mip(chain.fragments.planes[1], chain.pixels[1], all.planes[1],
-                                 chain.previews().planes[0].file, RunContext{});
-    std::size_t first = 1;
-    while (first + 1 < own.size() && own[first].loss > limit) ++first;
-    ASSERT_GT(first, 1u);
-    EXPECT_EQ(some.planes[1].rungs.back().quality, all.planes[1].rungs[first - 1].quality);
+  const TextureWays ways = ways_of(chain, encode(chain, true));
+  for (std::size_t k = 0; k < ways.pairs.size(); ++k) {
+    const RungPair& pair = ways.pairs[k];
+    EXPECT_LT(pair.loss[pair.level], ways.preview_loss[pair.level]) << k;
+    if (k == 0 || ways.pairs[k - 1].level != pair.level) continue;
+    EXPECT_LT(ways.pairs[k - 1].bytes, pair.bytes) << k;
+    EXPECT_GT(ways.pairs[k - 1].loss[pair.level], pair.loss[pair.level]) << k;
   }
 }
 
-TEST(ChooseRungs, WithoutMipsNothingIsDropped) {
-  const Chain chain = make_chain(true, false);
-  EXPECT_EQ(encode(chain, 0).planes[0].rungs.size(), LadderOptions{}.rungs.size());
+TEST(ChooseRungs, AMipHasARungThatShowsItWell) {
+  const Chain chain = make_chain(false);
+  EXPECT_LE(ways_of(chain, encode(chain, true)).pairs.back().loss[1], 0.02);
+}
+
+TEST(ChooseRungs, TheSourcesOwnCoefficientsStay) {
+  const Chain chain = make_chain(false);
+  Ladder ladder = encode(chain, false);
+  // Made as bad as a rung can be: nothing but the rule keeps it.
+  ladder.planes[0].source_rung = true;
+  ladder.planes[0].rungs.back().data = ladder.planes[0].rungs[0].data;
+  ladder.planes[0].rungs.back().offset = ladder.planes[0].rungs[0].offset;
+  ladder.planes[0].rungs.back().table_stream = ladder.planes[0].rungs[0].table_stream;
+  const auto kept =
+      choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), RunContext{});
+  EXPECT_EQ(kept[0].back(), kAll - 1);
+  EXPECT_GT(kept[0].size(), 1u);
+}
+
+TEST(ChooseRungs, IncrementalLaddersHaveNoGaps) {
+  Chain chain = make_chain(false);
+  Ladder ladder = encode(chain, false);
+  for (PlaneLadder& plane : ladder.planes) plane.codec = Codec::kJpegProgressive;
+  // What the rungs show does not matter here, only which of them are taken: every file is whole.
+  for (PlaneLadder& plane : ladder.planes) {
+    for (std::size_t r = plane.rungs.size(); r-- > 1;) plane.rungs[r].table_stream.clear();
+    LadderRung whole = plane.rungs[0];
+    for (LadderRung& rung : plane.rungs) rung.data.clear(), rung.offset.assign(whole.offset.size(), 0);
+  }
+  for (const auto& rungs :
+       choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), RunContext{})) {
+    std::vector<std::size_t> want(rungs.size());
+    std::iota(want.begin(), want.end(), std::size_t{0});
+    EXPECT_EQ(rungs, want);
+  }
 }
 
 TEST(ChooseRungs, SameForAnyNumberOfThreads) {
   const Chain chain = make_chain(false);
-  const Ladder one = encode(chain, 0.01, 1), many = encode(chain, 0.01, 8);
+  const Ladder one = encode(chain, true, 1), many = encode(chain, true, 8);
   for (std::size_t p = 0; p < 2; ++p) {
     ASSERT_EQ(one.planes[p].rungs.size(), many.planes[p].rungs.size());
     for (std::size_t r = 0; r < one.planes[p].rungs.size(); ++r)
@@ -89,22 +109,15 @@ TEST(ChooseRungs, APlaneWithoutCoveredFragmentsKeepsARung) {
     std::fill(plane.coverage.begin(), plane.coverage.end(), std::uint8_t{0});
     std::fill(plane.covered_texels.begin(), plane.covered_texels.end(), 0u);
   }
-  const Ladder ladder = encode(chain, 0.01);
-  for (const PlaneLadder& plane : ladder.planes) EXPECT_GE(plane.rungs.size(), 1u);
+  for (const PlaneLadder& plane : encode(chain, true).planes) EXPECT_EQ(plane.rungs.size(), 1u);
 }
 
-TEST(ChooseRungs, OfFullSizePlanesAll) {
+TEST(ChooseRungs, WithoutAPreviewThereIsNoChoice) {
   const Chain chain = make_chain(false);
-  Ladder ladder = encode(chain, kKeepAll);
-  const auto chosen = [&](double gain) {
-    return choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), gain, RunContext{});
-  };
-  std::vector<std::size_t> all(10);
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  EXPECT_EQ(chosen(kKeepAll), (std::vector{all, all}));
-  const auto some = chosen(1e9);
-  EXPECT_EQ(some[0], all);
-  EXPECT_LT(some[1].size(), all.size());
+  LadderOptions options;
+  EXPECT_THROW(encode_ladder(chain.fragments, chain.pixels, {}, {}, options, RunContext{}), StageError);
+  options.prune = false;
+  EXPECT_EQ(encode_ladder(chain.fragments, chain.pixels, {}, {}, options, RunContext{}).planes.size(), 2u);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -55,7 +56,7 @@ Plane make_plane(std::uint32_t columns, std::uint32_t rows, std::uint32_t side, 
   return out;
 }
 
-Ladder encode(const Plane& p, LadderOptions options = {}, int threads = 1) {
+Ladder encode(const Plane& p, LadderOptions options = testing::all_rungs(), int threads = 1) {
   RunContext context;
   context.threads = threads;
   return encode_ladder(p.fragments, p.pixels, {}, {}, options, context);
@@ -81,7 +82,7 @@ TEST(Ladder, EveryFragmentDecodesToWhatADirectEncodeGives) {
   for (const std::uint32_t channels : {1u, 3u})
     for (const Subsampling subsampling : {Subsampling::k420, Subsampling::k444}) {
       const Plane p = make_plane(3, 2, 64, channels);
-      LadderOptions options;
+      LadderOptions options = testing::all_rungs();
       options.subsampling = subsampling;
       const Ladder ladder = encode(p, options);
       ASSERT_EQ(ladder.planes[0].rungs.size(), options.rungs.size());
@@ -102,7 +103,7 @@ TEST(Ladder, EveryFragmentDecodesToWhatADirectEncodeGives) {
 TEST(Ladder, FragmentsMeetAsInTheWholeImage) {
   for (const Subsampling subsampling : {Subsampling::k420, Subsampling::k444}) {
     const Plane p = make_plane(2, 2, 64, 3);
-    LadderOptions options;
+    LadderOptions options = testing::all_rungs();
     options.subsampling = subsampling;
     options.rungs = {40, 95};
     const Ladder ladder = encode(p, options);
@@ -135,9 +136,9 @@ Pixels channels_apart(const Pixels& pixels, int quality) {
   return out;
 }
 
-TEST(Ladder, ChannelsOfDataPlanesAreKeptApart) {
+TEST(Ladder, ChannelsOfDataPlanesAreKeptApartWhereTheyHaveNothingInCommon) {
   for (const TextureRole role : {TextureRole::kNormal, TextureRole::kOcclusionRoughnessMetallic}) {
-    const Plane data = make_plane(1, 1, 64, 3, Content::kPhoto, role);
+    const Plane data = make_plane(1, 1, 64, 3, Content::kNoise, role);
     const Ladder ladder = encode(data);
     for (const LadderRung& rung : ladder.planes[0].rungs)
       EXPECT_TRUE(decode_baseline(rung, 0).data == channels_apart(data.pixels[0], rung.quality).data);
@@ -146,8 +147,17 @@ TEST(Ladder, ChannelsOfDataPlanesAreKeptApart) {
   }
 }
 
+TEST(Ladder, DataWhoseChannelsAreAlikeAreCodedAsYcc) {
+  Plane data = make_plane(1, 1, 64, 3, Content::kPhoto, TextureRole::kOcclusionRoughnessMetallic);
+  std::vector<std::uint8_t>& texels = data.pixels[0].data;
+  for (std::size_t k = 0; k < texels.size(); k += 3) texels[k + 1] = texels[k + 2] = texels[k];
+  const Ladder ladder = encode(data);
+  for (const LadderRung& rung : ladder.planes[0].rungs)
+    EXPECT_EQ(std::ranges::search(rung.table_stream, std::string("Adobe")).begin(), rung.table_stream.end());
+}
+
 TEST(Ladder, EveryRoleHasItsOwnRungs) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = {10, 20};
   options.normal_rungs = {30, 40, 50};
   options.data_rungs = {60};
@@ -210,7 +220,7 @@ TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
   for (std::uint32_t y = 0; y < 32; ++y)
     for (std::uint32_t x = 0; x < 32 * 3; ++x)
       p.pixels[0].data[y * 41 * 32 * 3 + x] = static_cast<std::uint8_t>(random.next() % 2 * 255);
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = {5, 50, 97, 100};
   options.training_fragments = 3;
   const Ladder ladder = encode(p, options);
@@ -257,7 +267,7 @@ TEST(Ladder, TablesAreTrainedOnCoveredFragmentsOnly) {
 
 TEST(Ladder, SameBytesForAnyNumberOfThreads) {
   const Plane p = make_plane(5, 4, 48, 3);
-  const Ladder one = encode(p, {}, 1), eight = encode(p, {}, 8);
+  const Ladder one = encode(p, testing::all_rungs(), 1), eight = encode(p, testing::all_rungs(), 8);
   for (std::size_t r = 0; r < one.planes[0].rungs.size(); ++r) {
     EXPECT_TRUE(one.planes[0].rungs[r].data == eight.planes[0].rungs[r].data);
     EXPECT_TRUE(one.planes[0].rungs[r].table_stream == eight.planes[0].rungs[r].table_stream);
@@ -267,7 +277,7 @@ TEST(Ladder, SameBytesForAnyNumberOfThreads) {
 
 TEST(Ladder, RefusesRungsThatDoNotRiseAndPixelsThatDoNotFit) {
   Plane p = make_plane(1, 1, 16, 3);
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   for (const std::vector<int>& rungs :
        {std::vector<int>{}, {10, 10}, {20, 10}, {0}, {101}, std::vector<int>(17, 1)}) {
     options.rungs = rungs;
@@ -282,7 +292,7 @@ TEST(Ladder, RefusesRungsThatDoNotRiseAndPixelsThatDoNotFit) {
 
 TEST(Ladder, EveryTruncationIsRefused) {
   const Plane p = make_plane(1, 1, 32, 3);
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = {30};
   const Ladder ladder = encode(p, options);
   const LadderRung& rung = ladder.planes[0].rungs[0];

@@ -6,6 +6,7 @@
 #include "stages/base/run_context.h"
 #include "stages/image/halve_pixels.h"
 #include "stages/ladder/ladder.h"
+#include "stages/ladder/rung_loss.h"
 #include "stages/previews/previews.h"
 #include "tests/support/meshes.h"
 
@@ -53,16 +54,19 @@ inline Chain make_chain(bool noise, bool with_mip = true) {
   return out;
 }
 
-inline Ladder encode(const Chain& chain, double gain, int threads = 1, LadderMode mode = LadderMode::kJpeg) {
+inline Ladder encode(const Chain& chain, bool prune, int threads = 1, LadderMode mode = LadderMode::kJpeg) {
   LadderOptions options;
   options.mode = mode;
-  options.hull_gain = gain;
+  options.prune = prune;
   options.normal_rungs = options.rungs;  // as low as those of colours
   RunContext context;
   context.threads = threads;
   return encode_ladder(chain.fragments, chain.pixels, chain.previews(), {}, options, context);
 }
 
-inline constexpr double kKeepAll = -1;
+inline TextureWays ways_of(const Chain& chain, const Ladder& ladder) {
+  return measure_ways(chain.fragments, chain.pixels, ladder.planes, 0, chain.previews().planes[0].file,
+                      RunContext{});
+}
 
 }  // namespace texmesh::testing

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "tests/stages/ladder/mip_chain.h"
 
@@ -12,22 +13,42 @@ namespace {
 
 using testing::Chain;
 using testing::encode;
-using testing::kKeepAll;
 using testing::make_chain;
+using testing::ways_of;
 
-TEST(RungLoss, LossFallsAlongTheFullSizeAndBytesAreWhatIsStored) {
+TEST(RungLoss, LossFallsAlongEveryPlaneAndBytesAreWhatIsStored) {
   const Chain chain = make_chain(false);
-  const Ladder ladder = encode(chain, kKeepAll);
+  const Ladder ladder = encode(chain, false);
   ASSERT_EQ(ladder.planes[1].rungs.size(), LadderOptions{}.rungs.size());
-  const auto pairs = measure_pairs(chain.fragments, chain.pixels, ladder.planes, 0, RunContext{});
-  ASSERT_EQ(pairs.size(), 20u);
-  for (const RungPair& pair : pairs) {
+  const TextureWays ways = ways_of(chain, ladder);
+  ASSERT_EQ(ways.pairs.size(), 20u);
+  ASSERT_EQ(ways.preview_loss.size(), 2u);
+  for (const RungPair& pair : ways.pairs) {
     const LadderRung& rung = ladder.planes[pair.level].rungs[pair.rung];
     EXPECT_EQ(pair.bytes, rung.data.size() + rung.table_stream.size());
+    EXPECT_EQ(pair.loss.size(), pair.level + 1);
+    EXPECT_FALSE(pair.fixed);
   }
-  EXPECT_GT(pairs[0].loss, pairs[9].loss);
-  EXPECT_LT(pairs[9].loss, 0.02);
-  EXPECT_GT(pairs[19].loss, pairs[9].loss);  // a mip never shows all of it
+  EXPECT_GT(ways.pairs[0].loss[0], ways.pairs[9].loss[0]);
+  EXPECT_LT(ways.pairs[9].loss[0], 0.02);
+  EXPECT_GT(ways.pairs[19].loss[0], ways.pairs[9].loss[0]);  // a mip never shows all of it
+  EXPECT_LT(ways.pairs[19].loss[1], 0.02);                   // but all of itself
+  EXPECT_GT(ways.preview_loss[0], ways.pairs[9].loss[0]);
+}
+
+TEST(RungLoss, ATextureIsAsLargeAsItsTexelsOnABall) {
+  const Chain chain = make_chain(false);
+  const TextureWays ways = ways_of(chain, encode(chain, false));
+  EXPECT_NEAR(ways.surface, 1, 1e-5);
+  EXPECT_NEAR(ways.texels_across, std::sqrt(512 * 384 / 3.14159265), 0.01);
+}
+
+TEST(RungLoss, TheSourcesOwnRungIsFixed) {
+  const Chain chain = make_chain(false);
+  Ladder ladder = encode(chain, false);
+  ladder.planes[0].source_rung = true;
+  const TextureWays ways = ways_of(chain, ladder);
+  for (std::size_t k = 0; k < ways.pairs.size(); ++k) EXPECT_EQ(ways.pairs[k].fixed, k == 9) << k;
 }
 
 /// The ladder with nothing but the marked fragments.
@@ -49,29 +70,19 @@ Ladder only(const Ladder& ladder, const std::vector<std::vector<std::uint8_t>>& 
 
 TEST(RungLoss, TheSampleShowsAllThatIsMeasuredAndItsBytesStandForThePlanes) {
   const Chain chain = make_chain(false);
-  const auto marks = hull_sample(chain.fragments);
+  const auto marks = choice_sample(chain.fragments);
   ASSERT_EQ(marks.size(), 2u);
-  EXPECT_EQ(std::count(marks[0].begin(), marks[0].end(), 1), 48);
-  EXPECT_EQ(marks[1], (std::vector<std::uint8_t>{0, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1}));
-  const Ladder all = encode(chain, kKeepAll), some = only(all, marks);
-  const auto pairs_of = [&](const Ladder& ladder) {
-    return measure_pairs(chain.fragments, chain.pixels, ladder.planes, 0, RunContext{});
-  };
-  const auto own_of = [&](const Ladder& ladder) {
-    return measure_mip(chain.fragments.planes[1], chain.pixels[1], ladder.planes[1],
-                       chain.previews().planes[0].file, RunContext{});
-  };
-  const auto expect_alike = [](const auto& want, const auto& got) {
-    ASSERT_EQ(want.size(), got.size());
-    for (std::size_t k = 0; k < want.size(); ++k) {
-      EXPECT_EQ(want[k].loss, got[k].loss) << k;
-      EXPECT_NEAR(static_cast<double>(got[k].bytes), static_cast<double>(want[k].bytes),
-                  0.3 * static_cast<double>(want[k].bytes))
-          << k;
-    }
-  };
-  expect_alike(pairs_of(all), pairs_of(some));
-  expect_alike(own_of(all), own_of(some));
+  EXPECT_EQ(std::count(marks[0].begin(), marks[0].end(), 1), 6);
+  const Ladder all = encode(chain, false), some = only(all, marks);
+  const TextureWays want = ways_of(chain, all), got = ways_of(chain, some);
+  EXPECT_EQ(want.preview_loss, got.preview_loss);
+  ASSERT_EQ(want.pairs.size(), got.pairs.size());
+  for (std::size_t k = 0; k < want.pairs.size(); ++k) {
+    EXPECT_EQ(want.pairs[k].loss, got.pairs[k].loss) << k;
+    EXPECT_NEAR(static_cast<double>(got.pairs[k].bytes), static_cast<double>(want.pairs[k].bytes),
+                0.3 * static_cast<double>(want.pairs[k].bytes))
+        << k;
+  }
 }
 
 TEST(RungLoss, AMipWhoseSampleShowsNothingIsSampledWhole) {
@@ -81,7 +92,7 @@ TEST(RungLoss, AMipWhoseSampleShowsNothingIsSampledWhole) {
   chain.fragments.planes[1].covered_texels[0] = 1;
   std::fill(chain.fragments.planes[1].coverage.begin(), chain.fragments.planes[1].coverage.end(),
             std::uint8_t{0});
-  EXPECT_EQ(hull_sample(chain.fragments)[1], std::vector<std::uint8_t>(12, 1));
+  EXPECT_EQ(choice_sample(chain.fragments)[1], std::vector<std::uint8_t>(12, 1));
 }
 
 TEST(RungLoss, WindowsWeighAsTheSurfaceOfTheirFragments) {
@@ -96,14 +107,12 @@ TEST(RungLoss, WindowsWeighAsTheSurfaceOfTheirFragments) {
     for (std::uint32_t x = 0; x < 64 * 3; ++x)
       chain.pixels[0].data[((kNoisy / 8 * 64 + y) * 512 + kNoisy % 8 * 64) * 3 + x] =
           static_cast<std::uint8_t>(random.next());
-  const Ladder ladder = encode(chain, kKeepAll);
+  const Ladder ladder = encode(chain, false);
   const auto losses = [&](std::size_t seen) {
     std::fill(plane.surface_fraction.begin(), plane.surface_fraction.end(), 0.0f);
     plane.surface_fraction[seen] = 1;
-    return std::array{measure_pairs(chain.fragments, chain.pixels, ladder.planes, 0, RunContext{})[0].loss,
-                      measure_mip(plane, chain.pixels[0], ladder.planes[0], chain.previews().planes[0].file,
-                                  RunContext{})[0]
-                          .loss};
+    const TextureWays ways = ways_of(chain, ladder);
+    return std::array{ways.pairs[0].loss[0], ways.preview_loss[0]};
   };
   for (const double loss : losses(kNoisy)) EXPECT_GT(loss, 0.3);
   for (const double loss : losses(kOther)) EXPECT_LT(loss, 0.01);

@@ -12,6 +12,7 @@
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -59,7 +60,7 @@ Ladder encode(const Plane& p, const LadderOptions& options, int threads = 1) {
 }
 
 LadderOptions rungs(std::vector<int> qualities) {
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.rungs = std::move(qualities);
   return options;
 }
@@ -108,20 +109,10 @@ TEST(SizeKnots, LieBetweenRungsAndPassTheTables) {
   EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].knot_quality, knots.quality);
 }
 
-TEST(SizeKnots, NoneAboveARungThatWasReplaced) {
-  const Plane p = make_plane();
-  Ladder ladder = encode(p, rungs({30, 53, 93}));
-  ladder.planes[0].rungs.back().quality = 100;
-  ladder.planes[0].lossless = true;
-  const PlaneTables t = tables_of(p, ladder);
-  ASSERT_FALSE(t.knot_quality.empty());
-  EXPECT_LT(t.knot_quality.back(), 53);
-}
-
 TEST(SizeKnots, OnlyOfFullSizeColoursInBaselineFiles) {
   const auto none = [](auto change) {
     Plane p = make_plane();
-    LadderOptions options;
+    LadderOptions options = testing::all_rungs();
     change(p, options);
     for (const PlaneLadder& plane : encode(p, options).planes) EXPECT_TRUE(plane.knots.quality.empty());
   };
@@ -134,7 +125,8 @@ TEST(SizeKnots, OnlyOfFullSizeColoursInBaselineFiles) {
 
 TEST(SizeKnots, SameForAnyNumberOfThreads) {
   const Plane p = make_plane();
-  const SizeKnots one = encode(p, {}, 1).planes[0].knots, eight = encode(p, {}, 8).planes[0].knots;
+  const SizeKnots one = encode(p, testing::all_rungs(), 1).planes[0].knots,
+                  eight = encode(p, testing::all_rungs(), 8).planes[0].knots;
   EXPECT_EQ(one.quality, eight.quality);
   EXPECT_EQ(one.position, eight.position);
 }

@@ -7,6 +7,7 @@
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
 #include "stages/zim/zim.h"
+#include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {
@@ -47,7 +48,7 @@ inline TexturePlane plane_of(std::uint32_t columns, std::uint32_t rows, std::uin
   return p;
 }
 
-inline Scene make_scene(LadderOptions ladder_options = {}) {
+inline Scene make_scene(LadderOptions ladder_options = testing::all_rungs()) {
   Scene s;
   s.fragments.scales = 2;
   s.fragments.planes = {plane_of(4, 3, 3), plane_of(2, 1, 1)};

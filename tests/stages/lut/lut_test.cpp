@@ -15,6 +15,7 @@
 #include "stages/measure/distortion.h"
 #include "stages/measure/fragment_meter.h"
 #include "tests/stages/lut/lut_scene.h"
+#include "tests/support/all_rungs.h"
 
 namespace texmesh {
 namespace {
@@ -71,7 +72,7 @@ TEST(Lut, NoChannelOfDataStandsForAnother) {
     s.pixels[0].data[k] = s.pixels[0].data[k + 1] = 128;
   const auto measured = [&](TextureRole role) {  // only blue varies: luma has 1/77 of its square error
     s.fragments.planes[0].role = role;
-    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+    s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, testing::all_rungs(), {});
     s.previews = make_previews(s.fragments, s.pixels, {}, {});
     return build(s).planes[0];
   };
@@ -139,7 +140,7 @@ TEST(Lut, SkippedFragmentsAreAsBadAsThePreview) {
   // A flat texture is as good in the preview.
   Scene flat = make_scene();
   for (Pixels& pixels : flat.pixels) std::fill(pixels.data.begin(), pixels.data.end(), std::uint8_t{97});
-  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {}, {}, {});
+  flat.ladder = encode_ladder(flat.fragments, flat.pixels, {}, {}, testing::all_rungs(), {});
   flat.previews = make_previews(flat.fragments, flat.pixels, {}, {});
   const PlaneTables t = build(flat).planes[0];
   for (const float v : t.skip_dssim) EXPECT_NEAR(v, 0, 1e-3);
@@ -173,8 +174,7 @@ TEST(Lut, SkippedFragmentsShowThePreviewOfTheirOwnImageBilinearly) {
       s.pixels[p].data[k] = static_cast<std::uint8_t>(128 + 60 * std::sin((x + 2.0) / length * 6.28) +
                                                       50 * std::cos(y / length * 6.28));
     }
-  LadderOptions ladder;
-  ladder.hull_gain = -1;
+  LadderOptions ladder = testing::all_rungs();
   s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, ladder, {});
   s.previews = make_previews(s.fragments, s.pixels, {.quality = 95}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
@@ -289,7 +289,7 @@ TEST(Lut, EmptyAndUnfitInput) {
     std::fill(p.covered_texels.begin(), p.covered_texels.end(), 0u);
     std::fill(p.coverage.begin(), p.coverage.end(), std::uint8_t{0});
   }
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, testing::all_rungs(), {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
   s.predictors = predict_quality(s.fragments, s.pixels, {}, {});
   const PackageTables none = build(s);

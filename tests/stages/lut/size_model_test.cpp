@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/stages/lut/lut_scene.h"
+#include "tests/support/all_rungs.h"
 
 namespace texmesh {
 namespace {
@@ -31,17 +32,17 @@ TEST(SizeModel, FitsAndIsAbsentForOneRung) {
   }
   EXPECT_NEAR(model.error, error, 1e-3);
 
-  LadderOptions one;
+  LadderOptions one = testing::all_rungs();
   one.rungs = {50};
   EXPECT_EQ(thesis_of(make_scene(one)).model, SizeModel{});
 }
 
-TEST(SizeModel, IsNotFittedOnARungWithoutLoss) {
-  LadderOptions options;
+TEST(SizeModel, IsNotFittedOnTheSourcesCoefficients) {
+  LadderOptions options = testing::all_rungs();
   options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
   Scene s = make_scene(options);
   EXPECT_GT(thesis_of(s).model.error, 0.01f);
-  s.ladder.planes[0].lossless = true;
+  s.ladder.planes[0].source_rung = true;
   const SizeModel model = thesis_of(s).model;
   EXPECT_NEAR(model.error, 0, 1e-5) << "two points have a curve through both";
   EXPECT_NEAR(model.correlation, 1, 1e-6);
@@ -51,7 +52,7 @@ TEST(SizeModel, ConstantBytesAreTheCodecs) {
   const Scene s = make_scene();
   EXPECT_EQ(constant_bytes(s.ladder.planes[0], 32, 48), 4 + 36 / 4.0);  // 4:2:0
   EXPECT_EQ(constant_bytes(s.ladder.planes[1], 32, 48), 4 + 24 / 4.0);  // grey
-  LadderOptions options;
+  LadderOptions options = testing::all_rungs();
   options.subsampling = Subsampling::k444;
   EXPECT_EQ(constant_bytes(make_scene(options).ladder.planes[0], 32, 48), 4 + 72 / 4.0);
   PlaneLadder other = s.ladder.planes[0];
@@ -91,7 +92,7 @@ TEST(SizeModel, HoldsForBlurredTextures) {  // whose blocks' shortest codes are 
         for (std::uint32_t c = 0; c < pixels.channels; ++c)
           pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
               static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, {}, {});
+  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, testing::all_rungs(), {});
   s.previews = make_previews(s.fragments, s.pixels, {}, {});
   const auto [tables, thesis] = build_all(s);
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {

@@ -30,9 +30,7 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   m.normal_texture.image = 1, m.normal_scale = 0.5f;
   c.materials[1].alpha_mode = AlphaMode::kBlend;
   c.materials[1].base_colour_texture.image = 0;
-  const ScaleFiles files = c.write(MeshCodec::kDraco);
-  ASSERT_GT(files.files.size(), 1u);
-  const Glb glb = open(files.files[0].glb);
+  const Glb glb = open(c.write(MeshCodec::kDraco).files[0].glb);
   const Json& j = glb.json["materials"][0];
   EXPECT_EQ(j["name"], "glass");
   EXPECT_EQ(j["pbrMetallicRoughness"]["baseColorFactor"], Json::parse("[0.1,0.2,0.3,0.4]"));
@@ -55,15 +53,7 @@ TEST(Scales, MaterialsCarryWhatTheSourceSays) {
   EXPECT_EQ(glb.json["images"][0]["name"], "texture/0");
   EXPECT_EQ(glb.json["images"][0]["mimeType"], "image/png");
   EXPECT_EQ(glb.json["images"][1]["name"], "texture/1");
-  // The coarsest scale has the previews; others name them, but for a picture that is no preview.
-  EXPECT_EQ(glb.json["images"][1]["uri"], "../preview/002.jpg");
-  EXPECT_EQ(glb.json["images"][1]["mimeType"], "image/jpeg");
-  EXPECT_FALSE(glb.json["images"][1].contains("bufferView"));
-  const Glb coarsest = open(files.files.back().glb);
-  EXPECT_EQ(view_bytes(coarsest, coarsest.json["images"][1]["bufferView"]), c.previews.planes[2].file);
-  EXPECT_FALSE(coarsest.json["images"][1].contains("uri"));
-  for (const char* same : {"materials", "textures", "samplers"})
-    EXPECT_EQ(coarsest.json[same], glb.json[same]);
+  EXPECT_EQ(view_bytes(glb, glb.json["images"][1]["bufferView"]), c.previews.planes[2].file);
 
   // The PNG holds the colours of one preview and the alpha of the other.
   Image png = probe_image("preview", view_bytes(glb, glb.json["images"][0]["bufferView"]), {});
@@ -176,6 +166,32 @@ TEST(Scales, PngOfEveryKindReadsBack) {
   }
   EXPECT_THROW(write_png(picture(3, 3, 2)), StageError);
   EXPECT_THROW(write_png(Pixels{}), StageError);
+}
+
+TEST(Scales, TheCoarsestScaleHasThePreviewsAndTheOthersNameThem) {
+  Mesh mesh = testing::bumpy_sphere(16, 24);
+  mesh.part_names = {"body", "gone"};
+  Case c(mesh);
+  c.add_image(TextureRole::kBaseColour);
+  c.materials[0].base_colour_texture = {
+      0, 0, Wrap::kClamp, Wrap::kMirror, true, Minification::kNearest, {{0.5f, 0}, {2, 3}, 0}};
+  const ScaleFiles files = c.write(MeshCodec::kDraco);
+  ASSERT_GT(files.files.size(), 2u);
+  const Glb last = open(files.files.back().glb);
+  EXPECT_EQ(view_bytes(last, last.json["images"][0]["bufferView"]), c.previews.planes[0].file);
+  EXPECT_FALSE(last.json["images"][0].contains("uri"));
+  for (const ScaleFile& file : files.files) {
+    const Glb glb = open(file.glb);
+    for (const char* same : {"materials", "textures", "samplers"})
+      EXPECT_EQ(glb.json[same], last.json[same]) << same;
+    ASSERT_EQ(glb.json["nodes"].size(), 2u);  // a node per part, whatever is left of it
+    EXPECT_EQ(glb.json["nodes"][0]["name"], "body");
+    EXPECT_EQ(glb.json["nodes"][1]["name"], "gone");
+    EXPECT_FALSE(glb.json["nodes"][1].contains("mesh"));
+    if (&file == &files.files.back()) continue;
+    EXPECT_EQ(glb.json["images"], Json::parse(R"([{"name":"texture/0","mimeType":"image/jpeg",
+                                                 "uri":"../preview/000.jpg"}])"));
+  }
 }
 
 }  // namespace

@@ -182,8 +182,8 @@ struct Case {
   }
 };
 
-/// Each file's faces, as files are written without a stream, are those of the stream up to its scale. Beside a
-/// stream only the finest and the coarsest have files.
+/// Each file's faces, as files are written without a stream, are those of the stream up to its scale. Beside
+/// a stream only the finest and the coarsest have files.
 void expect_files_in_stream(const Case& c, ScalesOptions options = {}) {
   const ScaleFiles with_stream = c.write(options);
   const Bytes& stream = with_stream.stream;

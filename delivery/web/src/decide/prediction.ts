@@ -8,6 +8,8 @@ import { exp, log, pow } from './portable_math';
 const leastFlip = 1e-6; // what logarithms take for 0
 const leastDssim = 1e-9;
 const mostLevels = 8;
+/** Twice as large texels lose so many times as much. */
+const lossPerDoubling = 1.6;
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
@@ -23,17 +25,27 @@ function between(axis: readonly number[], at: number, value: (x: number) => numb
 
 const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] => between(sizesPx, Math.max(displayedPx, 1), log);
 
+const ln2 = 0.693147180559945309417;
+/** How much more a picture of a fixed number of texels loses than at the nearest height of the table. */
+function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
+  const px = Math.max(displayedPx, 1);
+  const nearest = clamp(px, sizesPx[0], sizesPx[sizesPx.length - 1]);
+  return px === nearest ? 1 : pow(lossPerDoubling, log(px / nearest) / ln2);
+}
+
 /** One of the two displayed heights around the one that is asked for. */
 class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
   private readonly coarser_: Float32Array;
+  readonly preview: number;
 
-  constructor({ texelDssim, coded, coarser }: TextureLosses) {
+  constructor({ texelDssim, coded, preview, coarser }: TextureLosses, beyond: number) {
     let least = leastFlip;
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
     this.coarser_ = coarser.flip;
+    this.preview = Math.min(1, preview.flip[0] * beyond);
   }
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
@@ -51,6 +63,14 @@ class Curve {
   }
 }
 
+/** The two displayed heights of a table around one, px; 1 px for a table without any. */
+export function sizesAround(table: QualityTable, displayedPx: number): readonly [number, number] {
+  const [first, second] = sizeAt(table, displayedPx);
+  return [table.sizesPx[first] ?? 1, table.sizesPx[second] ?? 1];
+}
+/** How many times twice as large texels are on the screen as those that were sampled at each of sizesAround(). */
+export type TexelGrowth = readonly [number, number];
+
 /** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
 export class GroupCurve {
   private readonly curves_: Curve[];
@@ -59,20 +79,28 @@ export class GroupCurve {
   constructor(table: QualityTable, group: PlaneGroup, displayedPx: number) {
     const [first, second, part] = sizeAt(table, displayedPx);
     const sizes = table.groups.find((g) => g.group === group)?.sizes;
-    this.curves_ = sizes ? [new Curve(sizes[first]), new Curve(sizes[second])] : [];
+    const beyond = beyondSizes(table, displayedPx);
+    this.curves_ = sizes ? [new Curve(sizes[first], beyond), new Curve(sizes[second], beyond)] : [];
     this.part_ = part;
   }
   /** FLIP where the texels' 1 - SSIM is `dssim`. */
-  coded(dssim: number): number {
+  coded(dssim: number, growth: TexelGrowth = [0, 0]): number {
     if (!(dssim > leastDssim)) return 0;
     const [first, second] = this.curves_;
+    if (!first) return Math.min(1, dssim);
     const x = log(dssim);
-    return Math.min(1, first ? mixed(first.at(x), second.at(x), this.part_) : dssim);
+    const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(lossPerDoubling, growth[i])));
+    return Math.min(1, mixed(a, b, this.part_));
   }
-  /** FLIP with mips that are so many `levels` coarser than those for the display. */
-  coarser(levels: number): number {
+  /** FLIP where all textures of the group show their previews. */
+  preview(): number {
     const [first, second] = this.curves_;
-    return first && levels > 0 ? mixed(first.atLevel(levels), second.atLevel(levels), this.part_) : 0;
+    return first ? mixed(first.preview, second.preview, this.part_) : 1;
+  }
+  /** FLIP of the source's texels in mips with so much larger ones. */
+  coarser(growth: TexelGrowth): number {
+    const [first, second] = this.curves_;
+    return first ? mixed(first.atLevel(growth[0]), second.atLevel(growth[1]), this.part_) : 0;
   }
 }
 

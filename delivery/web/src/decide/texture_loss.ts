@@ -7,7 +7,7 @@ import { PlaneTables, fragmentCount } from '../format/tables';
 import { TextureInfo } from '../format/textures';
 import { sumOf } from './numbers';
 import { log } from './portable_math';
-import { GroupCurve, combinedFlip, geometryFlip } from './prediction';
+import { GroupCurve, TexelGrowth, combinedFlip, geometryFlip, sizesAround } from './prediction';
 import { surfaceWeights } from './rate_distortion';
 
 // delivery/cpp/decide/texture_loss.cpp, bit for bit.
@@ -53,12 +53,12 @@ function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
   return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
 }
 
-/** How often the texels of a full-size plane may be halved until one stands for a pixel; at least 0. */
+/** How often the texels of a full-size plane may be halved until one stands for a pixel; below 0 where one covers more. */
 function displayLevel(data: PackageData, base: number, displayedPx: number): number {
   const { coveredTexels, surfaceFraction } = tablesOf(data, base);
   const texelsPerArea = sumOf(coveredTexels) / (sumOf(surfaceFraction) * surfaceOf(data.manifest));
   if (!(texelsPerArea > 0 && texelsPerArea < Infinity)) return 0;
-  return Math.max(0, log(Math.sqrt(texelsPerArea) / (displayedPx / data.manifest.objectHeight)) / ln2);
+  return log(Math.sqrt(texelsPerArea) / (displayedPx / data.manifest.objectHeight)) / ln2;
 }
 
 /** The largest mip of a texture that is at most as coarse as `level`, or the full-size plane. */
@@ -74,7 +74,7 @@ function planeAtLevel({ textures }: PackageData, base: number, level: number): n
  */
 export function planesForDisplay(data: PackageData, displayedPx: number, levels: PerGroup = everyGroup(0)): PlaneChoice[] {
   return fullSize(data.textures).map(({ base }) => {
-    const level = displayLevel(data, base, displayedPx) + levels[groupIndex(data, base)];
+    const level = Math.max(0, displayLevel(data, base, displayedPx)) + levels[groupIndex(data, base)];
     return { base, plane: planeAtLevel(data, base, level) };
   });
 }
@@ -105,6 +105,7 @@ interface PlaneLoss {
 export class TextureLoss {
   private readonly curves_: GroupCurve[];
   private readonly planes_ = new Map<number, PlaneLoss>();
+  private readonly previewMeans_ = new Map<number, number>();
 
   constructor(
     readonly data: PackageData,
@@ -122,12 +123,60 @@ export class TextureLoss {
     const curve = this.curves_[groupIndex(this.data, plane)];
     const weights = surfaceWeights(t);
     const fragments = fragmentCount(t);
+    const growth = this.growth_(plane);
     const coded = new Float64Array((t.rungQuality.length + 1) * fragments);
+    const mean = this.previewMean_(plane);
+    const preview = this.previewLoss_(plane);
     for (const f of t.order) {
-      coded[f] = curve.coded(t.skipDssim[f]);
-      for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f]);
+      coded[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f]) / mean)) : 0;
+      for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f], growth);
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), coded };
+  }
+  /** What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says of their texels. */
+  private previewMean_(plane: number): number {
+    let mean = this.previewMeans_.get(plane);
+    if (mean !== undefined) return mean;
+    const t = tablesOf(this.data, plane);
+    const curve = this.curves_[groupIndex(this.data, plane)];
+    const weights = surfaceWeights(t);
+    let [sum, total] = [0, 0];
+    for (const f of t.order) {
+      sum += weights[f] * curve.coded(t.skipDssim[f] ?? 1);
+      total += weights[f];
+    }
+    this.previewMeans_.set(plane, (mean = total > 0 ? sum / total : 0));
+    return mean;
+  }
+  /** FLIP of the plane's preview, which is the same for all mips of a texture. */
+  private previewLoss_(plane: number): number {
+    const { data } = this;
+    const { mip, base } = data.textures[plane];
+    const group = groupIndex(data, plane);
+    let [sum, total] = [0, 0];
+    for (const full of fullSize(data.textures)) {
+      if (groupIndex(data, full.plane) !== group) continue;
+      const t = tablesOf(data, full.plane);
+      const weights = surfaceWeights(t);
+      const weight = sumOf([...t.order].map((f) => weights[f]));
+      sum += weight * this.previewMean_(full.plane);
+      total += weight;
+    }
+    const share = sum > 0 ? (this.previewMean_(mip > 0 ? base : plane) * total) / sum : 1;
+    return this.curves_[group].preview() * share;
+  }
+  /** How much larger the plane's texels are at this height than those that the quality table sampled. */
+  private growth_(plane: number): TexelGrowth {
+    const { data, displayedPx } = this;
+    const { textures } = data;
+    const { mip } = textures[plane];
+    const base = mip > 0 ? textures[plane].base : plane;
+    const here = mip - displayLevel(data, base, displayedPx);
+    const [first, second] = sizesAround(data.quality, displayedPx).map((px) => {
+      const level = displayLevel(data, base, px);
+      return here - (textures[planeAtLevel(data, base, level)].mip - level);
+    });
+    return [first, second];
   }
   /** The weight of each group's stored fragments. */
   weights(planes: readonly PlaneChoice[]): PerGroup {
@@ -137,13 +186,11 @@ export class TextureLoss {
   }
   /** TextureParts.coarser, as the mean over each group's surface. */
   coarser(planes: readonly PlaneChoice[]): PerGroup {
-    const { data, displayedPx } = this;
     const loss: [number, number, number] = [0, 0, 0];
     const weights = this.weights(planes);
-    for (const { base, plane } of planes) {
-      const group = groupIndex(data, plane);
-      const levels = data.textures[plane].mip - data.textures[planeAtLevel(data, base, displayLevel(data, base, displayedPx))].mip;
-      if (levels > 0 && weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser(levels);
+    for (const { plane } of planes) {
+      const group = groupIndex(this.data, plane);
+      if (weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser(this.growth_(plane));
     }
     return loss;
   }

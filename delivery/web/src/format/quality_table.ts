@@ -28,6 +28,8 @@ export interface TextureLosses {
   /** Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; a sample each. */
   texelDssim: Float32Array;
   coded: PictureLosses;
+  /** One: with the previews of all the group's textures. */
+  preview: PictureLosses;
   /** With the source's texels of mips that are 1, 2 .. levels coarser than those for that height. */
   coarser: PictureLosses;
 }
@@ -76,7 +78,8 @@ function readTexture(at: JsonAt): TextureLosses {
     return (before = v);
   }));
   const coarser = at.at('coarser');
-  return { texelDssim, coded: readLosses(at.at('coded'), texelDssim.length), coarser: readLosses(coarser, coarser.at('flip').array(0, 8)) };
+  const coded = readLosses(at.at('coded'), texelDssim.length);
+  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), coarser: readLosses(coarser, coarser.at('flip').array(0, 8)) };
 }
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */

@@ -28,8 +28,8 @@ export interface TextureInfo {
   previewHeightPx: number;
   /** IJG quality per rung, strictly rising. */
   rungQuality: number[];
-  /** The last rung loses nothing of the source. That rung is shown as any other, and fetched where a load asks for it or refines so far. */
-  lossless: boolean;
+  /** The last rung holds the coefficients of the source, a JPEG. That rung is shown as any other, and fetched where a load asks for it or refines so far. */
+  sourceRung: boolean;
   /** Ending of the source file among the entries, source/PPP.EXT; "" = none. Loads leave that file alone; PackageReader.entry reads it. */
   source: string;
 }
@@ -65,14 +65,14 @@ function readGrid(at: JsonAt) {
 const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
 
 /** Fields about the source itself. */
-function readSource(at: JsonAt, codec: CodecId, mip: number): { lossless: boolean; source: string } {
-  const lossless = at.has('lossless') && at.at('lossless').boolean();
-  if (lossless && (codec !== 'jpeg' || mip > 0)) at.at('lossless').fail('a full-size plane of codec jpeg', 'another');
-  if (!at.has('source')) return { lossless, source: '' };
+function readSource(at: JsonAt, codec: CodecId, mip: number): { sourceRung: boolean; source: string } {
+  const sourceRung = at.has('sourceRung') && at.at('sourceRung').boolean();
+  if (sourceRung && (codec !== 'jpeg' || mip > 0)) at.at('sourceRung').fail('a full-size plane of codec jpeg', 'another');
+  if (!at.has('source')) return { sourceRung, source: '' };
   const source = at.at('source').text(100);
   if (!sourceEndings.includes(source) || mip > 0) at.at('source').fail('jpg, png, tif, webp or exr of a full-size plane', source);
   at.at('sourceColours').boolean();
-  return { lossless, source };
+  return { sourceRung, source };
 }
 
 function readTexture(at: JsonAt): TextureInfo {

@@ -10,13 +10,13 @@ describe('small parts', () => {
       const [first, ...others] = textures;
       return new TextEncoder().encode(JSON.stringify({ textures: [{ ...first, ...more }, ...others] }));
     };
-    expect(readTextures(withFirst({}))[0]).toMatchObject({ lossless: false, source: '' });
-    expect(readTextures(withFirst({ lossless: true }))[0].lossless).toBe(true);
+    expect(readTextures(withFirst({}))[0]).toMatchObject({ sourceRung: false, source: '' });
+    expect(readTextures(withFirst({ sourceRung: true }))[0].sourceRung).toBe(true);
     expect(readTextures(withFirst({ source: 'exr', sourceColours: false }))[0].source).toBe('exr');
-    for (const bad of [{ lossless: 1 }, { source: 'gif', sourceColours: true }, { source: 'png' }, { lossless: true, codec: 'webp' }])
+    for (const bad of [{ sourceRung: 1 }, { source: 'gif', sourceColours: true }, { source: 'png' }, { sourceRung: true, codec: 'webp' }])
       expect(() => readTextures(withFirst(bad)), JSON.stringify(bad)).toThrow(FormatError);
     const mip = textures.findIndex((t: { mip?: number }) => (t.mip ?? 0) > 0);
-    textures[mip].lossless = true;
+    textures[mip].sourceRung = true;
     expect(() => readTextures(withFirst({}))).toThrow(FormatError);
   });
 });

@@ -65,6 +65,12 @@ export class FragmentMap {
     return info && tables ? { info, tables } : null;
   }
 
+  /** The row of the shown scale in tables; S_0's before there is one. */
+  private row(): number {
+    const rows = this.live?.manifest?.scales.map((s) => s.scale) ?? [];
+    return Math.max(rows.indexOf(this.live?.scale ?? 0), 0);
+  }
+
   private paint(): void {
     const width = this.canvas.clientWidth;
     const parts = this.parts();
@@ -110,7 +116,7 @@ export class FragmentMap {
     const bytesOf = (f: number): number => this.bytesOf(t, f);
     switch (this.by) {
       case 'eta': {
-        const eta = etaOf(t, this.live?.scale ?? 0);
+        const eta = etaOf(t, this.row());
         this.ramp('even', 'full of features', false);
         return (f) => (stored[f] ? rampColour(eta[f] ?? 0) : null);
       }
@@ -167,7 +173,7 @@ export class FragmentMap {
     if (column < 0 || row < 0 || column >= info.columns || row >= info.rows) return;
     const f = row * info.columns + column;
     const rung = this.live?.rungs.get(this.plane)?.[f] ?? -1;
-    const eta = etaOf(tables, this.live?.scale ?? 0)[f] ?? 0;
+    const eta = etaOf(tables, this.row())[f] ?? 0;
     const now = rung < 0 ? 'preview' : `quality ${tables.rungQuality[rung]}, ${format.bytes(this.bytesOf(tables, f))}`;
     this.hint.textContent = (tables.coveredTexels[f] ?? 0) === 0 ? `fragment ${f}: nothing of the object` :
       `fragment ${f}: η ${eta.toFixed(2)}, ${now}`;

@@ -81,7 +81,7 @@ TEST(CommandHelp, AllOfCompileHasEveryStageOptionOnce) {
     EXPECT_EQ(times_listed(everyday, "--" + f.path()), 0u) << f.path();
     EXPECT_NE(all.find("\nStage " + f.stage + ":\n"), std::string::npos) << f.stage;
   }
-  for (const char* name : {"--rungs", "--ladder", "--lossless-top", "--mesh-codec", "--jnd", "--title"}) {
+  for (const char* name : {"--rungs", "--ladder", "--keep-source", "--mesh-codec", "--jnd", "--title"}) {
     EXPECT_EQ(times_listed(all, name), 1u) << name;
     EXPECT_EQ(times_listed(everyday, name), 1u) << name;
   }

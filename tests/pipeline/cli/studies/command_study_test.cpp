@@ -92,6 +92,37 @@ TEST_F(StudyCommand, QualityOfAModel) {
   EXPECT_EQ(again.output, r.output);  // the same on one thread
 }
 
+TEST_F(StudyCommand, RungsThatLoadsChoose) {
+  const std::string scan = folder / "scan.glb", package = folder / "scan.texmesh";
+  ASSERT_EQ(
+      run_command({TEXMESH_MAKE_SCAN, "--triangles", "1500", "--texture", "1024", "-o", scan}).exit_code, 0);
+  ASSERT_EQ(texmesh({"compile", scan, "-o", package, "--no-cache"}).exit_code, 0);
+  const CommandResult r = texmesh({"study", "rungs", package, "--loads", "40", "--json"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const Json use = Json::parse(r.output)["packages"][0];
+  EXPECT_EQ(use["loads"], 40);
+  std::size_t shown = 0, rungs = 0, rare = 0;
+  for (const Json& plane : use["planes"]) {
+    shown += plane["shown"].get<std::size_t>();
+    ASSERT_EQ(plane["chosen"].size(), plane["rung_quality"].size());
+    for (const Json& chosen : plane["chosen"]) {
+      EXPECT_LE(chosen.get<std::size_t>(), plane["shown"].get<std::size_t>());
+      ++rungs;
+      rare += chosen == 0;
+    }
+  }
+  EXPECT_EQ(shown % 40, 0u) << "every load shows each texture at one size";
+  EXPECT_GT(shown, 0u);
+  EXPECT_EQ(use["rungs"], rungs);
+  EXPECT_EQ(use["rare_rungs"], rare);
+  EXPECT_GT(use["mean_flip"], 0);
+  EXPECT_LT(use["mean_flip"], 0.5);
+  const CommandResult text = texmesh({"study", "rungs", package, "--loads", "40"});
+  EXPECT_NE(text.output.find(std::to_string(rare) + " of " + std::to_string(rungs) + " rungs"),
+            std::string::npos)
+      << text.output;
+}
+
 TEST_F(StudyCommand, OutputsThatCannotBeWrittenAreToldBeforeTheStudy) {
   const std::string grey = image("grey.png", 1), scan = folder / "none.glb";
   for (const auto& arguments :
@@ -107,6 +138,9 @@ TEST_F(StudyCommand, OutputsThatCannotBeWrittenAreToldBeforeTheStudy) {
 TEST_F(StudyCommand, WhatCannotBeStudied) {
   EXPECT_EQ(texmesh({"study"}).exit_code, 2);
   EXPECT_EQ(texmesh({"study", "fragments"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "rungs"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"study", "rungs", folder / "none.texmesh"}).exit_code, 1);
+  EXPECT_EQ(texmesh({"study", "rungs", folder / "none.texmesh", "--loads", "0"}).exit_code, 2);
   const std::string good = image("good.png", 3);
   EXPECT_EQ(texmesh({"study", "fragments", good, "--qualities", "50,50"}).exit_code, 2);
   EXPECT_EQ(texmesh({"study", "fragments", good, "--qualities", "0"}).exit_code, 2);

@@ -35,8 +35,7 @@ Bytes mixed_values() {
     const std::uint16_t shorts[2] = {static_cast<std::uint16_t>(300 * i), 7};
     std::memcpy(&out[kStride * i], &f, 4);
     std::memcpy(&out[kStride * i + 4], shorts, 4);
-    for (std::size_t j = 0; j < 4; ++j)
-      out[kStride * i + 8 + j] = static_cast<std::uint8_t>(i * i * (j + 1));
+    for (std::size_t j = 0; j < 4; ++j) out[kStride * i + 8 + j] = static_cast<std::uint8_t>(i * i * (j + 1));
   }
   return out;
 }
@@ -121,9 +120,12 @@ GltfBuilder compressed_quad(const std::vector<std::string>& names) {
   json& v = b.json["bufferViews"][0];
   v = {{"buffer", 1}, {"byteLength", 48}};
   for (const std::string& name : names)
-    v["extensions"][name] = {{"buffer", 0},        {"byteOffset", encoded["byteOffset"]},
-                             {"byteLength", data.size()}, {"byteStride", 12},
-                             {"count", 4},         {"mode", "ATTRIBUTES"}};
+    v["extensions"][name] = {{"buffer", 0},
+                             {"byteOffset", encoded["byteOffset"]},
+                             {"byteLength", data.size()},
+                             {"byteStride", 12},
+                             {"count", 4},
+                             {"mode", "ATTRIBUTES"}};
   b.json["extensionsUsed"] = b.json["extensionsRequired"] = names;
   b.json["buffers"] = {{{"byteLength", b.bin.size()}},
                        {{"byteLength", 48}, {"extensions", {{names[0], {{"fallback", true}}}}}}};

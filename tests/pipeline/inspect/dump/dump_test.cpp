@@ -38,7 +38,7 @@ TEST_F(Dump, ScalesJsonHasTheAgreedShape) {
 TEST_F(Dump, SummaryIsAPageThatExplainsThePackage) {
   const std::string page = text(DumpPart::kSummary);
   for (const std::string line :
-       {"Two spheres\n", "format    1.1, made by texmesh test\n", "origin    10  20  30\n",
+       {"Two spheres\n", "format    2.0, made by texmesh test\n", "origin    10  20  30\n",
         "bounds    -1  -1  -1\n", "  S_5 ", "step function: displayed height in px", "O_V/E_S px",
         "base-colour", "ball.jpg", "bytes by kind", "ladder.rungs"})
     EXPECT_NE(page.find(line), std::string::npos) << line << "\n" << page;
@@ -82,6 +82,7 @@ TEST(RungFigures, WeighQualityByTexelsAndBySurface) {
   t.size_bytes = {10, 20, 0, 30, 40, 0};
   t.mse = {100, 10, 0, 50, 5, 0};
   t.dssim = {0.4f, 0.1f, 0, 0.2f, 0.05f, 0};
+  t.skip_dssim = {0.5f, 0.2f, 0};
   t.covered_texels = {300, 100, 0};
   t.surface_fraction = {0.25f, 0.75f, 0};
   t.order = {0, 1};

@@ -1,0 +1,57 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "stages/base/run_context.h"
+
+namespace texmesh {
+
+/// Whether the last rung of a plane holds the quantised coefficients of the plane's source image, a JPEG.
+bool holds_source(const TextureInfo& info);
+
+/// The quantised coefficients of one rung of a plane of codec jpeg, the fragments side by side: an image of
+/// the plane's size with the components, sampling and quantisers of the fragments. Two bytes for every
+/// sample.
+class JoinedJpeg {
+ public:
+  /// A block of a fragment that is not stored has no AC coefficients and the mean of the block to the left of
+  /// it, or above it. FormatError for fragments that are no such parts of one image. Same for any number of
+  /// threads.
+  JoinedJpeg(PackageReader& package, std::uint32_t plane, std::size_t rung, const RunContext& context);
+
+  std::uint32_t width_px() const { return width_px_; }
+  std::uint32_t height_px() const { return height_px_; }
+  std::uint32_t channels() const { return static_cast<std::uint32_t>(components_.size()); }
+
+  /// Makes cheap what nobody sees: blocks keep their mean alone where neither their MCU nor one of its eight
+  /// neighbours has a covered texel. `coverage`: bits as TexturePlane::coverage.
+  void flatten(const std::vector<std::uint8_t>& coverage);
+
+  /// A progressive JPEG with Huffman tables of its own. At quality 100 the coefficients are those of the
+  /// package; below (1..100) steps are at least those of texture_step(), and coefficients are rounded to
+  /// them. Same bytes for the same input.
+  std::vector<std::uint8_t> file(double quality = 100) const;
+
+ private:
+  using Block = std::array<std::int16_t, 64>;  // row by row
+  struct Component {
+    std::uint32_t across = 1, down = 1;                // sampling factors
+    std::uint32_t blocks_across = 0, blocks_down = 0;  // of the image
+    std::array<std::uint16_t, 64> quantisers{};        // row by row
+    std::vector<Block> blocks;
+  };
+  class Fragments;
+  void set_components(const Fragments& fragments, std::size_t first);
+  void put_fragment(const Fragments& fragments, std::size_t fragment);
+  void fill_gaps(const std::vector<std::uint8_t>& stored);
+  std::array<std::uint32_t, 2> mcu_px() const;
+
+  std::uint32_t width_px_ = 0, height_px_ = 0;
+  std::uint32_t fragment_width_px_ = 0, fragment_height_px_ = 0, columns_ = 0;
+  bool rgb_ = false;
+  std::vector<Component> components_;
+};
+
+}  // namespace texmesh

@@ -1,0 +1,11 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace texmesh {
+
+/// Text as it may stand in an element of HTML or XML, or in an attribute between quotes. Control characters,
+/// most of which XML 1.0 cannot write, become question marks; line feeds and tabs stay, as references.
+std::string markup_escaped(std::string_view text);
+
+}  // namespace texmesh

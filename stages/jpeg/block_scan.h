@@ -1,0 +1,116 @@
+#pragma once
+// Inside stages only: blocks of a baseline scan, each coded at several rungs by what of it is seen.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "format/base/bytes.h"
+#include "stages/jpeg/bit_writer.h"
+#include "stages/jpeg/huffman_table.h"
+#include "stages/jpeg/masked_block.h"
+
+namespace texmesh {
+
+/// How one rung's blocks are coded, by component.
+using MaskedRung = std::vector<BlockCoding>;
+
+/// What the block coder minds in a component: the luma of colours, or anything else.
+enum class BlockKind : std::uint8_t { kLuma, kOther };
+
+/// BlockCoding::bit_cost; `quantisers` in zigzag order.
+float bit_cost_of(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers);
+
+/// `quantisers` in zigzag order; `dc` and `ac` are the component's Huffman tables.
+BlockCoding block_coding(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers,
+                         const HuffmanTable& dc, const HuffmanTable& ac);
+
+/// Of an uncovered sample, so that it does not run away; .001 to .01 make 0.1 % of the bytes.
+inline constexpr float kUncoveredWeight = 0.003f;
+
+/// How much of a block is covered, by the weights of its samples.
+enum class BlockCoverage : std::uint8_t { kNothing, kPart, kAll };
+BlockCoverage coverage_of(const BlockValues& weights);
+
+float mean_of(const BlockValues& samples);
+
+/// Samples or weights of a component, row by row.
+struct SamplePlane {
+  std::uint32_t width = 0, height = 0;
+  std::vector<float> values;
+  BlockValues block(std::uint32_t left, std::uint32_t top) const;
+};
+
+/// How far off the DC before may be that the uncovered block at (left, top) takes for its own.
+float same_level_at(const SamplePlane& weights, std::uint32_t left, std::uint32_t top);
+
+/// A block that nobody sees: the DC before it, unless that is further off than `same_level`.
+CodedBlock flat_block(float level, float same_level, const BlockCoding& coding, int dc_before);
+
+/// Writes the blocks of one rung.
+class BitSink {
+ public:
+  BitSink(Bytes& out, const MaskedRung& rung) : writer_(out), rung_(&rung) {}
+  void begin_block(std::size_t component) {
+    coding_ = &(*rung_)[component];
+    writer_.reserve(kMostBlockBytes);
+  }
+  void dc(unsigned symbol, unsigned value) { put(coding_->dc, symbol, value, symbol); }
+  void ac(unsigned symbol, unsigned value) { put(coding_->ac, symbol, value, symbol & 15u); }
+  void finish() { writer_.finish(); }
+
+ private:
+  // 64 symbols of 16 + 11 bits at most, each byte perhaps with a zero behind it.
+  static constexpr std::size_t kMostBlockBytes = 512;
+
+  void put(const SymbolCodes& codes, unsigned symbol, unsigned value, unsigned size) {
+    writer_.put(unsigned{codes.code[symbol]} << size | (value & ((1u << size) - 1)),
+                codes.bits[symbol] + size);
+  }
+  BitWriter writer_;
+  const MaskedRung* rung_;
+  const BlockCoding* coding_ = nullptr;
+};
+
+/// Counts the symbols of one rung's blocks. `pairs`: of Huffman tables, by component.
+class CountSink {
+ public:
+  CountSink(std::span<const std::size_t> pairs, SymbolCounts& counts) : pairs_(pairs), counts_(&counts) {}
+  void begin_block(std::size_t component) { dc_ = counts_->data() + 2 * pairs_[component]; }
+  void dc(unsigned symbol, unsigned) { ++(*dc_)[symbol]; }
+  void ac(unsigned symbol, unsigned) { ++dc_[1][symbol]; }
+  void finish() {}
+
+ private:
+  std::span<const std::size_t> pairs_;
+  SymbolCounts* counts_;
+  SymbolCounts::value_type* dc_ = nullptr;  // and AC behind it
+};
+
+/// The symbols of a block, ISO 10918-1 F.1.2.
+template <class Sink>
+void emit_block(const CodedBlock& block, int dc_before, std::size_t component, Sink& sink) {
+  const auto size = [](int v) {
+    return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(v))));
+  };
+  const auto bits = [](int v) { return static_cast<unsigned>(v < 0 ? v - 1 : v); };
+  sink.begin_block(component);
+  const int step = block.values[0] - dc_before;
+  sink.dc(size(step), bits(step));
+  unsigned before = 0;
+  for (std::uint64_t left = block.used & ~std::uint64_t{1}; left != 0; left &= left - 1) {
+    const auto k = static_cast<unsigned>(std::countr_zero(left));
+    const int value = block.values[k];
+    unsigned zeros = k - before - 1;
+    for (; zeros > 15; zeros -= 16) sink.ac(0xf0, 0);
+    sink.ac(zeros << 4 | size(value), bits(value));
+    before = k;
+  }
+  if (before < 63) sink.ac(0, 0);
+}
+
+}  // namespace texmesh

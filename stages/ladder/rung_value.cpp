@@ -1,0 +1,252 @@
+#include "stages/ladder/rung_value.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "format/base/portable_math.h"
+#include "format/rules/ordinary_loads.h"
+
+namespace texmesh {
+namespace {
+
+// Of a load's bytes textures have so much; mesh and tables take the rest.
+constexpr double kTextureShare = 0.75;
+// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
+constexpr double kUnseen = 0.01;
+// Prices of a byte in loss, from dear to cheap: four an octave.
+constexpr int kPrices = 176, kPricesPerOctave = 4, kDearestOctave = -6;
+
+double price(int k) {
+  constexpr double kLn2 = 0.693147180559945309417;
+  return portable::exp(kLn2 * (kDearestOctave - static_cast<double>(k) / kPricesPerOctave));
+}
+
+/// The preview, where pairs are numbered.
+constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
+
+/// A vertex of a lower hull.
+struct Vertex {
+  std::size_t pair = kPreview;
+  double bytes = 0, loss = 0;
+};
+using Hull = std::vector<Vertex>;
+
+/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs.
+Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t level) {
+  Hull hull{{kPreview, 0, texture.preview_loss[level]}};
+  for (;;) {
+    const Vertex at = hull.back();
+    Vertex best;
+    double steepest = 0;
+    for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
+      const RungPair& pair = texture.pairs[k];
+      if (!keep[k] || pair.level < level) continue;
+      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[level]};
+      if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
+      const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
+      if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
+    }
+    if (best.pair == kPreview) return hull;
+    hull.push_back(best);
+  }
+}
+
+/// The vertex at or behind which so many bytes end.
+std::size_t segment_of(const Hull& hull, double bytes) {
+  std::size_t k = 0;
+  while (k + 1 < hull.size() && hull[k + 1].bytes <= bytes) ++k;
+  return k;
+}
+
+/// Some fragments at one vertex and the others at the next one.
+double loss_at(const Hull& hull, double bytes) {
+  const std::size_t k = segment_of(hull, bytes);
+  if (k + 1 == hull.size()) return hull[k].loss;
+  const Vertex &a = hull[k], &b = hull[k + 1];
+  return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
+}
+
+std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
+  std::size_t level = 0;
+  while (level + 1 < texture.preview_loss.size() &&
+         texture.texels_across >= displayed_px * static_cast<double>(std::uint64_t{2} << level))
+    ++level;
+  return level;
+}
+
+std::vector<std::uint8_t> better_than_the_preview(const TextureWays& texture) {
+  std::vector<std::uint8_t> keep;
+  for (const RungPair& pair : texture.pairs)
+    keep.push_back(pair.fixed || pair.loss[pair.level] < texture.preview_loss[pair.level]);
+  return keep;
+}
+
+/// One pair of every level: of those that have none the best one.
+void keep_one_of_each_level(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
+  for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
+    std::size_t best = kPreview;
+    bool any = false;
+    for (std::size_t k = 0; k < keep.size(); ++k) {
+      const RungPair& pair = texture.pairs[k];
+      if (pair.level != level) continue;
+      any = any || keep[k];
+      if (best == kPreview || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
+    }
+    if (!any && best != kPreview) keep[best] = 1;
+  }
+}
+
+/// The bytes that a texture takes where a level is wanted, by price.
+using BytesByPrice = std::array<double, kPrices>;
+
+BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                            std::size_t level) {
+  const Hull hull = hull_of(texture, keep, level);
+  BytesByPrice out{};
+  std::size_t at = 0;
+  for (std::size_t k = 0; k < kPrices; ++k) {
+    while (at + 1 < hull.size() && texture.surface * (hull[at].loss - hull[at + 1].loss) >=
+                                       price(static_cast<int>(k)) * (hull[at + 1].bytes - hull[at].bytes))
+      ++at;
+    out[k] = hull[at].bytes;
+  }
+  return out;
+}
+
+/// What loads give a texture: bytes, by wanted level.
+using GivenBytes = std::vector<std::vector<double>>;
+
+/// By texture. Where one price takes less than a load has and the next one more, every texture goes the same
+/// part of its way between them.
+std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
+                                    const std::vector<std::vector<std::uint8_t>>& keep,
+                                    const std::vector<TextureLoad>& loads) {
+  std::vector<std::vector<BytesByPrice>> bytes(textures.size());
+  std::vector<GivenBytes> given(textures.size());
+  for (std::size_t t = 0; t < textures.size(); ++t) {
+    given[t].resize(textures[t].preview_loss.size());
+    for (std::size_t level = 0; level < given[t].size(); ++level)
+      bytes[t].push_back(bytes_by_price(textures[t], keep[t], level));
+  }
+  std::vector<std::size_t> level(textures.size());
+  for (const TextureLoad& load : loads) {
+    for (std::size_t t = 0; t < level.size(); ++t) level[t] = wanted_level(textures[t], load.displayed_px);
+    const auto taken = [&](std::size_t k) {
+      double sum = 0;
+      for (std::size_t t = 0; t < level.size(); ++t) sum += bytes[t][level[t]][k];
+      return sum;
+    };
+    std::size_t k = 0;
+    double now = taken(0), next = now;
+    for (; k + 1 < kPrices; ++k, now = next) {
+      next = taken(k + 1);
+      if (next > load.bytes) break;
+    }
+    const std::size_t to = std::min<std::size_t>(k + 1, kPrices - 1);
+    const double part = next > now ? std::max(0.0, load.bytes - now) / (next - now) : 0;
+    for (std::size_t t = 0; t < level.size(); ++t) {
+      const BytesByPrice& own = bytes[t][level[t]];
+      given[t][level[t]].push_back(own[k] + part * (own[to] - own[k]));
+    }
+  }
+  return given;
+}
+
+/// What a pair is to the loads.
+struct Worth {
+  double loads = 0;  // that choose it
+  double rise = 0;   // of the loss without it, summed over loads, in parts of the whole ladder's loss
+};
+
+/// `whole`: the texture's hulls with all pairs, by level.
+std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                            const GivenBytes& given, const std::vector<Hull>& whole) {
+  std::vector<Worth> out(texture.pairs.size());
+  for (std::size_t level = 0; level < given.size(); ++level) {
+    if (given[level].empty()) continue;
+    const Hull hull = hull_of(texture, keep, level);
+    std::vector<Hull> without(hull.size());
+    for (std::size_t v = 1; v < hull.size(); ++v) {
+      std::vector<std::uint8_t> others = keep;
+      others[hull[v].pair] = 0;
+      without[v] = hull_of(texture, others, level);
+    }
+    for (const double bytes : given[level]) {
+      const double loss = loss_at(hull, bytes), unit = loss_at(whole[level], bytes) + kUnseen;
+      const std::size_t k = segment_of(hull, bytes), last = std::min(k + 1, hull.size() - 1);
+      for (std::size_t v = std::max<std::size_t>(k, 1); v <= last; ++v) {
+        if (v > k && bytes <= hull[k].bytes) continue;  // all fragments are at the vertex before
+        Worth& worth = out[hull[v].pair];
+        worth.loads += 1;
+        worth.rise += (loss_at(without[v], bytes) - loss) / unit;
+      }
+    }
+  }
+  return out;
+}
+
+/// What is asked of a pair.
+struct Asked {
+  double loads = 0;          // that choose it
+  double rise_per_byte = 0;  // Worth::rise
+};
+
+/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay.
+std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                       const std::vector<Worth>& worth, const Asked& asked) {
+  std::vector<std::size_t> of_level(texture.preview_loss.size());
+  for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
+  std::size_t next = kPreview;
+  double least = 0;
+  for (std::size_t k = 0; k < keep.size(); ++k) {
+    const RungPair& pair = texture.pairs[k];
+    if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
+    const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
+    if (worth[k].loads >= asked.loads && per_byte >= asked.rise_per_byte) continue;
+    if (next == kPreview || per_byte < least) next = k, least = per_byte;
+  }
+  return next;
+}
+
+/// `keep` of one texture without what is not worth its bytes.
+void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked& asked,
+                std::vector<std::uint8_t>& keep) {
+  std::vector<Hull> whole;
+  for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hull_of(texture, keep, level));
+  for (;;) {
+    const std::size_t next = next_to_go(texture, keep, worth_of(texture, keep, given, whole), asked);
+    if (next == kPreview) return;
+    keep[next] = 0;
+  }
+}
+
+}  // namespace
+
+std::vector<TextureLoad> texture_loads() {
+  std::vector<TextureLoad> out;
+  for (const OrdinaryLoad& load : ordinary_loads())
+    out.push_back({load.displayed_px, kTextureShare * load.bytes_s * load.time_limit_s});
+  return out;
+}
+
+std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
+                                                           const std::vector<TextureLoad>& loads, double gain,
+                                                           double least_share) {
+  std::vector<std::vector<std::uint8_t>> keep;
+  for (const TextureWays& texture : textures) {
+    keep.push_back(better_than_the_preview(texture));
+    keep_one_of_each_level(texture, keep.back());
+  }
+  const std::vector<GivenBytes> given = share_loads(textures, keep, loads);
+  const auto count = static_cast<double>(loads.size());
+  for (std::size_t t = 0; t < textures.size(); ++t) {
+    std::uint64_t most = 1;
+    for (const RungPair& pair : textures[t].pairs) most = std::max(most, pair.bytes);
+    drop_pairs(textures[t], given[t], {least_share * count, gain * count / static_cast<double>(most)},
+               keep[t]);
+  }
+  return keep;
+}
+
+}  // namespace texmesh

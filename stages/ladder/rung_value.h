@@ -1,0 +1,46 @@
+#pragma once
+// Inside the ladder only: which ways of storing a texture are worth their bytes.
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace texmesh {
+
+/// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
+struct RungPair {
+  std::size_t level = 0, rung = 0;
+  std::uint64_t bytes = 0;   // of all the rung's streams and its tables
+  std::vector<double> loss;  // [level + 1]: surface-weighted 1 - SSIM where the display shows that level
+  bool fixed = false;        // is stored whatever it is worth
+};
+
+/// A texture as loads meet it.
+struct TextureWays {
+  double surface = 0;                // share of the object's surface that shows it
+  double texels_across = 0;          // of full size, along the height of an object that looks like a ball
+  std::vector<double> preview_loss;  // [levels], as RungPair::loss; the preview takes no bytes
+  std::vector<RungPair> pairs;       // by (level, rung)
+};
+
+/// What a load is to textures.
+struct TextureLoad {
+  double displayed_px = 0;  // height of the object
+  double bytes = 0;         // that textures may take
+};
+
+/// Of ordinary_loads() (format/rules).
+std::vector<TextureLoad> texture_loads();
+
+/// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at the
+/// level of the display, and is shown by pairs of that level or of coarser ones, along the lower hull of loss
+/// over bytes that begins at the preview: some fragments at one vertex, the others at the next one. The
+/// load's bytes are shared at one price, in loss x surface, for all textures. First the pairs go that lose no
+/// less than the preview. Then, one by one, that pair goes whose removal raises the loss least for its bytes,
+/// while the removal raises the mean over loads by less than `gain` times the pair's share of the texture's
+/// most bytes, or while less than `least_share` of the loads choose the pair. Fixed pairs stay, and one of
+/// each level. Pure; same result anywhere.
+std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
+                                                           const std::vector<TextureLoad>& loads, double gain,
+                                                           double least_share);
+
+}  // namespace texmesh

@@ -1,0 +1,20 @@
+#include "pipeline/io/markup.h"
+
+#include <gtest/gtest.h>
+
+namespace texmesh {
+namespace {
+
+TEST(Markup, WhatHasAMeaningThereIsEscaped) {
+  EXPECT_EQ(markup_escaped("a<b>&\"c\"'d'"), "a&lt;b&gt;&amp;&quot;c&quot;&#39;d&#39;");
+  EXPECT_EQ(markup_escaped("Figürchen"), "Figürchen");
+  EXPECT_EQ(markup_escaped(""), "");
+}
+
+TEST(Markup, ControlCharactersDoNotPass) {
+  EXPECT_EQ(markup_escaped("a\nb\tc\x01\x1f\r"), "a&#10;b&#9;c???");
+  EXPECT_EQ(markup_escaped(std::string_view("\0x", 2)), "?x");
+}
+
+}  // namespace
+}  // namespace texmesh
