@@ -36,13 +36,15 @@ struct PackageOptions {
 /// every scale of the chain. A pure function of its inputs: nothing runs in parallel here. `source` is what
 /// the source says about itself: about.json is that with options.meta and options.title over it.
 /// asset.copyright of the scales' files is the source's own, so that they stay as they are when options.meta
-/// changes. `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates, hosts
-/// or paths).
-std::vector<std::uint8_t> assemble_package(
-    const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Image>& images,
-    const Fragments& fragments, const Ladder& ladder, const Previews& previews, const PackageTables& tables,
-    const ThesisTables& thesis, const ScaleFiles& files, const MeasuredQuality& quality, const Poster& poster,
-    const About& source,
-    double jnd, const std::string& provenance_json, const PackageOptions& options, const RunContext& context);
+/// changes. `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates,
+/// hosts or paths).
+std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
+                                           const std::vector<Image>& images, const Fragments& fragments,
+                                           const Ladder& ladder, const Previews& previews,
+                                           const PackageTables& tables, const ThesisTables& thesis,
+                                           const ScaleFiles& files, const MeasuredQuality& quality,
+                                           const Poster& poster, const About& source, double jnd,
+                                           const std::string& provenance_json, const PackageOptions& options,
+                                           const RunContext& context);
 
 }  // namespace texmesh

@@ -33,13 +33,31 @@ TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
 }
 
 TEST(Layout, StreamingOrder) {
-  const std::vector<std::string> order{
-      "manifest.json",         "mesh/s09.glb",       "index.bin",          "textures.json",      "quality.json",
-      "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin",      "poster.jpg",         "about.json",
-      "preview/000.jpg",       "preview/001.jpg",    "texture/0/r00.pack", "texture/1/r00.pack",
-      "texture/0/r01.pack",    "texture/1/r01.pack", "mesh/s04.glb",       "texture/0/r02.pack",
-      "texture/1/r02.pack",    "texture/0/r03.pack", "mesh/s00.glb",       "extra/thing.bin",
-      "source/000.png",        "provenance.json",    "META-INF/content_credential.c2pa"};
+  const std::vector<std::string> order{"manifest.json",
+                                       "mesh/s09.glb",
+                                       "index.bin",
+                                       "textures.json",
+                                       "quality.json",
+                                       "texture/0/tables.pack",
+                                       "texture/1/tables.pack",
+                                       "tables.bin",
+                                       "poster.jpg",
+                                       "about.json",
+                                       "preview/000.jpg",
+                                       "preview/001.jpg",
+                                       "texture/0/r00.pack",
+                                       "texture/1/r00.pack",
+                                       "texture/0/r01.pack",
+                                       "texture/1/r01.pack",
+                                       "mesh/s04.glb",
+                                       "texture/0/r02.pack",
+                                       "texture/1/r02.pack",
+                                       "texture/0/r03.pack",
+                                       "mesh/s00.glb",
+                                       "extra/thing.bin",
+                                       "source/000.png",
+                                       "provenance.json",
+                                       "META-INF/content_credential.c2pa"};
   std::vector<std::string> shuffled = order;
   std::ranges::sort(shuffled);
   EXPECT_EQ(streaming_order(shuffled), order);

@@ -166,12 +166,12 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
 TEST(Package, OrderIsStreamingOrder) {
   std::vector<std::string> paths;
   for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);
-  EXPECT_EQ(paths, (std::vector<std::string>{
-                       "manifest.json", "mesh/s09.glb", "index.bin", "textures.json", "quality.json",
-                       "texture/0/tables.pack", "texture/1/tables.pack", "tables.bin", "about.json",
-                       "preview/000.jpg", "preview/001.jpg", "texture/0/r00.pack", "texture/1/r00.pack",
-                       "mesh/s04.glb", "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb",
-                       "thesis.bin", "provenance.json"}));
+  EXPECT_EQ(paths, (std::vector<std::string>{"manifest.json", "mesh/s09.glb", "index.bin", "textures.json",
+                                             "quality.json", "texture/0/tables.pack", "texture/1/tables.pack",
+                                             "tables.bin", "about.json", "preview/000.jpg", "preview/001.jpg",
+                                             "texture/0/r00.pack", "texture/1/r00.pack", "mesh/s04.glb",
+                                             "texture/0/r01.pack", "texture/1/r01.pack", "mesh/s00.glb",
+                                             "thesis.bin", "provenance.json"}));
   EXPECT_EQ(streaming_order(paths), paths);
 }
 
