@@ -11,8 +11,7 @@ const container = golden('v2.0-scan');
 
 async function readDocuments(bytes: Uint8Array): Promise<void> {
   const reader = await PackageReader.openBytes(bytes, 'mutant');
-  for (let p = 0; p < reader.manifest.previews.length; ++p) await reader.preview(p);
-  await reader.textures();
+  for (const [p, plane] of (await reader.textures()).entries()) if (plane.mip === 0) await reader.preview(p);
   await reader.tables();
   await reader.quality();
 }
@@ -33,6 +32,7 @@ const refusals: [string, string, (m: Mutant) => void, ((manifest: Json) => void)
   ['R2', 'tables.bin', () => undefined, (m) => (m.tables.headSha256 = flipped(m.tables.headSha256))],
   ['R3', 'entry tables.bin', () => undefined, (m) => (m.tables.bytes += 1)],
   ['R3', 'entry provenance.json', () => undefined, (m) => (m.provenance.sha256 = flipped(m.provenance.sha256))],
+  ['R3', 'entry about.json', () => undefined, (m) => (m.about.sha256 = flipped(m.about.sha256))],
   ['R3', 'entry thesis.bin', () => undefined, (m) => (m.thesis.sha256 = flipped(m.thesis.sha256))],
   ['R3', 'entry poster.jpg', () => undefined, (m) => (m.poster.offset += 64)],
   ['R3', 'entry mesh/stream.bin', () => undefined, (m) => (m.stream.bytes += 1)],
@@ -40,8 +40,6 @@ const refusals: [string, string, (m: Mutant) => void, ((manifest: Json) => void)
   ['R4', 'planes', () => undefined, (m) => (m.planeCount += 1)],
   ['R4', 'planes', (m) => m.json('textures.json', (d) => d.textures.pop())],
   ['R5', 'codec-webp', (m) => m.json('textures.json', (d) => (d.textures[0].codec = 'webp'))],
-  ['R6', 'previews of the full-size planes', () => undefined, (m) => m.previews.pop()],
-  ['R6', 'preview/000.jpg', () => undefined, (m) => (m.previews[0][1] -= 1)],
   ['R7', 'preview/000.jpg', (m) => m.rename('preview/000.jpg', 'preview/900.jpg')],
   ['R7', 'texture/0/r00.pack', (m) => m.rename('texture/0/r00.pack', 'texture/0/r90.pack')],
   ['R8', 'grid and rungs', (m) =>

@@ -73,6 +73,7 @@ std::vector<Refusal> refusals() {
       {"R3", "index entry textures.json", sealed([=](Manifest& m) { other(m.textures); })},
       {"R3", "index entry quality.json", sealed([=](Manifest& m) { other(m.quality); })},
       {"R3", "index entry provenance.json", sealed([=](Manifest& m) { other(m.provenance); })},
+      {"R3", "index entry about.json", sealed([=](Manifest& m) { other(m.about); })},
       {"R3", "index entry thesis.bin", sealed([=](Manifest& m) { other(*m.thesis); })},
       {"R3", "index entry poster.jpg", sealed([=](Manifest& m) { other(*m.poster); })},
       {"R3", "index entry mesh/s05.glb", sealed([=](Manifest& m) { other(m.scales[1].glb); })},
@@ -81,13 +82,6 @@ std::vector<Refusal> refusals() {
       {"R4", "textures.json", sealed([](Manifest& m) { m.plane_count = 2; })},
       {"R4", "tables.bin", built([](PackageParts& p) { p.tables.planes.push_back(p.tables.planes[0]); })},
       {"R5", "codec-webp", built([](PackageParts& p) { p.textures[0].codec = Codec::kWebp; })},
-      {"R6", "preview", sealed([](Manifest& m) { m.previews[0].bytes -= 1; })},
-      {"R6", "previews of the full-size planes",
-       [] {
-         return PackagePatcher(testing::make_package(2))
-             .seal([](Manifest& m) { m.previews.pop_back(); })
-             .package();
-       }},
       {"R7", "preview/000.jpg", renamed(preview_path(0), "preview/009.jpg")},
       {"R7", "texture/0/r01.pack", renamed(rung_path(0, 1), rung_path(0, 9))},
       {"R7", "texture/0/tables.pack", renamed(table_streams_path(0), "texture/0/tables_pack")},

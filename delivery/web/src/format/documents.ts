@@ -2,7 +2,6 @@ import { toHex } from './bytes';
 import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
-import { fullSizePlanes } from './layout';
 import { ByteRange, EntryRef, Manifest, hasGlb, manifestOfContainer, readManifest } from './manifest';
 import { QualityTable, readQuality } from './quality_table';
 import { parseTablesSection, readTablesHead } from './read_tables';

@@ -33,7 +33,6 @@ describe('about.json', () => {
   it('is fetched when it is asked for, once', async () => {
     const server = range();
     const reader = await openAt(server);
-    await reader.firstPicture();
     await reader.textures();
     const before = reader.requests.length;
     const [one, two] = await Promise.all([reader.about(), reader.about()]);
