@@ -61,7 +61,6 @@ class SourceToExtract : public ::testing::Test {
     request.input = folder_ / "a.glb";
     request.output = folder_ / "a.texmesh";
     request.options.scales.mesh_codec = codec;
-    request.options.ladder.lossless_top = true;
     NullStore store;
     compile_model(request, store, {}, {});
     return request.output;
