@@ -20,10 +20,10 @@ constexpr double kMostTimesLeastError = 2;
 constexpr int kComparedErrors = 9;
 constexpr double kNoError = 1e-9;
 
-// Two channels, whose reader rebuilds z, were measured on four PNG normal maps of 512 px: 12 to 17 % fewer bytes
-// at equal angles than channels apart. With z's quantisers four times as large, which no reader needs to know,
-// channels apart take 8 to 10 % fewer; what two channels save beyond that, 2 to 8 %, is not worth a second way
-// to read normals.
+// Two channels, whose reader rebuilds z, were measured on four PNG normal maps of 512 px: 12 to 17 % fewer
+// bytes at equal angles than channels apart. With z's quantisers four times as large, which no reader needs
+// to know, channels apart take 8 to 10 % fewer; what two channels save beyond that, 2 to 8 %, is not worth a
+// second way to read normals.
 constexpr CodingSpace kApart{true, Subsampling::k444};
 constexpr std::array<CodingSpace, 2> kOthers{{{false, Subsampling::k444}, {false, Subsampling::k420}}};
 
