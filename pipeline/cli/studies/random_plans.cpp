@@ -8,7 +8,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kLeastPlanBytes = 50e3, kMostPlanBytes = 8e6;
+constexpr double kLeastDrawnBytes = 50e3, kMostDrawnBytes = 8e6;
 constexpr std::array<double, 5> kHeights{256, 362, 512, 724, 1024};
 
 /// Numbers in 0..1 by SplitMix64 (Steele, Lea, Flood 2014): the same on every machine.
@@ -30,9 +30,9 @@ class Random {
 };
 
 double all_bytes(PackageReader& package) {
-  double all = kLeastPlanBytes;
+  double all = kLeastDrawnBytes;
   for (const EntryRef& e : package.index()) all += static_cast<double>(e.bytes);
-  return std::min(all, kMostPlanBytes);
+  return std::min(all, kMostDrawnBytes);
 }
 
 DeliveryPlan drawn_link(PackageReader& package, Random& random, DeliveryRequest& request) {
@@ -89,10 +89,11 @@ std::vector<DrawnPlan> draw_plans(PackageReader& package, int count, std::uint64
       drawn.plan = drawn_link(package, random, request);
     } else {
       request.scale = scales[random.below(scales.size())].scale;
-      drawn.plan = drawn.kind == DrawnKind::kMix
-                       ? drawn_mix(package, random, request)
-                       : plan_budget(package, request,
-                                     static_cast<std::uint64_t>(random.between(kLeastPlanBytes, most_bytes)));
+      drawn.plan =
+          drawn.kind == DrawnKind::kMix
+              ? drawn_mix(package, random, request)
+              : plan_budget(package, request,
+                            static_cast<std::uint64_t>(random.between(kLeastDrawnBytes, most_bytes)));
     }
     out.push_back(std::move(drawn));
   }

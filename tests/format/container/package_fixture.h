@@ -88,7 +88,10 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
   quality.geometry = {{{0, 0.1f, 0.2f}, {0, 0.2f, 0.4f}, {0, 0.1f, 0.2f}}};
   if (planes > 0)
     quality.groups = {{PlaneGroup::kColour,
-                       {{{0.125f, 0.5f}, {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}}, {{}, {}, {}}}}}};
+                       {{{0.125f, 0.5f},
+                         {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}},
+                         {{0.25f}, {0.45f}, {0.15f}},
+                         {{}, {}, {}}}}}};
   const auto text = [](const std::string& s) { return std::vector<std::uint8_t>(s.begin(), s.end()); };
   entries.push_back({kTablesPath, write_tables(tables)});
   entries.push_back({kQualityPath, text(write_quality(quality))});

@@ -322,7 +322,7 @@ TEST(Package, TablesHaveTheRowsOfTheStoredScales) {
   EXPECT_EQ(tables.planes[1].quality, (std::vector<float>{all[0], all[4], all[9]}));
   ASSERT_TRUE(m.thesis.has_value());
   EXPECT_EQ(read_thesis(part(package, *m.thesis)).tables.planes[1].quality, all);
-  EXPECT_GT(m.thesis->offset, m.first_picture_offset + m.first_picture_bytes);
+  EXPECT_GT(m.thesis->offset, m.scales.back().glb.offset);
   EXPECT_FALSE(manifest_of(Inputs(0).assemble()).thesis.has_value());
 
   Inputs few(1);
