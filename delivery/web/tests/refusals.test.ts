@@ -39,7 +39,7 @@ const refusals: [string, string, (m: Mutant) => void, ((manifest: Json) => void)
   ['R3', 'entry mesh/s00.glb', () => undefined, (m) => (m.scales.sha256[0] = flipped(m.scales.sha256[0]))],
   ['R4', 'planes', () => undefined, (m) => (m.planeCount += 1)],
   ['R4', 'planes', (m) => m.json('textures.json', (d) => d.textures.pop())],
-  ['R5', 'codec-webp', (m) => m.json('textures.json', (d) => (d.textures[0].codec = 'webp'))],
+  ['R5', 'codec-webp', (m) => m.json('textures.json', (d) => (d.textures.at(-1).codec = 'webp'))],
   ['R7', 'preview/000.jpg', (m) => m.rename('preview/000.jpg', 'preview/900.jpg')],
   ['R7', 'texture/0/r00.pack', (m) => m.rename('texture/0/r00.pack', 'texture/0/r90.pack')],
   ['R8', 'grid and rungs', (m) =>

@@ -54,16 +54,12 @@ describe.each(goldenNames)('%s', (name) => {
 });
 
 describe('scales that the vertex-split stream alone has', () => {
-  /** The golden manifest with a scale between the finest and the coarsest. */
+  /** The golden manifest, whose scale between the finest and the coarsest is a prefix of the stream. */
   async function manifestWith(change: (scales: Record<string, unknown[]>, stream: { offset: number; bytes: number; headBytes: number }) => void = () => undefined) {
-    const json = JSON.parse(new TextDecoder().decode(await entryOf('v1.1-scan', 'manifest.json'))) as {
+    const json = JSON.parse(new TextDecoder().decode(await entryOf('v2.0-scan', 'manifest.json'))) as {
       scales: Record<string, unknown[]>;
       stream: { offset: number; bytes: number; headBytes: number };
     };
-    for (const column of Object.values(json.scales)) column.splice(1, 0, column[0]);
-    json.scales.scale = [0, 1, 2];
-    json.scales.offset[1] = json.stream.offset;
-    json.scales.bytes[1] = json.stream.bytes;
     change(json.scales, json.stream);
     return readManifest(new TextEncoder().encode(JSON.stringify(json)));
   }

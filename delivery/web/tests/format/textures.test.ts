@@ -8,7 +8,7 @@ describe('small parts', () => {
     const { textures } = JSON.parse(new TextDecoder().decode(entry));
     const withFirst = (more: object) => {
       const [first, ...others] = textures;
-      return new TextEncoder().encode(JSON.stringify({ textures: [{ ...first, ...more }, ...others] }));
+      return new TextEncoder().encode(JSON.stringify({ textures: [{ ...first, sourceRung: false, ...more }, ...others] }));
     };
     expect(readTextures(withFirst({}))[0]).toMatchObject({ sourceRung: false, source: '' });
     expect(readTextures(withFirst({ sourceRung: true }))[0].sourceRung).toBe(true);

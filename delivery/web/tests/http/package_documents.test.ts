@@ -46,7 +46,7 @@ describe('what is read ahead', () => {
 
 describe('a failure', () => {
   const asked: [string, (r: PackageReader) => Promise<unknown>][] = [
-    ['textures', (r) => r.textures()],
+    ['a preview', (r) => r.preview(0)],
     ['tables', (r) => r.tables()],
     ['quality', (r) => r.quality()],
     ['a mesh', (r) => r.scaleGlb(0)],

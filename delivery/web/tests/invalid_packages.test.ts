@@ -3,9 +3,9 @@ import { mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { afterAll, describe, expect, it } from 'vitest';
-import { SplitStreamReader } from '../../src/format/splits/split_stream';
-import { FormatError, PackageReader } from '../../src/reader';
-import { golden, goldenNames, root } from '../support/files';
+import { SplitStreamReader } from '../src/format/splits/split_stream';
+import { FormatError, PackageReader } from '../src/reader';
+import { golden, goldenNames, root } from './support/files';
 
 // Packages that break one rule of format/SPEC.md each. A client sees what it reads: documents, fragments, the stream.
 const ofClients = /^([IRXTQS]\d\d|J04|F03|F05|M01|M02|M05|M10|M11|M18|M19|M21|W03|W05|W06)-/;
