@@ -298,8 +298,7 @@ void add_compile_options(Command& c, CompileArguments& args) {
        "--profile, flags win over the file")
       .value_name("FILE");
   c.option("--meta", args.meta,
-           "JSON file about the object: title, creator, licence, unit, coordinate reference ... "
-           "(schemas/meta.v1.schema.json). The file wins over what the model and a collection say")
+           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words")
       .value_name("FILE")
       .everyday(kEverydayTitle);
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (texmesh stages lists the stages)");

@@ -8,6 +8,10 @@
 
 namespace texmesh {
 
+/// How the file of a finer scale names a picture of its package: "../preview/PPP.jpg". The one name that
+/// leaves the model's folder. Resolvers of packages know it; FileResolver refuses it as any other.
+bool is_preview_uri(const std::string& uri);
+
 /// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index
 /// returned; -1 and a warning "missing-texture" when it is not there. Content that no allow-listed reader
 /// takes throws InputError. Notes say what becomes of colour profiles, CMYK and EXIF orientation.

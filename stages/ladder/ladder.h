@@ -53,8 +53,7 @@ struct LadderOptions {
       "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "
       "colours");
     v("rungs", s.rungs, Range{1, 100},
-      "JPEG qualities of colour textures, strictly rising, at most 16; textures that come as JPEGs have the file's "
-      "own as their last rung, and below it these only when they are given");
+      "JPEG qualities of colour textures, strictly rising, at most 16; the last rung of a JPEG is its own");
     v("normal_rungs", s.normal_rungs, Range{1, 100}, "JPEG qualities of normal maps");
     v("data_rungs", s.data_rungs, Range{1, 100}, "JPEG qualities of occlusion, roughness, metalness");
     v("alpha_rungs", s.alpha_rungs, Range{1, 100}, "JPEG qualities of alpha channels");
@@ -70,7 +69,7 @@ struct LadderOptions {
     v("prune", s.prune,
       "store only the rungs, of full size and mips, that simulated loads choose and that are worth their bytes; "
       "false = store all of them");
-    v("keep_source", s.keep_source, "keep the source images in the package as the files they are");
+    v("keep_source", s.keep_source, "keep the source images as files");
   }
 };
 

@@ -24,7 +24,7 @@ struct PackageOptions {
   std::string title, meta;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("title", s.title, "shown by viewers, before any other title; nothing is taken from file names");
+    v("title", s.title, "shown by viewers, before any other title");
     v("meta", s.meta, Range{0, static_cast<double>(kMaxAboutBytes)},
       "about.json without what the source says, as one text; --meta FILE sets it");
   }

@@ -155,14 +155,14 @@ test('nothing is fetched twice', async () => {
   await server.close();
 });
 
-test('the first picture takes two round trips', () => throttled({}, async (page, link, url) => {
+test('the first picture takes one round trip', () => throttled({}, async (page, link, url) => {
   const r = await loaded(null, page, url, {load: {time: 3, autoRefine: false}});
   check(!r.error, JSON.stringify(r.error));
   const shown = r.events.find((e) => e.name === 'first-picture');
   check(shown, 'no first picture');
   const {roundTrips, bytes} = waitedFor(r.requests, shown.at);
-  check(roundTrips <= 2, `${roundTrips} round trips`);
-  check(bytes <= 60000, `${bytes} bytes`);
+  check(roundTrips <= 1, `${roundTrips} round trips`);
+  check(bytes <= 65536, `${bytes} bytes`);
 }));
 
 test('a deadline is kept on a slow link', () => throttled({}, async (page, link, url) => {

@@ -56,7 +56,7 @@ for (const [name, options] of [
     // Every plot with all sections open.
     await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
     await settled(page);
-    check(await page.locator('.plot canvas').count() >= 5, `${await page.locator('.plot canvas').count()} plots`);
+    await page.locator('.plot canvas').nth(4).waitFor({state: 'attached', timeout: 20000});
     await page.evaluate(() => { const p = document.getElementById('panel'); p.scrollTop = p.scrollHeight; });
     await settled(page);
     await shot(page, `viewer-${name}-plots`);

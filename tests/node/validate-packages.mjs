@@ -3,22 +3,25 @@
 //   node validate-packages.mjs PACKAGE... [--strict]
 //
 // Exit code 0: no error (with --strict: no warning either), 1: findings, 2: usage or a package that cannot be read.
-import { readFileSync, readdirSync, statSync } from 'node:fs';
+import { existsSync, readFileSync, readdirSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import validator from 'gltf-validator';
 
 const kSeverity = ['error', 'warning', 'information', 'hint'];
 
-/** [path, bytes] of the meshes of an unpacked package. */
-function meshesOfFolder(folder) {
-  return readdirSync(join(folder, 'mesh'))
-    .filter((name) => name.endsWith('.glb'))
-    .sort()
-    .map((name) => [`mesh/${name}`, readFileSync(join(folder, 'mesh', name))]);
+const kWanted = /^(mesh\/.*\.glb|preview\/.*\.jpg)$/;
+
+/** [path, bytes] of the meshes and previews of an unpacked package. */
+function entriesOfFolder(folder) {
+  return ['mesh', 'preview']
+    .filter((room) => existsSync(join(folder, room)))
+    .flatMap((room) => readdirSync(join(folder, room)).sort().map((name) => `${room}/${name}`))
+    .filter((path) => kWanted.test(path))
+    .map((path) => [path, readFileSync(join(folder, path))]);
 }
 
-/** [path, bytes] of the meshes of a container: a ZIP whose entries are stored. */
-function meshesOfFile(file) {
+/** [path, bytes] of the meshes and previews of a container: a ZIP whose entries are stored. */
+function entriesOfFile(file) {
   const zip = readFileSync(file);
   let end = zip.length - 22;
   while (end >= 0 && zip.readUInt32LE(end) !== 0x06054b50) --end;
@@ -26,7 +29,7 @@ function meshesOfFile(file) {
   const count = zip.readUInt16LE(end + 10);
   let at = zip.readUInt32LE(end + 16);
   if (count === 0xffff || at === 0xffffffff) throw new Error('ZIP64 is not read by this script, unpack the package');
-  const meshes = [];
+  const entries = [];
   for (let i = 0; i < count; ++i) {
     if (zip.readUInt32LE(at) !== 0x02014b50) throw new Error(`byte ${at}: no central directory header`);
     if (zip.readUInt16LE(at + 10) !== 0) throw new Error(`byte ${at}: the entry is not stored`);
@@ -35,16 +38,18 @@ function meshesOfFile(file) {
     const header = zip.readUInt32LE(at + 42);
     const name = zip.toString('utf8', at + 46, at + 46 + nameBytes);
     const data = header + 30 + zip.readUInt16LE(header + 26) + zip.readUInt16LE(header + 28);
-    if (/^mesh\/.*\.glb$/.test(name)) meshes.push([name, zip.subarray(data, data + bytes)]);
+    if (kWanted.test(name)) entries.push([name, zip.subarray(data, data + bytes)]);
     at += 46 + nameBytes + extraBytes + commentBytes;
   }
-  return meshes;
+  return entries;
 }
 
-async function validate(name, bytes) {
+async function validate(name, bytes, previews) {
   const report = await validator.validateBytes(new Uint8Array(bytes), {
     uri: name,
     format: 'glb',
+    externalResourceFunction: (uri) =>
+      previews.has(uri) ? Promise.resolve(new Uint8Array(previews.get(uri))) : Promise.reject(new Error('no such preview')),
     maxIssues: 0,
     writeTimestamp: false,
   });
@@ -66,17 +71,20 @@ let [meshes, errors, warnings] = [0, 0, 0];
 for (const path of packages) {
   let entries;
   try {
-    entries = statSync(path).isDirectory() ? meshesOfFolder(path) : meshesOfFile(path);
+    entries = statSync(path).isDirectory() ? entriesOfFolder(path) : entriesOfFile(path);
   } catch (error) {
     console.error(`${path}: ${error.message}`);
     process.exit(2);
   }
-  if (entries.length === 0) {
+  const glbs = entries.filter(([name]) => name.endsWith('.glb'));
+  if (glbs.length === 0) {
     console.error(`${path}: no mesh/*.glb`);
     process.exit(2);
   }
-  for (const [name, bytes] of entries) {
-    const issues = await validate(`${path}: ${name}`, bytes);
+  // A finer scale's file names the previews beside its folder.
+  const previews = new Map(entries.filter(([name]) => name.endsWith('.jpg')).map(([name, bytes]) => [`../${name}`, bytes]));
+  for (const [name, bytes] of glbs) {
+    const issues = await validate(`${path}: ${name}`, bytes, previews);
     ++meshes;
     errors += issues.numErrors;
     warnings += issues.numWarnings;

@@ -103,7 +103,7 @@ std::int32_t MaterialReader::read_image(std::size_t index) {
                                            source_.file, place + "/uri"),
                            source_.file, place, source_.options);
   }
-  const std::string file = decode_uri(uri, source_.file, place + "/uri");
+  const std::string file = is_preview_uri(uri) ? uri : decode_uri(uri, source_.file, place + "/uri");
   try {
     return add_image(model_, file, source_.resolver, source_.file, place + "/uri", source_.options);
   } catch (const InputError& e) {

@@ -132,11 +132,13 @@ PaintedGrid grid_of(PackageReader& package, std::uint32_t plane) {
       info.columns,  eta_of(tables, 0), tables.covered_texels,  decode("preview", package.preview(plane))};
 }
 
-/// The plane of a package that shows GLB image "texture/<name>" (import keeps the last part of a name), its
-/// full resolution first; -1 = none.
+/// The plane of a package that shows GLB image "texture/<name>" or "../preview/<name>" (import keeps the last
+/// part of a name), its full resolution first; -1 = none.
 std::int32_t plane_of(const std::vector<TextureInfo>& textures, const std::string& name) {
   for (std::size_t p = 0; p < textures.size(); ++p)
-    if (textures[p].role == "base-colour" && std::to_string(textures[p].image) == name)
+    if (textures[p].role == "base-colour" &&
+        (std::to_string(textures[p].image) == name ||
+         preview_path(static_cast<std::uint32_t>(p)).ends_with("/" + name)))
       return static_cast<std::int32_t>(p);
   return -1;
 }

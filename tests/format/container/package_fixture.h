@@ -89,8 +89,8 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
   if (planes > 0)
     quality.groups = {{PlaneGroup::kColour,
                        {{{0.125f, 0.5f},
-                         {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}},
-                         {{0.25f}, {0.45f}, {0.15f}},
+                         {{0.005f, 0.02f}, {0.01f, 0.04f}, {0.002f, 0.01f}},
+                         {{1}, {1}, {1}},
                          {{}, {}, {}}}}}};
   const auto text = [](const std::string& s) { return std::vector<std::uint8_t>(s.begin(), s.end()); };
   entries.push_back({kTablesPath, write_tables(tables)});

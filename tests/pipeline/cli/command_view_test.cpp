@@ -160,8 +160,8 @@ TEST_F(CliView, ReachesPackagesOnlyAndReadsOnly) {
   EXPECT_EQ(said["packages"].size(), 3u) << said;
   const Json list = Json::parse(client().Get("/packages.json")->body);
   EXPECT_EQ(list["packages"][0]["url"], "packages/a%20scan.texmesh");
-  EXPECT_FALSE(list["packages"][0].contains("poster")) << "packages of 1.1 have none";
-  EXPECT_EQ(status("/posters/a%20scan.texmesh"), 404);
+  EXPECT_TRUE(list["packages"][0].contains("poster"));
+  EXPECT_EQ(status("/posters/a%20scan.texmesh"), 200);
   for (const char* there : {"/packages/a%20scan.texmesh", "/packages/more/b.texmesh",
                             "/packages/tree/manifest.json", "/packages/tree/mesh/s00.glb"})
     EXPECT_EQ(status(there), 200) << there;

@@ -288,7 +288,7 @@ TEST_F(SourceToScales, NamesMaterialsNormalsAndColoursSurviveToEveryScale) {
   }
 }
 
-TEST_F(SourceToScales, TangentsSurviveToEveryScale) {
+TEST_F(SourceToScales, TangentsSurviveInEveryFile) {
   constexpr int kSide = 16;
   GltfBuilder b = sheet(kSide);
   Json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
@@ -304,6 +304,7 @@ TEST_F(SourceToScales, TangentsSurviveToEveryScale) {
   Package package = compile("m.glb", b.glb());
   ASSERT_GT(package.reader->manifest().scales.size(), 1u);
   for (const auto& scale : package.reader->manifest().scales) {
+    if (!scale.has_glb()) continue;  // the stream has none
     const Mesh mesh = package.import_scale(scale.scale).model.mesh;
     ASSERT_EQ(mesh.tangents.size(), mesh.wedge_count());
     for (const Vec4f& t : mesh.tangents) {

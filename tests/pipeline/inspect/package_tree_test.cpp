@@ -46,7 +46,7 @@ struct Tree : ::testing::Test {
 TEST_F(Tree, PackAfterUnpackGivesTheSameBytes) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   EXPECT_EQ(verify(folder / "tree"), "");
-  EXPECT_EQ(files_beneath(folder / "tree").size(), 13u);
+  EXPECT_EQ(files_beneath(folder / "tree").size(), 14u);
   pack_folder(folder / "tree", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   expect_names({"a.texmesh", "b.texmesh", "tree"});
@@ -86,7 +86,7 @@ TEST_F(Tree, ADamagedContentCredentialIsNotUnpacked) {
 TEST_F(Tree, PackAfterUnpackWithFragmentFiles) {
   unpack_package(folder / "a.texmesh", folder / "tree", {true, false});
   EXPECT_EQ(verify(folder / "tree"), "");
-  EXPECT_EQ(files_beneath(folder / "tree").size(), 13u + 6 + 1);
+  EXPECT_EQ(files_beneath(folder / "tree").size(), 14u + 6 + 1);
   pack_folder(folder / "tree/", folder / "b.texmesh");
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
   for (std::uint32_t rung = 0; rung < 2; ++rung) fs::remove(fs::path(folder / "tree") / rung_path(0, rung));

@@ -70,7 +70,7 @@ TEST(Verify, ASoundPackageHasNoFindings) {
   EXPECT_EQ(report.meshes, 2u);
   EXPECT_EQ(report.previews, 1u);
   EXPECT_EQ(report.fragments, 6u);
-  EXPECT_EQ(report.entries, 13u);
+  EXPECT_EQ(report.entries, 14u);
 }
 
 TEST(Verify, ThePatcherItselfKeepsAPackageSound) {
