@@ -44,7 +44,7 @@ if(TEXMESH_COMPILER)
     "extract/extract\\.h"
     "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/worker\\.h" "batch/progress\\.h"
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
-    "extract/glb/(extracted|image_codecs|plane_pixels)\\.h")
+    "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/plane_pixels.h"
 #include "pipeline/render/rendered_model.h"
 
 namespace texmesh {

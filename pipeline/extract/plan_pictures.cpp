@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "format/container/layout.h"
-#include "pipeline/extract/glb/plane_pixels.h"
 #include "pipeline/extract/glb/resize.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/scale_model.h"
 #include "pipeline/extract/glb/texture_source.h"
 #include "pipeline/extract/package_model.h"
 #include "pipeline/render/picture_sheet.h"
+#include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
 namespace {

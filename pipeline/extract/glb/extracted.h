@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pipeline/extract/glb/image_codecs.h"
-#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
 

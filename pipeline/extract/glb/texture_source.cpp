@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "format/container/layout.h"
-#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/plane_pixels.h"
 #include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"

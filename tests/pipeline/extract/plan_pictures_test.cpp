@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
 namespace {

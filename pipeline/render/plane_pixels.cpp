@@ -1,4 +1,4 @@
-#include "pipeline/extract/glb/plane_pixels.h"
+#include "pipeline/render/plane_pixels.h"
 
 #include <algorithm>
 #include <cstring>
