@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "format/container/layout.h"
 #include "format/rules/allocation.h"
-#include "pipeline/import/import.h"
 #include "pipeline/inspect/debug/debug_view.h"
+#include "pipeline/inspect/package_mesh.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -110,37 +108,12 @@ Pixels decode(const std::string& name, std::vector<std::uint8_t> bytes) {
   return decode_image(probe_image(name, std::move(bytes), {}));
 }
 
-/// The files that scale files refer to: "../preview/003.jpg".
-class PreviewsOf : public Resolver {
- public:
-  explicit PreviewsOf(PackageReader& package) : package_(package) {}
-  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t) override {
-    for (std::uint32_t p = 0; p < package_.textures().size(); ++p)
-      if (uri == "../" + preview_path(p)) return package_.preview(p);
-    return std::nullopt;
-  }
-
- private:
-  PackageReader& package_;
-};
-
 PaintedGrid grid_of(PackageReader& package, std::uint32_t plane) {
   const TextureInfo& info = package.textures()[plane];
   const PlaneTables& tables = package.tables().planes.at(plane);
   return {
       info.width_px, info.height_px,    info.fragment_width_px, info.fragment_height_px,
       info.columns,  eta_of(tables, 0), tables.covered_texels,  decode("preview", package.preview(plane))};
-}
-
-/// The plane of a package that shows GLB image "texture/<name>" or "../preview/<name>" (import keeps the last
-/// part of a name), its full resolution first; -1 = none.
-std::int32_t plane_of(const std::vector<TextureInfo>& textures, const std::string& name) {
-  for (std::size_t p = 0; p < textures.size(); ++p)
-    if (textures[p].role == "base-colour" &&
-        (std::to_string(textures[p].image) == name ||
-         preview_path(static_cast<std::uint32_t>(p)).ends_with("/" + name)))
-      return static_cast<std::int32_t>(p);
-  return -1;
 }
 
 }  // namespace
@@ -167,14 +140,12 @@ DebugView view_fragments(const ConditionedMesh& mesh, const std::vector<Material
 }
 
 DebugView view_fragments(PackageReader& package, const RunContext& context) {
-  PreviewsOf previews(package);
-  const std::string name = mesh_path(0);
-  const ImportedModel s0 = import_model(name, package.scale_glb(0), previews, {}, context);
+  const ImportedModel s0 = finest_scale(package, context);
   std::vector<std::int32_t> grid_of_image(s0.model.images.size(), -1);
   std::vector<PaintedGrid> grids;
   for (std::size_t i = 0; i < s0.model.images.size(); ++i) {
-    const std::int32_t plane = plane_of(package.textures(), s0.model.images[i].name);
-    if (plane < 0) continue;
+    const std::int32_t plane = plane_of_image(package.textures(), s0.model.images[i].name);
+    if (plane < 0 || package.textures()[static_cast<std::size_t>(plane)].role != "base-colour") continue;
     grid_of_image[i] = static_cast<std::int32_t>(grids.size());
     grids.push_back(grid_of(package, static_cast<std::uint32_t>(plane)));
   }
