@@ -10,7 +10,6 @@
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/options/units.h"
-#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
@@ -145,13 +144,8 @@ int run_check(const CheckArguments& args) {
     const auto sizes = check_switch_sizes(package, args.max_flip, args.views, context_of(0));
     results.insert(results.end(), sizes.begin(), sizes.end());
   }
-  if (!args.junit.empty()) {
-    const std::string xml = gate_junit(args.package, results);
-    write_output_file(args.junit, std::span(reinterpret_cast<const std::uint8_t*>(xml.data()), xml.size()));
-  }
-  std::vector<std::string> reasons;
-  for (const GateResult& r : results)
-    if (!r.failure.empty()) reasons.push_back(r.failure);
+  if (!args.junit.empty()) write_gate_junit(args.junit, "texmesh check", args.package, results);
+  const std::vector<std::string> reasons = gate_failures(results);
   if (args.json) {
     Json j = plan_json(package, plan, list);
     j["good"] = reasons.empty();

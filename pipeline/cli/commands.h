@@ -13,6 +13,7 @@ void add_verify_command(Command& app);
 void add_unpack_command(Command& app);  // command_pack.cpp
 void add_pack_command(Command& app);
 void add_debug_command(Command& app);
+void add_doctor_command(Command& app);
 void add_render_command(Command& app);
 void add_report_command(Command& app);
 void add_study_command(Command& app);

@@ -21,6 +21,7 @@ void add_commands(Command& program) {
   add_render_command(program);
   add_report_command(program);
   add_debug_command(program);
+  add_doctor_command(program);
   program.group("Export");
   add_extract_command(program);
   add_unpack_command(program);

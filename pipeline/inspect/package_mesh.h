@@ -11,8 +11,8 @@ namespace texmesh {
 /// S_0 of a package as its GLB has it; the images are previews. Errors as import_model().
 ImportedModel finest_scale(PackageReader& package, const RunContext& context);
 
-/// The full-size plane of a package that an image of finest_scale() stands for, colours before alpha; -1 = none.
-/// `name`: Image::name, the last part of "texture/<image>" or "../preview/<plane>.jpg".
+/// The full-size plane of a package that an image of finest_scale() stands for, colours before alpha; -1 =
+/// none. `name`: Image::name, the last part of "texture/<image>" or "../preview/<plane>.jpg".
 std::int32_t plane_of_image(const std::vector<TextureInfo>& textures, const std::string& name);
 
 }  // namespace texmesh

@@ -69,18 +69,22 @@ RenderedModel rendered_model(ImportedModel imported, const RunContext& context) 
   return model;
 }
 
-RenderedModel load_rendered_model(const std::string& path, const ImportOptions& options,
-                                  const RunContext& context) {
+ImportedModel import_file(const std::string& path, const ImportOptions& options, const RunContext& context) {
   const std::filesystem::path file(path);
   const std::vector<std::uint8_t> bytes =
       read_input_file(file, static_cast<std::uint64_t>(options.max_file_bytes));
   FileResolver resolver(file.parent_path());
   try {
-    return rendered_model(import_model(file.filename().string(), bytes, resolver, options, context), context);
+    return import_model(file.filename().string(), bytes, resolver, options, context);
   } catch (const InputError& e) {
     if (resolver.failed_for_resources()) throw ResourceError(e.file(), e.place(), e.expected(), e.found());
     throw;
   }
+}
+
+RenderedModel load_rendered_model(const std::string& path, const ImportOptions& options,
+                                  const RunContext& context) {
+  return rendered_model(import_file(path, options, context), context);
 }
 
 void make_unlit(RenderedModel& model) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/text_table.h"
 #include "pipeline/report/html.h"
@@ -51,14 +52,15 @@ std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_fl
   return results;
 }
 
-std::string gate_junit(const std::string& package, const std::vector<GateResult>& results) {
+std::string gate_junit(const std::string& suite, const std::string& input,
+                       const std::vector<GateResult>& results) {
   const auto failures =
       std::ranges::count_if(results, [](const GateResult& r) { return !r.failure.empty(); });
-  const std::string name = markup_escaped(printable(package));
+  const std::string name = markup_escaped(printable(input));
   std::string out = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"texmesh check\" "
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" "
       "tests=\"{}\" failures=\"{}\">\n",
-      results.size(), failures);
+      markup_escaped(suite), results.size(), failures);
   for (const GateResult& r : results) {
     out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, markup_escaped(r.name));
     out += r.failure.empty()
@@ -66,6 +68,19 @@ std::string gate_junit(const std::string& package, const std::vector<GateResult>
                : fmt::format("><failure message=\"{}\"/></testcase>\n", markup_escaped(r.failure));
   }
   return out + "</testsuite>\n</testsuites>\n";
+}
+
+void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
+                      const std::vector<GateResult>& results) {
+  const std::string xml = gate_junit(suite, input, results);
+  write_output_file(path, std::span(reinterpret_cast<const std::uint8_t*>(xml.data()), xml.size()));
+}
+
+std::vector<std::string> gate_failures(const std::vector<GateResult>& results) {
+  std::vector<std::string> out;
+  for (const GateResult& r : results)
+    if (!r.failure.empty()) out.push_back(r.failure);
+  return out;
 }
 
 }  // namespace texmesh

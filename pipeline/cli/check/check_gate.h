@@ -28,7 +28,13 @@ std::vector<GateResult> check_plan(const DeliveryPlan& plan, const Gate& gate, d
 std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_flip, int views,
                                            const RunContext& context);
 
-/// JUnit XML: one test suite, a case per result.
-std::string gate_junit(const std::string& package, const std::vector<GateResult>& results);
+/// JUnit XML: one test suite of this name ("texmesh check"), a case per result. `input`: what was checked.
+std::string gate_junit(const std::string& suite, const std::string& input,
+                       const std::vector<GateResult>& results);
+/// Writes it to a file. Errors as write_output_file().
+void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
+                      const std::vector<GateResult>& results);
+/// The sentences of the limits that are not kept.
+std::vector<std::string> gate_failures(const std::vector<GateResult>& results);
 
 }  // namespace texmesh

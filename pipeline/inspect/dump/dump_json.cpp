@@ -4,6 +4,7 @@
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
 #include "format/rules/viewing.h"
+#include "pipeline/inspect/atlas/atlas_report.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/package_figures.h"
 #include "pipeline/inspect/provenance.h"
@@ -290,6 +291,8 @@ Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
       return ladder_json(p);
     case DumpPart::kTables:
       return tables_json(p, gamma);
+    case DumpPart::kAtlas:
+      return {{"atlas", atlas_json(diagnose_atlases(atlas_subject(p, {}), {}))}};
     case DumpPart::kEntries:
       return entries_json(p);
     case DumpPart::kAbout:

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/inspect/atlas/atlas_report.h"
 #include "pipeline/inspect/dump/dump.h"
 #include "pipeline/inspect/dump/dump_summary.h"
 #include "pipeline/inspect/dump/dump_textures.h"
@@ -84,6 +85,8 @@ std::string part_text(PackageReader& p, DumpPart part, std::optional<double> gam
       return ladder_text(p);
     case DumpPart::kTables:
       return tables_text(p, gamma);
+    case DumpPart::kAtlas:
+      return atlas_text(diagnose_atlases(atlas_subject(p, {}), {}));
     case DumpPart::kEntries:
       return entries_text(p);
     case DumpPart::kAbout:

@@ -35,7 +35,7 @@ TEST(CheckGate, SwitchSizesAreRendered) {
 }
 
 TEST(CheckGate, JunitHasACaseForEach) {
-  const std::string xml = gate_junit("a<b>\"&.texmesh", {{"one", ""}, {"two", "3 < 4"}});
+  const std::string xml = gate_junit("texmesh check", "a<b>\"&.texmesh", {{"one", ""}, {"two", "3 < 4"}});
   EXPECT_NE(xml.find("tests=\"2\" failures=\"1\""), std::string::npos) << xml;
   EXPECT_NE(xml.find("classname=\"a&lt;b&gt;&quot;&amp;.texmesh\" name=\"one\"/>"), std::string::npos) << xml;
   EXPECT_NE(xml.find("<failure message=\"3 &lt; 4\"/>"), std::string::npos) << xml;
