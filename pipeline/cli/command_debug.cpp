@@ -131,7 +131,9 @@ void add_debug_options(Command& c, DebugArguments& args) {
        "--what", args.what,
        "persistence: up to which scale a vertex stays a feature. skeleton: the curve skeleton inside "
        "the shape. R: the distance to the skeleton, which errors are measured against. collapse-error: at "
-       "which error a vertex was removed. fragments: the texture's grid and importance (of packages, too)")
+       "which error a vertex was removed. fragments: the texture's grid and importance (of packages, too). atlas: "
+       "the charts of the textures, thin ones red, overlaps magenta; a PNG has the textures, too (of packages, "
+       "too)")
       .required()
       .one_of_explained({kDebugNames.begin(), kDebugNames.end()})
       .value_name("QUANTITY");
@@ -170,10 +172,11 @@ void add_debug_command(Command& app) {
   c.examples(
       "  texmesh debug turtle.glb --what persistence -o turtle.png\n"
       "  texmesh debug turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=120\n"
-      "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json");
+      "  texmesh debug turtle.texmesh --what fragments -o grid.glb --json\n"
+      "  texmesh debug turtle.glb --what atlas -o atlas.png");
   c.notes(
       "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives "
-      "their values. A GLB holds the colours as vertex colours (fragments: as textures) and the skeleton as "
+      "their values. A GLB holds the colours as vertex colours (fragments and atlas: as textures) and the skeleton as "
       "lines.\n"
       "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
   c.on_run([args] { return check_and_run_debug(*args); });

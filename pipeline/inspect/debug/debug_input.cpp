@@ -21,6 +21,14 @@ Stage view_stage(Inputs<Read...> read, DebugView (*view)(const Read&...)) {
                     [view](const Read&... objects, const RunContext&) { return view(objects...); });
 }
 
+/// Of the mesh as the file has it: conditioning may cut it.
+DebugView view_imported_atlas(const ImportedMesh& imported, const std::vector<Material>& materials,
+                              const std::vector<Image>& images) {
+  std::vector<AtlasImage> sides;
+  for (const Image& image : images) sides.push_back({image.width_px, image.height_px, nullptr});
+  return view_atlas(imported.mesh, materials, sides);
+}
+
 Stage view_stage_of(DebugQuantity what) {
   switch (what) {
     case DebugQuantity::kPersistence:
@@ -31,6 +39,8 @@ Stage view_stage_of(DebugQuantity what) {
       return view_stage(inputs(kConditionedMesh, kSkeleton), view_radius);
     case DebugQuantity::kCollapseError:
       return view_stage(inputs(kNestedScales), view_collapse_error);
+    case DebugQuantity::kAtlas:
+      return view_stage(inputs(kImportedMesh, kMaterials, kImages), view_imported_atlas);
     case DebugQuantity::kFragments:
       break;
   }
@@ -45,13 +55,13 @@ DebugView view_input(const CompileRequest& request, DebugQuantity what, Store& s
 }
 
 DebugView view_package(const std::string& path, DebugQuantity what, const RunContext& context) {
-  if (what != DebugQuantity::kFragments) {
+  if (what != DebugQuantity::kFragments && what != DebugQuantity::kAtlas) {
     const std::string name(kDebugNames[static_cast<std::size_t>(what)]);
     throw InputError(path, "--what " + name, "the model it was compiled from: a package does not hold this",
-                     "a package; try: texmesh debug MODEL --what " + name + ", or --what fragments");
+                     "a package; try: texmesh debug MODEL --what " + name + ", --what fragments or atlas");
   }
   PackageReader package(open_store(path));
-  return view_fragments(package, context);
+  return what == DebugQuantity::kAtlas ? view_atlas(package, context) : view_fragments(package, context);
 }
 
 bool is_package(const std::string& path) {

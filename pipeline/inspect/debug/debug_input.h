@@ -9,8 +9,8 @@ namespace texmesh {
 DebugView view_input(const CompileRequest& request, DebugQuantity what, Store& store,
                      const RunContext& context, const StageObserver& observer, Notes& notes);
 
-/// The view of a quantity that a package holds, which is fragments alone. For the other quantities InputError
-/// says what to do instead.
+/// The view of a quantity that a package holds, which is fragments and atlas alone. For the other quantities
+/// InputError says what to do instead.
 DebugView view_package(const std::string& path, DebugQuantity what, const RunContext& context);
 
 /// Whether `path` is a package (a .texmesh file, or a folder that unpack made) and not a model.

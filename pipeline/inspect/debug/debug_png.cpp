@@ -114,6 +114,37 @@ void paste_bar(Pixels& out) {
   }
 }
 
+constexpr std::size_t kMostLayouts = 4;
+
+/// The mean of the texels of a rectangle, of at least one.
+std::array<std::uint8_t, 3> mean_of(const Pixels& p, std::uint32_t x0, std::uint32_t y0, std::uint32_t x1,
+                                    std::uint32_t y1) {
+  std::array<std::uint64_t, 3> sum{};
+  for (std::uint32_t y = y0; y < y1; ++y)
+    for (std::uint32_t x = x0; x < x1; ++x)
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += p.at(x, y)[c];
+  const std::uint64_t count = std::uint64_t{x1 - x0} * (y1 - y0);
+  return {static_cast<std::uint8_t>(sum[0] / count), static_cast<std::uint8_t>(sum[1] / count),
+          static_cast<std::uint8_t>(sum[2] / count)};
+}
+
+/// A texture within the square whose left side is `left`, in its own shape.
+void paste_layout(const Pixels& texture, std::uint32_t left, Pixels& out) {
+  const std::uint32_t side = out.height_px, longer = std::max(texture.width_px, texture.height_px);
+  const auto scaled = [](std::uint32_t at, std::uint32_t from, std::uint32_t to) {
+    return static_cast<std::uint32_t>(std::uint64_t{at} * to / from);
+  };
+  const std::uint32_t width = std::max(1u, scaled(texture.width_px, longer, side)),
+                      height = std::max(1u, scaled(texture.height_px, longer, side));
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; ++x) {
+      const std::uint32_t x0 = scaled(x, width, texture.width_px), y0 = scaled(y, height, texture.height_px);
+      const auto c = mean_of(texture, x0, y0, std::max(x0 + 1, scaled(x + 1, width, texture.width_px)),
+                             std::max(y0 + 1, scaled(y + 1, height, texture.height_px)));
+      std::copy(c.begin(), c.end(), out.data.data() + (std::size_t{y} * out.width_px + left + x) * 3);
+    }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px) {
@@ -125,7 +156,10 @@ std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t s
   Material red;
   red.base_colour = {1, 0.02f, 0.02f, 1};
   Pixels out;
-  out.width_px = 2 * side_px + (view.legend.coloured ? kBar : 0), out.height_px = side_px, out.channels = 3;
+  const auto layouts =
+      static_cast<std::uint32_t>(view.shows_layout ? std::min(kMostLayouts, view.textures.size()) : 0);
+  out.width_px = (2 + layouts) * side_px + (view.legend.coloured ? kBar : 0);
+  out.height_px = side_px, out.channels = 3;
   out.data.resize(std::size_t{out.width_px} * out.height_px * 3);
   for (std::uint32_t k = 0; k < 2; ++k) {
     const ViewCamera camera = camera_at(0.5 + portable::kPi * k, bounds);
@@ -137,6 +171,7 @@ std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t s
     }
     paste(picture, k * side_px, out);
   }
+  for (std::uint32_t k = 0; k < layouts; ++k) paste_layout(view.textures[k], (2 + k) * side_px, out);
   if (view.legend.coloured) paste_bar(out);
   return write_png(out);
 }

@@ -15,14 +15,22 @@
 #include "stages/data/pixels.h"
 #include "stages/data/scale_map.h"
 #include "stages/data/skeleton.h"
+#include "stages/measure/atlas/atlas_figures.h"
 
 namespace texmesh {
 
 // What a stage computed as something to look at: `texmesh debug`.
 
-enum class DebugQuantity : std::uint8_t { kPersistence, kSkeleton, kRadius, kCollapseError, kFragments };
-inline constexpr std::array<std::string_view, 5> kDebugNames{"persistence", "skeleton", "R", "collapse-error",
-                                                             "fragments"};
+enum class DebugQuantity : std::uint8_t {
+  kPersistence,
+  kSkeleton,
+  kRadius,
+  kCollapseError,
+  kFragments,
+  kAtlas
+};
+inline constexpr std::array<std::string_view, 6> kDebugNames{"persistence",    "skeleton",  "R",
+                                                             "collapse-error", "fragments", "atlas"};
 
 using Srgb = std::array<std::uint8_t, 3>;
 
@@ -41,6 +49,7 @@ struct DebugView {
   Mesh mesh;                        // colours: linear RGBA per wedge; empty where textures show
   std::vector<Material> materials;  // for mesh.triangle_material; texture refs index `textures`
   std::vector<Pixels> textures;     // 3 channels, sRGB
+  bool shows_layout = false;        // the textures themselves say something: a PNG has them, too
   bool translucent = false;         // lines inside the mesh must be seen through it
   std::vector<Vec3f> nodes;
   std::vector<std::array<std::uint32_t, 2>> lines;  // both ends equal = a point
@@ -61,10 +70,17 @@ DebugView view_fragments(const ConditionedMesh& mesh, const std::vector<Material
 /// The same from a package: S_0's mesh, previews and tables.
 DebugView view_fragments(PackageReader& package, const RunContext& context);
 
+/// Every chart in a colour of its own, thin ones red, texels of two places magenta (debug_atlas.cpp).
+/// `images`: sides, as measure_atlases() takes them. InputError for a mesh without an atlas.
+DebugView view_atlas(const Mesh& mesh, const std::vector<Material>& materials,
+                     std::span<const AtlasImage> images);
+DebugView view_atlas(PackageReader& package, const RunContext& context);
+
 /// GLB: the mesh (COLOR_0 or textures), then the lines as a primitive of mode LINES in a node "lines".
 std::vector<std::uint8_t> write_debug_glb(const DebugView& view);
 /// Two views side by side from opposite sides, a little from above, each side_px wide, by the stages' own
 /// rasteriser; lines are drawn over the mesh. A bar at the right shows the scale of colours, hi at the top.
+/// With shows_layout the first four textures stand at the right, each within side_px.
 std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px);
 
 }  // namespace texmesh
