@@ -407,8 +407,8 @@ class Model:
         require("stream" in self.manifest, "E01", "no split stream in this package")
         data, ref = self.entry("mesh/stream.bin"), self.manifest["stream"]
         head = read_stream_head(data)
-        require(head["bytes"] == ref["headBytes"] and sha(data[: head["bytes"]]) == ref["headSha256"], "R03",
-                "the head of the stream")
+        require(head["bytes"] == ref["headBytes"], "S08", "headBytes of the stream")
+        require(sha(data[: head["bytes"]]) == ref["headSha256"], "R02", "headSha256 of the stream")
         return Splits(head), data
 
     def verify(self):

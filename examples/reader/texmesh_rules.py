@@ -65,11 +65,11 @@ class Cursor:
 def parse_json(data, most, what, free=()):
     def unique(pairs):
         names = [name for name, _ in pairs]
-        require(len(set(names)) == len(names), "J01", f"{what}: a name twice")
+        require(len(set(names)) == len(names), "J10", f"{what}: a name twice")
         return dict(pairs)
 
     def walk(value, depth, is_free):
-        require(depth <= 64, "J01", f"{what}: more than 64 levels")
+        require(depth <= 64, "J10", f"{what}: more than 64 levels")
         if isinstance(value, str) and not is_free:
             require(not re.search(r"[\x00-\x1f\x7f]", value), "J03", f"{what}: a control character")
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
