@@ -185,9 +185,10 @@ std::string JsonAt::text(std::size_t max_bytes) const {
 }
 
 Sha256 JsonAt::digest() const {
-  if (!value_.is_string()) fail_type("a SHA-256");
+  if (!value_.is_string()) by("J07").fail_type("a SHA-256");
   Sha256 digest{};
-  if (!from_hex(value_.get_ref<const std::string&>(), digest)) fail_type("64 lower-case hexadecimal digits");
+  if (!from_hex(value_.get_ref<const std::string&>(), digest))
+    by("J07").fail_type("64 lower-case hexadecimal digits");
   return digest;
 }
 

@@ -30,7 +30,7 @@ double shortest_double(float value);
 double six_digits(double value);
 
 /// A value and its JSON pointer. Every accessor checks the type and the range and throws RuleError otherwise:
-/// J04 where no other rule was named, J03 for control characters.
+/// J04 where no other rule was named, J03 for control characters, J07 for digests.
 class JsonAt {
  public:
   JsonAt(const nlohmann::json& value, const std::string& file, std::string pointer = "")

@@ -278,6 +278,10 @@ SplitStreamHead PackageReader::split_stream_head() {
   if (parsed.bytes != ref.head_bytes)
     throw RuleError("S08", store_->name(), std::string("head of ") + kSplitStreamPath,
                     std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+  const SplitBlock& last = parsed.blocks.back();
+  if (last.offset + last.bytes() != ref.bytes)
+    throw RuleError("S08", store_->name(), kSplitStreamPath, "blocks that end with the entry",
+                    "an end at byte " + std::to_string(last.offset + last.bytes()));
   return parsed;
 }
 

@@ -25,6 +25,10 @@ class Verifier {
 
   VerifyReport run() {
     store_.list_entries();
+    for (const char* path :
+         {kIndexPath, kTablesPath, kTexturesPath, kQualityPath, kAboutPath, kProvenancePath})
+      findings_.require(store_.listed().empty() || store_.contains(path), {"entry-set", "E01"}, path, "",
+                        "an entry of the package", "none");
     if (read_bootstrap() && read_index_entry()) {
       store_.check_entry_set(package_.index, package_.manifest.index);
       check_manifest(package_.manifest, findings_);

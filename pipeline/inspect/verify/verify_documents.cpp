@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "format/base/json_fields.h"
 #include "format/container/layout.h"
 #include "format/documents/textures.h"
 #include "pipeline/inspect/provenance.h"
@@ -29,12 +30,24 @@ std::string text_of(const EntryRef& e) {
          to_hex(e.digest).substr(0, 16) + "...";
 }
 
+void require_six_digits(double value, const std::string& field, Findings& findings) {
+  findings.require(six_digits(value) == value, {"manifest", "M07"}, kManifestPath, field,
+                   "at most six significant digits", shortest(value, 17));
+}
+
 void check_scales(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.scales.size(); ++k) {
     // No rule about triangles: on a coarse grid a scale may show more of them than the next finer one.
     const ManifestScale& s = m.scales[k];
     findings.require(s.error_rms <= s.error_max, {"scale", "M12"}, kManifestPath, at("scales/errorRms", k),
                      "at most errorMax, " + number(s.error_max), number(s.error_rms));
+    if (k == 0)
+      for (const double zero : {s.error_max, s.error_rms, s.p95, s.p99})
+        findings.require(zero == 0, {"scale", "M12"}, kManifestPath, at("scales", k), "0 for S_0",
+                         number(zero));
+    for (const double v : {s.error_max, s.error_rms, s.p95, s.p99, s.display_px_jnd, s.display_px_error,
+                           s.display_px_edge, s.display_px_flip})
+      require_six_digits(v, at("scales", k), findings);
   }
 }
 
@@ -42,6 +55,7 @@ void check_scales(const Manifest& m, Findings& findings) {
 void check_steps(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.steps.size(); ++k) {
     const ManifestStep& step = m.steps[k];
+    require_six_digits(step.up_to_px, at("steps", k), findings);
     for (const ManifestScale& s : m.scales) {
       if (s.scale != step.scale) continue;
       findings.require(step.up_to_px <= s.display_px_flip * (1 + 1e-5), {"step", "M22"}, kManifestPath,
@@ -60,6 +74,7 @@ void check_manifest(const Manifest& m, Findings& findings) {
   const double extent = std::max({size.x, size.y, size.z});
   findings.require(near(m.object_height, extent, 1e-5), {"manifest", "M04"}, kManifestPath, "/objectHeight",
                    number(extent) + ", the largest extent of the bounds", number(m.object_height));
+  require_six_digits(m.surface_area, "/surfaceArea", findings);
   check_scales(m, findings);
   check_steps(m, findings);
 }

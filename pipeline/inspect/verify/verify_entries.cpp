@@ -20,7 +20,7 @@ void EntryVerifier::check_entry(const EntryRef& e) {
     guarded(findings_, "entry-read", e.path, [&] { check_texture_entry(e, name); });
   } else if (name.kind == EntryKind::kSplitStream) {
     guarded(findings_, {"split-stream", "S08"}, e.path,
-            [&] { check_split_stream(package_.manifest, store_.read(e), context_, findings_); });
+            [&] { check_split_stream(package_.manifest, store_.read(e), share_, context_, findings_); });
   } else if (name.kind == EntryKind::kPoster) {
     guarded(findings_, {"poster", "O01"}, e.path, [&] { check_poster_entry(e); });
   } else if (name.kind == EntryKind::kThesis) {
@@ -47,6 +47,7 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
   ++report_.meshes;
   std::vector<Vec3d> positions = check_mesh(
       package_.manifest, *scale, package_.textures.value_or(std::vector<TextureInfo>{}), bytes, findings_);
+  if (!positions.empty()) check_shared(package_.manifest, e.path, bytes, share_, findings_);
   // Meshes stand from coarse to fine; any other order is a finding of "entry-order".
   if (coarser_ && coarser_->scale > scale->scale)
     check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);

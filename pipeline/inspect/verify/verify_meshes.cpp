@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "format/container/layout.h"
@@ -73,6 +74,29 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
                      "texture/<image> of textures.json", facts.image_names[k]);
   check_previews_of(m, scale, textures, facts, findings);
   return std::move(facts.positions);
+}
+
+void check_shared(const Manifest& m, const std::string& entry, std::span<const std::uint8_t> glb,
+                  MeshShare& share, Findings& findings) {
+  const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16 | std::size_t{glb[15]} << 24;
+  const auto json =
+      nlohmann::ordered_json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
+  const auto array = [&](const char* key) {
+    return json.contains(key) ? json[key] : nlohmann::ordered_json::array();
+  };
+  MeshShare here{"", "", array("materials").size(), true};
+  for (const char* key : {"materials", "textures", "samplers"}) here.materials += array(key).dump() + "\n";
+  for (const auto& node : array("nodes")) here.names += node.value("name", std::string()) + "\n";
+  if (!share.known) share = here;
+  findings.require(here.materials == share.materials, {"mesh-materials", "G07"}, entry, "/materials",
+                   "materials, textures and samplers of the other files", "others");
+  findings.require(here.names == share.names, {"mesh-nodes", "G09"}, entry, "/nodes",
+                   "nodes with the names of the other files", "others");
+  const bool one_node = std::ranges::any_of(array("meshes"), [](const auto& mesh) {
+    return mesh.contains("extras") && mesh["extras"].is_object() && mesh["extras"].contains("partNames");
+  });
+  findings.require(!one_node || std::ranges::all_of(m.scales, &ManifestScale::has_glb), {"mesh-nodes", "G10"},
+                   entry, "/meshes", "a file of every scale, as one node has all parts", "scales without");
 }
 
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,

@@ -41,10 +41,15 @@ void check_scale(const ManifestScale& scale, const SplitScale& s, std::span<cons
 
 }  // namespace
 
-void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, const RunContext& context,
-                        Findings& findings) {
+void check_split_stream(const Manifest& m, std::span<const std::uint8_t> bytes, const MeshShare& share,
+                        const RunContext& context, Findings& findings) {
   const SplitStreamHead head = read_split_head(bytes);
   check_head(m, bytes, head, findings);
+  for (const SplitGroup& g : head.groups)
+    findings.require(!share.known || g.material < std::max<std::size_t>(share.material_count, 1),
+                     {"split-stream", "S23"}, kSplitStreamPath, "groups",
+                     "a material of the GLBs, of " + std::to_string(share.material_count),
+                     std::to_string(g.material));
   // The manifest's counts bound nothing here: on a coarse grid most faces of a stream may show nothing, and
   // the files have none of them. What the reader makes is bounded by the bytes of the blocks.
   SplitStreamReader reader(head);

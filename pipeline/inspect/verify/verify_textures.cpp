@@ -147,6 +147,7 @@ void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const P
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings) {
   try {
+    check_jpeg_head(texture.preview.path, "", jpeg, findings);
     const Pixels p = decode_jpeg(jpeg, 1ull << 26);
     findings.require(p.width_px == texture.preview_width_px && p.height_px == texture.preview_height_px &&
                          p.channels == texture.channels,
@@ -182,7 +183,10 @@ void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::
                          Findings& findings) {
   if (pack.size() != sum(t.table_bytes)) return;  // check_textures says so
   std::size_t offset = 0;
+  std::vector<std::span<const std::uint8_t>> streams;
   for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    streams.push_back(pack.subspan(offset, t.table_bytes[r]));
+    check_jpeg_head(texture.tables.path, "rung " + std::to_string(r), streams.back(), findings);
     findings.require(
         is_table_stream(texture.codec, static_cast<std::uint32_t>(r), pack.subspan(offset, t.table_bytes[r])),
         {"table-stream", texture.codec == Codec::kJpeg ? "F05" : "F06"}, texture.tables.path,
@@ -192,6 +196,7 @@ void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::
         "other bytes");
     offset += t.table_bytes[r];
   }
+  if (texture.source_rung) check_source_rung(texture, streams, findings);
 }
 
 std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung,

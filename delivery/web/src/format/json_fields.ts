@@ -66,7 +66,7 @@ export class JsonAt {
   /** A SHA-256 (or its first bytes) as lower-case hexadecimal digits. */
   digest(bytes = 32): Uint8Array {
     const v = this.text(2 * bytes);
-    if (v.length !== 2 * bytes || /[^0-9a-f]/.test(v)) this.fail(`${2 * bytes} hexadecimal digits`, this.shown_());
+    if (v.length !== 2 * bytes || /[^0-9a-f]/.test(v)) this.fail(`${2 * bytes} hexadecimal digits`, this.shown_(), 'J07');
     return Uint8Array.from({ length: bytes }, (_, i) => parseInt(v.slice(2 * i, 2 * i + 2), 16));
   }
 }
