@@ -300,7 +300,7 @@ class Textures:
     def files(self, plane, rung):
         """(fragment, complete file) of every listed fragment; digests are checked."""
         t, codec = self.tables[plane], self.textures[plane]["codec"]
-        heads = cut(self.pack(plane, "tables", "R12", int(t["tables"].sum(dtype=np.int64))), t["tables"])
+        heads = self.table_streams(plane)
         rungs = range(rung + 1) if t["incremental"] else [rung]
         streams = []
         for r in rungs:
@@ -317,10 +317,15 @@ class Textures:
                 require(good, "F05", f"fragment {fragment}: no SOI or EOI")
                 yield fragment, heads[rung][:-2] + parts[0][2:]
             elif codec == "jpeg-progressive":
-                require(heads[0][:2] == b"\xff\xd8", "F06", "no SOI")
+                require(heads[0][:2] == b"\xff\xd8" and parts[-1][-1:] != b"\xff", "F06", "no SOI, or a stream that ends with FF")
                 yield fragment, heads[0][:-2] + b"".join(parts) + b"\xff\xd9"
             else:
+                require(parts[0][:4] == b"RIFF" and parts[0][8:12] == b"WEBP", "F07", f"fragment {fragment}: no WebP")
                 yield fragment, parts[0]
+
+    def table_streams(self, plane):
+        t = self.tables[plane]
+        return cut(self.pack(plane, "tables", "R12", int(t["tables"].sum(dtype=np.int64))), t["tables"])
 
     def preview(self, plane):
         t = self.textures[plane]
@@ -358,6 +363,17 @@ def decode_image(data, width, height, channels, rule, what):
         return image
     except (OSError, SyntaxError, ValueError) as error:
         raise Refused(f"{rule}: {what}: {error}") from error
+
+
+def decode_source(data, t, plane):
+    formats = {"jpg": "JPEG", "png": "PNG", "tif": "TIFF", "webp": "WEBP"}
+    if t["source"] in formats:  # Pillow does not read EXR
+        try:
+            image = Image.open(io.BytesIO(data), formats=(formats[t["source"]],))
+            require(image.size == (t["widthPx"], t["heightPx"]), "O02", f"source of plane {plane}: {image.size}")
+            image.load()
+        except (OSError, SyntaxError, ValueError) as error:
+            raise Refused(f"O02: source of plane {plane}: {error}") from error
 
 
 # Commands ---------------------------------------------------------------------------------------------
@@ -407,8 +423,8 @@ class Model:
         require("stream" in self.manifest, "E01", "no split stream in this package")
         data, ref = self.entry("mesh/stream.bin"), self.manifest["stream"]
         head = read_stream_head(data)
-        require(head["bytes"] == ref["headBytes"] and sha(data[: head["bytes"]]) == ref["headSha256"], "R03",
-                "the head of the stream")
+        require(head["bytes"] == ref["headBytes"], "S08", "headBytes of the stream")
+        require(sha(data[: head["bytes"]]) == ref["headSha256"], "R02", "headSha256 of the stream")
         return Splits(head), data
 
     def verify(self):
@@ -432,32 +448,45 @@ class Model:
         read_about(p.read("about.json"), m)
         parse_json(p.read("provenance.json"), 64 << 20, "provenance.json")
         if "thesis" in m:
-            check_thesis(p.read("thesis.bin"), m, self.textures)
+            check_thesis(p.read("thesis.bin"), m, self.textures, self.tables)
         if "poster" in m:
             decode_image(p.read("poster.jpg"), m["poster"]["widthPx"], m["poster"]["heightPx"], 3, "O01", "poster")
         for plane, t in enumerate(self.textures):
             if "mip" not in t:
+                check_jpeg_head(p.read(f"preview/{plane:03}.jpg"), f"preview {plane}")
                 self.pictures.preview(plane)
+            if "source" in t:
+                decode_source(p.read(f"source/{plane:03}.{t['source']}"), t, plane)
+            if t["codec"] != "webp":
+                streams = self.pictures.table_streams(plane)
+                for stream in streams:
+                    check_jpeg_head(stream, f"table stream of plane {plane}")
+                if t.get("sourceRung"):
+                    check_source_rung(t, streams, plane)
             for rung in range(len(t["rungQuality"])):
                 for _ in self.pictures.fragments(plane, rung):
                     pass
         coarsest = f"mesh/s{m['scales']['scale'][-1]:02}.glb"
+        glbs = {}
         for path in (path for path in self.index if path.endswith(".glb")):
-            check_glb(p.read(path), path, path == coarsest, self.textures, p.read)
+            glbs[int(path[6:8])] = check_glb(p.read(path), path, path == coarsest, self.textures, p.read)
         if "stream" in m:
-            self.verify_stream()
+            self.verify_stream(len(glbs[0].get("materials", [])))
+        check_shared(glbs, m)
 
-    def verify_stream(self):
+    def verify_stream(self, materials):
         columns, (splits, data) = self.manifest["scales"], self.stream()
         last = self.manifest["stream"]["headBytes"] + sum(sum(b["parts"]) for b in splits.head["blocks"])
         require(last == len(data), "S08", "the last block does not end with the stream")
+        require(all(g[0] < max(1, materials) for g in splits.head["groups"]), "S23", "a material that the GLBs lack")
         for end in splits.scale_ends(data):
             require(end["scale"] in columns["scale"], "S21", f"scale {end['scale']} of the stream")
             k = columns["scale"].index(end["scale"])
             require(end["triangles"] == columns["triangles"][k], "S21", f"triangles of scale {end['scale']}")
             if columns["offset"][k] == self.manifest["stream"]["offset"]:
-                prefix = (columns["bytes"][k], columns["sha256"][k])
-                require(prefix == (end["bytes"], sha(data[: end["bytes"]])), "M20", f"prefix of scale {end['scale']}")
+                require(columns["vertices"][k] == end["wedges"], "M16", f"vertices of scale {end['scale']}")
+                require(columns["bytes"][k] == end["bytes"], "M20", f"prefix of scale {end['scale']}")
+                require(columns["sha256"][k] == sha(data[: end["bytes"]]), "M17", f"prefix of scale {end['scale']}")
 
 
 def show_info(model):

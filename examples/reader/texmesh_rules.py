@@ -65,11 +65,11 @@ class Cursor:
 def parse_json(data, most, what, free=()):
     def unique(pairs):
         names = [name for name, _ in pairs]
-        require(len(set(names)) == len(names), "J01", f"{what}: a name twice")
+        require(len(set(names)) == len(names), "J10", f"{what}: a name twice")
         return dict(pairs)
 
     def walk(value, depth, is_free):
-        require(depth <= 64, "J01", f"{what}: more than 64 levels")
+        require(depth <= 64, "J10", f"{what}: more than 64 levels")
         if isinstance(value, str) and not is_free:
             require(not re.search(r"[\x00-\x1f\x7f]", value), "J03", f"{what}: a control character")
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -106,7 +106,7 @@ def check(value, name, kind, low=0, high=2**53, rule="J04"):
         "digest": lambda: isinstance(value, str) and re.fullmatch("[0-9a-f]{64}", value) is not None,
     }[kind]()
     shown = str(value)
-    require(good, rule, f"{name}: {shown if len(shown) < 60 else shown[:60] + '...'}")
+    require(good, "J07" if kind == "digest" else rule, f"{name}: {shown if len(shown) < 60 else shown[:60] + '...'}")
     return value
 
 
@@ -184,6 +184,10 @@ def check_scales(m):
             check(value, name, *kind)
     require(columns["scale"][0] == 0 and rises(columns["scale"]), "M10", "scale numbers")
     require(columns["displayPxFlip"][0] == 1e9, "M12", "displayPxFlip of S_0")
+    lengths = [columns[name] for name in kinds if name.startswith(("error", "p9", "displayPx"))]
+    require(not any(columns[name][0] for name in ("errorMax", "errorRms", "p95", "p99")), "M12", "errors of S_0")
+    numbers = [m["surfaceArea"], *(x for column in lengths for x in column)]
+    require(all(float(f"{x:.6g}") == x for x in numbers), "M07", "more than six significant digits")
     for k in range(n):
         check_offset(columns["offset"][k])
         require(columns["errorRms"][k] <= columns["errorMax"][k], "M12", f"errorRms of element {k}")
@@ -250,6 +254,8 @@ def read_textures(data, m):
         require(all(t[s] == -(-base[s] >> here[1]) for s in ("widthPx", "heightPx")), "X07", f"sides of mip {p}")
         same = ("image", "role", "channels", "colourSpace", "previewWidthPx", "previewHeightPx")
         require(all(t[s] == base[s] for s in same), "X07", f"mip {p} and its base")
+    images = [(t["image"], t["role"] == "alpha", t.get("mip", 0)) for t in textures]
+    require(len(set(images)) == len(images), "X08", "two planes of one image")
     return textures
 
 
@@ -306,8 +312,36 @@ def check_entry_order(paths, m, textures):
 # Sections 10, 12 to 14: meshes and the other documents ------------------------------------------------
 
 
+def jpeg_segments(data):
+    """(marker, bytes) of what stands in front of the first scan."""
+    at, found = 2, []
+    while data[at : at + 1] == b"\xff" and data[at + 1 : at + 2] not in (b"\xda", b"\xd9"):
+        size = int.from_bytes(data[at + 2 : at + 4], "big")
+        require(size >= 2, "F08", "a segment of a JPEG")
+        found.append((data[at + 1], data[at + 4 : at + 2 + size]))
+        at += 2 + size
+    return found
+
+
+def check_jpeg_head(data, what):
+    require(not {0xE1, 0xE2} & {marker for marker, _ in jpeg_segments(data)}, "F10", f"{what}: EXIF or a colour profile")
+
+
+def check_source_rung(t, streams, plane):
+    frames = []
+    for stream in streams:
+        frame = next((body for marker, body in jpeg_segments(stream) if marker in (0xC0, 0xC1, 0xC2)), b"")
+        frames.append([(f >> 4, f & 15) for f in frame[7::3]])
+    factors = [f for pair in frames[-1] for f in pair]
+    require(all(f in (1, 2, 4) for f in factors) and all(f == frames[-1] for f in frames), "F13", f"plane {plane}")
+    require(0xDD not in {marker for marker, _ in jpeg_segments(streams[-1])}, "F12", f"restarts in plane {plane}")
+    for side, k in (("fragmentWidthPx", 0), ("fragmentHeightPx", 1)):
+        most = max((pair[k] for pair in frames[-1]), default=1)
+        require(t[side] % (8 * most) == 0, "F12", f"{side} of plane {plane}")
+
+
 def check_glb(data, name, is_coarsest, textures, read):
-    """The JSON and the pictures of a GLB; meshes are not decoded. `read` gives an entry."""
+    """The JSON and the pictures of a GLB, whose JSON is returned; meshes are not decoded. `read` gives an entry."""
     c = Cursor(data, "G01", name)
     magic, version, length, size, kind = c.get("IIIII")
     require((magic, version, length, kind) == (0x46546C67, 2, len(data), 0x4E4F534A), "G01", f"the head of {name}")
@@ -330,6 +364,24 @@ def check_glb(data, name, is_coarsest, textures, read):
             plane = next(p for p, t in enumerate(textures) if t["image"] == int(found[1]) and t["role"] != "alpha")
             embedded = data[begin : begin + view["byteLength"]]
             require(embedded == read(f"preview/{plane:03}.jpg"), "G05", f"{name}: not preview {plane}")
+    return gltf
+
+
+def check_shared(glbs, m):
+    """{scale: JSON}: what the GLBs of a package have in common, and their counts."""
+    columns, first = m["scales"], next(iter(glbs.values()))
+    for scale, g in glbs.items():
+        require(all(g.get(key) == first.get(key) for key in ("materials", "textures", "samplers")), "G07", f"S_{scale}")
+        names = [[node.get("name") for node in x.get("nodes", [])] for x in (g, first)]
+        require(names[0] == names[1], "G09", f"names of S_{scale}'s nodes")
+        one_node = any("partNames" in mesh.get("extras", {}) for mesh in g["meshes"])
+        require(not one_node or len(glbs) == len(columns["scale"]), "G10", "scales without a GLB")
+        primitives = [p for mesh in g["meshes"] for p in mesh["primitives"]]
+        points = sum(g["accessors"][p["attributes"]["POSITION"]]["count"] for p in primitives)
+        corners = sum(g["accessors"][p["indices"]]["count"] for p in primitives)
+        k = columns["scale"].index(scale)
+        expected = columns["vertices"][k], 3 * columns["triangles"][k]
+        require((points, corners) == expected, "G02", f"counts of S_{scale}: {points}, {corners}")
 
 
 def check_losses(losses, count, low_first=False):
@@ -361,6 +413,8 @@ def read_quality(data, m, textures):
             check_losses(take(losses, "preview", "object"), 1)
             coarser = take(losses, "coarser", "object")
             check_losses(coarser, len(take(coarser, "flip", "list", 0, 8, "Q01")))
+    heights = m["scales"]["displayPxFlip"][1:]
+    require(all(h <= sizes[-1] * (1 + 1e-5) for h in heights), "M13", "displayPxFlip beyond the pictures")
     names = [group["group"] for group in groups]
     require(names == [g for g in GROUPS if g in present] or set(names) != present, "Q03", "order of groups")
     require(set(names) == present, "R15", f"groups {names}")
@@ -397,7 +451,7 @@ def read_about(data, m):
     return about
 
 
-def check_thesis(data, m, textures):
+def check_thesis(data, m, textures, tables=None):
     c = Cursor(data, "O04", "thesis.bin")
     require(c.raw(4) == b"TXTH", "O04", "magic")
     version = c.get("HH")
@@ -425,6 +479,8 @@ def check_thesis(data, m, textures):
             require(1 <= scales <= 100 and 1 <= width <= 8, "O05", "counts of a section")
             require(scales > m["scales"]["scale"][-1], "R16", f"{scales} scales")
             middle = s.array("<f4", scales)
+            stored = [middle[k] for k in m["scales"]["scale"]]
+            require(tables is None or stored == tables[plane]["middle"].tolist(), "O06", f"Q of plane {plane}")
             require(((middle >= 0) & (middle <= 100)).all(), "O05", "Q")
             totals = s.whole(width, scales * 21)
             require(width == max(1, (int(totals.max()).bit_length() + 7) // 8), "O05", "width of D")

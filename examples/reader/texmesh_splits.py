@@ -268,7 +268,7 @@ class Splits:
             found = len(self.places), len(self.wedge_point), len(self.faces), len(self.faces) - len(self.triangles())
             expected = s["points"], s["wedges"], s["faces"], s["hidden"]
             require(found == expected, "S19", f"scale {s['scale']}: {found} instead of {expected}")
-            yield {"scale": s["scale"], "triangles": s["faces"] - s["hidden"], "bytes": at}
+            yield {"scale": s["scale"], "triangles": s["faces"] - s["hidden"], "wedges": s["wedges"], "bytes": at}
 
     def decode_block(self, block, data):
         ends = np.cumsum(block["parts"]).tolist()

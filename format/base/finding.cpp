@@ -12,7 +12,8 @@ std::string to_string(const Finding& f) {
   add(": ", f.field);
   add(": expected ", f.expected);
   add(f.expected.empty() ? ": found " : ", found ", f.found);
-  return s + " [" + f.check + "]";
+  s += " [" + f.check + "]";
+  return f.rule.empty() ? s : s + " [" + f.rule + "]";
 }
 
 }  // namespace texmesh

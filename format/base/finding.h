@@ -3,42 +3,57 @@
 #include <utility>
 #include <vector>
 
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 
 namespace texmesh {
 
-/// One thing about a package that is not as its format says. `check` names the rule (stable, kebab-case),
-/// `entry` the path inside the package ("" = the package as a whole), `field` the place in the entry: a JSON
-/// pointer, an array element, a byte offset.
+/// One thing about a package that is not as its format says. `check` names what was looked at (stable,
+/// kebab-case), `rule` the rule of format/SPEC.md that is broken ("" = none), `entry` the path inside the
+/// package ("" = the package as a whole), `field` the place in the entry: a JSON pointer, an array element, a
+/// byte offset.
 struct Finding {
-  std::string check, entry, field, expected, found;
+  std::string check, rule, entry, field, expected, found;
   friend bool operator==(const Finding&, const Finding&) = default;
 };
 
-/// `mesh/s09.glb: /accessors/3/count: expected 12, found 13 [glb-accessor]`
+/// `mesh/s09.glb: /accessors/3/count: expected 12, found 13 [glb-accessor] [G01]`
 std::string to_string(const Finding& finding);
+
+/// What was looked at, and the rule that it breaks where it is not right.
+struct Check {
+  Check(const char* name_, const char* rule_ = "") : name(name_), rule(rule_) {}
+  std::string name, rule;
+};
 
 /// Collects findings; every method returns whether the rule holds, so that a check can stop where going
 /// on is pointless.
 class Findings {
  public:
-  void add(std::string check, std::string entry, std::string field, std::string expected, std::string found) {
-    list_.push_back(
-        {std::move(check), std::move(entry), std::move(field), std::move(expected), std::move(found)});
+  void add(Check check, std::string entry, std::string field, std::string expected, std::string found) {
+    list_.push_back({std::move(check.name), std::move(check.rule), std::move(entry), std::move(field),
+                     std::move(expected), std::move(found)});
   }
-  void add(const std::string& check, const std::string& entry, const Error& error) {
-    add(check, entry, error.place(), error.expected(), error.found());
+  /// The error's rule counts before the check's.
+  void add(const Check& check, const std::string& entry, const Error& error) {
+    const std::string rule = rule_of(error);
+    add({check.name.c_str(), rule.empty() ? check.rule.c_str() : rule.c_str()}, entry, error.place(),
+        error.expected(), error.found());
+  }
+  /// Findings from `begin` on that name no rule are breaches of this one.
+  void name_rule(std::size_t begin, const char* rule) {
+    for (std::size_t k = begin; k < list_.size(); ++k)
+      if (list_[k].rule.empty()) list_[k].rule = rule;
   }
   void append(Findings other) {
     for (Finding& f : other.list_) list_.push_back(std::move(f));
   }
-  bool require(bool holds, const char* check, const std::string& entry, const std::string& field,
+  bool require(bool holds, const Check& check, const std::string& entry, const std::string& field,
                const std::string& expected, const std::string& found) {
     if (!holds) add(check, entry, field, expected, found);
     return holds;
   }
   template <class T>
-  bool require_equal(const T& expected, const T& found, const char* check, const std::string& entry,
+  bool require_equal(const T& expected, const T& found, const Check& check, const std::string& entry,
                      const std::string& field) {
     if (expected == found) return true;
     if constexpr (std::is_same_v<T, std::string>) {

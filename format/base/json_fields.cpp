@@ -9,6 +9,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "format/base/rule_error.h"
 
 namespace texmesh {
 namespace {
@@ -17,8 +18,8 @@ using Json = nlohmann::json;
 
 void check_depth(std::span<const std::uint8_t> bytes, const std::string& file) {
   if (const auto byte = scan_json_shape(bytes, kMaxJsonDepth).too_deep)
-    throw FormatError(file, "byte " + std::to_string(*byte),
-                      "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
+    throw RuleError("J10", file, "byte " + std::to_string(*byte),
+                    "at most " + std::to_string(kMaxJsonDepth) + " levels", "more");
 }
 
 /// At most 40 printable ASCII characters of a value, for an error message.
@@ -55,6 +56,17 @@ class NameWatcher : public nlohmann::detail::json_sax_dom_parser<Json> {
   std::vector<std::set<std::string>> names_;
 };
 
+/// A larger whole number would be another one in a reader that has binary64 alone. (The parser's limit of
+/// levels bounds this function's.)
+void check_integers(const Json& json, const std::string& file) {
+  if (json.is_structured())
+    for (const Json& member : json) check_integers(member, file);
+  const bool large = json.is_number_unsigned()  ? json.get<std::uint64_t>() > kMaxJsonInteger
+                     : json.is_number_integer() ? json.get<std::int64_t>() < -std::int64_t{kMaxJsonInteger}
+                                                : false;
+  if (large) throw RuleError("J02", file, "", "whole numbers up to 2^53", excerpt(json));
+}
+
 std::string print(double v) {
   char text[32];
   const auto result = std::to_chars(text, text + sizeof text, v);
@@ -65,19 +77,22 @@ std::string print(double v) {
 
 Json parse_json(std::span<const std::uint8_t> bytes, const std::string& file, std::uint64_t max_bytes) {
   if (bytes.size() > max_bytes)
-    throw FormatError(file, "", "at most " + std::to_string(max_bytes) + " bytes",
-                      std::to_string(bytes.size()));
+    throw RuleError("L09", file, "", "at most " + std::to_string(max_bytes) + " bytes",
+                    std::to_string(bytes.size()));
   check_depth(bytes, file);
   Json json;
   NameWatcher watcher(json);
   try {
     Json::sax_parse(bytes.begin(), bytes.end(), &watcher);
   } catch (const Json::parse_error& e) {
-    throw FormatError(file, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
+    throw RuleError("J01", file, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
   } catch (const Json::exception&) {
-    throw FormatError(file, "", "JSON with numbers in range", "another number");
+    throw RuleError("J02", file, "", "JSON with numbers in range", "another number");
   }
-  if (watcher.repeated) throw FormatError(file, "", "every name once", excerpt(*watcher.repeated) + " twice");
+  if (watcher.repeated)
+    throw RuleError("J10", file, "", "every name once", excerpt(*watcher.repeated) + " twice");
+  if (!json.is_object()) throw RuleError("J01", file, "/", "an object", json.type_name());
+  check_integers(json, file);
   return json;
 }
 
@@ -108,9 +123,15 @@ double six_digits(double value) {
 }
 
 void JsonAt::fail(const std::string& expected, const std::string& found) const {
-  throw FormatError(file_, pointer_.empty() ? "/" : pointer_, expected, found);
+  throw RuleError(rule_, file_, pointer_.empty() ? "/" : pointer_, expected, found);
 }
 void JsonAt::fail_type(const char* expected) const { fail(expected, excerpt(value_)); }
+
+JsonAt JsonAt::by(const char* rule) const {
+  JsonAt at = *this;
+  at.rule_ = rule;
+  return at;
+}
 
 bool JsonAt::has(std::string_view name) const { return value_.is_object() && value_.contains(name); }
 
@@ -119,11 +140,11 @@ JsonAt JsonAt::operator[](std::string_view name) const {
   const auto it = value_.find(name);
   if (it == value_.end())
     JsonAt(value_, file_, pointer_ + "/" + std::string(name)).fail("a value", "nothing");
-  return {*it, file_, pointer_ + "/" + std::string(name)};
+  return JsonAt(*it, file_, pointer_ + "/" + std::string(name)).by(rule_);
 }
 
 JsonAt JsonAt::operator[](std::size_t index) const {
-  return {value_.at(index), file_, pointer_ + "/" + std::to_string(index)};
+  return JsonAt(value_.at(index), file_, pointer_ + "/" + std::to_string(index)).by(rule_);
 }
 
 std::size_t JsonAt::array(std::size_t min_size, std::size_t max_size) const {
@@ -159,14 +180,15 @@ std::string JsonAt::text(std::size_t max_bytes) const {
   const auto& v = value_.get_ref<const std::string&>();
   if (v.size() > max_bytes) fail("at most " + std::to_string(max_bytes) + " bytes", std::to_string(v.size()));
   if (std::ranges::any_of(v, [](char c) { return (c >= 0 && c < ' ') || c == 0x7f; }))
-    fail("no control characters", excerpt(value_));
+    by("J03").fail("no control characters", excerpt(value_));
   return v;
 }
 
 Sha256 JsonAt::digest() const {
-  if (!value_.is_string()) fail_type("a SHA-256");
+  if (!value_.is_string()) by("J07").fail_type("a SHA-256");
   Sha256 digest{};
-  if (!from_hex(value_.get_ref<const std::string&>(), digest)) fail_type("64 lower-case hexadecimal digits");
+  if (!from_hex(value_.get_ref<const std::string&>(), digest))
+    by("J07").fail_type("64 lower-case hexadecimal digits");
   return digest;
 }
 

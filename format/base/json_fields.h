@@ -15,8 +15,8 @@ namespace texmesh {
 inline constexpr std::uint64_t kMaxJsonInteger = std::uint64_t{1} << 53;
 inline constexpr int kMaxJsonDepth = 64;
 
-/// Size, depth (checked before parsing, so that no input can exhaust a stack), syntax, UTF-8 and repeated
-/// names are checked; FormatError names `file` and the byte.
+/// Size, depth (checked before parsing, so that no input can exhaust a stack), repeated names (J10),
+/// syntax, UTF-8 (J01) and numbers (J02) are checked; RuleError names `file` and the byte.
 nlohmann::json parse_json(std::span<const std::uint8_t> bytes, const std::string& file,
                           std::uint64_t max_bytes);
 
@@ -29,13 +29,15 @@ double shortest_double(float value);
 /// `value` rounded to six significant decimal digits.
 double six_digits(double value);
 
-/// A value and its JSON pointer. Every accessor checks the type and the range and
-/// throws FormatError otherwise.
+/// A value and its JSON pointer. Every accessor checks the type and the range and throws RuleError otherwise:
+/// J04 where no other rule was named, J03 for control characters, J07 for digests.
 class JsonAt {
  public:
   JsonAt(const nlohmann::json& value, const std::string& file, std::string pointer = "")
       : value_(value), file_(file), pointer_(std::move(pointer)) {}
-  JsonAt operator[](std::string_view name) const;  // must be there
+  /// The same value; what is wrong with it or within it breaks `rule`.
+  JsonAt by(const char* rule) const;
+  JsonAt operator[](std::string_view name) const;  // must be there, else J04
   JsonAt operator[](std::size_t index) const;      // of an array, index < size()
   bool has(std::string_view name) const;           // for fields that may be absent
   std::size_t array(std::size_t min_size, std::size_t max_size) const;
@@ -52,6 +54,7 @@ class JsonAt {
   const nlohmann::json& value_;
   const std::string& file_;
   std::string pointer_;
+  const char* rule_ = "J04";
 };
 
 }  // namespace texmesh

@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 #include "format/container/container.h"
 
 namespace texmesh {
@@ -32,8 +32,8 @@ class FileSource final : public ByteSource {
   std::uint64_t size() override { return size_; }
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
     if (offset > size_ || bytes > size_ - offset)
-      throw FormatError(path_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
-                        "a file of " + std::to_string(size_) + " bytes");
+      throw RuleError("K01", path_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
+                      "a file of " + std::to_string(size_) + " bytes");
     Bytes out(static_cast<std::size_t>(bytes));
     std::size_t done = 0;
     while (done < out.size()) {
@@ -43,8 +43,8 @@ class FileSource final : public ByteSource {
         throw InputError(path_, "byte " + std::to_string(offset + done), "readable bytes",
                          std::strerror(errno));
       if (n == 0)
-        throw FormatError(path_, "byte " + std::to_string(offset + done), "more bytes",
-                          "the file became shorter");
+        throw RuleError("K01", path_, "byte " + std::to_string(offset + done), "more bytes",
+                        "the file became shorter");
       done += static_cast<std::size_t>(n);
     }
     return out;
@@ -66,8 +66,8 @@ class MemorySource final : public ByteSource {
   std::uint64_t size() override { return bytes_.size(); }
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
     if (offset > bytes_.size() || bytes > bytes_.size() - offset)
-      throw FormatError(name_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
-                        "a package of " + std::to_string(bytes_.size()) + " bytes");
+      throw RuleError("K01", name_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
+                      "a package of " + std::to_string(bytes_.size()) + " bytes");
     const auto part = bytes_.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(bytes));
     return {part.begin(), part.end()};
   }

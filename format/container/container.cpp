@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "format/base/bytes.h"
+#include "format/base/rule_error.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -127,48 +128,63 @@ Bytes tail(std::uint64_t count, std::uint64_t directory_bytes, std::uint64_t dir
 struct Field {
   std::size_t at;
   const char* name;
+  const char* rule = "K02";
 };
 constexpr Field kLocalFields[] = {{0, "signature"},
-                                  {4, "version needed"},
+                                  {4, "version needed", "K09"},
                                   {6, "flags"},
                                   {8, "method (stored)"},
                                   {10, "time"},
                                   {12, "date (1980-01-01)"},
-                                  {14, "CRC-32"},
-                                  {18, "size"},
+                                  {14, "CRC-32", "K07"},
+                                  {18, "size", "K07"},
                                   {26, "name length"},
-                                  {28, "extra field length"},
-                                  {30, "name and extra fields"}};
+                                  {28, "extra field length", "K04"},
+                                  {30, "name and extra fields", "K04"}};
 constexpr Field kCentralFields[] = {{0, "signature"},
-                                    {4, "version made by"},
-                                    {6, "version needed"},
+                                    {4, "version made by", "K09"},
+                                    {5, "host of version made by"},
+                                    {6, "version needed", "K09"},
                                     {8, "flags"},
                                     {10, "method (stored)"},
                                     {12, "time"},
                                     {14, "date (1980-01-01)"},
-                                    {16, "CRC-32"},
-                                    {20, "size"},
+                                    {16, "CRC-32", "K07"},
+                                    {20, "size", "K07"},
                                     {28, "name length"},
-                                    {30, "extra field length"},
+                                    {30, "extra field length", "K08"},
                                     {32, "comment length"},
                                     {34, "disk"},
                                     {36, "attributes"},
-                                    {42, "offset of the local header"},
-                                    {46, "name and extra fields"}};
-constexpr Field kTailFields[] = {{0, "end of the central directory"}};
+                                    {42, "offset of the local header", "K01"},
+                                    {46, "name and extra fields", "K08"}};
+constexpr Field kTailFields[] = {{0, "end of the central directory", "K01"}};
+constexpr Field kZip64TailFields[] = {{0, "ZIP64 end of the central directory", "K10"}};
 
 /// The profile leaves no freedom: once path, size, CRC and offset are known, every byte of a header is.
 void require_same(std::span<const std::uint8_t> found, const Bytes& expected, std::span<const Field> fields,
                   const std::string& file, const std::string& place) {
   for (std::size_t i = 0; i < expected.size(); ++i) {
     if (i < found.size() && found[i] == expected[i]) continue;
-    const char* name = fields.front().name;
+    const Field* field = &fields.front();
     for (const Field& f : fields)
-      if (f.at <= i) name = f.name;
-    throw FormatError(file, place + ", " + name + " (byte " + std::to_string(i) + ")",
-                      std::to_string(expected[i]),
-                      i < found.size() ? std::to_string(found[i]) : std::string("the end"));
+      if (f.at <= i) field = &f;
+    throw RuleError(field->rule, file, place + ", " + field->name + " (byte " + std::to_string(i) + ")",
+                    std::to_string(expected[i]),
+                    i < found.size() ? std::to_string(found[i]) : std::string("the end"));
   }
+}
+
+/// The local header at byte `at`. Lengths that move the data off their place are named as that.
+void require_local_header(const Bytes& found, const Bytes& expected, std::uint64_t at,
+                          const std::string& file, const std::string& path) {
+  const std::string place = "local header of " + path;
+  BytesIn in(found, place);
+  in.raw(26);
+  const std::uint64_t name = in.u16(), extra = in.u16(), data = at + kLocalFixed + name + extra;
+  if (data % kAlignment != 0)
+    throw RuleError("K03", file, place, "data at a multiple of 64", "data at byte " + std::to_string(data));
+  require_same(found, expected, kLocalFields, file, place);
 }
 
 struct Directory {
@@ -181,17 +197,21 @@ Directory read_tail(ByteSource& source) {
   const Bytes bytes = source.read(size - tail_bytes, tail_bytes);
   const std::string place = "end of central directory";
   if (bytes.size() < kEndFixed)
-    throw FormatError(source.name(), place, "a ZIP file", std::to_string(size) + " bytes");
+    throw RuleError("K01", source.name(), place, "a ZIP file", std::to_string(size) + " bytes");
   BytesIn end{std::span(bytes).last(kEndFixed), source.name() + ": " + place};
-  end.expect("a ZIP end record without comment as the last 22 bytes", std::string_view("PK\5\6\0\0\0\0", 8));
+  under_rule("K01", [&] {
+    end.expect("a ZIP end record without comment as the last 22 bytes",
+               std::string_view("PK\5\6\0\0\0\0", 8));
+  });
   Directory d;
   end.u16();
   d.count = end.u16();
   d.bytes = end.u32();
   d.offset = end.u32();
-  if (d.count == kMax16 || d.bytes == kMax32 || d.offset == kMax32) {
+  const bool zip64 = d.count == kMax16 || d.bytes == kMax32 || d.offset == kMax32;
+  if (zip64) {
     if (bytes.size() < kZip64TailFixed + kEndFixed)
-      throw FormatError(source.name(), place, "a ZIP64 record", "too few bytes");
+      throw RuleError("K10", source.name(), place, "a ZIP64 record", "too few bytes");
     BytesIn record(bytes, source.name() + ": ZIP64 end of central directory");
     record.raw(32);
     d.count = record.u64();
@@ -199,14 +219,14 @@ Directory read_tail(ByteSource& source) {
     d.offset = record.u64();
   }
   const Bytes expected = tail(d.count, d.bytes, d.offset);
-  require_same(std::span(bytes).last(std::min(bytes.size(), expected.size())), expected, kTailFields,
-               source.name(), place);
+  require_same(std::span(bytes).last(std::min(bytes.size(), expected.size())), expected,
+               zip64 ? kZip64TailFields : kTailFields, source.name(), place);
   if (d.offset > size || d.bytes > size - d.offset || size - d.offset - d.bytes != expected.size())
-    throw FormatError(source.name(), place, "a directory that ends where this record begins",
-                      "offset " + std::to_string(d.offset) + ", " + std::to_string(d.bytes) + " bytes");
+    throw RuleError("K01", source.name(), place, "a directory that ends where this record begins",
+                    "offset " + std::to_string(d.offset) + ", " + std::to_string(d.bytes) + " bytes");
   if (d.count > d.bytes / (kCentralFixed + 1) || d.bytes > d.count * kLargestCentral)
-    throw FormatError(source.name(), place, "an entry count that fits the directory",
-                      std::to_string(d.count));
+    throw RuleError("K01", source.name(), place, "an entry count that fits the directory",
+                    std::to_string(d.count));
   return d;
 }
 
@@ -222,14 +242,15 @@ ContainerEntry read_central(BytesIn& in, std::uint64_t& header_offset) {
   header_offset = in.u32();
   e.path = in.text(path_bytes);
   BytesIn extra(in.raw(extra_bytes), "extra field of " + e.path);
-  if (e.bytes == kMax32 || header_offset == kMax32) {
+  under_rule("K08", [&] {
+    if (e.bytes != kMax32 && header_offset != kMax32) return;
     extra.raw(4);
     if (e.bytes == kMax32) {
       e.bytes = extra.u64();
       extra.u64();
     }
     if (header_offset == kMax32) header_offset = extra.u64();
-  }
+  });
   return e;
 }
 
@@ -238,20 +259,21 @@ void claim_path(const std::string& path, std::set<std::string>& paths, std::set<
   if (!is_valid_entry_path(path)) {
     std::string shown;
     for (char c : path.substr(0, 60)) shown += c >= ' ' && c <= '~' ? c : '?';
-    throw FormatError(file, "entry '" + shown + "'", "a relative path of a-z 0-9 . _ -, at most 200 bytes",
-                      "another");
+    throw RuleError("K05", file, "entry '" + shown + "'",
+                    "a relative path of a-z 0-9 . _ -, at most 200 bytes", "another");
   }
   if (paths.contains(kContentCredentialPath))
-    throw FormatError(file, "entry " + path, "nothing behind the content credential", "another entry");
+    throw RuleError("E04", file, "entry " + path, "nothing behind the content credential", "another entry");
   if (folders.contains(path))
-    throw FormatError(file, "entry " + path, "a file", "also a folder of other entries");
+    throw RuleError("K06", file, "entry " + path, "a file", "also a folder of other entries");
   for (std::size_t at = path.find('/'); at != std::string::npos; at = path.find('/', at + 1)) {
     const std::string folder = path.substr(0, at);
     if (paths.contains(folder))
-      throw FormatError(file, "entry " + path, "a free path", folder + " is a file");
+      throw RuleError("K06", file, "entry " + path, "a free path", folder + " is a file");
     folders.insert(folder);
   }
-  if (!paths.insert(path).second) throw FormatError(file, "entry " + path, "one entry of that path", "two");
+  if (!paths.insert(path).second)
+    throw RuleError("K06", file, "entry " + path, "one entry of that path", "two");
 }
 
 std::uint32_t crc_of(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
@@ -333,27 +355,30 @@ std::vector<ContainerEntry> read_container(ByteSource& source) {
   for (std::uint64_t i = 0; i < directory.count; ++i) {
     const std::size_t begin = in.at();
     std::uint64_t header_offset = 0;
-    ContainerEntry e = read_central(in, header_offset);
+    ContainerEntry e = under_rule("K01", [&] { return read_central(in, header_offset); });
     claim_path(e.path, paths, folders, source.name());
-    require_same(std::span(bytes).subspan(begin, in.at() - begin), central_header(e, header_offset),
-                 kCentralFields, source.name(), "central directory, entry " + e.path);
+    const Bytes expected = central_header(e, header_offset);
+    if (in.at() - begin != expected.size())
+      throw RuleError("K08", source.name(), "central directory, entry " + e.path,
+                      std::to_string(expected.size()) + " bytes", std::to_string(in.at() - begin));
+    require_same(std::span(bytes).subspan(begin, in.at() - begin), expected, kCentralFields, source.name(),
+                 "central directory, entry " + e.path);
     if (header_offset != at)
-      throw FormatError(source.name(), "entry " + e.path, "its local header at byte " + std::to_string(at),
-                        std::to_string(header_offset));
+      throw RuleError("K01", source.name(), "entry " + e.path,
+                      "its local header at byte " + std::to_string(at), std::to_string(header_offset));
     const Bytes header = local_header(e, at);
     if (header.size() > directory.offset - at || e.bytes > directory.offset - at - header.size())
-      throw FormatError(source.name(), "entry " + e.path, "data before the central directory",
-                        std::to_string(e.bytes) + " bytes");
-    require_same(source.read(at, header.size()), header, kLocalFields, source.name(),
-                 "local header of " + e.path);
+      throw RuleError("K01", source.name(), "entry " + e.path, "data before the central directory",
+                      std::to_string(e.bytes) + " bytes");
+    require_local_header(source.read(at, header.size()), header, at, source.name(), e.path);
     e.offset = at + header.size();
     at = e.offset + e.bytes;
     entries.push_back(std::move(e));
   }
-  in.finish();
+  under_rule("K01", [&] { in.finish(); });
   if (at != directory.offset)
-    throw FormatError(source.name(), "byte " + std::to_string(at), "the central directory",
-                      std::to_string(directory.offset - at) + " bytes of no entry");
+    throw RuleError("K01", source.name(), "byte " + std::to_string(at), "the central directory",
+                    std::to_string(directory.offset - at) + " bytes of no entry");
   return entries;
 }
 
@@ -366,8 +391,8 @@ void check_crc(ByteSource& source, const ContainerEntry& entry) {
     done += n;
   }
   if (crc != entry.crc32)
-    throw FormatError(source.name(), "entry " + entry.path, "CRC-32 " + std::to_string(entry.crc32),
-                      std::to_string(crc));
+    throw RuleError("K07", source.name(), "entry " + entry.path, "CRC-32 " + std::to_string(entry.crc32),
+                    std::to_string(crc));
 }
 
 }  // namespace texmesh

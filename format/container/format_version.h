@@ -2,6 +2,7 @@
 #include <string>
 
 #include "format/base/bytes.h"
+#include "format/base/rule_error.h"
 
 namespace texmesh {
 
@@ -21,12 +22,12 @@ inline void write_entry_start(BytesOut& out, std::string_view magic) {
   out.u16(kFormatMajor);
   out.u16(kFormatMinor);
 }
-/// The minor version. FormatError for another magic word or major version.
-inline int read_entry_start(BytesIn& in, std::string_view magic) {
-  in.expect("the magic " + std::string(magic), magic);
-  if (const auto major = in.u16(); major != kFormatMajor)
-    in.fail("major version " + std::to_string(kFormatMajor), describe_other_major(major));
-  return in.u16();
+/// The minor version. RuleError for another magic word (`magic_rule`) or major version (W03).
+inline int read_entry_start(BytesIn& in, std::string_view magic, const char* magic_rule) {
+  under_rule(magic_rule, [&] { in.expect("the magic " + std::string(magic), magic); });
+  if (const auto major = under_rule(magic_rule, [&] { return in.u16(); }); major != kFormatMajor)
+    fail_by("W03", in, "major version " + std::to_string(kFormatMajor), describe_other_major(major));
+  return under_rule(magic_rule, [&] { return in.u16(); });
 }
 
 }  // namespace texmesh

@@ -119,13 +119,13 @@ std::string write_about(const About& about) {
 
 About read_about(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kAboutFile, kMaxAboutBytes);
-  const JsonAt at(document, kAboutFile);
-  if (!document.is_object()) at.fail("an object", document.type_name());
+  const JsonAt at = JsonAt(document, kAboutFile).by("B01");
   About about;
   for (const TextField& f : kTextFields) {
     if (!at.has(f.name)) continue;
     about.*f.member = read_text(at[f.name], f.max_bytes);
-    if (f.is_url && !is_web_url(about.*f.member)) at[f.name].fail("an http or https URL", about.*f.member);
+    if (f.is_url && !is_web_url(about.*f.member))
+      at[f.name].by("B02").fail("an http or https URL", about.*f.member);
   }
   if (at.has("identifiers")) about.identifiers = read_list(at["identifiers"], kIdentifierNames);
   if (at.has("dates")) about.dates = read_list(at["dates"], kDateNames);

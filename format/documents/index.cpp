@@ -5,6 +5,7 @@
 #include <set>
 
 #include "format/base/bytes.h"
+#include "format/base/rule_error.h"
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -26,14 +27,15 @@ std::uint32_t plane_of(const EntryRef& entry) {
 /// What holds for any list of entries, whoever made it.
 void check_entry(const EntryRef& e) {
   if (!is_valid_entry_path(e.path))
-    throw FormatError(kIndexFile, "entry " + e.path, "a valid path", "another");
+    throw RuleError("I06", kIndexFile, "entry " + e.path, "a valid path", "another");
   if (e.path == kManifestPath || e.path == kIndexPath || e.path == kContentCredentialPath)
-    throw FormatError(kIndexFile, "entry " + e.path,
-                      "an entry other than manifest, index and content credential", e.path);
+    throw RuleError("I06", kIndexFile, "entry " + e.path,
+                    "an entry other than manifest, index and content credential", e.path);
   if (e.offset % 64 != 0 || e.offset == 0)
-    throw FormatError(kIndexFile, "offset of " + e.path, "a multiple of 64", std::to_string(e.offset));
+    throw RuleError("I05", kIndexFile, "offset of " + e.path, "a multiple of 64, not 0",
+                    std::to_string(e.offset));
   if (e.offset > std::uint64_t{1} << 53 || e.bytes > std::uint64_t{1} << 53)
-    throw FormatError(kIndexFile, "entry " + e.path, "offset and size up to 2^53", "more");
+    throw RuleError("I05", kIndexFile, "entry " + e.path, "offset and size up to 2^53", "more");
 }
 
 void check_entry_order(const std::vector<EntryRef>& entries) {
@@ -41,10 +43,10 @@ void check_entry_order(const std::vector<EntryRef>& entries) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const EntryRef& e = entries[i];
     if (!paths.insert(e.path).second)
-      throw FormatError(kIndexFile, "entry " + e.path, "each path once", "twice");
+      throw RuleError("I07", kIndexFile, "entry " + e.path, "each path once", "twice");
     if (i > 0 && e.offset <= entries[i - 1].offset + entries[i - 1].bytes)
-      throw FormatError(kIndexFile, "offset of " + e.path, "more than where " + entries[i - 1].path + " ends",
-                        std::to_string(e.offset));
+      throw RuleError("I07", kIndexFile, "offset of " + e.path,
+                      "more than where " + entries[i - 1].path + " ends", std::to_string(e.offset));
   }
 }
 
@@ -58,6 +60,56 @@ Bytes write_page(const std::vector<EntryRef>& entries) {
     out.text(e.path);
   }
   return out.finish();
+}
+
+IndexHead read_pages(BytesIn& in) {
+  IndexHead head;
+  head.minor = read_entry_start(in, kIndexMagic, "I01");
+  const std::uint64_t page_count = in.u32(), entry_count = in.u32();
+  if (page_count == 0 || page_count > in.left() / kPageFixed)
+    in.fail("a page count that fits the file", std::to_string(page_count));
+  head.bytes = kPageListHead + page_count * kPageFixed;
+  std::uint64_t offset = head.bytes, entries = 0;
+  for (std::uint64_t i = 0; i < page_count; ++i) {
+    IndexPage page;
+    page.plane = in.u32();
+    if (i == 0 ? page.plane != kNoPlane
+               : page.plane == kNoPlane || (i > 1 && page.plane <= head.pages.back().plane))
+      fail_by("I02", in, "page 0 without a plane, then rising planes", std::to_string(page.plane));
+    page.entries = in.u32();
+    page.offset = offset;
+    page.bytes = in.u32();
+    if (page.entries > page.bytes / kRecordFixed)
+      fail_by("I04", in, "an entry count that fits the page", std::to_string(page.entries));
+    const auto digest = in.raw(32);
+    std::copy(digest.begin(), digest.end(), page.digest.begin());
+    offset += page.bytes;
+    entries += page.entries;
+    head.pages.push_back(page);
+  }
+  if (entries != entry_count)
+    in.fail(std::to_string(entry_count) + " entries on all pages", std::to_string(entries));
+  return head;
+}
+
+std::vector<EntryRef> read_records(const IndexHead& head, const IndexPage& p, ByteSpan bytes,
+                                   const std::string& place) {
+  BytesIn in(bytes, kIndexFile + ": " + place);
+  std::vector<EntryRef> entries;
+  for (std::uint32_t i = 0; i < p.entries; ++i) {
+    EntryRef e;
+    e.offset = in.u64();
+    e.bytes = in.u64();
+    const auto digest = in.raw(32);
+    std::copy(digest.begin(), digest.end(), e.digest.begin());
+    e.path = in.text(in.u8());
+    check_entry(e);
+    if (plane_of(e) != p.plane) fail_by("I06", in, "entries of this page's plane", e.path);
+    entries.push_back(std::move(e));
+  }
+  if (head.minor <= kFormatMinor) in.finish();  // later minor versions may add to a page's end
+  check_entry_order(entries);
+  return entries;
 }
 
 }  // namespace
@@ -90,33 +142,7 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
 
 IndexHead read_index_head(std::span<const std::uint8_t> bytes) {
   BytesIn in(bytes, kIndexFile);
-  IndexHead head;
-  head.minor = read_entry_start(in, kIndexMagic);
-  const std::uint64_t page_count = in.u32(), entry_count = in.u32();
-  if (page_count == 0 || page_count > in.left() / kPageFixed)
-    in.fail("a page count that fits the file", std::to_string(page_count));
-  head.bytes = kPageListHead + page_count * kPageFixed;
-  std::uint64_t offset = head.bytes, entries = 0;
-  for (std::uint64_t i = 0; i < page_count; ++i) {
-    IndexPage page;
-    page.plane = in.u32();
-    if (i == 0 ? page.plane != kNoPlane
-               : page.plane == kNoPlane || (i > 1 && page.plane <= head.pages.back().plane))
-      in.fail("page 0 without a plane, then rising planes", std::to_string(page.plane));
-    page.entries = in.u32();
-    page.offset = offset;
-    page.bytes = in.u32();
-    if (page.entries > page.bytes / kRecordFixed)
-      in.fail("an entry count that fits the page", std::to_string(page.entries));
-    const auto digest = in.raw(32);
-    std::copy(digest.begin(), digest.end(), page.digest.begin());
-    offset += page.bytes;
-    entries += page.entries;
-    head.pages.push_back(page);
-  }
-  if (entries != entry_count)
-    in.fail(std::to_string(entry_count) + " entries on all pages", std::to_string(entries));
-  return head;
+  return under_rule("I03", [&] { return read_pages(in); });
 }
 
 std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
@@ -124,33 +150,19 @@ std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
   const IndexPage& p = head.pages.at(page);
   const std::string place = "page " + std::to_string(page);
   if (bytes.size() != p.bytes)
-    throw FormatError(kIndexFile, place, std::to_string(p.bytes) + " bytes", std::to_string(bytes.size()));
+    throw RuleError("I03", kIndexFile, place, std::to_string(p.bytes) + " bytes",
+                    std::to_string(bytes.size()));
   if (sha256(bytes) != p.digest)
-    throw FormatError(kIndexFile, place, "SHA-256 " + to_hex(p.digest), to_hex(sha256(bytes)));
-  BytesIn in(bytes, kIndexFile + ": " + place);
-  std::vector<EntryRef> entries;
-  for (std::uint32_t i = 0; i < p.entries; ++i) {
-    EntryRef e;
-    e.offset = in.u64();
-    e.bytes = in.u64();
-    const auto digest = in.raw(32);
-    std::copy(digest.begin(), digest.end(), e.digest.begin());
-    e.path = in.text(in.u8());
-    check_entry(e);
-    if (plane_of(e) != p.plane) in.fail("entries of this page's plane", e.path);
-    entries.push_back(std::move(e));
-  }
-  if (head.minor <= kFormatMinor) in.finish();  // later minor versions may add to a page's end
-  check_entry_order(entries);
-  return entries;
+    throw RuleError("I04", kIndexFile, place, "SHA-256 " + to_hex(p.digest), to_hex(sha256(bytes)));
+  return under_rule("I04", [&] { return read_records(head, p, bytes, place); });
 }
 
 std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes) {
   const IndexHead head = read_index_head(bytes);
   const IndexPage& last = head.pages.back();
   if (last.offset + last.bytes != bytes.size())
-    throw FormatError(kIndexFile, "", std::to_string(last.offset + last.bytes) + " bytes",
-                      std::to_string(bytes.size()));
+    throw RuleError("I03", kIndexFile, "", std::to_string(last.offset + last.bytes) + " bytes",
+                    std::to_string(bytes.size()));
   std::vector<EntryRef> entries;
   for (std::size_t i = 0; i < head.pages.size(); ++i) {
     const IndexPage& p = head.pages[i];

@@ -7,6 +7,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
+#include "format/base/rule_error.h"
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -120,17 +121,18 @@ Json manifest_json(const Manifest& m) {
 }
 
 void read_version(const JsonAt& at, Manifest& m) {
-  const std::string format = at["format"].text(100);
-  if (format != "texmesh") at["format"].fail("texmesh", format);
-  m.major = static_cast<int>(at["version"]["major"].integer(0, 1'000'000));
-  m.minor = static_cast<int>(at["version"]["minor"].integer(0, 1'000'000));
+  const std::string format = at["format"].by("M01").text(100);
+  if (format != "texmesh") at["format"].by("M01").fail("texmesh", format);
+  const JsonAt version = at["version"].by("M01");
+  m.major = static_cast<int>(version["major"].integer(0, 1'000'000));
+  m.minor = static_cast<int>(version["minor"].integer(0, 1'000'000));
   if (m.major != kFormatMajor)
-    at["version"]["major"].fail(std::to_string(kFormatMajor), describe_other_major(m.major));
+    version["major"].by("W03").fail(std::to_string(kFormatMajor), describe_other_major(m.major));
   const JsonAt features = at["requiredFeatures"];
   for (std::size_t i = 0, n = features.array(0, 100); i < n; ++i) {
     m.required_features.push_back(features[i].text(100));
     if (!is_known_feature(m.required_features.back()))
-      features[i].fail("a feature that this reader knows", m.required_features.back());
+      features[i].by("M02").fail("a feature that this reader knows", m.required_features.back());
   }
 }
 
@@ -141,8 +143,8 @@ Vec3d read_vector(const JsonAt& at) {
 }
 
 std::uint64_t read_offset(const JsonAt& at) {
-  const std::uint64_t offset = at.integer(64);
-  if (offset % 64 != 0) at.fail("a multiple of 64", std::to_string(offset));
+  const std::uint64_t offset = at.by("M05").integer(64);
+  if (offset % 64 != 0) at.by("M05").fail("a multiple of 64", std::to_string(offset));
   return offset;
 }
 
@@ -172,9 +174,9 @@ PosterRef read_poster(const JsonAt& at) {
   PosterRef ref;
   read_ref(at, kPosterPath, ref);
   if (ref.bytes > kMaxPosterBytes)
-    at["bytes"].fail("at most " + std::to_string(kMaxPosterBytes), std::to_string(ref.bytes));
-  ref.width_px = static_cast<std::uint32_t>(at["widthPx"].integer(1, kMaxPosterSide));
-  ref.height_px = static_cast<std::uint32_t>(at["heightPx"].integer(1, kMaxPosterSide));
+    at["bytes"].by("O01").fail("at most " + std::to_string(kMaxPosterBytes), std::to_string(ref.bytes));
+  ref.width_px = static_cast<std::uint32_t>(at["widthPx"].by("O01").integer(1, kMaxPosterSide));
+  ref.height_px = static_cast<std::uint32_t>(at["heightPx"].by("O01").integer(1, kMaxPosterSide));
   return ref;
 }
 
@@ -186,7 +188,7 @@ void read_shape(const JsonAt& at, Manifest& m) {
   m.bounds_max = read_vector(bounds["max"]);
   for (int i = 0; i < 3; ++i)
     if (m.bounds_min[i] > m.bounds_max[i])
-      bounds["max"][static_cast<std::size_t>(i)].fail("at least the minimum", "less");
+      bounds["max"][static_cast<std::size_t>(i)].by("M03").fail("at least the minimum", "less");
   m.object_height = at["objectHeight"].number(0, kLargest);
   m.surface_area = at["surfaceArea"].number(0, kLargest);
   m.jnd = at["jnd"].number(0, 1);
@@ -197,13 +199,13 @@ void read_scales(const JsonAt& at, Manifest& m) {
   for (const char* column :
        {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95", "p99",
         "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
-    at[column].array(n, n);
+    at[column].by("M10").array(n, n);
   for (std::size_t i = 0; i < n; ++i) {
     ManifestScale s;
     s.scale = static_cast<int>(at["scale"][i].integer(0, kMaxScales - 1));
-    if (i == 0 && s.scale != 0) at["scale"][i].fail("0", std::to_string(s.scale));
+    if (i == 0 && s.scale != 0) at["scale"][i].by("M10").fail("0", std::to_string(s.scale));
     if (i > 0 && s.scale <= m.scales.back().scale)
-      at["scale"][i].fail("a rising number", std::to_string(s.scale));
+      at["scale"][i].by("M10").fail("a rising number", std::to_string(s.scale));
     s.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
     s.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
     s.glb = {mesh_path(s.scale), read_offset(at["offset"][i]), at["bytes"][i].integer(1),
@@ -213,10 +215,10 @@ void read_scales(const JsonAt& at, Manifest& m) {
     s.error_rms = at["errorRms"][i].number(0, kLargest);
     s.p95 = at["p95"][i].number(0, kLargest);
     s.p99 = at["p99"][i].number(0, kLargest);
-    s.display_px_jnd = at["displayPxJnd"][i].number(0, kAnyDisplayPx);
-    s.display_px_error = at["displayPxError"][i].number(0, kAnyDisplayPx);
-    s.display_px_edge = at["displayPxEdge"][i].number(0, kAnyDisplayPx);
-    s.display_px_flip = at["displayPxFlip"][i].number(0, kAnyDisplayPx);
+    s.display_px_jnd = at["displayPxJnd"][i].by("M11").number(0, kAnyDisplayPx);
+    s.display_px_error = at["displayPxError"][i].by("M11").number(0, kAnyDisplayPx);
+    s.display_px_edge = at["displayPxEdge"][i].by("M11").number(0, kAnyDisplayPx);
+    s.display_px_flip = at["displayPxFlip"][i].by("M11").number(0, kAnyDisplayPx);
     s.floor = at["floor"][i].text(kMaxFloorBytes);
     m.scales.push_back(std::move(s));
   }
@@ -245,10 +247,10 @@ void resolve_stream_scales(const JsonAt& at, Manifest& m) {
     EntryRef& ref = m.scales[i].glb;
     if (ref.offset != m.stream->offset) continue;
     if (i == 0 || i + 1 == m.scales.size())
-      at["offset"][i].fail("a GLB of the finest and of the coarsest scale", "the stream");
+      at["offset"][i].by("M18").fail("a GLB of the finest and of the coarsest scale", "the stream");
     if (ref.bytes <= before || ref.bytes > m.stream->bytes)
-      at["bytes"][i].fail("more than " + std::to_string(before) + " bytes, at most the stream's",
-                          std::to_string(ref.bytes));
+      at["bytes"][i].by("M19").fail("more than " + std::to_string(before) + " bytes, at most the stream's",
+                                    std::to_string(ref.bytes));
     before = ref.bytes;
     ref.path = kSplitStreamPath;
   }
@@ -265,8 +267,8 @@ std::string write_manifest(const Manifest& manifest) {
   const std::string json = dump_json(manifest_json(manifest), kManifestFile);
   const std::uint64_t room = kBootstrapBytes - ContainerWriter::data_offset(0, kManifestPath, json.size());
   if (json.size() > room)
-    throw FormatError(kManifestFile, "", "at most " + std::to_string(room) + " bytes",
-                      std::to_string(json.size()) + " bytes");
+    throw RuleError("K12", kManifestFile, "", "at most " + std::to_string(room) + " bytes",
+                    std::to_string(json.size()) + " bytes");
   read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
   return json;
 }
@@ -278,7 +280,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_version(at, m);
   read_shape(at, m);
   read_scales(at["scales"], m);
-  read_steps(at["steps"], m);
+  read_steps(at["steps"].by("M21"), m);
   m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   read_paged_ref(at["index"], kIndexPath, m.index);
   read_paged_ref(at["tables"], kTablesPath, m.tables);

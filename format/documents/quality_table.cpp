@@ -79,7 +79,7 @@ GroupLosses read_group(const JsonAt& at, std::size_t sizes) {
   const std::string name = at["group"].text(20);
   const auto& names = EnumNames<PlaneGroup>::names;
   const auto found = std::ranges::find(names, name);
-  if (found == names.end()) at["group"].fail("colour, normal or data", name);
+  if (found == names.end()) at["group"].by("W06").fail("colour, normal or data", name);
   group.group = static_cast<PlaneGroup>(found - names.begin());
   at["sizes"].array(sizes, sizes);
   for (std::size_t i = 0; i < sizes; ++i) group.sizes.push_back(read_texture_losses(at["sizes"][i]));
@@ -111,7 +111,7 @@ std::string write_quality(const QualityTable& table) {
 
 QualityTable read_quality(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kQualityFile, kMaxQualityBytes);
-  const JsonAt at(document, kQualityFile);
+  const JsonAt at = JsonAt(document, kQualityFile).by("Q01");
   QualityTable table;
   table.views = static_cast<std::uint32_t>(at["views"].integer(1, 10000));
   table.sizes_px = read_rising<std::uint32_t>(at["sizesPx"], kMaxQualitySizes, 1, 65536);
@@ -125,8 +125,8 @@ QualityTable read_quality(std::span<const std::uint8_t> json) {
   for (std::size_t i = 0, n = at["groups"].array(0, kPlaneGroups); i < n; ++i) {
     table.groups.push_back(read_group(at["groups"][i], sizes));
     if (i > 0 && table.groups[i].group <= table.groups[i - 1].group)
-      at["groups"][i]["group"].fail("groups in the order colour, normal, data",
-                                    std::string(enum_name(table.groups[i].group)));
+      at["groups"][i]["group"].by("Q03").fail("groups in the order colour, normal, data",
+                                              std::string(enum_name(table.groups[i].group)));
   }
   return table;
 }

@@ -5,6 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "format/base/half.h"
+#include "format/base/rule_error.h"
 #include "format/base/unit16.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -23,26 +24,27 @@ constexpr float kLargestMse = 65025, kLargestDssim = 2;
 // How far rounding may carry a fraction out of 0..1 before the writer calls it an error.
 constexpr float kRounding = 1e-4f;
 
-[[noreturn]] void fail_tables(const std::string& place, const std::string& expected,
+[[noreturn]] void fail_tables(const char* rule, const std::string& place, const std::string& expected,
                               const std::string& found) {
-  throw FormatError(kTablesFile, place, expected, found);
+  throw RuleError(rule, kTablesFile, place, expected, found);
 }
 
-void require_tables(bool good, const std::string& place, const char* expected, const std::string& found) {
-  if (!good) fail_tables(place, expected, found);
+void require_tables(bool good, const char* rule, const std::string& place, const char* expected,
+                    const std::string& found) {
+  if (!good) fail_tables(rule, place, expected, found);
 }
 
 template <class T>
 void require_count(const std::vector<T>& values, std::size_t count, const std::string& place) {
   if (values.size() != count)
-    fail_tables(place, std::to_string(count) + " values", std::to_string(values.size()));
+    fail_tables("T03", place, std::to_string(count) + " values", std::to_string(values.size()));
 }
 
 void require_range(const std::vector<float>& values, float lo, float hi, const std::string& place) {
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!(values[i] >= lo && values[i] <= hi))
-      fail_tables(place + "[" + std::to_string(i) + "]", std::to_string(lo) + " to " + std::to_string(hi),
-                  std::to_string(values[i]));
+      fail_tables("T04", place + "[" + std::to_string(i) + "]",
+                  std::to_string(lo) + " to " + std::to_string(hi), std::to_string(values[i]));
 }
 
 std::uint64_t cells_of(std::uint64_t fragments, std::uint64_t rungs, std::uint64_t scales) {
@@ -68,21 +70,23 @@ void check_counts(const PlaneTables& t, const std::string& place) {
 void check_shape(const PlaneTables& t, const std::string& place) {
   require_tables(
       t.columns >= 1 && t.rows >= 1 && t.columns <= kMaxFragments && t.rows <= kMaxFragments / t.columns,
-      place + "/columns,rows", "1 to 65535 fragments",
+      "T03", place + "/columns,rows", "1 to 65535 fragments",
       std::to_string(t.columns) + " x " + std::to_string(t.rows));
-  require_tables(t.scale_count() >= 1 && t.scale_count() <= kMaxScaleCount, place + "/quality",
+  require_tables(t.scale_count() >= 1 && t.scale_count() <= kMaxScaleCount, "T03", place + "/quality",
                  "1 to 100 scales", std::to_string(t.scale_count()));
-  require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxPackageRungs,
+  require_tables(!t.rung_quality.empty() && t.rung_quality.size() <= kMaxPackageRungs, "T03",
                  place + "/rung_quality", "1 to 100 rungs", std::to_string(t.rung_quality.size()));
-  require_tables(cells_of(t) <= kMaxPlaneCells, place, "at most 2^24 cells", std::to_string(cells_of(t)));
+  require_tables(cells_of(t) <= kMaxPlaneCells, "L02", place, "at most 2^24 cells",
+                 std::to_string(cells_of(t)));
   for (std::size_t r = 0; r < t.rung_count(); ++r)
     require_tables(t.rung_quality[r] >= 1 && t.rung_quality[r] <= 100 &&
                        (r == 0 || t.rung_quality[r] > t.rung_quality[r - 1]),
-                   place + "/rung_quality", "1 to 100, strictly rising", std::to_string(t.rung_quality[r]));
+                   "T08", place + "/rung_quality", "1 to 100, strictly rising",
+                   std::to_string(t.rung_quality[r]));
 }
 
 void check_parameters(const PlaneTables& t, const std::string& place) {
-  require_tables(t.allocation <= 2, place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
+  require_tables(t.allocation <= 2, "T13", place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
   require_range({t.quality_width}, 0, 100, place + "/quality_width");
   require_range({t.log_width}, 0, 4, place + "/log_width");
   require_range({t.quality_max}, 1, 100, place + "/quality_max");
@@ -95,16 +99,16 @@ void check_fragment_order(const PlaneTables& t, const std::string& place) {
   const std::size_t fragments = t.fragment_count();
   std::vector<bool> listed(fragments, false);
   for (const std::uint16_t f : t.order) {
-    require_tables(f < fragments && !listed[f], place + "/order", "every stored fragment once",
+    require_tables(f < fragments && !listed[f], "T05", place + "/order", "every stored fragment once",
                    std::to_string(f));
     listed[f] = true;
   }
   for (std::size_t k = 0; k < t.size_bytes.size(); ++k)
-    require_tables(listed[k % fragments] == (t.size_bytes[k] > 0), place + "/size_bytes",
+    require_tables(listed[k % fragments] == (t.size_bytes[k] > 0), "T06", place + "/size_bytes",
                    "bytes at every rung for the fragments in the order and for no others",
                    "fragment " + std::to_string(k % fragments) + " with " + std::to_string(t.size_bytes[k]));
   for (std::size_t f = 0; f < fragments; ++f)
-    require_tables(listed[f] || t.covered_texels[f] == 0, place + "/covered_texels",
+    require_tables(listed[f] || t.covered_texels[f] == 0, "T07", place + "/covered_texels",
                    "0 where nothing is stored", std::to_string(t.covered_texels[f]));
 }
 
@@ -118,9 +122,9 @@ void check_knots(const PlaneTables& t, const std::string& place) {
     const bool rises = k == 0 || q > t.knot_quality[k - 1];
     const std::size_t before = above;
     while (above < t.rung_count() && t.rung_quality[above] < q) ++above;
-    require_tables(rises && above > 0 && above < t.rung_count() && t.rung_quality[above] != q,
+    require_tables(rises && above > 0 && above < t.rung_count() && t.rung_quality[above] != q, "T08",
                    place + "/knot_quality", "strictly rising, between rungs", std::to_string(q));
-    require_tables(k == 0 || above != before || t.knot_position[k] >= t.knot_position[k - 1],
+    require_tables(k == 0 || above != before || t.knot_position[k] >= t.knot_position[k - 1], "T08",
                    place + "/knot_position", "not falling between two rungs",
                    std::to_string(t.knot_position[k]));
   }
@@ -135,12 +139,12 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   require_range(t.mse, 0, kLargestMse, place + "/mse");
   require_range(t.dssim, -rounding, kLargestDssim, place + "/dssim");
   require_range(t.skip_dssim, -rounding, kLargestDssim, place + "/skip_dssim");
-  require_tables(t.knot_quality.size() < 256, place + "/knot_quality", "at most 255 knots", "more");
+  require_tables(t.knot_quality.size() < 256, "T03", place + "/knot_quality", "at most 255 knots", "more");
   check_knots(t, place);
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   require_range(t.quality, 0, 100, place + "/quality");
   for (const std::uint32_t f : t.features)
-    require_tables(f < kFeatureLimit, place + "/features", "less than 2^24", std::to_string(f));
+    require_tables(f < kFeatureLimit, "T03", place + "/features", "less than 2^24", std::to_string(f));
   check_fragment_order(t, place);
 }
 
@@ -216,7 +220,7 @@ void fill(std::vector<T>& values, std::uint64_t count, Get get) {
 
 float read_half(BytesIn& in) {
   const std::uint16_t v = in.u16();
-  if (v > kLargestHalf) in.fail("a finite binary16 >= 0", std::to_string(v));
+  if (v > kLargestHalf) fail_by("T04", in, "a finite binary16 >= 0", std::to_string(v));
   return from_half(v);
 }
 
@@ -224,7 +228,8 @@ void read_order(BytesIn& in, PlaneTables& t, std::uint64_t listed) {
   fill(t.order, listed, [&] { return in.u16(); });
   std::vector<bool> seen(t.fragment_count());
   for (const std::uint16_t f : t.order) {
-    if (f >= seen.size() || seen[f]) in.fail("every stored fragment once in the order", std::to_string(f));
+    if (f >= seen.size() || seen[f])
+      fail_by("T05", in, "every stored fragment once in the order", std::to_string(f));
     seen[f] = true;
   }
 }
@@ -270,7 +275,8 @@ SectionCounts read_section_start(BytesIn& in, PlaneTables& t, int minor) {
   const std::uint8_t flags = in.u8();
   counts.knots = in.u8();
   if (const auto reserved = in.u8(); (flags > kIncremental || reserved != 0) && minor <= kFormatMinor)
-    in.fail("flags 0 or 1 and a zero byte", std::to_string(flags) + ", " + std::to_string(reserved));
+    fail_by("W05", in, "flags 0 or 1 and a zero byte",
+            std::to_string(flags) + ", " + std::to_string(reserved));
   t.incremental = (flags & kIncremental) != 0;
   for (float* v : {&t.quality_width, &t.log_width, &t.quality_min, &t.quality_max}) *v = in.f32();
   counts.listed = in.u32();
@@ -281,7 +287,7 @@ SectionCounts read_section_start(BytesIn& in, PlaneTables& t, int minor) {
     in.fail("1 to 100 scales, 1 to 100 rungs and every fragment at most once", "others");
   if (const std::uint64_t cells = cells_of(t.fragment_count(), counts.rungs, counts.scales);
       cells > kMaxPlaneCells)
-    in.fail("at most 2^24 cells", std::to_string(cells));
+    fail_by("L02", in, "at most 2^24 cells", std::to_string(cells));
   if (counts.size_width < 1 || counts.size_width > 4 || counts.feature_width < 1 || counts.feature_width > 3)
     in.fail("widths of 1 to 4 and 1 to 3 bytes",
             std::to_string(counts.size_width) + ", " + std::to_string(counts.feature_width));
@@ -299,13 +305,14 @@ PlaneTables read_section(std::span<const std::uint8_t> bytes, int minor, const s
   if (minor <= kFormatMinor) in.finish();
   check_plane(t, 0, place);
   if (counts.size_width != width_of(t.size_bytes) || counts.feature_width != width_of(t.features))
-    in.fail("the least width that holds the values", "another");
+    fail_by("T08", in, "the least width that holds the values", "another");
   return t;
 }
 
 void add_cells(const PlaneTables& t, std::uint64_t& cells) {
   cells += cells_of(t);
-  require_tables(cells <= kMaxPackageCells, "", "at most 2^27 cells in all planes", std::to_string(cells));
+  require_tables(cells <= kMaxPackageCells, "L02", "", "at most 2^27 cells in all planes",
+                 std::to_string(cells));
 }
 
 std::string plane_place(std::size_t plane) { return "plane " + std::to_string(plane); }
@@ -345,12 +352,11 @@ std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
   return head.finish();
 }
 
-TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
-  BytesIn in(bytes, kTablesFile);
+static TablesHead read_directory(BytesIn& in) {
   TablesHead head;
-  head.minor = read_entry_start(in, kTablesMagic);
+  head.minor = read_entry_start(in, kTablesMagic, "T01");
   const std::uint64_t planes = in.u32();
-  if (in.u32() != 0 && head.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
+  if (in.u32() != 0 && head.minor <= kFormatMinor) fail_by("T01", in, "4 zero bytes", "others");
   if (planes > in.left() / kDirectoryRecord)
     in.fail("a plane count that fits the file", std::to_string(planes));
   head.bytes = kDirectoryHead + planes * kDirectoryRecord;
@@ -365,21 +371,28 @@ TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
   return head;
 }
 
+TablesHead read_tables_head(std::span<const std::uint8_t> bytes) {
+  BytesIn in(bytes, kTablesFile);
+  return under_rule("T02", [&] { return read_directory(in); });
+}
+
 PlaneTables read_tables_section(const TablesHead& head, std::size_t plane,
                                 std::span<const std::uint8_t> section) {
   const TablesSection& s = head.planes.at(plane);
   if (section.size() != s.bytes)
-    fail_tables(plane_place(plane), std::to_string(s.bytes) + " bytes", std::to_string(section.size()));
+    fail_tables("T02", plane_place(plane), std::to_string(s.bytes) + " bytes",
+                std::to_string(section.size()));
   if (sha256(section) != s.digest)
-    fail_tables(plane_place(plane), "SHA-256 " + to_hex(s.digest), to_hex(sha256(section)));
-  return read_section(section, head.minor, plane_place(plane));
+    fail_tables("T02", plane_place(plane), "SHA-256 " + to_hex(s.digest), to_hex(sha256(section)));
+  return under_rule("T03", [&] { return read_section(section, head.minor, plane_place(plane)); });
 }
 
 PackageTables read_tables(std::span<const std::uint8_t> bytes) {
   const TablesHead head = read_tables_head(bytes);
   const std::uint64_t end =
       head.planes.empty() ? head.bytes : head.planes.back().offset + head.planes.back().bytes;
-  if (end != bytes.size()) fail_tables("", std::to_string(end) + " bytes", std::to_string(bytes.size()));
+  if (end != bytes.size())
+    fail_tables("T02", "", std::to_string(end) + " bytes", std::to_string(bytes.size()));
   PackageTables tables;
   std::uint64_t cells = 0;
   for (std::size_t p = 0; p < head.planes.size(); ++p) {

@@ -6,6 +6,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
+#include "format/base/rule_error.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -61,16 +62,17 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
   t.fragment_width_px = u32(at["fragmentWidthPx"], 1, kMaxSide);
   t.fragment_height_px = u32(at["fragmentHeightPx"], 1, kMaxSide);
   for (const char* side : {"fragmentWidthPx", "fragmentHeightPx"})  // whole MCUs even with 4:2:0
-    if (at[side].integer(1) % 16 != 0) at[side].fail("a multiple of 16", std::to_string(at[side].integer(1)));
+    if (at[side].integer(1) % 16 != 0)
+      at[side].by("X04").fail("a multiple of 16", std::to_string(at[side].integer(1)));
   t.columns = u32(at["columns"], 1, 65535);
-  t.rows = u32(at["rows"], 1, 65535 / t.columns);
+  t.rows = u32(at["rows"].by("X05"), 1, 65535 / t.columns);
   const auto tiles = [](std::uint64_t count, std::uint64_t side, std::uint64_t whole) {
     return count * side >= whole && (count - 1) * side < whole;
   };
   if (!tiles(t.columns, t.fragment_width_px, t.width_px))
-    at["columns"].fail("as many as cover the width", std::to_string(t.columns));
+    at["columns"].by("X05").fail("as many as cover the width", std::to_string(t.columns));
   if (!tiles(t.rows, t.fragment_height_px, t.height_px))
-    at["rows"].fail("as many as cover the height", std::to_string(t.rows));
+    at["rows"].by("X05").fail("as many as cover the height", std::to_string(t.rows));
   t.grid_reason = at["gridReason"].text(kMaxTextBytes);
 }
 
@@ -82,12 +84,12 @@ void read_mip(const JsonAt& at, TextureInfo& t) {
 void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
   if (at.has("sourceRung")) t.source_rung = at["sourceRung"].boolean();
   if (t.source_rung && (t.codec != Codec::kJpeg || t.mip > 0))
-    at["sourceRung"].fail("a full-size plane of codec jpeg", "another");
+    at["sourceRung"].by("X11").fail("a full-size plane of codec jpeg", "another");
   if (!at.has("source")) return;
   t.source_extension = at["source"].text(100);
   if (std::ranges::find(kSourceExtensions, t.source_extension) == std::end(kSourceExtensions))
-    at["source"].fail("jpg, png, tif, webp or exr", t.source_extension);
-  if (t.mip > 0) at["source"].fail("none, for a mip", t.source_extension);
+    at["source"].by("X03").fail("jpg, png, tif, webp or exr", t.source_extension);
+  if (t.mip > 0) at["source"].by("X11").fail("none, for a mip", t.source_extension);
   t.source_colours = at["sourceColours"].boolean();
   t.source.path = source_path(plane, t.source_extension);
 }
@@ -97,20 +99,21 @@ void check_mips(const JsonAt& list, const std::vector<TextureInfo>& textures) {
   const std::size_t full = full_size_planes(textures);
   for (std::size_t p = full; p < textures.size(); ++p) {
     const TextureInfo& t = textures[p];
-    if (t.mip == 0) list[p].fail("a mip, as the plane before is one", "a full-size plane");
-    if (t.base >= full) list[p]["base"].fail("a full-size plane", std::to_string(t.base));
+    if (t.mip == 0) list[p].by("X06").fail("a mip, as the plane before is one", "a full-size plane");
+    if (t.base >= full) list[p]["base"].by("X06").fail("a full-size plane", std::to_string(t.base));
     const TextureInfo& base = textures[t.base];
     const std::uint32_t before = p > full && textures[p - 1].base == t.base ? textures[p - 1].mip : 0;
     if (t.mip <= before || (p > full && textures[p - 1].base > t.base))
-      list[p]["mip"].fail("mips by base and mip", std::to_string(t.mip));
+      list[p]["mip"].by("X06").fail("mips by base and mip", std::to_string(t.mip));
     const auto side = [&](std::uint64_t px) { return (px + (std::uint64_t{1} << t.mip) - 1) >> t.mip; };
     if (t.width_px != side(base.width_px) || t.height_px != side(base.height_px))
-      list[p]["widthPx"].fail("sides of 1 / 2^mip of the full size, rounded up", std::to_string(t.width_px));
+      list[p]["widthPx"].by("X07").fail("sides of 1 / 2^mip of the full size, rounded up",
+                                        std::to_string(t.width_px));
     if (t.image != base.image || t.role != base.role || t.channels != base.channels ||
         t.colour_space != base.colour_space || t.preview_width_px != base.preview_width_px ||
         t.preview_height_px != base.preview_height_px)
-      list[p].fail("image, role, channels, colour space and preview of plane " + std::to_string(t.base),
-                   "others");
+      list[p].by("X07").fail(
+          "image, role, channels, colour space and preview of plane " + std::to_string(t.base), "others");
   }
 }
 
@@ -121,9 +124,9 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   t.name = at["name"].text(kMaxTextBytes);
   t.colour_space = at["colourSpace"].text(100);
   if (t.colour_space != "srgb" && t.colour_space != "linear")
-    at["colourSpace"].fail("srgb or linear", t.colour_space);
+    at["colourSpace"].by("X03").fail("srgb or linear", t.colour_space);
   const std::string codec = at["codec"].text(100);
-  if (!find_codec(codec)) at["codec"].fail("jpeg, jpeg-progressive or webp", codec);
+  if (!find_codec(codec)) at["codec"].by("X03").fail("jpeg, jpeg-progressive or webp", codec);
   t.codec = *find_codec(codec);
   read_grid(at, t);
   t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
@@ -175,7 +178,8 @@ void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<Entr
   const auto resolve = [&](EntryRef& ref) {
     const auto it = by_path.find(ref.path);
     if (it == by_path.end())
-      throw FormatError(kIndexPath, ref.path, "an entry, for " + kTexturesFile + " speaks of it", "none");
+      throw RuleError("R07", kIndexPath, ref.path, "an entry, for " + kTexturesFile + " speaks of it",
+                      "none");
     ref = *it->second;
   };
   for (TextureInfo& t : textures) {

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "format/base/bytes.h"
+#include "format/base/rule_error.h"
 #include "format/base/unit16.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -30,7 +31,7 @@ struct ThesisSection {
 
 [[noreturn]] void fail_thesis(const std::string& place, const std::string& expected,
                               const std::string& found) {
-  throw FormatError(kThesisFile, place, expected, found);
+  throw RuleError("O05", kThesisFile, place, expected, found);
 }
 
 std::array<std::vector<float> PlaneThesis::*, 5> predictors() {
@@ -112,7 +113,7 @@ void read_size_model(BytesIn& in, PlaneThesis& t) {
 void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
   const std::uint32_t scales = in.u8();
   const int width = in.u8();
-  if (in.u16() != 0 && minor <= kFormatMinor) in.fail("2 zero bytes", "others");
+  if (in.u16() != 0 && minor <= kFormatMinor) fail_by("W05", in, "2 zero bytes", "others");
   if (scales == 0 || scales > kMostChainScales || width < 1 || width > 8)
     in.fail("1 to 100 scales and a width of 1 to 8", std::to_string(scales) + ", " + std::to_string(width));
   for (std::uint32_t s = 0; s < scales; ++s) t.quality.push_back(in.f32());
@@ -123,7 +124,8 @@ void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
 void read_thesis_section(const ThesisSection& section, int minor, ThesisTables& tables) {
   const std::string place = "plane " + std::to_string(section.plane) + ", ";
   if (section.plane >= kMaxPackagePlanes)
-    fail_thesis("section " + std::to_string(section.id), "a plane", std::to_string(section.plane));
+    throw RuleError("R16", kThesisFile, "section " + std::to_string(section.id), "a plane",
+                    std::to_string(section.plane));
   if (tables.planes.size() <= section.plane) tables.planes.resize(section.plane + std::size_t{1});
   PlaneThesis& plane = tables.planes[section.plane];
   BytesIn in(section.bytes, kThesisFile + ": " + place + "section " + std::to_string(section.id));
@@ -159,12 +161,12 @@ std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
   return head.finish();
 }
 
-ThesisFile read_thesis(std::span<const std::uint8_t> bytes) {
+static ThesisFile read_sections(ByteSpan bytes) {
   BytesIn in(bytes, kThesisFile);
   ThesisFile file;
-  file.minor = read_entry_start(in, kThesisMagic);
+  file.minor = read_entry_start(in, kThesisMagic, "O04");
   const std::uint64_t count = in.u32();
-  if (in.u32() != 0 && file.minor <= kFormatMinor) in.fail("4 zero bytes", "others");
+  if (in.u32() != 0 && file.minor <= kFormatMinor) fail_by("W05", in, "4 zero bytes", "others");
   if (count > in.left() / kSectionRecord)
     in.fail("a section count that fits the file", std::to_string(count));
   BytesIn data(bytes, kThesisFile);
@@ -178,12 +180,16 @@ ThesisFile read_thesis(std::span<const std::uint8_t> bytes) {
     const ByteSpan part = data.raw(in.u32());
     if (section.id >= kPerceptualTableId) continue;
     section.bytes.assign(part.begin(), part.end());
-    read_thesis_section(section, file.minor, file.tables);
+    under_rule("O05", [&] { read_thesis_section(section, file.minor, file.tables); });
   }
   data.finish();
   for (std::size_t p = 0; p < file.tables.planes.size(); ++p)
     check_thesis_plane(file.tables.planes[p], 0, "plane " + std::to_string(p) + ", ");
   return file;
+}
+
+ThesisFile read_thesis(std::span<const std::uint8_t> bytes) {
+  return under_rule("O04", [&] { return read_sections(bytes); });
 }
 
 }  // namespace texmesh

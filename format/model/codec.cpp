@@ -4,7 +4,7 @@
 #include <string>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 
 namespace texmesh {
 namespace {
@@ -24,20 +24,20 @@ bool begins_and_ends(Span bytes) {
          marker_at(bytes, bytes.size() - kMarkerBytes, kEnd);
 }
 
-[[noreturn]] void fail(const char* place, const char* expected, Span found) {
-  throw FormatError("JPEG", place, expected, std::to_string(found.size()) + " other bytes");
+[[noreturn]] void fail(const char* rule, const char* place, const char* expected, Span found) {
+  throw RuleError(rule, "JPEG", place, expected, std::to_string(found.size()) + " other bytes");
 }
 
 void append(Bytes& out, Span part) { out.insert(out.end(), part.begin(), part.end()); }
 
-Span without_end(Span tables) {
-  if (!begins_and_ends(tables)) fail("table stream", "SOI ... EOI", tables);
+Span without_end(Span tables, const char* rule) {
+  if (!begins_and_ends(tables)) fail(rule, "table stream", "SOI ... EOI", tables);
   return tables.first(tables.size() - kMarkerBytes);
 }
 
 Bytes join_jpeg(Span tables, Span stream) {
-  const Span head = without_end(tables);
-  if (!begins_and_ends(stream)) fail("fragment", "SOI ... EOI", stream);
+  const Span head = without_end(tables, "F05");
+  if (!begins_and_ends(stream)) fail("F05", "fragment", "SOI ... EOI", stream);
   Bytes out;
   out.reserve(head.size() + stream.size());
   append(out, head);
@@ -48,10 +48,10 @@ Bytes join_jpeg(Span tables, Span stream) {
 /// A stream that ends in a lone 0xFF would turn the EOI behind it into part of its data.
 Bytes join_progressive(Span tables, std::span<const Span> streams) {
   Bytes out;
-  append(out, without_end(tables));
+  append(out, without_end(tables, "F06"));
   const std::size_t head = out.size();
   for (const Span stream : streams) append(out, stream);
-  if (out.size() == head || out.back() == 0xff) fail("fragment", "scans", Span(out).subspan(head));
+  if (out.size() == head || out.back() == 0xff) fail("F06", "fragment", "scans", Span(out).subspan(head));
   out.insert(out.end(), {0xff, kEnd});
   return out;
 }
@@ -99,8 +99,8 @@ Bytes join_fragment(Codec codec, Span tables, std::span<const Span> streams) {
       break;
   }
   if (!is_webp(streams.front()))
-    throw FormatError("WebP", "fragment", "RIFF ... WEBP",
-                      std::to_string(streams.front().size()) + " other bytes");
+    throw RuleError("F07", "WebP", "fragment", "RIFF ... WEBP",
+                    std::to_string(streams.front().size()) + " other bytes");
   return {streams.front().begin(), streams.front().end()};
 }
 
@@ -114,7 +114,7 @@ Bytes split_fragment(Codec codec, Span tables, Span file, std::uint64_t lower_by
       throw FormatError("WebP", "file", "RIFF ... WEBP", std::to_string(file.size()) + " other bytes");
     return {file.begin(), file.end()};
   }
-  const Span head = without_end(tables);
+  const Span head = without_end(tables, codec == Codec::kJpeg ? "F05" : "F06");
   if (file.size() < head.size() + kMarkerBytes || !marker_at(file, file.size() - kMarkerBytes, kEnd) ||
       !std::equal(head.begin(), head.end(), file.begin()))
     throw FormatError("JPEG", "byte 0", "the rung's table stream", "other bytes");

@@ -104,9 +104,10 @@ std::vector<int> components_of(const SplitStreamHead& head) {
 SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limits) {
   const SplitScale& last = head.scales.at(head.scales.size() - 1);
   if (last.points > limits.points)
-    fail_split_stream("points", "at most " + std::to_string(limits.points), std::to_string(last.points));
+    fail_split_stream("L09", "points", "at most " + std::to_string(limits.points),
+                      std::to_string(last.points));
   if (last.faces > limits.faces || last.wedges > 3ull * limits.faces)
-    fail_split_stream("faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
+    fail_split_stream("L09", "faces", "at most " + std::to_string(limits.faces), std::to_string(last.faces));
   return {last.points, last.faces};
 }
 
@@ -161,13 +162,13 @@ std::size_t SplitStreamReader::next_block() const { return state_->block; }
 void SplitStreamReader::add_block(ByteSpan block) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
-  if (s.block >= s.head.blocks.size()) fail_split_stream(place, "no more blocks", "one");
+  if (s.block >= s.head.blocks.size()) fail_split_stream("S08", place, "no more blocks", "one");
   const SplitBlock& b = s.head.blocks[s.block];
   if (block.size() != b.bytes())
-    fail_split_stream(place, std::to_string(b.bytes()) + " bytes", std::to_string(block.size()));
+    fail_split_stream("S08", place, std::to_string(b.bytes()) + " bytes", std::to_string(block.size()));
   const Sha256 digest = sha256(block);
   if (!std::equal(b.digest.begin(), b.digest.end(), digest.begin()))
-    fail_split_stream(place, "bytes of the digest in the head", "others");
+    fail_split_stream("S09", place, "bytes of the digest in the head", "others");
   std::vector<ByteSpan> parts;
   std::size_t at = 0;
   for (std::uint32_t size : b.parts) {
@@ -180,13 +181,13 @@ void SplitStreamReader::add_block(ByteSpan block) {
 void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   State& s = *state_;
   const std::string place = "block " + std::to_string(s.block);
-  if (s.block >= s.head.blocks.size()) fail_split_stream(place, "no more blocks", "one");
+  if (s.block >= s.head.blocks.size()) fail_split_stream("S08", place, "no more blocks", "one");
   const SplitBlock& b = s.head.blocks[s.block];
   if (parts.size() != b.parts.size())
-    fail_split_stream(place, std::to_string(b.parts.size()) + " parts", std::to_string(parts.size()));
+    fail_split_stream("S08", place, std::to_string(b.parts.size()) + " parts", std::to_string(parts.size()));
   for (std::size_t i = 0; i < parts.size(); ++i)
     if (parts[i].size() != b.parts[i] && (i == 0 || !parts[i].empty()))
-      fail_split_stream(place, std::to_string(b.parts[i]) + " bytes", std::to_string(parts[i].size()));
+      fail_split_stream("S08", place, std::to_string(b.parts[i]) + " bytes", std::to_string(parts[i].size()));
   if (parts[1].size() != b.parts[1]) s.complete = false;
   if (s.block == 0 || s.block == s.head.scales[s.scale].blocks) {
     if (s.block > 0) ++s.scale;
@@ -202,7 +203,7 @@ void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   if (s.block != scale.blocks) return;
   const auto require = [&](const char* what, std::size_t expected, std::size_t found) {
     if (expected != found)
-      fail_split_stream("scale " + std::to_string(scale.scale), std::to_string(expected) + " " + what,
+      fail_split_stream("S19", "scale " + std::to_string(scale.scale), std::to_string(expected) + " " + what,
                         std::to_string(found));
   };
   require("points", scale.points, s.mesh.points().size());
@@ -222,7 +223,7 @@ void SplitStreamReader::read_to_scale(std::size_t index, ByteSpan stream) {
   while (state_->block < end) {
     const SplitBlock& b = state_->head.blocks[state_->block];
     if (b.offset > stream.size() || b.bytes() > stream.size() - b.offset)
-      fail_split_stream("block " + std::to_string(state_->block),
+      fail_split_stream("S08", "block " + std::to_string(state_->block),
                         "bytes up to " + std::to_string(b.offset + b.bytes()), std::to_string(stream.size()));
     add_block(stream.subspan(static_cast<std::size_t>(b.offset), static_cast<std::size_t>(b.bytes())));
   }

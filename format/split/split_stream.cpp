@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "format/base/bytes.h"
+#include "format/base/rule_error.h"
 #include "format/split/codec/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
@@ -29,12 +30,12 @@ std::uint32_t read_varint(BytesIn& in) {
       return static_cast<std::uint32_t>(value);
     }
   }
-  in.fail("a number of at most 32 bits in its shortest form", "another");
+  fail_by("S06", in, "a number of at most 32 bits in its shortest form", "another");
 }
 
 std::uint32_t read_sum(BytesIn& in, std::uint32_t before) {
   const std::uint32_t more = read_varint(in);
-  if (more > 0xffffffffu - before) in.fail("a count of at most 32 bits", "a larger one");
+  if (more > 0xffffffffu - before) fail_by("S05", in, "a count of at most 32 bits", "a larger one");
   return before + more;
 }
 
@@ -46,15 +47,17 @@ void write_grid(BytesOut& out, const SplitGrid& grid, std::size_t axes) {
 void read_grid(BytesIn& in, SplitGrid& grid, std::size_t axes) {
   for (std::size_t k = 0; k < axes; ++k) {
     grid.origin[k] = in.f32();
-    if (!std::isfinite(grid.origin[k])) in.fail("a finite origin", "another");
+    if (!std::isfinite(grid.origin[k])) fail_by("S04", in, "a finite origin", "another");
   }
   grid.range = in.f32();
-  if (!std::isfinite(grid.range) || !(grid.range > 0)) in.fail("a finite range above 0", "another");
+  if (!std::isfinite(grid.range) || !(grid.range > 0))
+    fail_by("S04", in, "a finite range above 0", "another");
 }
 
 int read_bits(BytesIn& in, int least) {
   const int bits = in.u8();
-  if (bits < least || bits > 24) in.fail(std::to_string(least) + " to 24 bits", std::to_string(bits));
+  if (bits < least || bits > 24)
+    fail_by("S03", in, std::to_string(least) + " to 24 bits", std::to_string(bits));
   return bits;
 }
 
@@ -62,50 +65,54 @@ void read_attributes(BytesIn& in, std::size_t count, SplitStreamHead& head) {
   for (std::size_t i = 0; i < count; ++i) {
     SplitAttribute a;
     const int kind = in.u8();
-    if (kind > static_cast<int>(SplitKind::kColour)) in.fail("an attribute kind", std::to_string(kind));
+    if (kind > static_cast<int>(SplitKind::kColour))
+      fail_by("S03", in, "an attribute kind", std::to_string(kind));
     a.kind = static_cast<SplitKind>(kind);
-    if (i > 0 && a.kind <= head.attributes.back().kind) in.fail("rising kinds", std::to_string(kind));
+    if (i > 0 && a.kind <= head.attributes.back().kind)
+      fail_by("S03", in, "rising kinds", std::to_string(kind));
     a.grid.bits = read_bits(in, a.kind == SplitKind::kNormal ? 2 : 1);
-    if (in.u16() != 0) in.fail("0", "another number");
+    if (in.u16() != 0) fail_by("S02", in, "0", "another number");
     if (has_grid(a.kind)) read_grid(in, a.grid, 2);
     head.attributes.push_back(a);
   }
 }
 
 void read_scales(BytesIn& in, std::size_t count, std::size_t blocks, SplitStreamHead& head) {
-  if (count == 0 || count > kMostScales) in.fail("1 to 100 scales", std::to_string(count));
+  if (count == 0 || count > kMostScales) fail_by("S05", in, "1 to 100 scales", std::to_string(count));
   for (std::size_t i = 0; i < count; ++i) {
     const SplitScale before = i > 0 ? head.scales.back() : SplitScale{100, 0, 0, 0, 0, 0};
     SplitScale s = before;
     s.scale = in.u8();
     for (std::uint32_t* n : {&s.blocks, &s.points, &s.wedges, &s.faces}) *n = read_sum(in, *n);
     const std::uint32_t hidden = read_varint(in);
-    if (s.scale >= before.scale) in.fail("falling scale numbers", std::to_string(s.scale));
+    if (s.scale >= before.scale) fail_by("S05", in, "falling scale numbers", std::to_string(s.scale));
     if (s.blocks <= before.blocks || s.blocks > blocks)
-      in.fail("a rising number of blocks, at most " + std::to_string(blocks), std::to_string(s.blocks));
+      fail_by("S05", in, "a rising number of blocks, at most " + std::to_string(blocks),
+              std::to_string(s.blocks));
     if (hidden > s.faces || s.wedges < s.points || s.faces == 0)
-      in.fail("counts that can belong together", "others");
+      fail_by("S05", in, "counts that can belong together", "others");
     s.triangles = s.faces - hidden;
     head.scales.push_back(s);
   }
   if (head.scales.back().scale != 0 || head.scales.back().blocks != blocks)
-    in.fail("S_0 with all blocks", "scale " + std::to_string(head.scales.back().scale));
+    fail_by("S05", in, "S_0 with all blocks", "scale " + std::to_string(head.scales.back().scale));
 }
 
 void read_blocks(BytesIn& in, std::size_t count, SplitStreamHead& head) {
   const std::size_t parts = head.attributes.size() + 2;
-  if (count > in.left() / (parts + 9)) in.fail("blocks with an entry in the table", std::to_string(count));
+  if (count > in.left() / (parts + 9))
+    fail_by("S08", in, "blocks with an entry in the table", std::to_string(count));
   head.blocks.resize(count);
   for (SplitBlock& b : head.blocks) {
     const std::uint32_t code = read_varint(in);
     b.is_patch = (code & 1) != 0;
     b.count = code >> 1;
     if (b.count == 0 || (!b.is_patch && b.count > kMostSplits))
-      in.fail("at least one face or split, at most 4096 splits", std::to_string(b.count));
+      fail_by("S07", in, "at least one face or split, at most 4096 splits", std::to_string(b.count));
     b.parts.resize(parts);
     for (std::uint32_t& p : b.parts) p = read_varint(in);
     if (b.bytes() < b.count / kMostPerByte)
-      in.fail("at least a byte for every 64", std::to_string(b.bytes()) + " bytes");
+      fail_by("S07", in, "at least a byte for every 64", std::to_string(b.bytes()) + " bytes");
     std::ranges::copy(in.raw(8), b.digest.begin());
   }
 }
@@ -156,21 +163,21 @@ std::vector<std::uint8_t> write_split_head(const SplitStreamHead& head) {
   return out.finish();
 }
 
-SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
+static SplitStreamHead read_head(ByteSpan bytes) {
   BytesIn in(bytes, kSplitStreamName);
-  in.expect("TXMS", "TXMS");
+  under_rule("S01", [&] { in.expect("TXMS", "TXMS"); });
   if (const auto major = in.u16(); major != kSplitStreamMajor)
-    in.fail("major version " + std::to_string(kSplitStreamMajor), std::to_string(major));
+    fail_by("S01", in, "major version " + std::to_string(kSplitStreamMajor), std::to_string(major));
   in.u16();  // the minor version
   SplitStreamHead head;
   head.position.bits = read_bits(in, 1);
   const std::size_t attributes = in.u8(), scales = in.u8();
-  if (in.u8() != 0) in.fail("0", "another number");
+  if (in.u8() != 0) fail_by("S02", in, "0", "another number");
   const std::size_t groups = in.u32(), blocks = in.u32();
   read_grid(in, head.position, 3);
   read_attributes(in, attributes, head);
   if (groups == 0 || groups > 65536 || groups > in.left() / 4)
-    in.fail("1 to 65536 groups", std::to_string(groups));
+    fail_by("S05", in, "1 to 65536 groups", std::to_string(groups));
   for (std::size_t i = 0; i < groups; ++i) {
     const std::uint16_t material = in.u16();
     head.groups.push_back({material, in.u16()});
@@ -190,10 +197,14 @@ SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
   return head;
 }
 
+SplitStreamHead read_split_head(std::span<const std::uint8_t> bytes) {
+  return under_rule("S08", [&] { return read_head(bytes); });
+}
+
 std::uint64_t split_prefix_bytes(const SplitStreamHead& head, int scale) {
   const auto found = std::ranges::find(head.scales, scale, &SplitScale::scale);
   if (found == head.scales.end())
-    throw FormatError(kSplitStreamName, "scales", "scale " + std::to_string(scale), "none");
+    throw RuleError("S21", kSplitStreamName, "scales", "scale " + std::to_string(scale), "none");
   const SplitBlock& last = head.blocks.at(found->blocks - 1);
   return last.offset + last.bytes();
 }

@@ -43,7 +43,7 @@ VerifyReport verify_path(const std::string& path, const RunContext& context) {
     return verify_package(*store, context);
   } catch (const Error& e) {
     VerifyReport report;
-    report.findings.push_back({"readable", "", e.place(), e.expected(), e.found()});
+    report.findings.push_back({"readable", rule_of(e), "", e.place(), e.expected(), e.found()});
     return report;
   }
 }
@@ -52,6 +52,7 @@ Json to_json(const std::string& path, const VerifyReport& r) {
   Json findings = Json::array();
   for (const Finding& f : r.findings)
     findings.push_back({{"check", f.check},
+                        {"rule", f.rule},
                         {"entry", f.entry},
                         {"field", f.field},
                         {"expected", f.expected},

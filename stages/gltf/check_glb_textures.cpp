@@ -43,7 +43,7 @@ void check_glb_image(GlbDocument& d, std::size_t i, GlbFacts& facts) {
   if (!d.standalone() && json.contains("uri")) {
     const bool preview = is_preview_uri(json["uri"]) && !json.contains("bufferView");
     if (!preview || json.value("mimeType", std::string()) != "image/jpeg")
-      d.fail("glb-image", place + "/uri", "a preview as image/jpeg, ../preview/PPP.jpg",
+      d.fail({"glb-image", "G06"}, place + "/uri", "a preview as image/jpeg, ../preview/PPP.jpg",
              json["uri"].dump().substr(0, 80));
     facts.image_uris.back() = json["uri"].get<std::string>();
     return;

@@ -51,7 +51,7 @@ class GlbDocument {
   /// Component `c` of element `i` as a number; normalised integers are mapped to 0..1 or -1..1.
   double value(const Accessor& a, std::size_t i, std::size_t c) const;
 
-  [[noreturn]] void fail(const char* check, const std::string& field, const std::string& expected,
+  [[noreturn]] void fail(const Check& check, const std::string& field, const std::string& expected,
                          const std::string& found);
   /// The JSON pointer of an element of a top-level array.
   static std::string element(const char* array, std::size_t i) {

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
 
@@ -37,13 +37,14 @@ PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::
 
 Bytes PackageReader::read_all(const EntryRef& ref) {
   if (ref.bytes > most_entry_bytes(ref.path))
-    throw FormatError(store_->name(), "entry " + ref.path,
-                      "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
-                      std::to_string(ref.bytes));
+    throw RuleError("L09", store_->name(), "entry " + ref.path,
+                    "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
+                    std::to_string(ref.bytes));
   Bytes bytes = store_->read(ref, 0, ref.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != ref.digest)
-    throw FormatError(store_->name(), "entry " + ref.path, "SHA-256 " + to_hex(ref.digest), to_hex(digest));
+    throw RuleError("I08", store_->name(), "entry " + ref.path, "SHA-256 " + to_hex(ref.digest),
+                    to_hex(digest));
   return bytes;
 }
 
@@ -51,22 +52,22 @@ Bytes PackageReader::read_paged(const PagedRef& ref) {
   Bytes bytes = read_all(ref);
   const Sha256 digest = sha256(std::span(bytes).first(static_cast<std::size_t>(ref.head_bytes)));
   if (digest != ref.head_digest)
-    throw FormatError(store_->name(), "head of " + ref.path, "SHA-256 " + to_hex(ref.head_digest),
-                      to_hex(digest));
+    throw RuleError("R02", store_->name(), "head of " + ref.path, "SHA-256 " + to_hex(ref.head_digest),
+                    to_hex(digest));
   return bytes;
 }
 
 void PackageReader::require_minor(const std::string& path, int minor) const {
   if (minor != manifest_.minor)
-    throw FormatError(store_->name(), path,
-                      "the manifest's minor version, " + std::to_string(manifest_.minor),
-                      std::to_string(minor));
+    throw RuleError("R01", store_->name(), path,
+                    "the manifest's minor version, " + std::to_string(manifest_.minor),
+                    std::to_string(minor));
 }
 
 void PackageReader::require_head(const PagedRef& ref, std::uint64_t head_bytes) const {
   if (ref.head_bytes != head_bytes)
-    throw FormatError(store_->name(), "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
-                      std::to_string(head_bytes));
+    throw RuleError("R02", store_->name(), "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
+                    std::to_string(head_bytes));
 }
 
 const std::vector<EntryRef>& PackageReader::index() {
@@ -79,8 +80,8 @@ const std::vector<EntryRef>& PackageReader::index() {
   const auto require_entry = [&](const EntryRef& ref) {
     const auto it = std::ranges::find(entries, ref.path, &EntryRef::path);
     if (it == entries.end() || !(*it == ref))
-      throw FormatError(store_->name(), "index entry " + ref.path, "what the manifest says of it",
-                        it == entries.end() ? "none" : "another offset, size or digest");
+      throw RuleError("R03", store_->name(), "index entry " + ref.path, "what the manifest says of it",
+                      it == entries.end() ? "none" : "another offset, size or digest");
   };
   for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
                               manifest_.provenance, manifest_.about})
@@ -92,8 +93,8 @@ const std::vector<EntryRef>& PackageReader::index() {
   if (manifest_.stream) {
     const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
     if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
-      throw FormatError(store_->name(), std::string("index entry ") + kSplitStreamPath,
-                        "what the manifest says of it", it == entries.end() ? "none" : "another place");
+      throw RuleError("R03", store_->name(), std::string("index entry ") + kSplitStreamPath,
+                      "what the manifest says of it", it == entries.end() ? "none" : "another place");
   }
   index_ = std::move(entries);
   return *index_;
@@ -102,7 +103,7 @@ const std::vector<EntryRef>& PackageReader::index() {
 const EntryRef& PackageReader::find(const std::string& path) {
   const auto it = std::ranges::find(index(), path, &EntryRef::path);
   if (it == index_->end())
-    throw FormatError(store_->name(), "entry " + path, "an entry of the index", "none");
+    throw RuleError("R07", store_->name(), "entry " + path, "an entry of the index", "none");
   return *it;
 }
 
@@ -110,13 +111,13 @@ const std::vector<TextureInfo>& PackageReader::textures() {
   if (textures_) return *textures_;
   std::vector<TextureInfo> textures = read_textures(read_all(manifest_.textures));
   if (textures.size() != manifest_.plane_count)
-    throw FormatError(store_->name(), kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
-                      std::to_string(textures.size()));
+    throw RuleError("R04", store_->name(), kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
+                    std::to_string(textures.size()));
   for (const TextureInfo& t : textures)
     if (const auto feature = codec_traits(t.codec).required_feature;
         !feature.empty() &&
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
-      throw FormatError(store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
+      throw RuleError("R05", store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
   resolve_textures(textures, index());
   textures_ = std::move(textures);
   return *textures_;
@@ -126,27 +127,31 @@ void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
   const TextureInfo& texture = textures()[plane];
   const bool same_rungs = std::ranges::equal(tables.rung_quality, texture.rung_quality, {},
                                              [](std::uint8_t q) { return int{q}; });
-  if (tables.columns != texture.columns || tables.rows != texture.rows || !same_rungs)
-    throw FormatError(store_->name(), plane_place(plane), "the grid and rungs of textures.json in tables.bin",
-                      "others");
+  if (tables.columns != texture.columns || tables.rows != texture.rows)
+    throw RuleError("R08", store_->name(), plane_place(plane), "the grid of textures.json in tables.bin",
+                    "another");
+  if (!same_rungs)
+    throw RuleError("R09", store_->name(), plane_place(plane), "the rungs of textures.json in tables.bin",
+                    "others");
   if (tables.scale_count() != manifest_.scales.size())
-    throw FormatError(store_->name(), plane_place(plane),
-                      "a row in tables.bin for each of the manifest's " +
-                          std::to_string(manifest_.scales.size()) + " scales",
-                      std::to_string(tables.scale_count()));
+    throw RuleError("R11", store_->name(), plane_place(plane),
+                    "a row in tables.bin for each of the manifest's " +
+                        std::to_string(manifest_.scales.size()) + " scales",
+                    std::to_string(tables.scale_count()));
   if (tables.incremental != codec_traits(texture.codec).incremental)
-    throw FormatError(store_->name(), plane_place(plane), "tables of the codec in textures.json", "others");
-  const auto require_sum = [&](const EntryRef& ref, std::uint64_t sum) {
+    throw RuleError("R10", store_->name(), plane_place(plane), "tables of the codec in textures.json",
+                    "others");
+  const auto require_sum = [&](const char* rule, const EntryRef& ref, std::uint64_t sum) {
     if (ref.bytes != sum)
-      throw FormatError(store_->name(), "entry " + ref.path,
-                        std::to_string(sum) + " bytes, as tables.bin adds up", std::to_string(ref.bytes));
+      throw RuleError(rule, store_->name(), "entry " + ref.path,
+                      std::to_string(sum) + " bytes, as tables.bin adds up", std::to_string(ref.bytes));
   };
-  require_sum(texture.tables,
+  require_sum("R12", texture.tables,
               std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}));
   const std::size_t fragments = tables.fragment_count();
   for (std::size_t r = 0; r < tables.rung_count(); ++r) {
     const auto begin = tables.size_bytes.begin() + static_cast<std::ptrdiff_t>(r * fragments);
-    require_sum(texture.rungs[r],
+    require_sum("R13", texture.rungs[r],
                 std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(fragments), std::uint64_t{0}));
   }
 }
@@ -163,8 +168,8 @@ const PackageTables& PackageReader::tables() {
   require_head(manifest_.tables, head.bytes);
   PackageTables tables = read_tables(bytes);
   if (tables.planes.size() != manifest_.plane_count)
-    throw FormatError(store_->name(), kTablesPath, std::to_string(manifest_.plane_count) + " planes",
-                      std::to_string(tables.planes.size()));
+    throw RuleError("R04", store_->name(), kTablesPath, std::to_string(manifest_.plane_count) + " planes",
+                    std::to_string(tables.planes.size()));
   fragment_offsets_.clear();
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneTables& t = tables.planes[p];
@@ -193,8 +198,8 @@ ThesisTables PackageReader::read_thesis_entry() {
   require_minor(kThesisPath, file.minor);
   const auto require = [&](bool good, std::size_t plane, const char* expected) {
     if (!good)
-      throw FormatError(store_->name(), std::string(kThesisPath) + ", " + plane_place(plane), expected,
-                        "others");
+      throw RuleError("R16", store_->name(), std::string(kThesisPath) + ", " + plane_place(plane), expected,
+                      "others");
   };
   const auto last_scale = static_cast<std::size_t>(manifest_.scales.back().scale);
   for (std::size_t p = 0; p < file.tables.planes.size(); ++p) {
@@ -212,12 +217,13 @@ const QualityTable& PackageReader::quality() {
   QualityTable table = read_quality(read_all(manifest_.quality));
   const auto number_of = [](const ManifestScale& s) { return s.scale; };
   if (!std::ranges::equal(table.scales, manifest_.scales, {}, {}, number_of))
-    throw FormatError(store_->name(), kQualityPath, "the manifest's scales", "others");
+    throw RuleError("R14", store_->name(), kQualityPath, "the manifest's scales", "others");
   std::set<PlaneGroup> planes, found;
   for (const TextureInfo& t : textures()) planes.insert(group_of(t.role));
   for (const GroupLosses& g : table.groups) found.insert(g.group);
   if (planes != found)
-    throw FormatError(store_->name(), kQualityPath, "the groups of the planes in textures.json", "others");
+    throw RuleError("R15", store_->name(), kQualityPath, "the groups of the planes in textures.json",
+                    "others");
   quality_ = std::move(table);
   return *quality_;
 }
@@ -246,8 +252,8 @@ Bytes PackageReader::split_prefix(int scale) {
       store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0, s.glb.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != s.glb.digest)
-    throw FormatError(store_->name(), std::string("prefix of ") + kSplitStreamPath,
-                      "SHA-256 " + to_hex(s.glb.digest), to_hex(digest));
+    throw RuleError("M17", store_->name(), std::string("prefix of ") + kSplitStreamPath,
+                    "SHA-256 " + to_hex(s.glb.digest), to_hex(digest));
   return bytes;
 }
 
@@ -266,12 +272,16 @@ SplitStreamHead PackageReader::split_stream_head() {
   const StreamRef& ref = *manifest_.stream;
   const Bytes head = store_->read({kSplitStreamPath, ref.offset, ref.bytes, {}}, 0, ref.head_bytes);
   if (sha256(head) != ref.head_digest)
-    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath, to_hex(ref.head_digest),
-                      to_hex(sha256(head)));
+    throw RuleError("R02", store_->name(), std::string("head of ") + kSplitStreamPath,
+                    to_hex(ref.head_digest), to_hex(sha256(head)));
   SplitStreamHead parsed = read_split_head(head);
   if (parsed.bytes != ref.head_bytes)
-    throw FormatError(store_->name(), std::string("head of ") + kSplitStreamPath,
-                      std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+    throw RuleError("S08", store_->name(), std::string("head of ") + kSplitStreamPath,
+                    std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+  const SplitBlock& last = parsed.blocks.back();
+  if (last.offset + last.bytes() != ref.bytes)
+    throw RuleError("S08", store_->name(), kSplitStreamPath, "blocks that end with the entry",
+                    "an end at byte " + std::to_string(last.offset + last.bytes()));
   return parsed;
 }
 
@@ -319,11 +329,11 @@ Bytes PackageReader::fragment(std::uint32_t plane, std::uint32_t rung, std::uint
   const ByteRange range = fragment_range(plane, rung, fragment);
   const EntryRef& pack = textures()[plane].rungs[rung];
   const std::string place = "fragment " + std::to_string(fragment) + " of " + pack.path;
-  if (range.bytes == 0) throw FormatError(store_->name(), place, "a stored fragment", "none");
+  if (range.bytes == 0) throw RuleError("T07", store_->name(), place, "a stored fragment", "none");
   Bytes bytes = store_->read(pack, range.offset, range.bytes);
   const PlaneTables& t = tables().planes[plane];
   if (truncated(sha256(bytes)) != t.digest[rung * t.fragment_count() + fragment])
-    throw FormatError(store_->name(), place, "bytes of the digest in tables.bin", "others");
+    throw RuleError("F03", store_->name(), place, "bytes of the digest in tables.bin", "others");
   return bytes;
 }
 

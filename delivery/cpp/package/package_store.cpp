@@ -11,7 +11,7 @@
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -23,9 +23,9 @@ constexpr std::uint64_t kManifestOffset = 64;  // of its data: the header always
 void require_range(const std::string& file, const EntryRef& entry, std::uint64_t offset,
                    std::uint64_t bytes) {
   if (offset > entry.bytes || bytes > entry.bytes - offset)
-    throw FormatError(file, "entry " + entry.path,
-                      std::to_string(bytes) + " bytes from " + std::to_string(offset),
-                      "an entry of " + std::to_string(entry.bytes) + " bytes");
+    throw RuleError("E01", file, "entry " + entry.path,
+                    std::to_string(bytes) + " bytes from " + std::to_string(offset),
+                    "an entry of " + std::to_string(entry.bytes) + " bytes");
 }
 
 class ContainerStore final : public PackageStore {
@@ -42,13 +42,13 @@ class ContainerStore final : public PackageStore {
     const bool starts =
         head.size() >= kManifestOffset && std::equal(kStart, kStart + 10, head.begin()) &&
         std::equal(kManifestPath, kManifestPath + std::strlen(kManifestPath), head.begin() + 30);
-    if (!starts) throw FormatError(name(), "byte 0", "a texmesh package", "something else");
+    if (!starts) throw RuleError("K11", name(), "byte 0", "a texmesh package", "something else");
     std::uint64_t bytes = 0;
     for (int i = 3; i >= 0; --i) bytes = bytes << 8 | head[static_cast<std::size_t>(22 + i)];
     if (bytes > head.size() - kManifestOffset)
-      throw FormatError(name(), "entry manifest.json",
-                        "at most " + std::to_string(head.size() - kManifestOffset) + " bytes",
-                        std::to_string(bytes));
+      throw RuleError("K12", name(), "entry manifest.json",
+                      "at most " + std::to_string(head.size() - kManifestOffset) + " bytes",
+                      std::to_string(bytes));
     const auto begin = head.begin() + static_cast<std::ptrdiff_t>(kManifestOffset);
     return {begin, begin + static_cast<std::ptrdiff_t>(bytes)};
   }
@@ -94,8 +94,8 @@ class FolderStore final : public PackageStore {
     std::uint64_t bytes = 0;
     const Descriptor file = open_file(kManifestPath, bytes);
     if (bytes > kBootstrapBytes)
-      throw FormatError(root_, kManifestPath, "at most " + std::to_string(kBootstrapBytes) + " bytes",
-                        std::to_string(bytes));
+      throw RuleError("K12", root_, kManifestPath, "at most " + std::to_string(kBootstrapBytes) + " bytes",
+                      std::to_string(bytes));
     return read_file(file, kManifestPath, 0, bytes);
   }
 
@@ -104,7 +104,7 @@ class FolderStore final : public PackageStore {
     std::uint64_t size = 0;
     const Descriptor file = open_file(entry.path, size);
     if (size != entry.bytes)
-      throw FormatError(root_, entry.path, std::to_string(entry.bytes) + " bytes", std::to_string(size));
+      throw RuleError("I08", root_, entry.path, std::to_string(entry.bytes) + " bytes", std::to_string(size));
     return read_file(file, entry.path, offset, bytes);
   }
 
@@ -115,8 +115,10 @@ class FolderStore final : public PackageStore {
       const std::string path = it->path().lexically_relative(root_).generic_string();
       const fs::file_status status = it->symlink_status(error);
       if (fs::is_directory(status)) continue;
-      if (!fs::is_regular_file(status)) throw FormatError(root_, path, "a regular file", "something else");
-      if (!is_valid_entry_path(path)) throw FormatError(root_, path, "a path of a-z 0-9 . _ -", "another");
+      if (!fs::is_regular_file(status))
+        throw RuleError("L05", root_, path, "a regular file", "something else");
+      if (!is_valid_entry_path(path))
+        throw RuleError("K05", root_, path, "a path of a-z 0-9 . _ -", "another");
       entries.push_back({path, 0, it->file_size(error), 0});
     }
     if (error) throw InputError(root_, "", "a readable folder", error.message());
@@ -128,7 +130,8 @@ class FolderStore final : public PackageStore {
   /// Goes down part by part and follows no symbolic link, so that a tree from elsewhere cannot point
   /// out of itself.
   Descriptor open_file(const std::string& path, std::uint64_t& size) const {
-    if (!is_valid_entry_path(path)) throw FormatError(root_, path, "a path within the package", "another");
+    if (!is_valid_entry_path(path))
+      throw RuleError("K05", root_, path, "a path within the package", "another");
     Descriptor folder(::dup(fd_.get()));
     std::size_t begin = 0;
     for (std::size_t end; (end = path.find('/', begin)) != std::string::npos; begin = end + 1)
@@ -136,14 +139,14 @@ class FolderStore final : public PackageStore {
     Descriptor file = open_at(folder, path.substr(begin), O_NONBLOCK, path);
     struct stat st {};
     if (::fstat(file.get(), &st) != 0 || !S_ISREG(st.st_mode))
-      throw FormatError(root_, path, "a regular file", "something else");
+      throw RuleError("L05", root_, path, "a regular file", "something else");
     size = static_cast<std::uint64_t>(st.st_size);
     return file;
   }
   Descriptor open_at(const Descriptor& folder, const std::string& part, int flags,
                      const std::string& path) const {
     Descriptor d(::openat(folder.get(), part.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | flags));
-    if (d.get() < 0) throw FormatError(root_, path, "a file", std::strerror(errno));
+    if (d.get() < 0) throw RuleError("E01", root_, path, "a file", std::strerror(errno));
     return d;
   }
   Bytes read_file(const Descriptor& file, const std::string& path, std::uint64_t offset,
@@ -154,7 +157,7 @@ class FolderStore final : public PackageStore {
           ::pread(file.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
       if (n < 0 && errno == EINTR) continue;
       if (n < 0) throw InputError(root_, path, "readable bytes", std::strerror(errno));
-      if (n == 0) throw FormatError(root_, path, "more bytes", "the file became shorter");
+      if (n == 0) throw RuleError("I08", root_, path, "more bytes", "the file became shorter");
       done += static_cast<std::size_t>(n);
     }
     return out;

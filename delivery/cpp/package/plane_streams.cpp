@@ -4,15 +4,15 @@
 #include <string>
 #include <utility>
 
-#include "format/base/errors.h"
+#include "format/base/rule_error.h"
 
 namespace texmesh {
 namespace {
 
-void require_size(const char* what, std::uint64_t expected, std::uint64_t found) {
+void require_size(const char* rule, const char* what, std::uint64_t expected, std::uint64_t found) {
   if (expected != found)
-    throw FormatError(what, "", std::to_string(expected) + " bytes, as the tables say",
-                      std::to_string(found));
+    throw RuleError(rule, what, "", std::to_string(expected) + " bytes, as the tables say",
+                    std::to_string(found));
 }
 
 }  // namespace
@@ -23,7 +23,7 @@ PlaneStreams::PlaneStreams(Codec codec, const PlaneTables& tables, std::vector<s
       table_pack_(std::move(table_pack)),
       packs_(tables.rung_count()),
       offsets_(tables.rung_count()) {
-  require_size("table streams",
+  require_size("R12", "table streams",
                std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}),
                table_pack_.size());
 }
@@ -39,7 +39,7 @@ void PlaneStreams::add_pack(std::size_t rung, std::vector<std::uint8_t> pack) {
     offsets[f] = at;
     at += tables_.size_bytes[rung * fragments + f];
   }
-  require_size("rung", at, pack.size());
+  require_size("R13", "rung", at, pack.size());
   if (!incremental) packs_[rung_].clear();
   rung_ = rung;
   packs_[rung] = std::move(pack);

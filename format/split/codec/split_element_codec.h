@@ -30,13 +30,13 @@ class SplitElementCodec {
 
   std::uint32_t add_point() {
     if (mesh.points().size() >= limits_.points)
-      fail_split_stream("points within the reader's limit", std::to_string(limits_.points));
+      fail_split_stream("S19", "points within the reader's limit", std::to_string(limits_.points));
     return mesh.add_point();
   }
   /// `is_pending`: the wedge's values are still to be coded.
   std::uint32_t add_wedge(std::uint32_t point, bool is_pending) {
     if (mesh.wedge_point().size() >= 3ull * limits_.faces)
-      fail_split_stream("wedges within the reader's limit", std::to_string(limits_.faces));
+      fail_split_stream("S19", "wedges within the reader's limit", std::to_string(limits_.faces));
     const std::uint32_t w = mesh.add_wedge(point);
     offered_.push_back(0);
     values.add_wedge(w, is_pending);
@@ -44,7 +44,7 @@ class SplitElementCodec {
   }
   std::uint32_t add_face(std::array<std::uint32_t, 3> wedges, std::uint16_t group) {
     if (mesh.faces().size() >= limits_.faces)
-      fail_split_stream("faces within the reader's limit", std::to_string(limits_.faces));
+      fail_split_stream("S19", "faces within the reader's limit", std::to_string(limits_.faces));
     const std::uint32_t face = mesh.add_face(wedges, group);
     channel.update_truth([&](auto& t) { t.bind_face(face); });
     return face;
@@ -61,7 +61,7 @@ class SplitElementCodec {
   template <class Truth>
   std::uint32_t code_index(std::size_t count, Truth&& truth) {
     const std::uint32_t value = channel.raw(std::bit_width(count - 1), truth);
-    if (value >= count) fail_split_stream("an index that exists", std::to_string(value));
+    if (value >= count) fail_split_stream("S19", "an index that exists", std::to_string(value));
     return value;
   }
 

@@ -56,7 +56,7 @@ class SplitPatchCodec {
       if (exists) {
         points[k] = elements_.code_index(mesh_.points().size(), [k](auto& t) { return t.wanted_point(k); });
         if (k > 0 && (points[k] == points[0] || points[k] == points[k - 1]))
-          fail_split_stream("three points of a face", "two");
+          fail_split_stream("S22", "three points of a face", "two");
         wedges[k] = elements_.code_wedge(k, kNoIndex, models_.listed, points[k]);
       } else {
         const std::uint32_t before =
@@ -138,7 +138,7 @@ class SplitPatchCodec {
       return elements_.code_wedge(2, mesh_.wedge_at(r.face, r.corner + 1), models_.patch_expected[3], r.a);
     const std::uint32_t p =
         elements_.code_index(mesh_.points().size(), [](auto& t) { return t.wanted_point(2); });
-    if (p == a || p == b) fail_split_stream("three points of a face", "two");
+    if (p == a || p == b) fail_split_stream("S22", "three points of a face", "two");
     return elements_.code_wedge(2, kNoIndex, models_.listed, p);
   }
 

@@ -56,12 +56,12 @@ class SplitQueue {
  private:
   static constexpr std::uint8_t kHasSplit = 4;
   void refill() {
-    if (no_split_since_refill_) fail_split_stream("a split among all points", "none");
+    if (no_split_since_refill_) fail_split_stream("S19", "a split among all points", "none");
     no_split_since_refill_ = true;
     queue_.clear();
     next_ = 0;
     for (std::uint32_t p = 0; p < mesh_.points().size(); ++p) push(p);
-    if (queue_.empty()) fail_split_stream("points to split", "none");
+    if (queue_.empty()) fail_split_stream("S19", "points to split", "none");
   }
 
   const SplitMesh& mesh_;

@@ -3,20 +3,21 @@
 #include <string>
 #include <vector>
 
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
+#include "format/base/rule_error.h"
 #include "format/split/split_mesh.h"
 
 namespace texmesh {
 
 inline constexpr const char* kSplitStreamName = "mesh/stream.bin";
 
-[[noreturn]] inline void fail_split_stream(const std::string& place, const std::string& expected,
-                                           const std::string& found) {
-  throw FormatError(kSplitStreamName, place, expected, found);
+[[noreturn]] inline void fail_split_stream(const char* rule, const std::string& place,
+                                           const std::string& expected, const std::string& found) {
+  throw RuleError(rule, kSplitStreamName, place, expected, found);
 }
-[[noreturn]] inline void fail_split_stream(const std::string& expected, const std::string& found) {
-  fail_split_stream("", expected, found);
+[[noreturn]] inline void fail_split_stream(const char* rule, const std::string& expected,
+                                           const std::string& found) {
+  fail_split_stream(rule, "", expected, found);
 }
 
 /// Bounds the codec's steps by the size of the mesh. Otherwise a few bytes could ask many points, or go round
@@ -28,7 +29,8 @@ class SplitStepLimit {
   void add(std::uint64_t steps) {
     steps_ += steps;
     if (steps_ > (std::uint64_t{1} << 20) + 256 * (mesh_.points().size() + mesh_.faces().size()))
-      fail_split_stream("splits that are found in reasonable time", "more steps than 256 per point and face");
+      fail_split_stream("S20", "splits that are found in reasonable time",
+                        "more steps than 256 per point and face");
   }
 
  private:

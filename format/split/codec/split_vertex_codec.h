@@ -102,7 +102,7 @@ class SplitVertexCodec {
   void code_extra_face() {
     const std::uint32_t x =
         elements_.code_index(mesh_.points().size(), [](auto& t) { return t.third_point(); });
-    if (x == site_.parent || x == site_.child) fail_split_stream("three points of a face", "two");
+    if (x == site_.parent || x == site_.child) fail_split_stream("S22", "three points of a face", "two");
     const bool forward = channel_.raw(1, [&](auto& t) { return t.is_forward(x) ? 1u : 0u; }) != 0;
     finish_face(x, forward, {kNoIndex, kNoIndex, kNoIndex}, 1, kNoIndex);
   }

@@ -1,7 +1,9 @@
 #include "pipeline/inspect/verify/verify.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "format/base/json_fields.h"
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
@@ -14,6 +16,8 @@
 namespace texmesh {
 namespace {
 
+constexpr std::uint64_t kMostProvenanceBytes = 64u << 20;
+
 class Verifier {
  public:
   Verifier(PackageStore& store, const RunContext& context)
@@ -21,6 +25,10 @@ class Verifier {
 
   VerifyReport run() {
     store_.list_entries();
+    for (const char* path :
+         {kIndexPath, kTablesPath, kTexturesPath, kQualityPath, kAboutPath, kProvenancePath})
+      findings_.require(store_.listed().empty() || store_.contains(path), {"entry-set", "E01"}, path, "",
+                        "an entry of the package", "none");
     if (read_bootstrap() && read_index_entry()) {
       store_.check_entry_set(package_.index, package_.manifest.index);
       check_manifest(package_.manifest, findings_);
@@ -49,16 +57,17 @@ class Verifier {
   }
 
   void check_minor(int minor, const char* entry) {
-    findings_.require_equal(package_.manifest.minor, minor, "version", entry, "minor version");
+    findings_.require_equal(package_.manifest.minor, minor, {"version", "R01"}, entry, "minor version");
   }
 
   void check_head(const PagedRef& ref, const Bytes& bytes, std::uint64_t head_bytes,
                   const std::string& field) {
-    if (!findings_.require_equal(head_bytes, ref.head_bytes, "reference", kManifestPath,
+    if (!findings_.require_equal(head_bytes, ref.head_bytes, {"reference", "R02"}, kManifestPath,
                                  field + "/headBytes"))
       return;
     findings_.require_equal(to_hex(sha256(std::span(bytes).first(static_cast<std::size_t>(head_bytes)))),
-                            to_hex(ref.head_digest), "reference", kManifestPath, field + "/headSha256");
+                            to_hex(ref.head_digest), {"reference", "R02"}, kManifestPath,
+                            field + "/headSha256");
   }
 
   void read_documents() {
@@ -87,8 +96,10 @@ class Verifier {
     guarded(findings_, "about", kAboutPath, [&] {
       check_about(package_.manifest, read_about(store_.read(package_.manifest.about)), findings_);
     });
-    guarded(findings_, "provenance", kProvenancePath, [&] {
-      const Provenance provenance = read_provenance(store_.read(package_.manifest.provenance));
+    guarded(findings_, {"provenance", "O03"}, kProvenancePath, [&] {
+      const Bytes bytes = store_.read(package_.manifest.provenance);
+      parse_json(bytes, kProvenancePath, kMostProvenanceBytes);  // by the rules of all documents
+      const Provenance provenance = read_provenance(bytes);
       check_provenance(package_.manifest, package_.textures.value_or(std::vector<TextureInfo>{}), provenance,
                        findings_);
     });

@@ -53,6 +53,18 @@ std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& sca
                               const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
                               Findings& findings);
 
+/// What the GLBs of a package have in common, as JSON texts.
+struct MeshShare {
+  std::string materials, names;  // materials, textures and samplers; names of nodes
+  std::size_t material_count = 0;
+  bool known = false;
+};
+
+/// The first GLB says what is shared; the others must have the same. One node for all parts leaves no scale
+/// to the stream alone. `glb` has passed check_glb.
+void check_shared(const Manifest& manifest, const std::string& entry, std::span<const std::uint8_t> glb,
+                  MeshShare& share, Findings& findings);
+
 /// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty
 /// list says nothing.
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,
@@ -60,9 +72,16 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
                   Findings& findings);
 
 /// The stream of vertex splits: its head against the manifest, every block, and the triangles of every scale
-/// it passes. FormatError where it cannot be decoded.
-void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes,
+/// it passes; its groups are of the files' materials. FormatError where it cannot be decoded.
+void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes, const MeshShare& share,
                         const RunContext& context, Findings& findings);
+
+/// What the head of a JPEG (preview or table stream) must not have; see verify_jpeg.cpp.
+void check_jpeg_head(const std::string& entry, const std::string& field, std::span<const std::uint8_t> jpeg,
+                     Findings& findings);
+/// Table streams of a plane with a source rung: one frame for all rungs, on the fragments' grid.
+void check_source_rung(const TextureInfo& texture, std::span<const std::span<const std::uint8_t>> tables,
+                       Findings& findings);
 
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 

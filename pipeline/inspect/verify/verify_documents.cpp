@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "format/base/json_fields.h"
 #include "format/container/layout.h"
 #include "format/documents/textures.h"
 #include "pipeline/inspect/provenance.h"
@@ -29,12 +30,24 @@ std::string text_of(const EntryRef& e) {
          to_hex(e.digest).substr(0, 16) + "...";
 }
 
+void require_six_digits(double value, const std::string& field, Findings& findings) {
+  findings.require(six_digits(value) == value, {"manifest", "M07"}, kManifestPath, field,
+                   "at most six significant digits", shortest(value, 17));
+}
+
 void check_scales(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.scales.size(); ++k) {
     // No rule about triangles: on a coarse grid a scale may show more of them than the next finer one.
     const ManifestScale& s = m.scales[k];
-    findings.require(s.error_rms <= s.error_max, "scale", kManifestPath, at("scales/errorRms", k),
+    findings.require(s.error_rms <= s.error_max, {"scale", "M12"}, kManifestPath, at("scales/errorRms", k),
                      "at most errorMax, " + number(s.error_max), number(s.error_rms));
+    if (k == 0)
+      for (const double zero : {s.error_max, s.error_rms, s.p95, s.p99})
+        findings.require(zero == 0, {"scale", "M12"}, kManifestPath, at("scales", k), "0 for S_0",
+                         number(zero));
+    for (const double v : {s.error_max, s.error_rms, s.p95, s.p99, s.display_px_jnd, s.display_px_error,
+                           s.display_px_edge, s.display_px_flip})
+      require_six_digits(v, at("scales", k), findings);
   }
 }
 
@@ -42,9 +55,10 @@ void check_scales(const Manifest& m, Findings& findings) {
 void check_steps(const Manifest& m, Findings& findings) {
   for (std::size_t k = 0; k < m.steps.size(); ++k) {
     const ManifestStep& step = m.steps[k];
+    require_six_digits(step.up_to_px, at("steps", k), findings);
     for (const ManifestScale& s : m.scales) {
       if (s.scale != step.scale) continue;
-      findings.require(step.up_to_px <= s.display_px_flip * (1 + 1e-5), "step", kManifestPath,
+      findings.require(step.up_to_px <= s.display_px_flip * (1 + 1e-5), {"step", "M22"}, kManifestPath,
                        at("steps", k, "/0"),
                        "at most " + number(s.display_px_flip) + ", up to which S_" + std::to_string(s.scale) +
                            " is enough",
@@ -58,8 +72,9 @@ void check_steps(const Manifest& m, Findings& findings) {
 void check_manifest(const Manifest& m, Findings& findings) {
   const Vec3d size = m.bounds_max - m.bounds_min;
   const double extent = std::max({size.x, size.y, size.z});
-  findings.require(near(m.object_height, extent, 1e-5), "manifest", kManifestPath, "/objectHeight",
+  findings.require(near(m.object_height, extent, 1e-5), {"manifest", "M04"}, kManifestPath, "/objectHeight",
                    number(extent) + ", the largest extent of the bounds", number(m.object_height));
+  require_six_digits(m.surface_area, "/surfaceArea", findings);
   check_scales(m, findings);
   check_steps(m, findings);
 }
@@ -70,9 +85,9 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   const auto check = [&](const EntryRef& ref, const std::string& field) {
     const auto it = entries.find(ref.path);
     if (it == entries.end())
-      findings.add("reference", kManifestPath, field, "an entry " + ref.path, "none in the index");
+      findings.add({"reference", "R03"}, kManifestPath, field, "an entry " + ref.path, "none in the index");
     else
-      findings.require(*it->second == ref, "reference", kManifestPath, field,
+      findings.require(*it->second == ref, {"reference", "R03"}, kManifestPath, field,
                        text_of(*it->second) + " as in the index", text_of(ref));
   };
   check(m.tables, "/tables");
@@ -83,11 +98,12 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   if (m.stream) {
     const auto it = entries.find(kSplitStreamPath);
     if (it == entries.end())
-      findings.add("reference", kManifestPath, "/stream", std::string("an entry ") + kSplitStreamPath,
-                   "none in the index");
+      findings.add({"reference", "R03"}, kManifestPath, "/stream",
+                   std::string("an entry ") + kSplitStreamPath, "none in the index");
     else
       findings.require(it->second->offset == m.stream->offset && it->second->bytes == m.stream->bytes,
-                       "reference", kManifestPath, "/stream", text_of(*it->second) + " as in the index",
+                       {"reference", "R03"}, kManifestPath, "/stream",
+                       text_of(*it->second) + " as in the index",
                        std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
   }
   if (m.thesis) check(*m.thesis, "/thesis");
@@ -97,7 +113,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
 }
 
 void check_about(const Manifest& m, const About& about, Findings& findings) {
-  findings.require_equal(about.title, m.title, "about", kManifestPath, "/title");
+  findings.require_equal(about.title, m.title, {"about", "B03"}, kManifestPath, "/title");
 }
 
 /// Switch sizes are heights that were rendered.
@@ -107,17 +123,17 @@ static void check_switch_sizes(const Manifest& m, const QualityTable& q, Finding
   for (std::size_t k = 1; k < m.scales.size(); ++k) {
     const double px = m.scales[k].display_px_flip;
     findings.require(px == 0 || (px >= kLeastSwitchPx * (1 - kDigits) && px <= largest * (1 + kDigits)),
-                     "scale", kManifestPath, at("scales/displayPxFlip", k),
+                     {"scale", "M13"}, kManifestPath, at("scales/displayPxFlip", k),
                      "0, or " + number(kLeastSwitchPx) + " to " + number(largest), number(px));
   }
-  findings.require(m.scales[0].display_px_flip == kAnyDisplayPx, "scale", kManifestPath,
+  findings.require(m.scales[0].display_px_flip == kAnyDisplayPx, {"scale", "M12"}, kManifestPath,
                    "/scales/displayPxFlip/0", number(kAnyDisplayPx), number(m.scales[0].display_px_flip));
 }
 
 static void check_geometry(const QualityTable& q, Findings& findings) {
   for (std::size_t i = 0; i < q.geometry.size(); ++i)
     for (const auto* list : {&q.geometry[i].flip, &q.geometry[i].flip_p95, &q.geometry[i].dssim})
-      findings.require((*list)[0] == 0, "quality", kQualityPath, at("geometry", i),
+      findings.require((*list)[0] == 0, {"quality", "Q02"}, kQualityPath, at("geometry", i),
                        "no loss of S_0, which is what is compared with",
                        number(static_cast<double>((*list)[0])));
 }
@@ -126,13 +142,14 @@ void check_quality(const Manifest& m, const std::vector<TextureInfo>& textures, 
                    Findings& findings) {
   std::vector<int> kept;
   for (const ManifestScale& s : m.scales) kept.push_back(s.scale);
-  findings.require(q.scales == kept, "quality", kQualityPath, "/scales", "the scales of the package",
+  findings.require(q.scales == kept, {"quality", "R14"}, kQualityPath, "/scales", "the scales of the package",
                    std::to_string(q.scales.size()) + " others or in another order");
   std::set<PlaneGroup> groups;
   for (const TextureInfo& t : textures) groups.insert(group_of(t.role));
   std::set<PlaneGroup> found;
   for (const GroupLosses& group : q.groups) found.insert(group.group);
-  findings.require(groups == found, "quality", kQualityPath, "/groups", "the groups that the planes have",
+  findings.require(groups == found, {"quality", "R15"}, kQualityPath, "/groups",
+                   "the groups that the planes have",
                    std::to_string(found.size()) + " of " + std::to_string(groups.size()) + ", or others");
   check_geometry(q, findings);
   check_switch_sizes(m, q, findings);
@@ -147,8 +164,9 @@ static std::string rungs_option(const TextureInfo& texture) {
 
 void check_provenance(const Manifest& m, const std::vector<TextureInfo>& textures, const Provenance& p,
                       Findings& findings) {
-  findings.require(p.format_major == m.major && p.format_minor == m.minor, "provenance", kProvenancePath,
-                   "/format", std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
+  findings.require(p.format_major == m.major && p.format_minor == m.minor, {"provenance", "O03"},
+                   kProvenancePath, "/format",
+                   std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
                    std::to_string(p.format_major) + "." + std::to_string(p.format_minor));
   const auto option = [&](const char* stage, const char* name) {
     const auto section = p.options->find(stage);
@@ -157,11 +175,11 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
   };
   const auto title = option("package", "title");
   if (title.is_string() && title != "" && title != m.title)
-    findings.add("provenance", kProvenancePath, "/options/package/title", m.title + ", as the manifest",
-                 title.get<std::string>());
+    findings.add({"provenance", "O03"}, kProvenancePath, "/options/package/title",
+                 m.title + ", as the manifest", title.get<std::string>());
   const auto jnd = option("perceptual_values", "jnd");
   if (jnd.is_number() && jnd.get<double>() != m.jnd)
-    findings.add("provenance", kProvenancePath, "/options/perceptual_values/jnd",
+    findings.add({"provenance", "O03"}, kProvenancePath, "/options/perceptual_values/jnd",
                  number(m.jnd) + ", as the manifest", jnd.dump());
   for (std::size_t k = 0; k < textures.size(); ++k) {
     const std::string name = rungs_option(textures[k]);
@@ -169,8 +187,8 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
     if (textures[k].source_rung) continue;  // its qualities follow from the source
     for (const int q : textures[k].rung_quality) {
-      findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), "provenance", kProvenancePath,
-                       "/options/ladder/" + name,
+      findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), {"provenance", "O03"},
+                       kProvenancePath, "/options/ladder/" + name,
                        "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());
     }
   }

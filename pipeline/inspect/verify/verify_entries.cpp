@@ -19,17 +19,17 @@ void EntryVerifier::check_entry(const EntryRef& e) {
   } else if (texture) {
     guarded(findings_, "entry-read", e.path, [&] { check_texture_entry(e, name); });
   } else if (name.kind == EntryKind::kSplitStream) {
-    guarded(findings_, "split-stream", e.path,
-            [&] { check_split_stream(package_.manifest, store_.read(e), context_, findings_); });
+    guarded(findings_, {"split-stream", "S08"}, e.path,
+            [&] { check_split_stream(package_.manifest, store_.read(e), share_, context_, findings_); });
   } else if (name.kind == EntryKind::kPoster) {
-    guarded(findings_, "poster", e.path, [&] { check_poster_entry(e); });
+    guarded(findings_, {"poster", "O01"}, e.path, [&] { check_poster_entry(e); });
   } else if (name.kind == EntryKind::kThesis) {
-    findings_.require(package_.manifest.thesis.has_value(), "entry-set", e.path, "",
+    findings_.require(package_.manifest.thesis.has_value(), {"entry-set", "E03"}, e.path, "",
                       "to be named by the manifest", "not there");
   } else if (name.kind == EntryKind::kSource) {
-    guarded(findings_, "source", e.path, [&] { check_source_entry(e, name); });
+    guarded(findings_, {"source", "O02"}, e.path, [&] { check_source_entry(e, name); });
   } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
-    findings_.require(package_.manifest.minor > kFormatMinor, "entry-unknown", e.path, "",
+    findings_.require(package_.manifest.minor > kFormatMinor, {"entry-unknown", "E03"}, e.path, "",
                       "an entry that format " + std::to_string(kFormatMajor) + "." +
                           std::to_string(kFormatMinor) + " defines",
                       "another");
@@ -41,12 +41,13 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
   const Bytes bytes = store_.read(e);
   const auto scale = std::find_if(package_.manifest.scales.begin(), package_.manifest.scales.end(),
                                   [&](const ManifestScale& s) { return s.scale == number; });
-  if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), "entry-set", e.path, "",
-                         "a file of a scale of the manifest", "none"))
+  if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), {"entry-set", "E03"},
+                         e.path, "", "a file of a scale of the manifest", "none"))
     return;
   ++report_.meshes;
   std::vector<Vec3d> positions = check_mesh(
       package_.manifest, *scale, package_.textures.value_or(std::vector<TextureInfo>{}), bytes, findings_);
+  if (!positions.empty()) check_shared(package_.manifest, e.path, bytes, share_, findings_);
   // Meshes stand from coarse to fine; any other order is a finding of "entry-order".
   if (coarser_ && coarser_->scale > scale->scale)
     check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
@@ -58,7 +59,7 @@ void EntryVerifier::check_texture_entry(const EntryRef& e, const EntryName& name
   const Bytes bytes = store_.read(e);
   if (!package_.textures || !package_.tables) return;  // they have their findings
   const std::size_t plane = name.number;
-  if (!findings_.require(plane < package_.textures->size(), "entry-set", e.path, "",
+  if (!findings_.require(plane < package_.textures->size(), {"entry-set", "E03"}, e.path, "",
                          "a plane of textures.json", "none"))
     return;
   const TextureInfo& info = (*package_.textures)[plane];
@@ -71,8 +72,8 @@ void EntryVerifier::check_texture_entry(const EntryRef& e, const EntryName& name
   if (name.kind == EntryKind::kTableStreams) {
     check_table_streams(info, t, bytes, findings_);
   } else if (name.kind == EntryKind::kRung) {
-    if (!findings_.require(name.rung < t.rung_count(), "entry-set", e.path, "", "a rung of textures.json",
-                           "none"))
+    if (!findings_.require(name.rung < t.rung_count(), {"entry-set", "E03"}, e.path, "",
+                           "a rung of textures.json", "none"))
       return;
     check_rung_entry(info, t, name, bytes);
   }
@@ -83,19 +84,19 @@ void EntryVerifier::check_source_entry(const EntryRef& e, const EntryName& name)
   if (!package_.textures) return;
   const bool named = name.number < package_.textures->size() &&
                      (*package_.textures)[name.number].source_extension == name.extension;
-  if (findings_.require(named, "entry-set", e.path, "", "to be named by textures.json", "not there"))
+  if (findings_.require(named, {"entry-set", "E03"}, e.path, "", "to be named by textures.json", "not there"))
     check_source((*package_.textures)[name.number], std::move(bytes), findings_);
 }
 
 void EntryVerifier::check_poster_entry(const EntryRef& e) {
   const Bytes bytes = store_.read(e);
   const std::optional<PosterRef>& poster = package_.manifest.poster;
-  if (!findings_.require(poster.has_value(), "entry-set", e.path, "", "to be named by the manifest",
+  if (!findings_.require(poster.has_value(), {"entry-set", "E03"}, e.path, "", "to be named by the manifest",
                          "not there"))
     return;
   const Pixels pixels = decode_jpeg(bytes, std::uint64_t{kMaxPosterSide} * kMaxPosterSide);
-  findings_.require_equal(poster->width_px, pixels.width_px, "poster", e.path, "width");
-  findings_.require_equal(poster->height_px, pixels.height_px, "poster", e.path, "height");
+  findings_.require_equal(poster->width_px, pixels.width_px, {"poster", "O01"}, e.path, "width");
+  findings_.require_equal(poster->height_px, pixels.height_px, {"poster", "O01"}, e.path, "height");
 }
 
 void EntryVerifier::check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name,

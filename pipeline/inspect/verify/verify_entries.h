@@ -10,6 +10,7 @@
 #include "format/documents/manifest.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "pipeline/inspect/verify/verify_checks.h"
 #include "pipeline/inspect/verify/verify_store.h"
 #include "stages/base/run_context.h"
 
@@ -52,6 +53,7 @@ class EntryVerifier {
   VerifyReport& report_;
   const ManifestScale* coarser_ = nullptr;  // the mesh looked at last
   std::vector<Vec3d> coarser_positions_;
+  MeshShare share_;
   std::map<std::uint32_t, PlaneStreams> streams_;  // per plane
 };
 

@@ -9,7 +9,7 @@ namespace texmesh {
 
 /// Runs `body`; what it throws about the package becomes a finding, and the result is false.
 template <class Body>
-bool guarded(Findings& findings, const char* check, const std::string& entry, Body&& body) {
+bool guarded(Findings& findings, const Check& check, const std::string& entry, Body&& body) {
   try {
     body();
     return true;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "format/container/layout.h"
@@ -24,13 +25,14 @@ void check_previews_of(const Manifest& m, const ManifestScale& scale,
         textures, [&](const TextureInfo& t) { return t.role == "alpha" && t.image == plane->image; });
     const std::string place = "/images/" + std::to_string(k), &uri = facts.image_uris[k];
     const bool named = !coarsest && !alpha;
-    if (!findings.require(uri == (named ? "../" + preview_path(number) : ""), "mesh-images", scale.glb.path,
-                          place + "/uri", named ? "../" + preview_path(number) : "an image within the file",
+    if (!findings.require(uri == (named ? "../" + preview_path(number) : ""),
+                          {"mesh-images", coarsest || alpha ? "G05" : "G06"}, scale.glb.path, place + "/uri",
+                          named ? "../" + preview_path(number) : "an image within the file",
                           uri.empty() ? "none" : uri))
       continue;
     if (uri.empty() && !alpha && !plane->preview.path.empty())
-      findings.require_equal(to_hex(plane->preview.digest), to_hex(facts.image_digests[k]), "mesh-images",
-                             scale.glb.path, place);
+      findings.require_equal(to_hex(plane->preview.digest), to_hex(facts.image_digests[k]),
+                             {"mesh-images", "G05"}, scale.glb.path, place);
   }
 }
 
@@ -42,14 +44,17 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
   const std::string& entry = scale.glb.path;
   const std::size_t before = findings.list().size();
   GlbFacts facts = check_glb(glb, entry, findings);
+  findings.name_rule(before, "G01");
   if (findings.list().size() != before) return {};  // counts of a broken file say nothing
-  findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, "mesh-counts", entry, "triangles");
-  findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, "mesh-counts", entry, "vertices");
+  findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, {"mesh-counts", "G02"}, entry,
+                                        "triangles");
+  findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, {"mesh-counts", "G02"}, entry,
+                                        "vertices");
   const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
   for (int k = 0; k < 3 && facts.has_bounds; ++k)
     findings.require(
         facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
-        "mesh-bounds", entry, std::string("axis ") + "xyz"[k],
+        {"mesh-bounds", "G02"}, entry, std::string("axis ") + "xyz"[k],
         shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
         shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
   for (const TextureInfo& t : textures) {
@@ -58,17 +63,40 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
     if (scale.scale == 0)
       findings.require(
           std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(),
-          "mesh-images", entry, "/images", "an image named " + name, "none");
+          {"mesh-images", "G04"}, entry, "/images", "an image named " + name, "none");
   }
   for (std::size_t k = 0; k < facts.image_names.size(); ++k)
     findings.require(std::any_of(textures.begin(), textures.end(),
                                  [&](const TextureInfo& t) {
                                    return facts.image_names[k] == "texture/" + std::to_string(t.image);
                                  }),
-                     "mesh-images", entry, "/images/" + std::to_string(k) + "/name",
+                     {"mesh-images", "G04"}, entry, "/images/" + std::to_string(k) + "/name",
                      "texture/<image> of textures.json", facts.image_names[k]);
   check_previews_of(m, scale, textures, facts, findings);
   return std::move(facts.positions);
+}
+
+void check_shared(const Manifest& m, const std::string& entry, std::span<const std::uint8_t> glb,
+                  MeshShare& share, Findings& findings) {
+  const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16 | std::size_t{glb[15]} << 24;
+  const auto json =
+      nlohmann::ordered_json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
+  const auto array = [&](const char* key) {
+    return json.contains(key) ? json[key] : nlohmann::ordered_json::array();
+  };
+  MeshShare here{"", "", array("materials").size(), true};
+  for (const char* key : {"materials", "textures", "samplers"}) here.materials += array(key).dump() + "\n";
+  for (const auto& node : array("nodes")) here.names += node.value("name", std::string()) + "\n";
+  if (!share.known) share = here;
+  findings.require(here.materials == share.materials, {"mesh-materials", "G07"}, entry, "/materials",
+                   "materials, textures and samplers of the other files", "others");
+  findings.require(here.names == share.names, {"mesh-nodes", "G09"}, entry, "/nodes",
+                   "nodes with the names of the other files", "others");
+  const bool one_node = std::ranges::any_of(array("meshes"), [](const auto& mesh) {
+    return mesh.contains("extras") && mesh["extras"].is_object() && mesh["extras"].contains("partNames");
+  });
+  findings.require(!one_node || std::ranges::all_of(m.scales, &ManifestScale::has_glb), {"mesh-nodes", "G10"},
+                   entry, "/meshes", "a file of every scale, as one node has all parts", "scales without");
 }
 
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,
@@ -83,7 +111,8 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
                       finer_positions.end(), std::back_inserter(strangers), before);
   if (strangers.empty()) return;
   const Vec3d& p = strangers.front();
-  findings.add("mesh-nested", coarser.glb.path, "positions", "positions of " + finer.glb.path + " only",
+  findings.add({"mesh-nested", "G03"}, coarser.glb.path, "positions",
+               "positions of " + finer.glb.path + " only",
                std::to_string(strangers.size()) + " others, " + shortest(p.x, 9) + " " + shortest(p.y, 9) +
                    " " + shortest(p.z, 9) + " for one");
 }

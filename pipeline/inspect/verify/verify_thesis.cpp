@@ -12,14 +12,16 @@ void check_gamma_table(const Manifest& m, const PlaneTables& t, const PlaneThesi
   for (std::size_t row = 0; row < m.scales.size(); ++row) {
     const auto s = static_cast<std::size_t>(m.scales[row].scale);
     const std::string scale = std::to_string(s);
-    if (!findings.require(s < thesis.quality.size(), "thesis", kThesisPath, place + "scale " + scale,
+    if (!findings.require(s < thesis.quality.size(), {"thesis", "R16"}, kThesisPath, place + "scale " + scale,
                           "Q_i and D_i", "none"))
       return;
-    findings.require_equal(t.quality[row], thesis.quality[s], "thesis", kThesisPath, place + "Q_" + scale);
+    findings.require_equal(t.quality[row], thesis.quality[s], {"thesis", "O06"}, kThesisPath,
+                           place + "Q_" + scale);
     for (std::size_t g = 0; g < kGammaSteps; ++g) {
       const double gamma = static_cast<double>(g) / (kGammaSteps - 1);
       findings.require_equal(bytes_asked_for(t, row, gamma), thesis.total_bytes[s * kGammaSteps + g],
-                             "thesis", kThesisPath, place + "D_" + scale + "(" + fixed(gamma, 2) + ")");
+                             {"thesis", "O06"}, kThesisPath,
+                             place + "D_" + scale + "(" + fixed(gamma, 2) + ")");
     }
   }
 }
@@ -31,13 +33,13 @@ void check_thesis(const Manifest& m, const PackageTables& tables, const ThesisTa
   for (std::size_t p = 0; p < thesis.planes.size(); ++p) {
     const PlaneThesis& plane = thesis.planes[p];
     const std::string place = "plane " + std::to_string(p) + ", ";
-    if (!findings.require(p < tables.planes.size(), "thesis", kThesisPath, place, "a plane of the package",
-                          "none"))
+    if (!findings.require(p < tables.planes.size(), {"thesis", "R16"}, kThesisPath, place,
+                          "a plane of the package", "none"))
       return;
     const PlaneTables& t = tables.planes[p];
     if (!plane.z.empty())
-      findings.require_equal<std::uint64_t>(t.fragment_count(), plane.z.size(), "thesis", kThesisPath,
-                                            place + "fragments");
+      findings.require_equal<std::uint64_t>(t.fragment_count(), plane.z.size(), {"thesis", "R16"},
+                                            kThesisPath, place + "fragments");
     if (!plane.quality.empty() && t.scale_count() == m.scales.size())
       check_gamma_table(m, t, plane, place, findings);
   }

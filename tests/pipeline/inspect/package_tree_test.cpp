@@ -190,7 +190,7 @@ TEST_F(Tree, VerifyNamesFilesThatAreMissingOrTooMany) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   write_text(folder / "tree/notes.txt", "x");
   EXPECT_EQ(verify(folder / "tree"),
-            "notes.txt: expected to be named by the index, found not there [entry-set]\n");
+            "notes.txt: expected to be named by the index, found not there [entry-set] [I08]\n");
   fs::remove(folder / "tree/notes.txt");
   fs::remove(fs::path(folder / "tree") / mesh_path(5));
   EXPECT_NE(

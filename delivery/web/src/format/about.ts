@@ -44,12 +44,12 @@ export const isWebUrl = (text: string): boolean => webUrl.test(text);
  * document.
  */
 export function readAbout(json: Uint8Array): About {
-  const about = parseJson(json, aboutPath, 262144);
+  const about = parseJson(json, aboutPath, 262144).by('B01');
   const check = (within: JsonAt, name: string, read: (at: JsonAt) => unknown): void => {
     if (within.has(name)) read(within.at(name));
   };
   const text = (most: number, good = /[^]/) => (at: JsonAt): void => {
-    if (!good.test(at.text(most))) at.fail(`a text like ${good.source}`, 'another');
+    if (!good.test(at.text(most))) at.fail(`a text like ${good.source}`, '', good === webUrl ? 'B02' : undefined);
   };
   for (const [name, most] of Object.entries(texts)) check(about, name, text(most, /Url/.test(name) ? webUrl : undefined));
   for (const [name, [kind, value]] of Object.entries(lists))

@@ -1,6 +1,6 @@
 import { FormatError } from './errors';
 
-/** Reads little-endian numbers from bytes; FormatError names the place where the bytes end too early. */
+/** Reads little-endian numbers from bytes; FormatError names the place where the bytes end too early, which breaks `rule`. */
 export class BytesIn {
   private readonly view_: DataView;
   private position_ = 0;
@@ -8,6 +8,7 @@ export class BytesIn {
   constructor(
     private readonly bytes_: Uint8Array,
     private readonly name_: string,
+    private readonly rule_: string,
   ) {
     this.view_ = new DataView(bytes_.buffer, bytes_.byteOffset, bytes_.byteLength);
   }
@@ -20,7 +21,7 @@ export class BytesIn {
   }
 
   private advance_(bytes: number): number {
-    if (bytes > this.left) this.fail(`${bytes} bytes`, `${this.left} bytes`);
+    if (bytes > this.left) this.fail(`${bytes} bytes`, this.left);
     const at = this.position_;
     this.position_ += bytes;
     return at;
@@ -38,7 +39,7 @@ export class BytesIn {
   u64(): number {
     const at = this.advance_(8);
     const value = this.view_.getUint32(at + 4, true) * 4294967296 + this.view_.getUint32(at, true);
-    if (value > 9007199254740992) this.fail('at most 2^53', 'more');
+    if (value > 9007199254740992) this.fail('at most 2^53', '', 'I05');
     return value;
   }
   f32(): number {
@@ -58,13 +59,13 @@ export class BytesIn {
   text(bytes: number): string {
     return String.fromCharCode(...this.raw(bytes));
   }
-  expect(word: string): void {
-    if (this.text(word.length) !== word) this.fail(`the magic ${word}`, 'other bytes');
+  expect(word: string, rule: string): void {
+    if (this.text(word.length) !== word) this.fail(word, '', rule);
   }
   finish(): void {
     if (this.left !== 0) this.fail('the end', `${this.left} more bytes`);
   }
-  fail(expected: string, found: string): never {
-    throw new FormatError(this.name_, `byte ${this.position_}`, expected, found);
+  fail(expected: string, found: unknown = '', rule = this.rule_): never {
+    throw new FormatError(this.name_, `byte ${this.position_}`, expected, `${found}`, rule);
   }
 }

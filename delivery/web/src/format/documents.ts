@@ -20,8 +20,8 @@ export { requireSelfContained } from './self_contained_glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 
-function require(good: boolean, file: string, place: string, expected: string, found: unknown): asserts good {
-  if (!good) throw new FormatError(file, place, expected, String(found));
+function require(good: boolean, rule: string, file: string, place: string, expected: string, found: unknown = ''): asserts good {
+  if (!good) throw new FormatError(file, place, expected, `${found}`, rule);
 }
 
 /** Manifest and package id from manifest.json, or from the first bytes of a container where `container` names one. */
@@ -39,7 +39,7 @@ export interface PageRef extends EntryRef {
 }
 /** The entries of one package have one version. */
 function requireMinor(minor: number, { version }: Manifest, file: string): void {
-  require(minor === version.minor, file, '', `the manifest's minor version, ${version.minor}`, minor);
+  require(minor === version.minor, 'R01', file, '', `minor version ${version.minor}`, minor);
 }
 
 /** The pages of index.bin, from its head or more. */
@@ -47,8 +47,8 @@ export function indexPages(bytes: Uint8Array, m: Manifest): PageRef[] {
   const { index } = m;
   const { bytes: headBytes, pages, minor } = readIndexHead(bytes);
   requireMinor(minor, m, paths.indexPath);
-  require(headBytes === index.headBytes, paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
-  return pages.map((p) => ({ ...p, minor, path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
+  require(headBytes === index.headBytes, 'R02', paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
+  return pages.map((p) => ({ ...p, minor, rule: 'I04', path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
 }
 
 /** The entries of a page of index.bin by their paths. Entries without a plane must be as the manifest says. */
@@ -62,7 +62,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
     if (!ref) continue;
     const e = entries.get(ref.path);
     const same = e && e.offset === ref.offset && e.bytes === ref.bytes && (ref.sha256 ?? e.sha256).every((byte, i) => byte === e.sha256[i]);
-    require(!!same, paths.indexPath, `entry ${ref.path}`, 'what the manifest says of it', e ? 'another offset, size or digest' : 'none');
+    require(!!same, 'R03', paths.indexPath, ref.path, 'what the manifest says of it');
   }
   return entries;
 }
@@ -70,9 +70,9 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
 /** The planes of textures.json. */
 export function textures(bytes: Uint8Array, { planeCount, requiredFeatures }: Manifest): TextureInfo[] {
   const planes = readTextures(bytes);
-  require(planes.length === planeCount, paths.texturesPath, '', `${planeCount} planes`, planes.length);
+  require(planes.length === planeCount, 'R04', paths.texturesPath, '', `${planeCount} planes`, planes.length);
   const feature = missingFeature(planes, requiredFeatures);
-  require(feature === '', paths.manifestPath, '/requiredFeatures', feature, 'a codec without it');
+  require(feature === '', 'R05', paths.manifestPath, '/requiredFeatures', feature);
   return planes;
 }
 
@@ -80,7 +80,7 @@ export function textures(bytes: Uint8Array, { planeCount, requiredFeatures }: Ma
 export function quality(bytes: Uint8Array, { scales }: Manifest): QualityTable {
   const table = readQuality(bytes);
   const same = table.scales.length === scales.length && scales.every((s, k) => s.scale === table.scales[k]);
-  require(same, paths.qualityPath, '/scales', "the manifest's scales", 'others');
+  require(same, 'R14', paths.qualityPath, '/scales', "the manifest's scales");
   return table;
 }
 
@@ -95,12 +95,12 @@ export function tableSections(bytes: Uint8Array, m: Manifest): SectionRef[] {
   const { tables: ref, planeCount, scales } = m;
   const head = readTablesHead(bytes);
   requireMinor(head.minor, m, paths.tablesPath);
-  require(head.bytes === ref.headBytes, paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
-  require(head.planes.length === planeCount, paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
+  require(head.bytes === ref.headBytes, 'R02', paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
+  require(head.planes.length === planeCount, 'R04', paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
   const last = head.planes[planeCount - 1];
   const end = last ? last.offset + last.bytes : head.bytes;
-  require(end === ref.bytes, paths.tablesPath, '', `${end} bytes`, ref.bytes);
-  return head.planes.map((s, p) => ({ ...s, minor: head.minor, scales: scales.length, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
+  require(end === ref.bytes, 'T02', paths.tablesPath, '', `${end} bytes`, ref.bytes);
+  return head.planes.map((s, p) => ({ ...s, rule: 'T02', minor: head.minor, scales: scales.length, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
 }
 
 /** Tables of one plane, and where its fragments are. */
@@ -123,21 +123,24 @@ export function planeTables(
   entries: Map<string, EntryRef>,
 ): PlaneDocument {
   const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
-  const requireHere = (good: boolean, expected: string, found: unknown): void =>
-    require(good, paths.tablesPath, `texture plane ${plane}`, expected, found);
+  const requireHere = (good: boolean, rule: string, expected: string): void =>
+    require(good, rule, paths.tablesPath, `texture plane ${plane}`, expected);
   const { columns, rows, rungQuality, order, sizeBytes } = tables;
   const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
-  requireHere(columns === info.columns && rows === info.rows && sameRungs, 'the grid and rungs of textures.json', 'others');
-  const { length: rowCount } = tables.quality;
-  requireHere(rowCount === scales, `a row for each of the manifest's ${scales} scales`, rowCount);
-  requireHere(tables.incremental === codecTraits(info.codec).incremental, 'tables of the codec in textures.json', 'others');
-  const requireSum = (path: string, total: number): void =>
-    requireHere(entries.get(path)?.bytes === total, `${path} of ${total} bytes in the index`, entries.get(path)?.bytes ?? 'none');
-  requireSum(paths.tableStreamsPath(plane), sum(tables.tableBytes));
+  requireHere(columns === info.columns && rows === info.rows, 'R08', 'the grid of textures.json');
+  requireHere(sameRungs, 'R09', 'the rungs of textures.json');
+  requireHere(tables.quality.length === scales, 'R11', `${scales} rows`);
+  requireHere(tables.incremental === codecTraits(info.codec).incremental, 'R10', 'tables of the codec');
+  const requireSum = (path: string, total: number, rule: string): void => {
+    const entry = entries.get(path);
+    requireHere(!!entry, 'R07', path);
+    requireHere(entry!.bytes === total, rule, `${path} of ${total} bytes`);
+  };
+  requireSum(paths.tableStreamsPath(plane), sum(tables.tableBytes), 'R12');
   const n = fragmentCount(tables);
   const offsets = new Float64Array(n * rungCount(tables));
   for (let r = 0; r < rungCount(tables); ++r) {
-    requireSum(layout.rungPath(plane, r), sum(sizeBytes.subarray(r * n, (r + 1) * n)));
+    requireSum(layout.rungPath(plane, r), sum(sizeBytes.subarray(r * n, (r + 1) * n)), 'R13');
     let at = 0;
     for (const f of order) {
       offsets[r * n + f] = at;

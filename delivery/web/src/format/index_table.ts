@@ -1,10 +1,9 @@
-import { toHex } from './bytes';
 import { BytesIn } from './bytes_in';
 import * as paths from './entry_paths';
 import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { EntryRef, formatMinor } from './manifest';
-import { sha256 } from './sha256';
+import { requireDigest } from './sha256';
 
 const file = paths.indexPath;
 const noPlane = 0xffffffff;
@@ -27,11 +26,11 @@ export interface IndexHead {
 
 /** Head of index.bin (format/SPEC.md, section 6); the bytes may stop after it. */
 export function readIndexHead(bytes: Uint8Array): IndexHead {
-  const input = new BytesIn(bytes, file);
-  const minor = readEntryStart(input, 'TXMX');
+  const input = new BytesIn(bytes, file, 'I03');
+  const minor = readEntryStart(input, 'TXMX', 'I01');
   const pageCount = input.u32();
   const entryCount = input.u32();
-  if (pageCount === 0 || pageCount > input.left / 44) input.fail('a page count that fits the file', `${pageCount}`);
+  if (pageCount === 0 || pageCount > input.left / 44) input.fail('fewer pages', pageCount);
   const head: IndexHead = { minor, bytes: 16 + pageCount * 44, pages: [] };
   let offset = head.bytes;
   let entries = 0;
@@ -39,7 +38,7 @@ export function readIndexHead(bytes: Uint8Array): IndexHead {
     const plane = input.u32();
     const before = i > 1 ? head.pages[i - 1].plane : -1;
     if (i === 0 ? plane !== noPlane : plane === noPlane || plane <= before)
-      input.fail('page 0 without a plane, then rising planes', `${plane}`);
+      input.fail('rising planes', plane, 'I02');
     const page: IndexPage = {
       plane: i === 0 ? -1 : plane,
       entries: input.u32(),
@@ -47,23 +46,23 @@ export function readIndexHead(bytes: Uint8Array): IndexHead {
       bytes: input.u32(),
       sha256: input.raw(32),
     };
-    if (page.entries > page.bytes / 49) input.fail('an entry count that fits the page', `${page.entries}`);
+    if (page.entries > page.bytes / 49) input.fail('fewer entries', page.entries, 'I04');
     offset += page.bytes;
     entries += page.entries;
     head.pages.push(page);
   }
-  if (entries !== entryCount) input.fail(`${entryCount} entries on all pages`, `${entries}`);
+  if (entries !== entryCount) input.fail(`${entryCount} entries`, entries);
   return head;
 }
 
 function checkOrder(entries: EntryRef[]): void {
   const paths = new Set<string>();
   entries.forEach((e, i) => {
-    if (paths.has(e.path)) throw new FormatError(file, `entry ${e.path}`, 'each path once', 'twice');
+    if (paths.has(e.path)) throw new FormatError(file, e.path, 'each path once', '', 'I07');
     paths.add(e.path);
     const before = entries[i - 1];
     if (before && e.offset <= before.offset + before.bytes)
-      throw new FormatError(file, `offset of ${e.path}`, `more than where ${before.path} ends`, `${e.offset}`);
+      throw new FormatError(file, e.path, 'rising offsets', `${e.offset}`, 'I07');
   });
 }
 
@@ -73,15 +72,15 @@ function readRecord(input: BytesIn, plane: number): EntryRef {
   const digest = input.raw(32);
   const path = input.text(input.u8());
   if (!paths.isValidEntryPath(path) || path === paths.manifestPath || path === paths.indexPath)
-    input.fail('a valid path of an entry', path);
-  if (offset % 64 !== 0 || offset === 0) input.fail('an offset that is a multiple of 64', `${offset}`);
-  if (paths.planeOfPath(path) !== plane) input.fail("entries of this page's plane", path);
+    input.fail('a path of an entry', path, 'I06');
+  if (offset % 64 !== 0 || offset === 0) input.fail('a multiple of 64', offset, 'I05');
+  if (paths.planeOfPath(path) !== plane) input.fail('entries of the plane', path, 'I06');
   return { path, offset, bytes, sha256: digest };
 }
 
 /** The entries of a page, in container order. The caller has checked the digest. */
 export function parseIndexPage(bytes: Uint8Array, plane: number, count: number, minor: number): EntryRef[] {
-  const input = new BytesIn(bytes, `${file}: ${plane < 0 ? 'page 0' : `page of plane ${plane}`}`);
+  const input = new BytesIn(bytes, `${file}: page of plane ${plane}`, 'I04');
   const entries: EntryRef[] = [];
   for (let i = 0; i < count; ++i) entries.push(readRecord(input, plane));
   if (minor <= formatMinor) input.finish();
@@ -93,9 +92,8 @@ export function parseIndexPage(bytes: Uint8Array, plane: number, count: number, 
 export async function readIndexPage(head: IndexHead, page: number, bytes: Uint8Array): Promise<EntryRef[]> {
   const p = head.pages[page];
   const place = `page ${page}`;
-  if (bytes.length !== p.bytes) throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`);
-  const digest = toHex(await sha256(bytes));
-  if (digest !== toHex(p.sha256)) throw new FormatError(file, place, `SHA-256 ${toHex(p.sha256)}`, digest);
+  if (bytes.length !== p.bytes) throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`, 'I03');
+  await requireDigest(bytes, p.sha256, file, place, 'I04');
   return parseIndexPage(bytes, p.plane, p.entries, head.minor);
 }
 
@@ -104,7 +102,7 @@ export async function readIndex(bytes: Uint8Array): Promise<EntryRef[]> {
   const head = readIndexHead(bytes);
   const last = head.pages[head.pages.length - 1];
   if (last.offset + last.bytes !== bytes.length)
-    throw new FormatError(file, '', `${last.offset + last.bytes} bytes`, `${bytes.length}`);
+    throw new FormatError(file, '', `${last.offset + last.bytes} bytes`, `${bytes.length}`, 'I03');
   const pages = await Promise.all(
     head.pages.map((p, i) => readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))),
   );

@@ -5,9 +5,8 @@ import { FormatError } from './errors';
 const beginsAndEnds = (b: Uint8Array): boolean =>
   b.length >= 4 && b[0] === 0xff && b[1] === 0xd8 && b[b.length - 2] === 0xff && b[b.length - 1] === 0xd9;
 
-function withoutEnd(tables: Uint8Array): Uint8Array {
-  if (!beginsAndEnds(tables))
-    throw new FormatError('JPEG', 'table stream', 'SOI ... EOI', `${tables.length} other bytes`);
+function withoutEnd(tables: Uint8Array, rule: string): Uint8Array {
+  if (!beginsAndEnds(tables)) throw new FormatError('JPEG', 'table stream', 'SOI ... EOI', '', rule);
   return tables.subarray(0, tables.length - 2);
 }
 
@@ -16,21 +15,21 @@ function withoutEnd(tables: Uint8Array): Uint8Array {
  * incremental codec; `streams` is the rung's one stream, or those of the lowest rung up to it. Nothing is decoded.
  */
 export function joinFragment(codec: CodecId, tables: Uint8Array, streams: readonly Uint8Array[]): Uint8Array {
-  const fail = (expected: string): never => {
-    throw new FormatError(codec, 'fragment', expected, `${streams[0]?.length ?? 0} other bytes`);
+  const fail = (expected: string, rule?: string): never => {
+    throw new FormatError(codec, 'fragment', expected, '', rule);
   };
   if (streams.length === 0 || (streams.length > 1 && !codecTraits(codec).incremental)) fail('one stream');
   const first = streams[0];
   if (codec === 'jpeg') {
-    if (!beginsAndEnds(first)) fail('SOI ... EOI');
-    return concat([withoutEnd(tables), first.subarray(2)]);
+    if (!beginsAndEnds(first)) fail('SOI ... EOI', 'F05');
+    return concat([withoutEnd(tables, 'F05'), first.subarray(2)]);
   }
   if (codec === 'jpeg-progressive') {
     const last = streams[streams.length - 1];
-    if (first.length === 0 || last[last.length - 1] === 0xff) fail('scans');
-    return concat([withoutEnd(tables), ...streams, new Uint8Array([0xff, 0xd9])]);
+    if (first.length === 0 || last[last.length - 1] === 0xff) fail('scans', 'F06');
+    return concat([withoutEnd(tables, 'F06'), ...streams, new Uint8Array([0xff, 0xd9])]);
   }
   const text = (at: number): string => String.fromCharCode(...first.subarray(at, at + 4));
-  if (first.length <= 12 || text(0) !== 'RIFF' || text(8) !== 'WEBP') fail('RIFF ... WEBP');
+  if (first.length <= 12 || text(0) !== 'RIFF' || text(8) !== 'WEBP') fail('RIFF ... WEBP', 'F07');
   return first;
 }

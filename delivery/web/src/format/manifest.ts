@@ -16,6 +16,8 @@ export interface EntryRef {
   offset: number;
   bytes: number;
   sha256: Uint8Array;
+  /** The rule of format/SPEC.md that bytes of another digest break; absent = I08. */
+  rule?: string;
 }
 /** An entry whose head tells where its pages are, and their digests. */
 export interface PagedRef extends EntryRef {
@@ -109,8 +111,8 @@ const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
 const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge', 'displayPxFlip'] as const;
 
 function readOffset(at: JsonAt): number {
-  const offset = at.integer(64);
-  if (offset % 64 !== 0) at.fail('a multiple of 64', `${offset}`);
+  const offset = at.by('M05').integer(64);
+  if (offset % 64 !== 0) at.fail('a multiple of 64', offset, 'M05');
   return offset;
 }
 
@@ -138,8 +140,8 @@ function readStream(at: JsonAt): StreamRef {
 
 function readPoster(at: JsonAt): PosterRef {
   const ref = readRef(at, layout.posterPath);
-  if (ref.bytes > 1e6) at.at('bytes').fail('at most 1000000', `${ref.bytes}`);
-  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).integer(1, 4096));
+  at.at('bytes').by('O01').integer(1, 1e6);
+  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).by('O01').integer(1, 4096));
   return { ...ref, widthPx, heightPx };
 }
 
@@ -152,14 +154,14 @@ export const otherMajor = (major: number): string =>
   `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again' : 'a later reader is for'}`;
 
 function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'> {
-  const format = at.at('format').text(100);
-  if (format !== 'texmesh') at.at('format').fail('texmesh', format);
-  const version = at.at('version');
+  const format = at.at('format').by('M01');
+  if (format.text(100) !== 'texmesh') format.fail('texmesh');
+  const version = at.at('version').by('M01');
   const [major, minor] = ['major', 'minor'].map((name) => version.at(name).integer(0, 1e6));
-  if (major !== formatMajor) version.at('major').fail(`${formatMajor}`, otherMajor(major));
+  if (major !== formatMajor) version.at('major').fail(`${formatMajor}`, otherMajor(major), 'W03');
   const requiredFeatures = at.at('requiredFeatures').each(0, 100, (feature) => {
     const name = feature.text(100);
-    if (!knownFeatures.includes(name)) feature.fail('a feature that this reader knows', name);
+    if (!knownFeatures.includes(name)) feature.fail('a known feature', name, 'M02');
     return name;
   });
   return { version: { major, minor }, requiredFeatures };
@@ -172,13 +174,13 @@ function readScales(at: JsonAt): ManifestScale[] {
   return at.at('scale').each(n, n, (scaleAt, i) => {
     const field = (name: string): JsonAt => {
       const column = at.at(name);
-      column.array(n, n);
+      column.by('M10').array(n, n);
       return column.at(i);
     };
-    const numbers = <K extends string>(names: readonly K[], most: number): Record<K, number> =>
-      Object.fromEntries(names.map((name) => [name, field(name).number(0, most)])) as Record<K, number>;
+    const numbers = <K extends string>(names: readonly K[], most: number, rule?: string): Record<K, number> =>
+      Object.fromEntries(names.map((name) => [name, field(name).by(rule).number(0, most)])) as Record<K, number>;
     const scale = scaleAt.integer(0, 99);
-    if (i === 0 ? scale !== 0 : scale <= before) scaleAt.fail(i === 0 ? '0' : 'a rising number', `${scale}`);
+    if (i === 0 ? scale !== 0 : scale <= before) scaleAt.fail('0, then rising', scale, 'M10');
     before = scale;
     return {
       scale,
@@ -187,7 +189,7 @@ function readScales(at: JsonAt): ManifestScale[] {
       glb: readRef({ at: field as JsonAt['at'] }, paths.meshPath(scale)),
       major: field('major').boolean(),
       ...numbers(lengths, largest),
-      ...numbers(heights, layout.anyDisplayPx),
+      ...numbers(heights, layout.anyDisplayPx, 'M11'),
       floor: field('floor').text(100),
     };
   });
@@ -198,12 +200,12 @@ function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   const steps = at.each(1, 100, (pair) => {
     pair.array(2, 2);
     const step = { upToPx: pair.at(0).number(0, layout.anyDisplayPx), scale: pair.at(1).integer(0, 100) };
-    if (!scales.some((s) => s.scale === step.scale)) pair.at(1).fail('a scale of the package', `${step.scale}`);
-    if (step.upToPx <= before.upToPx) pair.at(0).fail('a rising number', 'another');
-    if (step.scale >= before.scale) pair.at(1).fail('a finer scale', `${step.scale}`);
+    if (!scales.some((s) => s.scale === step.scale)) pair.fail('a scale of the package', step.scale);
+    if (step.upToPx <= before.upToPx) pair.fail('a rising number');
+    if (step.scale >= before.scale) pair.fail('a finer scale');
     return (before = step);
   });
-  if (before.upToPx !== layout.anyDisplayPx || before.scale !== 0) at.at(steps.length - 1).fail('1e9 and scale 0', 'another step');
+  if (before.upToPx !== layout.anyDisplayPx || before.scale !== 0) at.fail('[1e9, 0] at the end');
   return steps;
 }
 
@@ -213,9 +215,9 @@ function resolveStreamScales(at: JsonAt, scales: ManifestScale[], stream: Stream
   for (let i = scales.length - 1; i >= 0; --i) {
     const { glb } = scales[i];
     if (glb.offset !== stream.offset) continue;
-    if (i === 0 || i === scales.length - 1) at.at('offset').at(i).fail('a GLB of the finest and of the coarsest scale', 'the stream');
+    if (i === 0 || i === scales.length - 1) at.fail('GLBs of the finest and the coarsest scale', '', 'M18');
     if (glb.bytes <= before || glb.bytes > stream.bytes)
-      at.at('bytes').at(i).fail(`more than ${before} bytes, at most the stream's`, `${glb.bytes}`);
+      at.fail(`prefixes of more than ${before} bytes`, glb.bytes, 'M19');
     before = glb.bytes;
     glb.path = layout.splitStreamPath;
   }
@@ -231,7 +233,7 @@ export function readManifest(json: Uint8Array): Manifest {
   const bounds = at.at('bounds');
   const [boundsMin, boundsMax] = ['min', 'max'].map((name) => readVector(bounds.at(name)));
   boundsMax.forEach((most, i) => {
-    if (boundsMin[i] > most) bounds.at('max').at(i).fail('at least the minimum', 'less');
+    if (boundsMin[i] > most) bounds.fail('at least the minimum', '', 'M03');
   });
   const scales = readScales(at.at('scales'));
   const stream = at.has('stream') ? readStream(at.at('stream')) : undefined;
@@ -246,7 +248,7 @@ export function readManifest(json: Uint8Array): Manifest {
     surfaceArea: at.at('surfaceArea').number(0, largest),
     jnd: at.at('jnd').number(0, 1),
     scales,
-    steps: readSteps(at.at('steps'), scales),
+    steps: readSteps(at.at('steps').by('M21'), scales),
     planeCount: at.at('planeCount').integer(0, 10000),
     index: readPagedRef(at.at('index'), paths.indexPath),
     tables: readPagedRef(at.at('tables'), paths.tablesPath),
@@ -264,9 +266,9 @@ export function readManifest(json: Uint8Array): Manifest {
 export function manifestOfContainer(head: Uint8Array, file: string): Uint8Array {
   const text = (begin: number, end: number): string => String.fromCharCode(...head.subarray(begin, end));
   if (text(0, 10) !== 'PK\x03\x04\n\0\0\0\0\0' || text(30, 43) !== paths.manifestPath || head.length < 64)
-    throw new FormatError(file, 'byte 0', 'a texmesh package', 'something else');
+    throw new FormatError(file, 'byte 0', 'a texmesh package', '', 'K11');
   const bytes = new DataView(head.buffer, head.byteOffset).getUint32(22, true);
   const room = Math.min(head.length, layout.bootstrapBytes) - 64;
-  if (bytes > room) throw new FormatError(file, 'entry manifest.json', `at most ${room} bytes`, `${bytes}`);
+  if (bytes > room) throw new FormatError(file, paths.manifestPath, `at most ${room} bytes`, `${bytes}`, 'K12');
   return head.subarray(64, 64 + bytes);
 }

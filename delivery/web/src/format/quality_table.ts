@@ -56,7 +56,7 @@ function readRising(at: JsonAt, mostValues: number, least: number, most: number)
   let before = -Infinity;
   return at.each(1, mostValues, (one) => {
     const v = one.integer(least, most);
-    if (v <= before) one.fail('a rising number', `${v}`);
+    if (v <= before) one.fail('a rising number', v);
     return (before = v);
   });
 }
@@ -74,7 +74,7 @@ function readTexture(at: JsonAt): TextureLosses {
   let before = 0;
   const texelDssim = Float32Array.from(at.at('texelDssim').each(1, 100, (one) => {
     const v = Math.fround(one.number(0, 2));
-    if (!(v > before)) one.fail('a rising number above 0', `${v}`);
+    if (!(v > before)) one.fail('a rising number above 0', v);
     return (before = v);
   }));
   const coarser = at.at('coarser');
@@ -84,7 +84,7 @@ function readTexture(at: JsonAt): TextureLosses {
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */
 export function readQuality(json: Uint8Array): QualityTable {
-  const at = parseJson(json, qualityPath, 4 << 20);
+  const at = parseJson(json, qualityPath, 4 << 20).by('Q01');
   const sizesPx = readRising(at.at('sizesPx'), mostSizes, 1, 65536);
   const scales = readRising(at.at('scales'), 100, 0, 99);
   const sizes = sizesPx.length;
@@ -99,7 +99,7 @@ export function readQuality(json: Uint8Array): QualityTable {
     groups: at.at('groups').each(0, planeGroups.length, (one) => {
       const name = one.at('group').text(20);
       const place = planeGroups.indexOf(name as PlaneGroup);
-      if (place <= last) one.at('group').fail('colour, normal or data, in this order', name);
+      if (place <= last) one.fail(`${planeGroups}`, name, place < 0 ? 'W06' : 'Q03');
       last = place;
       return { group: planeGroups[place], sizes: one.at('sizes').each(sizes, sizes, readTexture) };
     }),
@@ -110,5 +110,5 @@ export function readQuality(json: Uint8Array): QualityTable {
 export function requireGroups({ groups }: QualityTable, planes: readonly TextureInfo[]): void {
   const wanted = planeGroups.filter((group) => planes.some((t) => groupOf(t.role) === group));
   if (groups.length !== wanted.length || groups.some((g, k) => g.group !== wanted[k]))
-    throw new FormatError(qualityPath, '/groups', 'the groups of the planes in textures.json', 'others');
+    throw new FormatError(qualityPath, '/groups', 'those of the planes', '', 'R15');
 }

@@ -1,10 +1,9 @@
 import { BytesIn } from './bytes_in';
-import { toHex } from './bytes';
 import { tablesPath as file } from './entry_paths';
 import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { formatMinor } from './manifest';
-import { sha256 } from './sha256';
+import { requireDigest } from './sha256';
 import { PlaneTables, TablesHead, fragmentCount } from './tables';
 
 const mostFragments = 65535;
@@ -15,11 +14,11 @@ const mostCells = 1 << 24;
 
 /** Head of tables.bin; the bytes may stop after the head. */
 export function readTablesHead(bytes: Uint8Array): TablesHead {
-  const input = new BytesIn(bytes, file);
-  const minor = readEntryStart(input, 'TXMT');
+  const input = new BytesIn(bytes, file, 'T02');
+  const minor = readEntryStart(input, 'TXMT', 'T01');
   const planes = input.u32();
-  if (input.u32() !== 0 && minor <= formatMinor) input.fail('4 zero bytes', 'others');
-  if (planes > input.left / 36) input.fail('a plane count that fits the file', `${planes}`);
+  if (input.u32() !== 0 && minor <= formatMinor) input.fail('0', '', 'T01');
+  if (planes > input.left / 36) input.fail('fewer planes', planes);
   const head: TablesHead = { minor, bytes: 16 + planes * 36, planes: [] };
   let offset = head.bytes;
   for (let p = 0; p < planes; ++p) {
@@ -43,7 +42,7 @@ function fromHalf(half: number): number {
 
 function readHalf(input: BytesIn): number {
   const half = input.u16();
-  if (half > largestHalf) input.fail('a finite binary16 >= 0', `${half}`);
+  if (half > largestHalf) input.fail('a finite binary16 >= 0', half, 'T04');
   return fromHalf(half);
 }
 
@@ -73,7 +72,7 @@ function readArrays(input: BytesIn, t: PlaneTables, c: Counts): void {
   t.order = fill(new Uint16Array(c.listed), () => input.u16());
   const seen = new Uint8Array(f);
   for (const fragment of t.order)
-    if (fragment >= f || seen[fragment]++) input.fail('every stored fragment once in the order', `${fragment}`);
+    if (fragment >= f || seen[fragment]++) input.fail('every fragment once', fragment, 'T05');
   t.rungQuality = input.raw(c.rungs);
   t.tableBytes = fill(new Uint32Array(c.rungs), u32);
   t.knotQuality = input.raw(c.knots);
@@ -118,16 +117,16 @@ function widthOf(values: Uint32Array): number {
 
 /** Throws FormatError where values make no sense. */
 function checkPlane(t: PlaneTables, place: string): void {
-  const require = (good: boolean, what: string, expected: string, found: unknown): void => {
-    if (!good) throw new FormatError(file, `${place}/${what}`, expected, String(found));
+  const require = (good: boolean, rule: string, what: string, expected: string, found: unknown): void => {
+    if (!good) throw new FormatError(file, `${place}/${what}`, expected, String(found), rule);
   };
   const within = (values: ArrayLike<number>, least: number, most: number, what: string): void => {
     for (let k = 0; k < values.length; ++k)
       if (!(values[k] >= least && values[k] <= most))
-        require(false, `${what}[${k}]`, `${least} to ${most}`, values[k]);
+        require(false, 'T04', `${what}[${k}]`, `${least} to ${most}`, values[k]);
   };
   t.rungQuality.forEach((q, r) =>
-    require(q >= 1 && q <= 100 && (r === 0 || q > t.rungQuality[r - 1]), 'rungQuality', '1 to 100, rising', q),
+    require(q >= 1 && q <= 100 && (r === 0 || q > t.rungQuality[r - 1]), 'T08', 'rungQuality', 'rising', q),
   );
   within([t.qualityWidth], 0, 100, 'qualityWidth');
   within([t.logWidth], 0, 4, 'logWidth');
@@ -139,14 +138,14 @@ function checkPlane(t: PlaneTables, place: string): void {
   t.knotQuality.forEach((q, k) => {
     const above = t.rungQuality.findIndex((r) => r >= q);
     const before = k > 0 ? t.knotQuality[k - 1] : 0;
-    require(q > before && above > 0 && t.rungQuality[above] !== q, 'knotQuality', 'rising, between rungs', q);
+    require(q > before && above > 0 && t.rungQuality[above] !== q, 'T08', 'knotQuality', 'rising, between rungs', q);
     if (before > t.rungQuality[above - 1])
-      require(t.knotPosition[k] >= t.knotPosition[k - 1], 'knotPosition', 'not falling', t.knotPosition[k]);
+      require(t.knotPosition[k] >= t.knotPosition[k - 1], 'T08', 'knotPosition', 'rising', t.knotPosition[k]);
   });
   within(t.surfaceFraction, 0, 1, 'surfaceFraction');
   within(t.quality, 0, 100, 'quality');
   for (let line = 0; line < t.sizeBytes.length; line += fragmentCount(t))
-    for (const f of t.order) require(t.sizeBytes[line + f] > 0, 'sizeBytes', 'bytes at every rung', `none of fragment ${f}`);
+    for (const f of t.order) require(t.sizeBytes[line + f] > 0, 'T06', 'sizeBytes', 'bytes at every rung', `none of ${f}`);
 }
 
 /** Fields in front of a section's arrays. */
@@ -158,34 +157,35 @@ function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
   const flags = input.u8();
   c.knots = input.u8();
   const reserved = input.u8();
-  if (minor <= formatMinor && (flags > 1 || reserved !== 0)) input.fail('flags 0 or 1 and a zero byte', `${flags}, ${reserved}`);
+  if (minor <= formatMinor && (flags > 1 || reserved !== 0)) input.fail('0', `${flags}, ${reserved}`, 'W05');
   t.incremental = (flags & 1) !== 0;
   for (const name of parameters) t[name] = input.f32();
   c.listed = input.u32();
   const { columns, rows } = t;
   if (columns === 0 || rows === 0 || columns > mostFragments || rows > Math.floor(mostFragments / columns))
-    input.fail('1 to 65535 fragments', `${columns} x ${rows}`);
+    input.fail('1 to 65535 fragments');
   const good = c.scales > 0 && c.scales <= mostScales && c.rungs > 0 && c.rungs <= mostRungs && c.listed <= columns * rows;
-  if (!good || t.allocation > 2) input.fail('1 to 100 scales, 1 to 100 rungs, every fragment at most once and allocation 0, 1 or 2', 'others');
+  if (!good) input.fail('counts in their ranges');
+  if (t.allocation > 2) input.fail('allocation 0 to 2', t.allocation, 'T13');
   const cells = columns * rows * (5 * c.rungs + c.scales);
-  if (cells > mostCells) input.fail('at most 2^24 cells', `${cells}`);
+  if (cells > mostCells) input.fail('at most 2^24 cells', cells, 'L02');
   if (c.size < 1 || c.size > 4 || c.feature < 1 || c.feature > 3)
-    input.fail('widths of 1 to 4 and 1 to 3 bytes', `${c.size}, ${c.feature}`);
+    input.fail('widths of 1 to 4 and 1 to 3 bytes');
   return c;
 }
 
 /** Tables of a plane from its section's bytes; counts are checked before anything is allocated. */
 export function parseTablesSection(bytes: Uint8Array, minor: number, place: string): PlaneTables {
-  const input = new BytesIn(bytes, `${file}: ${place}`);
+  const input = new BytesIn(bytes, `${file}: ${place}`, 'T03');
   const t = emptyTables();
   const counts = readStart(input, t, minor);
   const expected = sectionBytes(counts);
-  if (bytes.length < expected) input.fail(`${expected} bytes`, `${bytes.length}`);
+  if (bytes.length < expected) input.fail(`${expected} bytes`, bytes.length);
   readArrays(input, t, counts);
   if (minor <= formatMinor) input.finish();
   checkPlane(t, place);
   if (counts.size !== widthOf(t.sizeBytes) || counts.feature !== widthOf(t.features))
-    input.fail('the least width that holds the values', 'another');
+    input.fail('the least widths', '', 'T08');
   return t;
 }
 
@@ -193,8 +193,7 @@ export function parseTablesSection(bytes: Uint8Array, minor: number, place: stri
 export async function readTablesSection(head: TablesHead, plane: number, section: Uint8Array): Promise<PlaneTables> {
   const s = head.planes[plane];
   const place = `plane ${plane}`;
-  if (section.length !== s.bytes) throw new FormatError(file, place, `${s.bytes} bytes`, `${section.length}`);
-  const digest = toHex(await sha256(section));
-  if (digest !== toHex(s.sha256)) throw new FormatError(file, place, `SHA-256 ${toHex(s.sha256)}`, digest);
+  if (section.length !== s.bytes) throw new FormatError(file, place, `${s.bytes} bytes`, `${section.length}`, 'T02');
+  await requireDigest(section, s.sha256, file, place, 'T02');
   return parseTablesSection(section, head.minor, place);
 }

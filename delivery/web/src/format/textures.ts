@@ -48,16 +48,14 @@ function readGrid(at: JsonAt) {
     rows: 0,
     gridReason: '',
   };
-  if (grid.channels === 2) at.at('channels').fail('1 or 3', '2');
+  if (grid.channels === 2) at.at('channels').fail('1 or 3');
   if (grid.fragmentWidthPx % 16 || grid.fragmentHeightPx % 16)
-    at.fail('sides of fragments that are multiples of 16', `${grid.fragmentWidthPx} x ${grid.fragmentHeightPx}`);
-  grid.rows = integer('rows', 1, Math.floor(65535 / grid.columns));
+    at.fail('sides of fragments that are multiples of 16', '', 'X04');
+  grid.rows = at.at('rows').by('X05').integer(1, Math.floor(65535 / grid.columns));
   const tiles = (count: number, side: number, whole: number): boolean =>
     count * side >= whole && (count - 1) * side < whole;
-  if (!tiles(grid.columns, grid.fragmentWidthPx, grid.widthPx))
-    at.at('columns').fail('as many as cover the width', `${grid.columns}`);
-  if (!tiles(grid.rows, grid.fragmentHeightPx, grid.heightPx))
-    at.at('rows').fail('as many as cover the height', `${grid.rows}`);
+  if (!tiles(grid.columns, grid.fragmentWidthPx, grid.widthPx) || !tiles(grid.rows, grid.fragmentHeightPx, grid.heightPx))
+    at.fail('columns and rows that cover the plane', '', 'X05');
   grid.gridReason = at.at('gridReason').text(1000);
   return grid;
 }
@@ -67,24 +65,25 @@ const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
 /** Fields about the source itself. */
 function readSource(at: JsonAt, codec: CodecId, mip: number): { sourceRung: boolean; source: string } {
   const sourceRung = at.has('sourceRung') && at.at('sourceRung').boolean();
-  if (sourceRung && (codec !== 'jpeg' || mip > 0)) at.at('sourceRung').fail('a full-size plane of codec jpeg', 'another');
+  if (sourceRung && (codec !== 'jpeg' || mip > 0)) at.fail('sourceRung of a full-size plane of codec jpeg', '', 'X11');
   if (!at.has('source')) return { sourceRung, source: '' };
   const source = at.at('source').text(100);
-  if (!sourceEndings.includes(source) || mip > 0) at.at('source').fail('jpg, png, tif, webp or exr of a full-size plane', source);
+  if (!sourceEndings.includes(source)) at.fail('a known source', source, 'X03');
+  if (mip > 0) at.fail('source of a full-size plane', '', 'X11');
   at.at('sourceColours').boolean();
   return { sourceRung, source };
 }
 
 function readTexture(at: JsonAt): TextureInfo {
   const colourSpace = at.at('colourSpace').text(100);
-  if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.at('colourSpace').fail('srgb or linear', colourSpace);
+  if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.fail('srgb or linear', colourSpace, 'X03');
   const codec = at.at('codec').text(100);
-  if (!isCodec(codec)) return at.at('codec').fail('jpeg, jpeg-progressive or webp', codec);
+  if (!isCodec(codec)) return at.fail('a known codec', codec, 'X03');
   const mip = at.has('mip') ? at.at('mip').integer(1, 20) : 0;
   const rungQuality: number[] = [];
   for (let i = 0, n = at.at('rungQuality').array(1, 100); i < n; ++i) {
     const quality = at.at('rungQuality').at(i).integer(1, 100);
-    if (i > 0 && quality <= rungQuality[i - 1]) at.at('rungQuality').at(i).fail('a rising number', `${quality}`);
+    if (i > 0 && quality <= rungQuality[i - 1]) at.at('rungQuality').fail('rising numbers');
     rungQuality.push(quality);
   }
   return {
@@ -108,19 +107,19 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
   const full = fullSizePlanes(textures);
   for (let p = full; p < textures.length; ++p) {
     const t = textures[p];
-    if (t.mip === 0) list.at(p).fail('a mip, as the plane before is one', 'a full-size plane');
-    if (t.base >= full) list.at(p).at('base').fail('a full-size plane', `${t.base}`);
+    if (t.mip === 0) list.at(p).fail('a mip', '', 'X06');
+    if (t.base >= full) list.at(p).fail('a full-size base', t.base, 'X06');
     const base = textures[t.base];
     const before = p > full ? textures[p - 1] : undefined;
     if (before && (before.base > t.base || (before.base === t.base && t.mip <= before.mip)))
-      list.at(p).at('mip').fail('mips by base and mip', `${t.mip}`);
+      list.at(p).fail('mips by base and mip', '', 'X06');
     const side = (px: number): number => Math.ceil(px / (1 << t.mip));
     if (t.widthPx !== side(base.widthPx) || t.heightPx !== side(base.heightPx))
-      list.at(p).at('widthPx').fail('sides of 1 / 2^mip of the full size, rounded up', `${t.widthPx}`);
+      list.at(p).fail('sides of 1 / 2^mip of the full size', '', 'X07');
     const same = (['image', 'role', 'channels', 'colourSpace', 'previewWidthPx', 'previewHeightPx'] as const).every(
       (name) => t[name] === base[name],
     );
-    if (!same) list.at(p).fail(`image, role, channels, colour space and preview of plane ${t.base}`, 'others');
+    if (!same) list.at(p).fail(`what plane ${t.base} has`, '', 'X07');
   }
 }
 

@@ -29,7 +29,7 @@ const gapBytes = 4096;
 const noPlane = -1;
 
 /** The head of a document or stream as an entry of its own. */
-const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef => ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256 });
+const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef => ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256, rule: 'R02' });
 
 /**
  * The documents of a package, each read when it is first asked for, and never twice. Everything handed out has been checked: entries
@@ -88,8 +88,8 @@ export class PackageDocuments {
   /** Reads a range of the container within an entry; these parts of the range are held to their digests. */
   protected readParts_(place: Place, range: ByteRange, how: ReadOptions, ...parts: EntryRef[]): Promise<Uint8Array> {
     const verify = async (got: Uint8Array): Promise<void> => {
-      for (const { path, offset, bytes, sha256 } of parts)
-        await requireDigest(got.subarray(offset - range.offset).subarray(0, bytes), sha256, this.store.name, path);
+      for (const { path, offset, bytes, sha256, rule } of parts)
+        await requireDigest(got.subarray(offset - range.offset).subarray(0, bytes), sha256, this.store.name, path, rule);
     };
     return this.store.read(place, range, { ...how, verify });
   }
@@ -145,7 +145,7 @@ export class PackageDocuments {
   /** An entry on the index page of a plane, or (-1) of no plane. */
   async findOn(plane: number, path: string, signal?: AbortSignal): Promise<EntryRef> {
     const entry = (await this.indexPage_(plane, signal)).get(path);
-    if (!entry) throw new FormatError(this.store.name, path, 'an entry of the index', 'none');
+    if (!entry) throw new FormatError(this.store.name, path, 'an entry of the index', '', 'R07');
     return entry;
   }
   /** An entry that belongs to no plane. */

@@ -135,10 +135,10 @@ export class PackageReader extends PackageDocuments {
     const { offset, bytes } = await this.fragmentRange(plane, rung, fragment);
     const pack = await this.find(rungPath(plane, rung), signal);
     const path = `fragment ${fragment} of ${pack.path}`;
-    if (bytes === 0) throw new FormatError(this.store.name, path, 'a stored fragment', 'none');
+    if (bytes === 0) throw new FormatError(this.store.name, path, 'a stored fragment', '', 'T07');
     const sha256 = await this.fragmentDigest(plane, rung, fragment);
     const how = { kind: 'texture', once: this.form !== 'files', signal } as const;
-    return this.readChecked({ path, offset: pack.offset + offset, bytes, sha256 }, how, pack);
+    return this.readChecked({ path, offset: pack.offset + offset, bytes, sha256, rule: 'F03' }, how, pack);
   }
   /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
   async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {

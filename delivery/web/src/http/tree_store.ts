@@ -40,7 +40,7 @@ export class TreeStore implements PackageStore {
       try {
         const whole = await this.file_(place.path, place.bytes, how, reload);
         if (whole.length !== place.bytes)
-          throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`);
+          throw new FormatError(this.name, place.path, `${place.bytes} bytes`, `${whole.length}`, 'I08');
         const begin = offset - place.offset;
         const part = whole.subarray(begin, begin + bytes);
         await how.verify?.(part);
@@ -61,7 +61,7 @@ export class TreeStore implements PackageStore {
         if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload); // another asker cancelled
         throw error;
       });
-    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', 'another');
+    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', '', 'K05');
     const wanted = this.mirrors_.ask(maxBytes, (m, asking) => {
       this.from_.set(path, m);
       return this.get_(m, path, maxBytes, how, { ...asking, reload });

@@ -15,7 +15,7 @@ class WholeStore implements PackageStore {
   }
   async read(place: Place, { offset, bytes }: ByteRange, how: ReadOptions): Promise<Uint8Array> {
     if (offset + bytes > this.bytes_.length)
-      throw new FormatError(this.name, place.path, `${offset + bytes} bytes`, `${this.bytes_.length}`);
+      throw new FormatError(this.name, place.path, `${offset + bytes} bytes`, `${this.bytes_.length}`, 'K01');
     const part = this.bytes_.subarray(offset, offset + bytes);
     await how.verify?.(part);
     return part;

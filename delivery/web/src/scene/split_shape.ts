@@ -148,7 +148,7 @@ export class SplitShapes {
     const { parser, scene } = gltf;
     const there = index < (parser.json.materials ?? []).length;
     const chosen = there ? ((await parser.getDependency('material', index)) as Material) : (meshesOf(scene)[0]?.material as Material | undefined);
-    if (!chosen) throw new FormatError('mesh', '', `material ${index}`, 'none');
+    if (!chosen) throw new FormatError('mesh', '', `material ${index}`, '', 'S23');
     const mesh = new Mesh(geometry, chosen);
     parser.assignFinalMaterial(mesh);
     this.materials_.shareMaterials(gltf, [mesh], this.added_);

@@ -64,6 +64,6 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
 /** Errors lose their class on the way; their parts do not. */
 export function packError(error: unknown): WorkerAnswer['error'] {
   if (error instanceof TexmeshError)
-    return { name: error.name, message: error.message, parts: [error.file, error.place, error.expected, error.found] };
+    return { name: error.name, message: error.message, parts: [error.file, error.place, error.expected, error.found, error.rule] };
   return { name: error instanceof Error ? error.name : 'Error', message: String((error as Error)?.message ?? error) };
 }

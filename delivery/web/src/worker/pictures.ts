@@ -12,13 +12,13 @@ const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOr
 export async function decodePicture(request: DecodeRequest): Promise<Levels> {
   for (const [i, digest] of request.digests.entries())
     if (!samePrefix(await sha256(request.streams[i]), digest))
-      throw new FormatError('fragment', '', 'bytes of the digest in tables.bin', 'others');
+      throw new FormatError('fragment', '', 'the digest of tables.bin', '', 'F03');
   const file = request.complete
     ? request.streams[0]
     : joinFragment(request.codec, request.tables, request.streams);
   const size = imageSize(file);
   if (!(size[0] > 0 && size[1] > 0 && size[0] <= request.most[0] && size[1] <= request.most[1]))
-    throw new FormatError('fragment', '', `a picture of at most ${request.most.join(' x ')} px`, size.join(' x '));
+    throw new FormatError('fragment', '', `a picture of at most ${request.most.join(' x ')} px`, size.join(' x '), 'F08');
   const blob = new Blob([file as BlobPart], { type: codecTraits(request.codec).mediaType });
   const levels: Levels = [await createImageBitmap(blob, asItIs)];
   while (levels.length < request.levels) {

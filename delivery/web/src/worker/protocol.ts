@@ -94,5 +94,5 @@ export interface WorkerAnswer {
   result?: unknown;
   /** The error itself, where no thread lies between. */
   failed?: unknown;
-  error?: { name: string; message: string; parts?: [string, string, string, string] };
+  error?: { name: string; message: string; parts?: [string, string, string, string, string] };
 }

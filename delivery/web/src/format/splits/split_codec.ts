@@ -71,9 +71,9 @@ export class SplitCodec {
   }
   private refillQueue_(): void {
     const { queue, mesh } = this.state_;
-    if (this.fruitless_) this.state_.fail('a split among all points', 'none');
+    if (this.fruitless_) this.state_.fail('a split among all points');
     this.fruitless_ = true;
     queue.refill(mesh.points);
-    if (queue.isEmpty) this.state_.fail('points to split', 'none');
+    if (queue.isEmpty) this.state_.fail('points to split');
   }
 }

@@ -38,7 +38,7 @@ export class SplitPatches {
     for (let k = 0; k < 3; ++k) {
       if (mesh.points > 0 && state.bit(m.seedExists)) {
         const p = state.number(mesh.points);
-        if (k > 0 && (p === points[0] || p === points[k - 1])) state.fail('three points of a face', 'two');
+        if (k > 0 && (p === points[0] || p === points[k - 1])) state.fail('three points of a face', 'S22');
         points.push(p);
         wedges.push(state.codeWedge(none, m.listedModel, p));
       } else {
@@ -67,7 +67,7 @@ export class SplitPatches {
     this.state_.countWork(mesh.degree.data[point]);
     mesh.gather(point, corners, fans);
     for (const fan of fans) for (let i = fan.begin; i < fan.end; ++i) if (corners.face[i] === face) return fan;
-    return this.state_.fail('a face at its own point', 'none');
+    return this.state_.fail('a face at its own point');
   }
   /** The face behind an open edge, if there is one; false when not. */
   private passGate_(gate: number): boolean {
@@ -108,7 +108,7 @@ export class SplitPatches {
     if (right.point !== a && right.point !== left.point && state.bit(m.thirdRight))
       return state.codeWedge(right.wedge, m.patchExpected + 3, right.point);
     const p = state.number(state.mesh.points);
-    if (p === a || p === b) state.fail('three points of a face', 'two');
+    if (p === a || p === b) state.fail('three points of a face', 'S22');
     return state.codeWedge(none, m.listedModel, p);
   }
 }

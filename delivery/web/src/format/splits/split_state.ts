@@ -73,35 +73,35 @@ export class SplitState {
   /** A number below `count`. */
   number(count: number): number {
     const value = this.bits_.raw(bitWidth(count - 1));
-    if (value >= count) this.fail('an index that exists', `${value}`);
+    if (value >= count) this.fail('an index that exists');
     return value;
   }
-  fail(expected: string, found: string): never {
-    throw new FormatError('mesh/stream.bin', '', expected, found);
+  fail(expected: string, rule = 'S19'): never {
+    throw new FormatError('mesh/stream.bin', '', expected, '', rule);
   }
   /** Work is bounded by the mesh, so that few bytes cannot ask many points again and again. */
   countWork(work: number): void {
     this.work_ += work;
     if (this.work_ > 1048576 + 256 * (this.mesh.points + this.mesh.faceCount))
-      this.fail('splits that are found in reasonable time', 'more steps than 256 per point and face');
+      this.fail('256 steps per point and face', 'S20');
   }
 
   // ---- points, wedges, faces
 
   addPoint(): number {
-    if (this.mesh.points >= this.limits_.points) this.fail('no more points than the head says', 'more');
+    if (this.mesh.points >= this.limits_.points) this.fail('no more points');
     this.queue.addPoint();
     return this.mesh.addPoint();
   }
   addWedge(point: number, pending: boolean): number {
-    if (this.mesh.wedges >= this.limits_.wedges) this.fail('no more wedges than the head says', 'more');
+    if (this.mesh.wedges >= this.limits_.wedges) this.fail('no more wedges');
     const w = this.mesh.addWedge(point);
     this.wedges.add(pending);
     if (pending) this.fresh.push(w);
     return w;
   }
   addFace(w0: number, w1: number, w2: number, group: number): number {
-    if (this.mesh.faceCount >= this.limits_.faces) this.fail('no more faces than the head says', 'more');
+    if (this.mesh.faceCount >= this.limits_.faces) this.fail('no more faces');
     return this.mesh.addFace(w0, w1, w2, group);
   }
   /** The group of a new face: mostly that of the face beside. */

@@ -71,19 +71,19 @@ function readVarint(input: BytesIn): number {
     if (value > 0xffffffff || (byte === 0 && k > 0)) break;
     return value;
   }
-  return input.fail('a number of at most 32 bits in its shortest form', 'another');
+  return input.fail('a short number', '', 'S06');
 }
 
 function readGrid(input: BytesIn, bits: number, axes: number): SplitGrid {
   const origin = Array.from({ length: axes }, () => input.f32());
   const range = input.f32();
-  if (!origin.every(Number.isFinite)) input.fail('a finite origin', 'another');
-  if (!Number.isFinite(range) || !(range > 0)) input.fail('a finite range above 0', 'another');
+  if (!origin.every(Number.isFinite)) input.fail('a finite origin', '', 'S04');
+  if (!Number.isFinite(range) || !(range > 0)) input.fail('a finite range above 0', '', 'S04');
   return { bits, origin, range };
 }
 function readBits(input: BytesIn, least: number): number {
   const bits = input.u8();
-  if (bits < least || bits > 24) input.fail(`${least} to 24 bits`, `${bits}`);
+  if (bits < least || bits > 24) input.fail(`${least} to 24 bits`, bits, 'S03');
   return bits;
 }
 function readAttributes(input: BytesIn, count: number): SplitAttribute[] {
@@ -91,41 +91,41 @@ function readAttributes(input: BytesIn, count: number): SplitAttribute[] {
   let before = -1;
   for (let i = 0; i < count; ++i) {
     const number = input.u8();
-    if (number >= kinds.length || number <= before) input.fail('rising attribute kinds', `${number}`);
+    if (number >= kinds.length || number <= before) input.fail('rising attribute kinds', number, 'S03');
     before = number;
     const kind = kinds[number];
     const bits = readBits(input, kind === 'normal' ? 2 : 1);
-    if (input.u16() !== 0) input.fail('0', 'another number');
+    if (input.u16() !== 0) input.fail('0', '', 'S02');
     const grid = number < 2 ? readGrid(input, bits, 2) : { bits, origin: [], range: 1 };
     attributes.push({ kind, components: kind === 'colour' ? 4 : 2, grid });
   }
   return attributes;
 }
 function readScales(input: BytesIn, count: number, blocks: number): SplitScale[] {
-  if (count === 0 || count > 100) input.fail('1 to 100 scales', `${count}`);
+  if (count === 0 || count > 100) input.fail('1 to 100 scales', count, 'S05');
   const scales: SplitScale[] = [];
   let before: SplitScale = { scale: 100, blocks: 0, points: 0, wedges: 0, faces: 0, triangles: 0 };
   for (let i = 0; i < count; ++i) {
     const s = { ...before, scale: input.u8() };
     for (const name of ['blocks', 'points', 'wedges', 'faces'] as const) {
       s[name] += readVarint(input);
-      if (s[name] > 0xffffffff) input.fail('a count of at most 32 bits', 'a larger one');
+      if (s[name] > 0xffffffff) input.fail('at most 32 bits', '', 'S05');
     }
     const hidden = readVarint(input);
-    if (s.scale >= before.scale) input.fail('falling scale numbers', `${s.scale}`);
+    if (s.scale >= before.scale) input.fail('falling scale numbers', s.scale, 'S05');
     if (s.blocks <= before.blocks || s.blocks > blocks)
-      input.fail(`a rising number of blocks, at most ${blocks}`, `${s.blocks}`);
+      input.fail(`rising numbers of blocks to ${blocks}`, s.blocks, 'S05');
     if (hidden > s.faces || s.wedges < s.points || s.faces === 0)
-      input.fail('counts that can belong together', 'others');
+      input.fail('counts that can belong together', '', 'S05');
     s.triangles = s.faces - hidden;
     scales.push(s);
     before = s;
   }
-  if (before.scale !== 0 || before.blocks !== blocks) input.fail('S_0 with all blocks', `scale ${before.scale}`);
+  if (before.scale !== 0 || before.blocks !== blocks) input.fail('S_0 with all blocks', '', 'S05');
   return scales;
 }
 function readBlocks(input: BytesIn, count: number, partCount: number): SplitBlock[] {
-  if (count > input.left / (partCount + 9)) input.fail('blocks with an entry in the table', `${count}`);
+  if (count > input.left / (partCount + 9)) input.fail('fewer blocks', count);
   const blocks: SplitBlock[] = [];
   for (let i = 0; i < count; ++i) {
     const code = readVarint(input);
@@ -133,10 +133,10 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
       isPatch: code % 2 === 1, count: Math.floor(code / 2), offset: 0, parts: [], bytes: 0, digest: new Uint8Array(0),
     };
     if (b.count === 0 || (!b.isPatch && b.count > 4096))
-      input.fail('at least one face or split, at most 4096 splits', `${b.count}`);
+      input.fail('1 to 4096 splits', b.count, 'S07');
     for (let p = 0; p < partCount; ++p) b.parts.push(readVarint(input));
     b.bytes = b.parts.reduce((sum, n) => sum + n, 0);
-    if (b.bytes < Math.floor(b.count / 64)) input.fail('at least a byte for every 64', `${b.bytes} bytes`);
+    if (b.bytes < Math.floor(b.count / 64)) input.fail('a byte for every 64', b.bytes, 'S07');
     b.digest = input.raw(8);
     blocks.push(b);
   }
@@ -148,21 +148,21 @@ const streamMajor = 2;
 
 /** Reads the head of a stream; checks everything that can be checked without the blocks. */
 export function readSplitHead(bytes: Uint8Array): SplitStreamHead {
-  const input = new BytesIn(bytes, file);
-  input.expect('TXMS');
+  const input = new BytesIn(bytes, file, 'S08');
+  input.expect('TXMS', 'S01');
   const major = input.u16();
-  if (major !== streamMajor) input.fail(`major version ${streamMajor}`, `${major}`);
+  if (major !== streamMajor) input.fail(`version ${streamMajor}`, major, 'S01');
   input.u16();
   const positionBits = readBits(input, 1);
   const attributeCount = input.u8();
   const scaleCount = input.u8();
-  if (input.u8() !== 0) input.fail('0', 'another number');
+  if (input.u8() !== 0) input.fail('0', '', 'S02');
   const groupCount = input.u32();
   const blockCount = input.u32();
   const position = readGrid(input, positionBits, 3);
   const attributes = readAttributes(input, attributeCount);
   if (groupCount === 0 || groupCount > 65536 || groupCount > input.left / 4)
-    input.fail('1 to 65536 groups', `${groupCount}`);
+    input.fail('1 to 65536 groups', groupCount, 'S05');
   const groups = Array.from({ length: groupCount }, () => ({ material: input.u16(), part: input.u16() }));
   const scales = readScales(input, scaleCount, blockCount);
   const models = Array.from({ length: attributeCount + 1 }, () => input.raw(valueModelCount));
@@ -190,7 +190,7 @@ export class SplitStreamReader {
     const { attributes, scales, position, groups } = this.head;
     const last = scales[scales.length - 1];
     if (last.points > mostPoints || last.faces > mostFaces || last.wedges > 3 * mostFaces)
-      throw new FormatError(file, 'head', `at most ${mostPoints} points and ${mostFaces} faces`, 'more');
+      throw new FormatError(file, 'head', `at most ${mostPoints} points and ${mostFaces} faces`, '', 'L09');
     this.mesh = new SplitMesh(attributes.map((a) => a.components));
     this.values_ = attributes.map(() => new ValueDecoder());
     const coded = attributes.map((a) => ({ normal: a.kind === 'normal', components: a.components, bits: a.grid.bits }));
@@ -206,18 +206,19 @@ export class SplitStreamReader {
   async check(from: number, bytes: Uint8Array): Promise<void> {
     for (const [i, { offset, bytes: size, digest }] of this.head.blocks.entries())
       if (offset >= from && offset + size <= from + bytes.length && !samePrefix(await sha256(bytes.subarray(offset - from, offset - from + size)), digest))
-        throw new FormatError(file, `block ${i}`, 'bytes of the digest in the head', 'others');
+        throw new FormatError(file, `block ${i}`, 'the digest of the head', '', 'S09');
   }
   /** Decodes whole blocks that stand one after the other, digests checked. */
   async addBlocks(bytes: Uint8Array): Promise<void> {
     for (let at = 0; at < bytes.length; ) {
       const b = this.head.blocks[this.block_];
-      if (!b) throw new FormatError(file, `block ${this.block_}`, 'no more blocks', 'one');
+      const fail = (expected: string, rule = 'S08'): never => {
+        throw new FormatError(file, `block ${this.block_}`, expected, '', rule);
+      };
+      if (!b) return fail('no more blocks');
       const block = bytes.subarray(at, at + b.bytes);
-      if (block.length !== b.bytes)
-        throw new FormatError(file, `block ${this.block_}`, `${b.bytes} bytes`, `${block.length}`);
-      if (!samePrefix(await sha256(block), b.digest))
-        throw new FormatError(file, `block ${this.block_}`, 'bytes of the digest in the head', 'others');
+      if (block.length !== b.bytes) fail(`${b.bytes} bytes`);
+      if (!samePrefix(await sha256(block), b.digest)) fail('the digest of the head', 'S09');
       this.decode_(b, block);
       at += b.bytes;
     }
@@ -242,6 +243,6 @@ export class SplitStreamReader {
     const found = { points: this.mesh.points, wedges: this.mesh.wedges, faces: this.mesh.faceCount };
     for (const name of ['points', 'wedges', 'faces'] as const)
       if (scale[name] !== found[name])
-        throw new FormatError(file, `scale ${scale.scale}`, `${scale[name]} ${name}`, `${found[name]}`);
+        throw new FormatError(file, `scale ${scale.scale}`, `${scale[name]} ${name}`, `${found[name]}`, 'S19');
   }
 }

@@ -172,7 +172,7 @@ export class SplitVertices {
   }
   private codeExtraFace_(): void {
     const x = this.state_.number(this.state_.mesh.points);
-    if (x === this.state_.parent || x === this.state_.child) this.state_.fail('three points of a face', 'two');
+    if (x === this.state_.parent || x === this.state_.child) this.state_.fail('three points of a face', 'S22');
     const forward = this.state_.raw(1) !== 0;
     this.finishFace_(x, forward, none, none, none, 1, none);
   }
