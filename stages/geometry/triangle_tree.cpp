@@ -254,8 +254,7 @@ std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const
     if (box_distance2(n.box, p) > distance2) continue;
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
       const OnTriangle on = closest_on_triangle(corners_[i], p);
-      if (!(on.distance2 < distance2 ||
-            (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
+      if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
           !faces(corners_[i], facing))
         continue;
       distance2 = on.distance2;

@@ -9,9 +9,9 @@
 namespace texmesh::proxies {
 namespace {
 
-constexpr double kCage = 0.03;        // of the diagonal, to both sides
-constexpr double kSameSide = 0.15;    // cosine: walls at right angles are no match
-constexpr float kNoLength = 1e-20f;   // squares below this are no length
+constexpr double kCage = 0.03;       // of the diagonal, to both sides
+constexpr double kSameSide = 0.15;   // cosine: walls at right angles are no match
+constexpr float kNoLength = 1e-20f;  // squares below this are no length
 
 template <class T>
 T mean_of(const std::vector<T>& of_wedges, const Triangle& corner, const std::array<double, 3>& weight) {
@@ -89,7 +89,10 @@ TextureFrame texture_frame(const std::array<Vec3d, 3>& corner, const std::array<
 }
 
 BakeSource::BakeSource(const Mesh& mesh, const ShownMaterials& shown, const MaterialGroups& groups)
-    : mesh_(mesh), shown_(shown), groups_(groups.groups.size()), tree_index_(mesh.triangles.size(), kNoIndex) {
+    : mesh_(mesh),
+      shown_(shown),
+      groups_(groups.groups.size()),
+      tree_index_(mesh.triangles.size(), kNoIndex) {
   std::vector<Vec3d> points;
   Box3d box;
   for (const Vec3f p : mesh.positions) points.push_back(to_double(p));
