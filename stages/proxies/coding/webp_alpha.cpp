@@ -1,5 +1,6 @@
 #include "stages/proxies/coding/webp_alpha.h"
 
+#include <webp/decode.h>
 #include <webp/encode.h>
 
 #include <string>
@@ -31,6 +32,17 @@ Bytes encode_webp_alpha(const Pixels& rgba, int quality) {
   WebPMemoryWriterClear(&memory);
   if (!coded)
     throw StageError("proxies", "WebP", "a picture that libwebp can code", "error " + std::to_string(error));
+  return out;
+}
+
+Pixels decode_webp_alpha(const Bytes& file) {
+  int width = 0, height = 0;
+  if (!WebPGetInfo(file.data(), file.size(), &width, &height))
+    throw StageError("proxies", "WebP", "a file", std::to_string(file.size()) + " bytes");
+  Pixels out{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), 4, {}};
+  out.data.resize(std::size_t{4} * out.width_px * out.height_px);
+  if (!WebPDecodeRGBAInto(file.data(), file.size(), out.data.data(), out.data.size(), width * 4))
+    throw StageError("proxies", "WebP", "a file that decodes", "another");
   return out;
 }
 

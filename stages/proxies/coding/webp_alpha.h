@@ -9,4 +9,7 @@ namespace texmesh::proxies {
 /// refuses.
 Bytes encode_webp_alpha(const Pixels& rgba, int quality);
 
+/// The reverse, for files of encode_webp_alpha() alone.
+Pixels decode_webp_alpha(const Bytes& file);
+
 }  // namespace texmesh::proxies
