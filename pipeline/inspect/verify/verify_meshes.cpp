@@ -34,6 +34,17 @@ void check_previews_of(const Manifest& m, const ManifestScale& scale,
   }
 }
 
+/// Stored positions may lie a little outside of S_0's bounds.
+void check_bounds(const Manifest& m, const GlbFacts& facts, const std::string& entry, Findings& findings) {
+  const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
+  for (int k = 0; k < 3 && facts.has_bounds; ++k)
+    findings.require(
+        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
+        "mesh-bounds", entry, std::string("axis ") + "xyz"[k],
+        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
+        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
+}
+
 }  // namespace
 
 std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
@@ -45,13 +56,7 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
   if (findings.list().size() != before) return {};  // counts of a broken file say nothing
   findings.require_equal<std::uint64_t>(scale.triangles, facts.triangles, "mesh-counts", entry, "triangles");
   findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, "mesh-counts", entry, "vertices");
-  const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
-  for (int k = 0; k < 3 && facts.has_bounds; ++k)
-    findings.require(
-        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
-        "mesh-bounds", entry, std::string("axis ") + "xyz"[k],
-        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
-        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
+  check_bounds(m, facts, entry, findings);
   for (const TextureInfo& t : textures) {
     const std::string name = "texture/" + std::to_string(t.image);
     // A scale may have lost every triangle of a material; S_0 has them all.
@@ -69,6 +74,21 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
                      "texture/<image> of textures.json", facts.image_names[k]);
   check_previews_of(m, scale, textures, facts, findings);
   return std::move(facts.positions);
+}
+
+void check_proxy(const Manifest& m, const ManifestProxy& proxy, std::span<const std::uint8_t> glb,
+                 Findings& findings) {
+  const std::string& entry = proxy.glb.path;
+  const std::size_t before = findings.list().size();
+  const GlbFacts facts = check_glb(glb, entry, findings, GlbRules::kStandalone);
+  if (findings.list().size() != before) return;  // counts of a broken file say nothing
+  findings.require_equal<std::uint64_t>(proxy.triangles, facts.triangles, "mesh-counts", entry, "triangles");
+  findings.require_equal<std::uint64_t>(proxy.vertices, facts.vertices, "mesh-counts", entry, "vertices");
+  findings.require_equal<std::uint64_t>(proxy.texture_px, facts.largest_image_px, "mesh-images", entry,
+                                        "longest side of its textures");
+  findings.require(facts.codec != "draco", "mesh-codec", entry, "", "a mesh that needs no Draco",
+                   facts.codec);
+  check_bounds(m, facts, entry, findings);
 }
 
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,

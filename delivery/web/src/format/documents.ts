@@ -56,7 +56,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
-    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
+    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...[...m.scales.filter(hasGlb), ...m.proxies].map(({ glb }) => glb),
   ];
   for (const ref of refs) {
     if (!ref) continue;
