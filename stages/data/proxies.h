@@ -21,10 +21,10 @@ struct ProxyTexture {
 };
 
 /// Lit FLIP against S_0 with the source's texels, over the pixels of all views that either picture covers.
-struct ProxyLoss {
+struct ProxyPictureLoss {
   double displayed_px = 0;  // height of the object in the pictures
   double flip_mean = 0, flip_p95 = 0;
-  friend bool operator==(const ProxyLoss&, const ProxyLoss&) = default;
+  friend bool operator==(const ProxyPictureLoss&, const ProxyPictureLoss&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.displayed_px, s.flip_mean, s.flip_p95);
@@ -37,7 +37,7 @@ struct Proxy {
   std::uint64_t target_bytes = 0;  // what it was made for
   std::uint32_t triangles = 0, vertices = 0;  // as stored
   std::vector<ProxyTexture> textures;
-  std::vector<ProxyLoss> losses;  // by rising displayed_px, the same sizes in all proxies of a model
+  std::vector<ProxyPictureLoss> losses;  // by rising displayed_px, the same sizes in all proxies of a model
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.glb, s.target_bytes, s.triangles, s.vertices, s.textures, s.losses);

@@ -99,8 +99,8 @@ FlipSum ProxyStudio::compare(const RenderScene& scene, const std::vector<RenderT
   return sum;
 }
 
-std::vector<ProxyLoss> ProxyStudio::losses(const ShownModel& model, const RunContext& context) {
-  std::vector<ProxyLoss> out;
+std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const RunContext& context) {
+  std::vector<ProxyPictureLoss> out;
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
   for (std::size_t size = 0; size < kDisplayedPx.size(); ++size) {
     const FlipSum flip = compare(scene, model.shown.textures, size, context);

@@ -34,7 +34,7 @@ class ProxyStudio {
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
                   const RunContext& context);
   /// At all of them.
-  std::vector<ProxyLoss> losses(const ShownModel& model, const RunContext& context);
+  std::vector<ProxyPictureLoss> losses(const ShownModel& model, const RunContext& context);
 
  private:
   struct View {

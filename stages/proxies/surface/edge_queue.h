@@ -30,7 +30,8 @@ class EdgeQueue {
   void touch(std::uint32_t vertex) { ++versions_[vertex]; }
   void push(std::uint32_t a, std::uint32_t b, double cost, std::uint32_t tries = 0) {
     if (heap_.size() >= sweep_at_) sweep();
-    heap_.push_back({static_cast<float>(cost), std::min(a, b), std::max(a, b), versions_[a] + versions_[b], tries});
+    heap_.push_back(
+        {static_cast<float>(cost), std::min(a, b), std::max(a, b), versions_[a] + versions_[b], tries});
     std::push_heap(heap_.begin(), heap_.end());
   }
   QueuedEdge pop() {
