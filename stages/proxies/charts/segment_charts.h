@@ -20,8 +20,8 @@ struct SurfaceCharts {
 };
 
 /// Cuts a surface into charts by merging triangles from the bottom up, and flattens each chart along its mean
-/// normal. A chart is a disk of one group; no triangle flips, no two overlap; singular values of the flattening
-/// are within 3 x of each other. Same bytes everywhere. Throws Cancelled.
+/// normal. A chart is a disk of one group; no triangle flips, no two overlap; singular values of the
+/// flattening are within 3 x of each other. Same bytes everywhere. Throws Cancelled.
 SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context);
 
 }  // namespace texmesh

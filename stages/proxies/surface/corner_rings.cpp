@@ -15,7 +15,8 @@ CornerRings::CornerRings(std::vector<Triangle> triangles, std::size_t vertex_cou
       live_count_(triangles_.size()) {
   for (std::uint32_t c = 0; c < next_.size(); ++c) {
     const std::uint32_t v = triangles_[c / 3][c % 3];
-    if (first_[v] == kNoIndex) first_[v] = next_[c] = c;
+    if (first_[v] == kNoIndex)
+      first_[v] = next_[c] = c;
     else
       next_[c] = std::exchange(next_[first_[v]], c);
     ++valence_[v];
@@ -31,7 +32,8 @@ void CornerRings::triangles_at(std::uint32_t vertex, std::vector<std::uint32_t>&
     const std::uint32_t following = next_[c];
     if (live_[c / 3]) {
       out.push_back(c / 3);
-      if (last == kNoIndex) head = c;
+      if (last == kNoIndex)
+        head = c;
       else
         next_[last] = c;
       last = c;
@@ -56,7 +58,8 @@ void CornerRings::merge(std::uint32_t from, std::uint32_t to) {
     triangles_[c / 3][c % 3] = to;
     c = next_[c];
   } while (c != start);
-  if (first_[to] == kNoIndex) first_[to] = start;
+  if (first_[to] == kNoIndex)
+    first_[to] = start;
   else
     std::swap(next_[first_[to]], next_[start]);
   valence_[to] += std::exchange(valence_[from], 0);

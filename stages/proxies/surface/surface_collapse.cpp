@@ -73,8 +73,7 @@ void SurfaceCollapse::queue_edges_of(std::uint32_t vertex) {
       if (w != vertex) neighbours_.push_back(w);
   std::sort(neighbours_.begin(), neighbours_.end());
   neighbours_.erase(std::unique(neighbours_.begin(), neighbours_.end()), neighbours_.end());
-  for (const std::uint32_t w : neighbours_)
-    queue_.push(vertex, w, quadrics_.best_target(vertex, w).cost);
+  for (const std::uint32_t w : neighbours_) queue_.push(vertex, w, quadrics_.best_target(vertex, w).cost);
 }
 
 bool SurfaceCollapse::keeps_triangle(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
@@ -124,8 +123,8 @@ void SurfaceCollapse::find_folded(std::uint32_t a, std::uint32_t b) {
   }
 }
 
-/// What vanishes with folded triangles is a thin tip, or a component's last triangles. Planes do not count it,
-/// so it costs as if its area moved by its own size.
+/// What vanishes with folded triangles is a thin tip, or a component's last triangles. Planes do not count
+/// it, so it costs as if its area moved by its own size.
 double SurfaceCollapse::folded_cost() const {
   double cost = 0;
   for (const std::uint32_t t : folded_) {
@@ -146,14 +145,13 @@ void SurfaceCollapse::apply(std::uint32_t a, std::uint32_t b, Vec3d place) {
   queue_edges_of(a);
 }
 
-bool SurfaceCollapse::collapse(const QueuedEdge& edge) {
+bool SurfaceCollapse::collapse(const QueuedPair& edge) {
   const auto [cost, a, b, stamp, tries] = edge;
   if (rings_.valence(a) + rings_.valence(b) > kMostTriangles) return false;
   rings_.triangles_at(a, at_a_);
   rings_.triangles_at(b, at_b_);
-  if (std::none_of(at_b_.begin(), at_b_.end(), [&, v = a](std::uint32_t t) {
-        return has(rings_.triangles()[t], v);
-      }))
+  if (std::none_of(at_b_.begin(), at_b_.end(),
+                   [&, v = a](std::uint32_t t) { return has(rings_.triangles()[t], v); }))
     return false;  // the edge's triangles have vanished
   find_folded(a, b);
   const double extra = folded_cost();
@@ -197,7 +195,7 @@ void SurfaceCollapse::run(std::size_t triangle_count, const RunContext& context)
       queue_all_edges();
       if (queue_.empty()) return drop_smallest(triangle_count);
     }
-    if (const QueuedEdge edge = queue_.pop(); queue_.is_fresh(edge)) collapse(edge);
+    if (const QueuedPair edge = queue_.pop(); queue_.is_fresh(edge)) collapse(edge);
   }
 }
 

@@ -77,9 +77,8 @@ void SurfaceQuadrics::add_borders(const std::vector<Triangle>& triangles,
   for (std::size_t e = 0; e < edges.edge_count(); ++e) {
     const std::span<const std::uint32_t> half_edges = edges.edge(e);
     const std::uint32_t first_group = group[half_edges[0] / 3];
-    const bool one_group = std::all_of(half_edges.begin(), half_edges.end(), [&](std::uint32_t h) {
-      return group[h / 3] == first_group;
-    });
+    const bool one_group = std::all_of(half_edges.begin(), half_edges.end(),
+                                       [&](std::uint32_t h) { return group[h / 3] == first_group; });
     if (half_edges.size() > 1 && one_group) continue;
     for (const std::uint32_t h : half_edges) {
       const std::uint32_t a = corners[h], b = corners[next_corner(h)];

@@ -10,10 +10,10 @@
 namespace texmesh {
 
 /// Vertices with the planes of the triangles and borders that they stand for.
-/// Borders, and outlines of groups, get planes that stand upright on their triangles. A border's weight is its
-/// length times border_width: as if a strip of that width stood there. So it does not depend on how finely the
-/// border is divided. A component has no wider strip than the side of a square of its area, so dust is not
-/// held by its borders.
+/// Borders, and outlines of groups, get planes that stand upright on their triangles. A border's weight is
+/// its length times border_width: as if a strip of that width stood there. So it does not depend on how
+/// finely the border is divided. A component has no wider strip than the side of a square of its area, so
+/// dust is not held by its borders.
 class SurfaceQuadrics {
  public:
   SurfaceQuadrics(std::vector<Vec3d> places, const std::vector<Triangle>& triangles,
