@@ -145,7 +145,7 @@ void SurfaceCollapse::apply(std::uint32_t a, std::uint32_t b, Vec3d place) {
   queue_edges_of(a);
 }
 
-bool SurfaceCollapse::collapse(const QueuedEdge& edge) {
+bool SurfaceCollapse::collapse(const QueuedPair& edge) {
   const auto [cost, a, b, stamp, tries] = edge;
   if (rings_.valence(a) + rings_.valence(b) > kMostTriangles) return false;
   rings_.triangles_at(a, at_a_);
@@ -195,7 +195,7 @@ void SurfaceCollapse::run(std::size_t triangle_count, const RunContext& context)
       queue_all_edges();
       if (queue_.empty()) return drop_smallest(triangle_count);
     }
-    if (const QueuedEdge edge = queue_.pop(); queue_.is_fresh(edge)) collapse(edge);
+    if (const QueuedPair edge = queue_.pop(); queue_.is_fresh(edge)) collapse(edge);
   }
 }
 

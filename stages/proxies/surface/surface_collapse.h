@@ -8,7 +8,7 @@
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/proxies/surface/corner_rings.h"
-#include "stages/proxies/surface/edge_queue.h"
+#include "stages/proxies/surface/pair_queue.h"
 #include "stages/proxies/surface/surface_quadrics.h"
 
 namespace texmesh {
@@ -31,7 +31,7 @@ class SurfaceCollapse {
  private:
   void queue_all_edges();
   void queue_edges_of(std::uint32_t vertex);
-  bool collapse(const QueuedEdge& edge);
+  bool collapse(const QueuedPair& edge);
   bool keeps_shape(std::uint32_t a, std::uint32_t b, Vec3d place) const;
   bool keeps_triangle(std::uint32_t triangle, std::uint32_t a, std::uint32_t b, Vec3d place) const;
   void find_folded(std::uint32_t a, std::uint32_t b);
@@ -42,7 +42,7 @@ class SurfaceCollapse {
 
   CornerRings rings_;
   SurfaceQuadrics quadrics_;
-  EdgeQueue queue_;
+  PairQueue queue_;
   CollapseGuard guard_ = CollapseGuard::kFair;
   std::vector<std::uint32_t> at_a_, at_b_;  // triangles of the edge in hand
   std::vector<std::uint32_t> folded_;       // those that lie on each other after the collapse in hand

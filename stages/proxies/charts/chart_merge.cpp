@@ -1,0 +1,147 @@
+#include "stages/proxies/charts/chart_merge.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "format/base/no_index.h"
+#include "format/base/portable_math.h"
+#include "stages/geometry/mesh_topology.h"
+#include "stages/proxies/charts/flat_chart.h"
+
+namespace texmesh {
+namespace {
+
+// A flattened triangle's singular values are 1 and the cosine of its slope, so they lie within 2.5 x.
+constexpr double kLeastCosine = 0.4;
+constexpr double kMostStretch = 1.25;  // L2 of Sander et al. 2001: 1 for a flat chart
+constexpr double kRoundnessShare = 0.02;
+
+}  // namespace
+
+ChartMerge::ChartMerge(const ProxySurface& surface)
+    : surface_(surface), queue_(surface.triangles.size()), marks_(surface.positions.size(), 0) {
+  find_opposites();
+  start_charts();
+}
+
+void ChartMerge::find_opposites() {
+  std::vector<std::uint32_t> corners;
+  corners.reserve(3 * surface_.triangles.size());
+  for (const Triangle& t : surface_.triangles) corners.insert(corners.end(), t.begin(), t.end());
+  opposites_.assign(corners.size(), kNoIndex);
+  const EdgeTable edges = group_edges(corners, surface_.positions.size());
+  for (std::size_t e = 0; e < edges.edge_count(); ++e) {
+    const std::span<const std::uint32_t> pair = edges.edge(e);
+    if (pair.size() != 2 || corners[pair[0]] == corners[pair[1]]) continue;  // not the same way round
+    if (surface_.group[pair[0] / 3] != surface_.group[pair[1] / 3]) continue;
+    opposites_[pair[0]] = pair[1];
+    opposites_[pair[1]] = pair[0];
+  }
+}
+
+void ChartMerge::start_charts() {
+  const auto count = static_cast<std::uint32_t>(surface_.triangles.size());
+  charts_.resize(count);
+  shared_lengths_.assign(count, 0);
+  for (std::uint32_t t = 0; t < count; ++t) {
+    std::array<Vec3d, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = to_double(surface_.positions[surface_.triangles[t][k]]);
+    area_normals_.push_back(cross(p[1] - p[0], p[2] - p[0]) * 0.5);
+    areas_.push_back(length(area_normals_.back()));
+    chart_of_.push_back(t);
+    charts_[t] = {{t}, {3 * t, 3 * t + 1, 3 * t + 2}, area_normals_[t], areas_[t], 0};
+    for (std::size_t k = 0; k < 3; ++k) {
+      lengths_.push_back(length(p[(k + 1) % 3] - p[k]));
+      charts_[t].perimeter += lengths_.back();
+    }
+  }
+  for (std::uint32_t t = 0; t < count; ++t) queue_neighbours(t, true);
+}
+
+double ChartMerge::merge_cost(const GrowingChart& a, const GrowingChart& b, double shared_length) const {
+  const double area = a.area + b.area;
+  const double deviation = 1 - length(a.area_normal + b.area_normal) / area;
+  const double perimeter = a.perimeter + b.perimeter - 2 * shared_length;
+  return deviation + kRoundnessShare * perimeter * perimeter / (4 * portable::kPi * area);
+}
+
+void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
+  neighbours_.clear();
+  for (const std::uint32_t h : charts_[chart].border) {
+    if (opposites_[h] == kNoIndex) continue;
+    const std::uint32_t other = chart_of_[opposites_[h] / 3];
+    if (later_ones_only && other < chart) continue;
+    if (shared_lengths_[other] == 0) neighbours_.push_back(other);
+    shared_lengths_[other] += lengths_[h];
+  }
+  for (const std::uint32_t other : neighbours_)
+    queue_.push(chart, other,
+                merge_cost(charts_[chart], charts_[other], std::exchange(shared_lengths_[other], 0)));
+}
+
+/// Two disks make a disk when what they share is one path: one corner more than edges.
+bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
+  ++round_;
+  std::size_t shared_edges = 0, shared_corners = 0;
+  for (const std::uint32_t h : charts_[a].border) {
+    marks_[start_of(h)] = round_;
+    shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
+  }
+  for (const std::uint32_t h : charts_[b].border) shared_corners += marks_[start_of(h)] == round_;
+  return shared_corners == shared_edges + 1;
+}
+
+bool ChartMerge::stays_flat(const GrowingChart& a, const GrowingChart& b, Vec3d axis) const {
+  double flat_area = 0, stretch = 0;
+  for (const GrowingChart* chart : {&a, &b})
+    for (const std::uint32_t t : chart->triangles) {
+      const double flat = dot(area_normals_[t], axis);
+      if (!(flat >= kLeastCosine * areas_[t])) return false;
+      flat_area += flat;
+      stretch += areas_[t] * (1 + areas_[t] * areas_[t] / (flat * flat)) / 2;
+    }
+  const double area = a.area + b.area;
+  return stretch * flat_area <= kMostStretch * kMostStretch * area * area;
+}
+
+std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b) const {
+  std::vector<std::uint32_t> border;
+  for (const auto& [from, to] : {std::pair{a, b}, std::pair{b, a}})
+    for (const std::uint32_t h : charts_[from].border)
+      if (opposites_[h] == kNoIndex || chart_of_[opposites_[h] / 3] != to) border.push_back(h);
+  return border;
+}
+
+bool ChartMerge::try_merge(std::uint32_t a, std::uint32_t b) {
+  if (charts_[a].triangles.size() < charts_[b].triangles.size()) std::swap(a, b);
+  GrowingChart& into = charts_[a];
+  GrowingChart& from = charts_[b];
+  const Vec3d axis = normalized(into.area_normal + from.area_normal);
+  if (!stays_flat(into, from, axis) || !makes_disk(a, b)) return false;
+  std::vector<std::uint32_t> border = joint_border(a, b);
+  if (!border_is_simple(surface_, border, PlaneAxes(axis))) return false;
+  into.border = std::move(border);
+  into.area_normal = into.area_normal + from.area_normal;
+  into.area += from.area;
+  into.perimeter = 0;
+  for (const std::uint32_t h : into.border) into.perimeter += lengths_[h];
+  for (const std::uint32_t t : from.triangles) chart_of_[t] = a;
+  into.triangles.insert(into.triangles.end(), from.triangles.begin(), from.triangles.end());
+  from = {};
+  queue_.touch(a);
+  queue_.touch(b);
+  queue_neighbours(a, false);
+  return true;
+}
+
+void ChartMerge::run(const RunContext& context) {
+  for (std::size_t steps = 0; !queue_.empty(); ++steps) {
+    if (steps % 1024 == 0) context.check_cancelled();
+    if (const QueuedPair pair = queue_.pop(); queue_.is_fresh(pair)) try_merge(pair.a, pair.b);
+  }
+}
+
+}  // namespace texmesh
