@@ -263,7 +263,7 @@ void read_steps(const JsonAt& at, Manifest& m) {
   if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
 }
 
-std::vector<double> read_losses(const JsonAt& at, std::size_t sizes) {
+std::vector<double> read_proxy_losses(const JsonAt& at, std::size_t sizes) {
   at.array(sizes, sizes);
   std::vector<double> losses;
   for (std::size_t i = 0; i < sizes; ++i) losses.push_back(at[i].number(0, 1));
@@ -288,8 +288,8 @@ void read_proxies(const JsonAt& at, Manifest& m) {
     p.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
     p.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
     p.texture_px = static_cast<std::uint32_t>(at["texturePx"][i].integer(0, kMaxProxyTexturePx));
-    p.flip = read_losses(at["flip"][i], m.proxy_sizes_px.size());
-    p.flip_p95 = read_losses(at["flipP95"][i], m.proxy_sizes_px.size());
+    p.flip = read_proxy_losses(at["flip"][i], m.proxy_sizes_px.size());
+    p.flip_p95 = read_proxy_losses(at["flipP95"][i], m.proxy_sizes_px.size());
     m.proxies.push_back(std::move(p));
   }
 }

@@ -159,7 +159,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"proxies", kProxiesVersion,
-             "S_0 with the source's texels -> small meshes with atlases of their own"},
+             "S_0 with the source's texels -> small GLBs with atlases of their own"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kProxies),
             read_of(o, o.proxies), {"libjpeg-turbo", "libwebp", "meshoptimizer"}, bake_proxies),
       stage({"package", kPackageVersion, "everything -> the container"},

@@ -21,7 +21,7 @@ constexpr std::array<std::array<double, 3>, 10> kPlaces = [] {
 
 using CornerSums = std::array<Vec3d, 3>;
 
-Vec3d doubled_area(const AtlasMesh& mesh, const Triangle& t) {
+Vec3d face_vector(const AtlasMesh& mesh, const Triangle& t) {
   const auto at = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
   return cross(at(1) - at(0), at(2) - at(0));
 }
@@ -29,7 +29,7 @@ Vec3d doubled_area(const AtlasMesh& mesh, const Triangle& t) {
 CornerSums sums_of(const AtlasMesh& mesh, std::size_t triangle, const std::vector<Vec3d>& smooth,
                    const BakeSource& source) {
   const Triangle& t = mesh.triangles[triangle];
-  const Vec3d face = doubled_area(mesh, t);
+  const Vec3d face = face_vector(mesh, t);
   const double area = length(face);
   CornerSums out{};
   if (!(area > 0)) return out;
@@ -73,7 +73,7 @@ std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& sour
   const std::vector<std::uint32_t> shared = shared_normals(mesh);
   std::vector<Vec3d> face_sum(shared.size());
   for (const Triangle& t : mesh.triangles)
-    for (const std::uint32_t v : t) face_sum[shared[v]] = face_sum[shared[v]] + doubled_area(mesh, t);
+    for (const std::uint32_t v : t) face_sum[shared[v]] = face_sum[shared[v]] + face_vector(mesh, t);
   std::vector<Vec3d> smooth(shared.size());
   for (std::size_t v = 0; v < shared.size(); ++v) smooth[v] = normalized(face_sum[shared[v]]);
 
