@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stages/proxies/making/make_proxy.h"
+#include "stages/proxies/making/nested_rival.h"
 
 namespace texmesh {
 namespace {
@@ -40,6 +41,46 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
 }
 
+/// One model's proxies, smallest first.
+class ProxyRun {
+ public:
+  ProxyRun(const NestedScales& scales, const Mesh& mesh, const ShownMaterials& shown,
+           const BakeSource& source, const MaterialGroups& groups, const ProxiesOptions& options,
+           const RunContext& context)
+      : scales_(scales),
+        shown_(shown),
+        mode_(options.mode),
+        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
+        shop_{source, groups, surfaces_},
+        studio_(mesh, shown, context) {}
+
+  void add(int bytes, Proxies& out, const RunContext& context) {
+    std::optional<MadeProxy> made = shop_.make(static_cast<std::uint64_t>(bytes), split_for(bytes), context);
+    if (!made) return note_none(out.notes, bytes, "mesh and pictures do not fit");
+    if (!out.proxies.empty() && made->proxy.glb.size() <= out.proxies.back().glb.size())
+      return note_none(out.notes, bytes, "the whole object takes fewer");
+    made->proxy.losses = studio_.losses(made->shown, context);
+    if (mode_ == ProxyMode::kAuto) {
+      const auto rival = rival_flip(scales_, shown_, made->proxy.glb.size(), studio_, context);
+      if (rival && *rival <= made->proxy.losses[ProxyStudio::kMiddle].flip_mean)
+        return note_none(out.notes, bytes, "a scale with the source's atlas looks better for the same bytes");
+    }
+    out.proxies.push_back(std::move(made->proxy));
+  }
+
+ private:
+  static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
+    return static_cast<std::uint32_t>(std::min<double>(options.sizes.back() / kLeastBytesPerTriangle,
+                                                       static_cast<double>(mesh.triangles.size())));
+  }
+  const NestedScales& scales_;
+  const ShownMaterials& shown_;
+  ProxyMode mode_;
+  SurfaceLadder surfaces_;
+  ProxyWorkshop shop_;
+  ProxyStudio studio_;
+};
+
 }  // namespace
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
@@ -59,22 +100,9 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
     add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");
     return out;
   }
-  const double most = options.sizes.back() / kLeastBytesPerTriangle;
-  SurfaceLadder surfaces(mesh, groups, kLeastTriangles,
-                         static_cast<std::uint32_t>(std::min<double>(most, mesh.triangles.size())), inner);
-  ProxyWorkshop shop{source, groups, surfaces};
-  ProxyStudio studio(mesh, shown, inner);
+  ProxyRun run(scales, mesh, shown, source, groups, options, inner);
   for (std::size_t i = 0; i < options.sizes.size(); ++i) {
-    const int bytes = options.sizes[i];
-    std::optional<MadeProxy> made = shop.make(static_cast<std::uint64_t>(bytes), split_for(bytes), inner);
-    if (!made) {
-      note_none(out.notes, bytes, "mesh and pictures do not fit");
-    } else if (!out.proxies.empty() && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
-      note_none(out.notes, bytes, "the whole object takes fewer");
-    } else {
-      made->proxy.losses = studio.losses(made->shown, inner);
-      out.proxies.push_back(std::move(made->proxy));
-    }
+    run.add(options.sizes[i], out, inner);
     context.report(static_cast<double>(i + 1) / static_cast<double>(options.sizes.size()));
   }
   return out;
