@@ -9,20 +9,16 @@
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/proxies/charts/flat_chart.h"
 
 namespace texmesh {
 namespace {
 
-// A flattened triangle's singular values are 1 and the cosine of its slope, so they lie within 2.5 x.
-constexpr double kLeastCosine = 0.4;
-constexpr double kMostStretch = 1.25;  // L2 of Sander et al. 2001: 1 for a flat chart
 constexpr double kRoundnessShare = 0.02;
 
 }  // namespace
 
 ChartMerge::ChartMerge(const ProxySurface& surface)
-    : surface_(surface), queue_(surface.triangles.size()), marks_(surface.positions.size(), 0) {
+    : surface_(surface), queue_(surface.triangles.size()), layout_(surface), marks_(surface.positions.size(), 0) {
   find_opposites();
   start_charts();
 }
@@ -94,19 +90,6 @@ bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
   return shared_corners == shared_edges + 1;
 }
 
-bool ChartMerge::stays_flat(const GrowingChart& a, const GrowingChart& b, Vec3d axis) const {
-  double flat_area = 0, stretch = 0;
-  for (const GrowingChart* chart : {&a, &b})
-    for (const std::uint32_t t : chart->triangles) {
-      const double flat = dot(area_normals_[t], axis);
-      if (!(flat >= kLeastCosine * areas_[t])) return false;
-      flat_area += flat;
-      stretch += areas_[t] * (1 + areas_[t] * areas_[t] / (flat * flat)) / 2;
-    }
-  const double area = a.area + b.area;
-  return stretch * flat_area <= kMostStretch * kMostStretch * area * area;
-}
-
 std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b) const {
   std::vector<std::uint32_t> border;
   for (const auto& [from, to] : {std::pair{a, b}, std::pair{b, a}})
@@ -119,17 +102,18 @@ bool ChartMerge::try_merge(std::uint32_t a, std::uint32_t b) {
   if (charts_[a].triangles.size() < charts_[b].triangles.size()) std::swap(a, b);
   GrowingChart& into = charts_[a];
   GrowingChart& from = charts_[b];
-  const Vec3d axis = normalized(into.area_normal + from.area_normal);
-  if (!stays_flat(into, from, axis) || !makes_disk(a, b)) return false;
-  std::vector<std::uint32_t> border = joint_border(a, b);
-  if (!border_is_simple(surface_, border, PlaneAxes(axis))) return false;
+  if (!makes_disk(a, b)) return false;
+  std::vector<std::uint32_t> border = joint_border(a, b), triangles = into.triangles;
+  triangles.insert(triangles.end(), from.triangles.begin(), from.triangles.end());
+  if (!layout_.try_disk(triangles, border, into.area_normal + from.area_normal)) return false;
+  layout_.keep_tried(triangles);
   into.border = std::move(border);
   into.area_normal = into.area_normal + from.area_normal;
   into.area += from.area;
   into.perimeter = 0;
   for (const std::uint32_t h : into.border) into.perimeter += lengths_[h];
   for (const std::uint32_t t : from.triangles) chart_of_[t] = a;
-  into.triangles.insert(into.triangles.end(), from.triangles.begin(), from.triangles.end());
+  into.triangles = std::move(triangles);
   from = {};
   queue_.touch(a);
   queue_.touch(b);
