@@ -14,11 +14,14 @@ namespace texmesh {
 namespace {
 
 constexpr double kRoundnessShare = 0.02;
+// At an edge of more triangles charts end: their pairs would take time that grows with the square.
+constexpr std::size_t kMostSheets = 64;
 
 }  // namespace
 
 ChartMerge::ChartMerge(const ProxySurface& surface)
     : surface_(surface), queue_(surface.triangles.size()), layout_(surface), marks_(surface.positions.size(), 0) {
+  measure_triangles();
   find_opposites();
   start_charts();
 }
@@ -29,12 +32,37 @@ void ChartMerge::find_opposites() {
   for (const Triangle& t : surface_.triangles) corners.insert(corners.end(), t.begin(), t.end());
   opposites_.assign(corners.size(), kNoIndex);
   const EdgeTable edges = group_edges(corners, surface_.positions.size());
-  for (std::size_t e = 0; e < edges.edge_count(); ++e) {
-    const std::span<const std::uint32_t> pair = edges.edge(e);
-    if (pair.size() != 2 || corners[pair[0]] == corners[pair[1]]) continue;  // not the same way round
-    if (surface_.group[pair[0] / 3] != surface_.group[pair[1] / 3]) continue;
-    opposites_[pair[0]] = pair[1];
-    opposites_[pair[1]] = pair[0];
+  for (std::size_t e = 0; e < edges.edge_count(); ++e)
+    if (edges.edge(e).size() <= kMostSheets) pair_half_edges(edges.edge(e));
+}
+
+/// Where several sheets meet in an edge, those go on in each other that turn least.
+void ChartMerge::pair_half_edges(std::span<const std::uint32_t> half_edges) {
+  struct Candidate {
+    double turn;
+    std::uint32_t a, b;
+    auto operator<=>(const Candidate&) const = default;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < half_edges.size(); ++i)
+    for (std::size_t j = i + 1; j < half_edges.size(); ++j) {
+      const std::uint32_t a = half_edges[i], b = half_edges[j];
+      if (start_of(a) == start_of(b)) continue;  // not the same way round
+      if (surface_.group[a / 3] != surface_.group[b / 3]) continue;
+      candidates.push_back({-dot(normalized(area_normals_[a / 3]), normalized(area_normals_[b / 3])), a, b});
+    }
+  std::sort(candidates.begin(), candidates.end());
+  for (const auto& [turn, a, b] : candidates)
+    if (opposites_[a] == kNoIndex && opposites_[b] == kNoIndex) opposites_[a] = b, opposites_[b] = a;
+}
+
+void ChartMerge::measure_triangles() {
+  for (const Triangle& t : surface_.triangles) {
+    std::array<Vec3d, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = to_double(surface_.positions[t[k]]);
+    area_normals_.push_back(cross(p[1] - p[0], p[2] - p[0]) * 0.5);
+    areas_.push_back(length(area_normals_.back()));
+    for (std::size_t k = 0; k < 3; ++k) lengths_.push_back(length(p[(k + 1) % 3] - p[k]));
   }
 }
 
@@ -43,16 +71,9 @@ void ChartMerge::start_charts() {
   charts_.resize(count);
   shared_lengths_.assign(count, 0);
   for (std::uint32_t t = 0; t < count; ++t) {
-    std::array<Vec3d, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) p[k] = to_double(surface_.positions[surface_.triangles[t][k]]);
-    area_normals_.push_back(cross(p[1] - p[0], p[2] - p[0]) * 0.5);
-    areas_.push_back(length(area_normals_.back()));
     chart_of_.push_back(t);
-    charts_[t] = {{t}, {3 * t, 3 * t + 1, 3 * t + 2}, area_normals_[t], areas_[t], 0};
-    for (std::size_t k = 0; k < 3; ++k) {
-      lengths_.push_back(length(p[(k + 1) % 3] - p[k]));
-      charts_[t].perimeter += lengths_.back();
-    }
+    const double perimeter = lengths_[3 * t] + lengths_[3 * t + 1] + lengths_[3 * t + 2];
+    charts_[t] = {{t}, {3 * t, 3 * t + 1, 3 * t + 2}, area_normals_[t], areas_[t], perimeter};
   }
   for (std::uint32_t t = 0; t < count; ++t) queue_neighbours(t, true);
 }
@@ -78,15 +99,18 @@ void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
                 merge_cost(charts_[chart], charts_[other], std::exchange(shared_lengths_[other], 0)));
 }
 
-/// Two disks make a disk when what they share is one path: one corner more than edges.
+/// Two disks make a disk when what they share is one path: one corner more than edges. All corners count, not
+/// those of the borders alone: sheets may meet in a point.
 bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
-  ++round_;
   std::size_t shared_edges = 0, shared_corners = 0;
-  for (const std::uint32_t h : charts_[a].border) {
-    marks_[start_of(h)] = round_;
+  for (const std::uint32_t h : charts_[a].border)
     shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
-  }
-  for (const std::uint32_t h : charts_[b].border) shared_corners += marks_[start_of(h)] == round_;
+  round_ += 2;
+  for (const std::uint32_t t : charts_[a].triangles)
+    for (const std::uint32_t p : surface_.triangles[t]) marks_[p] = round_ - 1;
+  for (const std::uint32_t t : charts_[b].triangles)
+    for (const std::uint32_t p : surface_.triangles[t])
+      if (marks_[p] == round_ - 1) marks_[p] = round_, ++shared_corners;
   return shared_corners == shared_edges + 1;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Inside proxies only: triangles grow together to charts.
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "format/base/vec.h"
@@ -28,7 +29,9 @@ class ChartMerge {
   const ChartLayout& layout() const { return layout_; }
 
  private:
+  void measure_triangles();
   void find_opposites();
+  void pair_half_edges(std::span<const std::uint32_t> half_edges);
   void start_charts();
   void queue_neighbours(std::uint32_t chart, bool later_ones_only);
   double merge_cost(const GrowingChart& a, const GrowingChart& b, double shared_length) const;
