@@ -71,7 +71,8 @@ bool ChartLayout::unfold(std::span<const std::uint32_t> triangles, std::span<con
   const auto vertex = [&](std::uint32_t c) { return vertex_of_[surface_.triangles[c / 3][c % 3]]; };
   const double distance = length(corner_position(b) - corner_position(a));
   std::vector<Vec2d> found;
-  if (vertex(a) != vertex(b)) found = conformal_map(disk_, disk_own_, count, {vertex(a), vertex(b)}, distance);
+  if (vertex(a) != vertex(b))
+    found = conformal_map(disk_, disk_own_, count, {vertex(a), vertex(b)}, distance);
   if (!found.empty())
     for (const std::uint32_t t : triangles)
       for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) tried_[c] = found[vertex(c)];

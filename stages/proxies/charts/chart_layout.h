@@ -10,8 +10,8 @@
 
 namespace texmesh {
 
-/// Lays disks of triangles into planes, and keeps the places of those that became charts. A chart's area in its
-/// plane is its area on the surface.
+/// Lays disks of triangles into planes, and keeps the places of those that became charts. A chart's area in
+/// its plane is its area on the surface.
 class ChartLayout {
  public:
   /// Every triangle lies in its own plane at first.

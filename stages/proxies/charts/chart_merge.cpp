@@ -13,14 +13,17 @@
 namespace texmesh {
 namespace {
 
-constexpr double kRoundnessShare = 0.02;
+constexpr double kRoundnessShare = 0.3;
 // At an edge of more triangles charts end: their pairs would take time that grows with the square.
 constexpr std::size_t kMostSheets = 64;
 
 }  // namespace
 
 ChartMerge::ChartMerge(const ProxySurface& surface)
-    : surface_(surface), queue_(surface.triangles.size()), layout_(surface), marks_(surface.positions.size(), 0) {
+    : surface_(surface),
+      queue_(surface.triangles.size()),
+      layout_(surface),
+      marks_(surface.positions.size(), 0) {
   measure_triangles();
   find_opposites();
   start_charts();

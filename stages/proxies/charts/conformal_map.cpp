@@ -37,7 +37,8 @@ std::vector<Vec2d> conformal_map(std::span<const Triangle> triangles, std::span<
       if (row < 0) continue;
       for (std::size_t j = 0; j < 3; ++j) {
         const Complex product = std::conj(w[i]) * w[j];
-        if (const int at = column[triangles[t][j]]; at >= 0) entries.emplace_back(row, at, product);
+        if (const int at = column[triangles[t][j]]; at >= 0)
+          entries.emplace_back(row, at, product);
         else if (triangles[t][j] == pinned[1])
           right[row] -= product * distance;
       }

@@ -11,8 +11,8 @@
 
 namespace texmesh {
 
-/// Least-squares conformal map of a disk (Levy et al. 2002). `triangles`: indices of vertices, all of which are
-/// in use; `own`: the same triangles in their own planes; two vertices far from each other are pinned at
+/// Least-squares conformal map of a disk (Levy et al. 2002). `triangles`: indices of vertices, all of which
+/// are in use; `own`: the same triangles in their own planes; two vertices far from each other are pinned at
 /// `distance`. Returns a place per vertex; empty when the equations have no solution.
 std::vector<Vec2d> conformal_map(std::span<const Triangle> triangles, std::span<const OwnPlane> own,
                                  std::size_t vertex_count, std::array<std::uint32_t, 2> pinned,

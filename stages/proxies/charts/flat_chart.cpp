@@ -84,8 +84,8 @@ bool border_is_simple(const ProxySurface& surface, std::span<const std::uint32_t
   segments.reserve(half_edges.size());
   for (const std::uint32_t h : half_edges) {
     const std::uint32_t next = next_corner(h);
-    segments.push_back({places[h], places[next], surface.triangles[h / 3][h % 3],
-                        surface.triangles[next / 3][next % 3]});
+    segments.push_back(
+        {places[h], places[next], surface.triangles[h / 3][h % 3], surface.triangles[next / 3][next % 3]});
   }
   std::sort(segments.begin(), segments.end(), [](const BorderSegment& a, const BorderSegment& b) {
     return a.left() != b.left() ? a.left() < b.left() : a.from_position < b.from_position;
