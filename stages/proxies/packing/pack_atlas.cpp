@@ -68,7 +68,7 @@ class AtlasPacking {
   TextureSize size_;
   std::uint32_t cell_px_;
   double area_ = 0;
-  std::vector<std::uint32_t> order_;                   // of charts: the longest first
+  std::vector<std::vector<std::uint32_t>> orders_;     // of charts, to try
   std::vector<std::vector<std::uint32_t>> triangles_;  // per chart
   std::vector<PlacedChart> placed_;
 };
