@@ -9,20 +9,22 @@
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/proxies/charts/flat_chart.h"
 
 namespace texmesh {
 namespace {
 
-// A flattened triangle's singular values are 1 and the cosine of its slope, so they lie within 2.5 x.
-constexpr double kLeastCosine = 0.4;
-constexpr double kMostStretch = 1.25;  // L2 of Sander et al. 2001: 1 for a flat chart
-constexpr double kRoundnessShare = 0.02;
+constexpr double kRoundnessShare = 0.3;
+// At an edge of more triangles charts end: their pairs would take time that grows with the square.
+constexpr std::size_t kMostSheets = 64;
 
 }  // namespace
 
 ChartMerge::ChartMerge(const ProxySurface& surface)
-    : surface_(surface), queue_(surface.triangles.size()), marks_(surface.positions.size(), 0) {
+    : surface_(surface),
+      queue_(surface.triangles.size()),
+      layout_(surface),
+      marks_(surface.positions.size(), 0) {
+  measure_triangles();
   find_opposites();
   start_charts();
 }
@@ -33,12 +35,37 @@ void ChartMerge::find_opposites() {
   for (const Triangle& t : surface_.triangles) corners.insert(corners.end(), t.begin(), t.end());
   opposites_.assign(corners.size(), kNoIndex);
   const EdgeTable edges = group_edges(corners, surface_.positions.size());
-  for (std::size_t e = 0; e < edges.edge_count(); ++e) {
-    const std::span<const std::uint32_t> pair = edges.edge(e);
-    if (pair.size() != 2 || corners[pair[0]] == corners[pair[1]]) continue;  // not the same way round
-    if (surface_.group[pair[0] / 3] != surface_.group[pair[1] / 3]) continue;
-    opposites_[pair[0]] = pair[1];
-    opposites_[pair[1]] = pair[0];
+  for (std::size_t e = 0; e < edges.edge_count(); ++e)
+    if (edges.edge(e).size() <= kMostSheets) pair_half_edges(edges.edge(e));
+}
+
+/// Where several sheets meet in an edge, those go on in each other that turn least.
+void ChartMerge::pair_half_edges(std::span<const std::uint32_t> half_edges) {
+  struct Candidate {
+    double turn;
+    std::uint32_t a, b;
+    auto operator<=>(const Candidate&) const = default;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < half_edges.size(); ++i)
+    for (std::size_t j = i + 1; j < half_edges.size(); ++j) {
+      const std::uint32_t a = half_edges[i], b = half_edges[j];
+      if (start_of(a) == start_of(b)) continue;  // not the same way round
+      if (surface_.group[a / 3] != surface_.group[b / 3]) continue;
+      candidates.push_back({-dot(normalized(area_normals_[a / 3]), normalized(area_normals_[b / 3])), a, b});
+    }
+  std::sort(candidates.begin(), candidates.end());
+  for (const auto& [turn, a, b] : candidates)
+    if (opposites_[a] == kNoIndex && opposites_[b] == kNoIndex) opposites_[a] = b, opposites_[b] = a;
+}
+
+void ChartMerge::measure_triangles() {
+  for (const Triangle& t : surface_.triangles) {
+    std::array<Vec3d, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = to_double(surface_.positions[t[k]]);
+    area_normals_.push_back(cross(p[1] - p[0], p[2] - p[0]) * 0.5);
+    areas_.push_back(length(area_normals_.back()));
+    for (std::size_t k = 0; k < 3; ++k) lengths_.push_back(length(p[(k + 1) % 3] - p[k]));
   }
 }
 
@@ -47,16 +74,9 @@ void ChartMerge::start_charts() {
   charts_.resize(count);
   shared_lengths_.assign(count, 0);
   for (std::uint32_t t = 0; t < count; ++t) {
-    std::array<Vec3d, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) p[k] = to_double(surface_.positions[surface_.triangles[t][k]]);
-    area_normals_.push_back(cross(p[1] - p[0], p[2] - p[0]) * 0.5);
-    areas_.push_back(length(area_normals_.back()));
     chart_of_.push_back(t);
-    charts_[t] = {{t}, {3 * t, 3 * t + 1, 3 * t + 2}, area_normals_[t], areas_[t], 0};
-    for (std::size_t k = 0; k < 3; ++k) {
-      lengths_.push_back(length(p[(k + 1) % 3] - p[k]));
-      charts_[t].perimeter += lengths_.back();
-    }
+    const double perimeter = lengths_[3 * t] + lengths_[3 * t + 1] + lengths_[3 * t + 2];
+    charts_[t] = {{t}, {3 * t, 3 * t + 1, 3 * t + 2}, area_normals_[t], areas_[t], perimeter};
   }
   for (std::uint32_t t = 0; t < count; ++t) queue_neighbours(t, true);
 }
@@ -82,29 +102,19 @@ void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
                 merge_cost(charts_[chart], charts_[other], std::exchange(shared_lengths_[other], 0)));
 }
 
-/// Two disks make a disk when what they share is one path: one corner more than edges.
+/// Two disks make a disk when what they share is one path: one corner more than edges. All corners count, not
+/// those of the borders alone: sheets may meet in a point.
 bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
-  ++round_;
   std::size_t shared_edges = 0, shared_corners = 0;
-  for (const std::uint32_t h : charts_[a].border) {
-    marks_[start_of(h)] = round_;
+  for (const std::uint32_t h : charts_[a].border)
     shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
-  }
-  for (const std::uint32_t h : charts_[b].border) shared_corners += marks_[start_of(h)] == round_;
+  round_ += 2;
+  for (const std::uint32_t t : charts_[a].triangles)
+    for (const std::uint32_t p : surface_.triangles[t]) marks_[p] = round_ - 1;
+  for (const std::uint32_t t : charts_[b].triangles)
+    for (const std::uint32_t p : surface_.triangles[t])
+      if (marks_[p] == round_ - 1) marks_[p] = round_, ++shared_corners;
   return shared_corners == shared_edges + 1;
-}
-
-bool ChartMerge::stays_flat(const GrowingChart& a, const GrowingChart& b, Vec3d axis) const {
-  double flat_area = 0, stretch = 0;
-  for (const GrowingChart* chart : {&a, &b})
-    for (const std::uint32_t t : chart->triangles) {
-      const double flat = dot(area_normals_[t], axis);
-      if (!(flat >= kLeastCosine * areas_[t])) return false;
-      flat_area += flat;
-      stretch += areas_[t] * (1 + areas_[t] * areas_[t] / (flat * flat)) / 2;
-    }
-  const double area = a.area + b.area;
-  return stretch * flat_area <= kMostStretch * kMostStretch * area * area;
 }
 
 std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b) const {
@@ -119,17 +129,18 @@ bool ChartMerge::try_merge(std::uint32_t a, std::uint32_t b) {
   if (charts_[a].triangles.size() < charts_[b].triangles.size()) std::swap(a, b);
   GrowingChart& into = charts_[a];
   GrowingChart& from = charts_[b];
-  const Vec3d axis = normalized(into.area_normal + from.area_normal);
-  if (!stays_flat(into, from, axis) || !makes_disk(a, b)) return false;
-  std::vector<std::uint32_t> border = joint_border(a, b);
-  if (!border_is_simple(surface_, border, PlaneAxes(axis))) return false;
+  if (!makes_disk(a, b)) return false;
+  std::vector<std::uint32_t> border = joint_border(a, b), triangles = into.triangles;
+  triangles.insert(triangles.end(), from.triangles.begin(), from.triangles.end());
+  if (!layout_.try_disk(triangles, border, into.area_normal + from.area_normal)) return false;
+  layout_.keep_tried(triangles);
   into.border = std::move(border);
   into.area_normal = into.area_normal + from.area_normal;
   into.area += from.area;
   into.perimeter = 0;
   for (const std::uint32_t h : into.border) into.perimeter += lengths_[h];
   for (const std::uint32_t t : from.triangles) chart_of_[t] = a;
-  into.triangles.insert(into.triangles.end(), from.triangles.begin(), from.triangles.end());
+  into.triangles = std::move(triangles);
   from = {};
   queue_.touch(a);
   queue_.touch(b);

@@ -1,11 +1,13 @@
 #pragma once
 // Inside proxies only: triangles grow together to charts.
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "format/base/vec.h"
 #include "stages/base/run_context.h"
 #include "stages/proxies/atlas_mesh.h"
+#include "stages/proxies/charts/chart_layout.h"
 #include "stages/proxies/surface/pair_queue.h"
 
 namespace texmesh {
@@ -24,14 +26,16 @@ class ChartMerge {
   explicit ChartMerge(const ProxySurface& surface);
   void run(const RunContext& context);
   const std::vector<GrowingChart>& charts() const { return charts_; }
+  const ChartLayout& layout() const { return layout_; }
 
  private:
+  void measure_triangles();
   void find_opposites();
+  void pair_half_edges(std::span<const std::uint32_t> half_edges);
   void start_charts();
   void queue_neighbours(std::uint32_t chart, bool later_ones_only);
   double merge_cost(const GrowingChart& a, const GrowingChart& b, double shared_length) const;
   bool makes_disk(std::uint32_t a, std::uint32_t b);
-  bool stays_flat(const GrowingChart& a, const GrowingChart& b, Vec3d axis) const;
   bool try_merge(std::uint32_t a, std::uint32_t b);
   std::vector<std::uint32_t> joint_border(std::uint32_t a, std::uint32_t b) const;
   std::uint32_t start_of(std::uint32_t half_edge) const {
@@ -46,6 +50,7 @@ class ChartMerge {
   std::vector<std::uint32_t> chart_of_;   // per triangle
   std::vector<GrowingChart> charts_;
   PairQueue queue_;
+  ChartLayout layout_;
   std::vector<std::uint32_t> marks_;    // per position: the last round that has marked it
   std::vector<double> shared_lengths_;  // per chart; 0 between calls
   std::vector<std::uint32_t> neighbours_;

@@ -61,14 +61,31 @@ PlaneAxes::PlaneAxes(Vec3d n) {
   y = cross(n, x);
 }
 
+OwnPlane::OwnPlane(const std::array<Vec3d, 3>& p) {
+  const Vec3d along = p[1] - p[0], other = p[2] - p[0];
+  base = length(along);
+  if (!(base > 0)) return;
+  apex = {dot(other, along) / base, length(cross(along, other)) / base};
+}
+
+FlatStretch flat_stretch(const OwnPlane& own, const Vec2d* p) {
+  const Vec2d s = (p[1] - p[0]) * (1 / own.base);
+  const Vec2d t = (p[2] - p[0] - s * own.apex.x) * (1 / own.apex.y);
+  const double ss = dot(s, s), tt = dot(t, t), st = dot(s, t);
+  const double root = std::sqrt((ss - tt) * (ss - tt) + 4 * st * st), determinant = cross(s, t);
+  const double largest2 = (ss + tt + root) / 2;
+  // The difference (ss + tt - root) / 2 would lose its digits.
+  return {largest2, largest2 > 0 ? determinant * determinant / largest2 : 0, determinant * own.area()};
+}
+
 bool border_is_simple(const ProxySurface& surface, std::span<const std::uint32_t> half_edges,
-                      const PlaneAxes& axes) {
+                      const std::vector<Vec2d>& places) {
   std::vector<BorderSegment> segments;
   segments.reserve(half_edges.size());
   for (const std::uint32_t h : half_edges) {
     const std::uint32_t next = next_corner(h);
-    const std::uint32_t a = surface.triangles[h / 3][h % 3], b = surface.triangles[next / 3][next % 3];
-    segments.push_back({axes(to_double(surface.positions[a])), axes(to_double(surface.positions[b])), a, b});
+    segments.push_back(
+        {places[h], places[next], surface.triangles[h / 3][h % 3], surface.triangles[next / 3][next % 3]});
   }
   std::sort(segments.begin(), segments.end(), [](const BorderSegment& a, const BorderSegment& b) {
     return a.left() != b.left() ? a.left() < b.left() : a.from_position < b.from_position;

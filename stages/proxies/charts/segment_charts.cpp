@@ -1,7 +1,6 @@
 #include "stages/proxies/charts/segment_charts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "format/base/no_index.h"
@@ -11,18 +10,12 @@
 namespace texmesh {
 namespace {
 
-/// Places of a chart's corners in its plane, and the box around them.
-void lay_flat(const ProxySurface& surface, const GrowingChart& chart, SurfaceCharts& out) {
-  const PlaneAxes axes(normalized(chart.area_normal));
+/// Turns a chart so that the box around it is small, and moves the box to the origin.
+void turn_chart(const GrowingChart& chart, const std::vector<Vec2d>& places, SurfaceCharts& out) {
   std::vector<Vec2d> points;
-  double flat_area = 0;
-  for (const std::uint32_t t : chart.triangles) {
-    for (std::size_t k = 0; k < 3; ++k)
-      points.push_back(axes(to_double(surface.positions[surface.triangles[t][k]])));
-    const Vec2d* p = &points[points.size() - 3];
-    flat_area += cross(p[1] - p[0], p[2] - p[0]) / 2;
-  }
-  const Vec2d side = smallest_box_side(points) * (flat_area > 0 ? std::sqrt(chart.area / flat_area) : 1);
+  for (const std::uint32_t t : chart.triangles)
+    for (std::size_t k = 0; k < 3; ++k) points.push_back(places[3 * std::size_t{t} + k]);
+  const Vec2d side = smallest_box_side(points);
   for (Vec2d& p : points) p = {dot(side, p), cross(side, p)};
   Vec2d low = points[0], high = points[0];
   for (const Vec2d p : points) {
@@ -50,7 +43,7 @@ SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& cont
   for (std::size_t t = 0; t < chart_of.size(); ++t) {
     if (number[chart_of[t]] == kNoIndex) {
       number[chart_of[t]] = out.chart_count++;
-      lay_flat(surface, merge.charts()[chart_of[t]], out);
+      turn_chart(merge.charts()[chart_of[t]], merge.layout().places(), out);
     }
     out.chart_of[t] = number[chart_of[t]];
   }

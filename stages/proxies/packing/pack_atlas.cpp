@@ -58,6 +58,8 @@ class AtlasPacking {
   }
 
  private:
+  void add_order(double (*size_of)(Vec2d box));
+  bool place_in_order(const std::vector<std::uint32_t>& order, double scale, const RunContext& context);
   Vec2d in_box(std::size_t corner, Vec2d box) const;
   ChartMask mask_at(std::uint32_t chart, const PlacedChart& at) const;
   bool place(std::uint32_t chart, PackingGrid& grid, double scale, std::uint64_t& room);
@@ -66,7 +68,7 @@ class AtlasPacking {
   TextureSize size_;
   std::uint32_t cell_px_;
   double area_ = 0;
-  std::vector<std::uint32_t> order_;                   // of charts: the longest first
+  std::vector<std::vector<std::uint32_t>> orders_;     // of charts, to try
   std::vector<std::vector<std::uint32_t>> triangles_;  // per chart
   std::vector<PlacedChart> placed_;
 };
@@ -75,7 +77,6 @@ AtlasPacking::AtlasPacking(const SurfaceCharts& charts, TextureSize size)
     : charts_(charts),
       size_(size),
       cell_px_((std::max(size.width_px, size.height_px) + kMostCells - 1) / kMostCells),
-      order_(charts.chart_count),
       triangles_(charts.chart_count),
       placed_(charts.chart_count) {
   for (std::uint32_t t = 0; t < charts.chart_of.size(); ++t) {
@@ -83,10 +84,19 @@ AtlasPacking::AtlasPacking(const SurfaceCharts& charts, TextureSize size)
     const Vec2d* p = &charts.plane[3 * std::size_t{t}];
     area_ += std::fabs(cross(p[1] - p[0], p[2] - p[0])) / 2;
   }
-  std::iota(order_.begin(), order_.end(), 0);
-  const auto longest = [&](std::uint32_t c) { return std::max(charts.size[c].x, charts.size[c].y); };
-  std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return longest(a) != longest(b) ? longest(a) > longest(b) : a < b;
+  // Which order packs best differs from atlas to atlas by 1 to 7 % of the texture.
+  add_order([](Vec2d box) { return box.x * box.y; });
+  add_order([](Vec2d box) { return std::max(box.x, box.y); });
+  add_order([](Vec2d box) { return box.x + box.y; });
+}
+
+/// Charts by falling size of their boxes.
+void AtlasPacking::add_order(double (*size_of)(Vec2d box)) {
+  std::vector<std::uint32_t>& order = orders_.emplace_back(charts_.chart_count);
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const double x = size_of(charts_.size[a]), y = size_of(charts_.size[b]);
+    return x != y ? x > y : a < b;
   });
 }
 
@@ -144,11 +154,17 @@ bool AtlasPacking::place(std::uint32_t chart, PackingGrid& grid, double scale, s
 }
 
 bool AtlasPacking::place_all(double scale, const RunContext& context) {
+  return std::any_of(orders_.begin(), orders_.end(),
+                     [&](const auto& order) { return place_in_order(order, scale, context); });
+}
+
+bool AtlasPacking::place_in_order(const std::vector<std::uint32_t>& order, double scale,
+                                  const RunContext& context) {
   const std::uint32_t width = size_.width_px / cell_px_, height = size_.height_px / cell_px_;
   if (width == 0 || height == 0) return false;
   PackingGrid grid(width, height, (size_.gutter_px + cell_px_ - 1) / cell_px_);
   std::uint64_t room = std::uint64_t{width} * height;
-  return std::all_of(order_.begin(), order_.end(), [&](std::uint32_t chart) {
+  return std::all_of(order.begin(), order.end(), [&](std::uint32_t chart) {
     context.check_cancelled();
     return place(chart, grid, scale, room);
   });
