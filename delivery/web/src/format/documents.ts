@@ -14,8 +14,8 @@ import * as layout from './layout';
 // Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
 // where there are none. Digests have been checked before.
 
-export { readAbout as about } from './about';
 export { readIndex } from './index_table';
+export { plainGlb } from './glb/plain_glb';
 export { requireSelfContained } from './self_contained_glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);

@@ -120,6 +120,9 @@ export interface Manifest {
   poster?: PosterRef;
 }
 
+/** What is shown first: the smallest proxy, where there is none the GLB of the coarsest scale. */
+export const firstPicture = ({ proxies, scales }: Manifest): EntryRef => (proxies[0] ?? scales[scales.length - 1]).glb;
+
 const largest = 1e300;
 const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
 const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge', 'displayPxFlip'] as const;

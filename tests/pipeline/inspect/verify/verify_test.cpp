@@ -98,7 +98,7 @@ TEST(Verify, Proxies) {
     for (Vec3f& v : large.positions) v.x *= 1.1f;
     p.proxies[1] = testing::make_glb(large, p.streams[preview_path(0)]).glb();
   }));
-  EXPECT_TRUE(caught("glb-image", [](PackageParts& p) {
+  EXPECT_TRUE(caught("glb-reference", [](PackageParts& p) {
     GlbParts named = testing::make_glb(testing::fine_mesh(), p.streams[preview_path(0)]);
     testing::name_previews(named);  // a proxy stands alone
     p.proxies[1] = named.glb();
@@ -108,7 +108,7 @@ TEST(Verify, Proxies) {
   const PackageParts sound = parts_with([](PackageParts& p) { testing::add_proxies(p); });
   EXPECT_TRUE(
       catches(PackagePatcher(sound.build()).edit(proxy_path(0), [](Bytes& b) { b.back() ^= 1; }).package(),
-              "digest", proxy_path(0)));
+              "entry-digest", proxy_path(0)));
   EXPECT_TRUE(catches(
       PackagePatcher(sound.build()).seal([](Manifest& m) { m.proxies[0].glb.digest.fill(1); }).package(),
       "reference", kManifestPath));
