@@ -35,7 +35,7 @@ if(TEXMESH_COMPILER)
   # Of the stages the data, and of each its one public header (tests/house/check_layers).
   texmesh_install_headers(stages "data/.*" "base/run_context\\.h")
   foreach(stage condition skeletonization ssf simplification perceptual_values fragmentation fill zim previews ladder lut
-      scales quality poster package)
+      scales quality poster proxies package)
     texmesh_install_headers(stages "${stage}/${stage}\\.h")
   endforeach()
   # Of the pipeline what a program calls, and what those headers name; tests/house/check_install sees that none misses.

@@ -21,20 +21,34 @@ const entries = { texmesh: 'index', open: 'open', reader: 'reader', worker: 'wor
  */
 const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 34 * 1024, texmeshAll: 50 * 1024, worker: 21 * 1024 };
 
+/**
+ * Workers decode documents. Where there are none, the page itself loads the workers' file, which has mostly come already: nothing is
+ * shipped twice. The reader stands without that file.
+ */
+const documentsOfWorkers = {
+  name: 'documents-of-workers',
+  resolveId: (id, importer) => (id === './documents' && importer?.endsWith('document_decoder.ts') ? { id: './worker.js', external: true } : null),
+};
+
+/** Private names, which end in _, and short ones: the same in every chunk. */
+const sources = readdirSync(join(here, 'src'), { recursive: true }).filter((name) => name.endsWith('.ts'));
+const privateNames = new Set(sources.flatMap((name) => readFileSync(join(here, 'src', name), 'utf8').match(/\b[a-z]\w*_(?!\w)/gi) ?? []));
+const mangled = { mangleProps: /^[a-z]\w*_$/i, mangleCache: Object.fromEntries([...privateNames].sort().map((name, i) => [name, `_${i.toString(36)}`])) };
+
 /** TypeScript by esbuild: types taken away from each file, each chunk minified. */
 const typescript = {
   name: 'typescript',
   resolveId: (id, importer) => (importer && /^\.\.?\//.test(id) ? join(dirname(importer), `${id}.ts`) : null),
   load: (file) =>
     file.endsWith('.ts') ? transform(readFileSync(file, 'utf8'), { loader: 'ts', target: 'es2022', sourcemap: 'external', sourcefile: file }) : null,
-  renderChunk: (code) => transform(code, { minify: true, format: 'esm', target: 'es2022', sourcemap: 'external' }),
+  renderChunk: (code) => transform(code, { minify: true, format: 'esm', target: 'es2022', sourcemap: 'external', ...mangled }),
 };
 
 async function bundled(entry) {
   const bundle = await rollup({
     input: { [entry]: join(here, 'src', `${entries[entry]}.ts`) },
     external: [/^three($|\/)/],
-    plugins: [typescript],
+    plugins: [...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), typescript],
     preserveEntrySignatures: 'allow-extension', // no file more that only passes names on
     onwarn: (warning) => { throw new Error(warning.message); },
   });

@@ -413,6 +413,9 @@ class Model:
         for s, at, size, digest in zip(*(columns[c] for c in ("scale", "offset", "bytes", "sha256"))):
             if not stream or at != stream["offset"]:
                 named[f"mesh/s{s:02}.glb"] = {"offset": at, "bytes": size, "sha256": digest}
+        proxies = m.get("proxies", {"offset": [], "bytes": [], "sha256": []})
+        for path, *ref in zip(proxy_paths(m), *(proxies[c] for c in ("offset", "bytes", "sha256"))):
+            named[path] = dict(zip(("offset", "bytes", "sha256"), ref))
         for path, ref in named.items():
             require(path in self.index, "R03", f"{path} is not in the index")
             expected = self.index[path]
@@ -467,8 +470,10 @@ class Model:
                 for _ in self.pictures.fragments(plane, rung):
                     pass
         coarsest = f"mesh/s{m['scales']['scale'][-1]:02}.glb"
+        for path, triangles in zip(proxy_paths(m), m.get("proxies", {}).get("triangles", [])):
+            check_proxy(p.read(path), path, triangles)
         glbs = {}
-        for path in (path for path in self.index if path.endswith(".glb")):
+        for path in (path for path in self.index if path.endswith(".glb") and path.startswith("mesh/")):
             glbs[int(path[6:8])] = check_glb(p.read(path), path, path == coarsest, self.textures, p.read)
         if "stream" in m:
             self.verify_stream(len(glbs[0].get("materials", [])))

@@ -148,6 +148,8 @@ def read_manifest(data):
             check_reference(take(m, name, "object"), name)
     check_scales(m)
     check_steps(m)
+    if "proxies" in m:
+        check_proxies(take(m, "proxies", "object"))
     return m
 
 
@@ -197,6 +199,30 @@ def check_scales(m):
     sizes = [columns["bytes"][k] for k in reversed(prefixes)]
     if sizes:
         require(stream["headBytes"] < sizes[0] and sizes[-1] <= stream["bytes"] and rises(sizes), "M19", "prefixes")
+
+
+def check_proxies(columns):
+    n, sizes = len(take(columns, "bytes", "list", 1, 8, "M23")), take(columns, "sizesPx", "list", 1, 8, "M23")
+    kinds = {"offset": ("int",), "bytes": ("int", 1), "sha256": ("digest",), "triangles": ("int", 1, MAX32),
+             "vertices": ("int", 1, MAX32), "texturePx": ("int", 0, 8192)}
+    for name, kind in kinds.items():
+        for value in take(columns, name, "list", n, n, "M23"):
+            check(value, name, *kind)
+    for name in ("flip", "flipP95"):
+        for losses in take(columns, name, "list", n, n, "M23"):
+            check(losses, name, "list", len(sizes), len(sizes), "M23")
+            for loss in losses:
+                check(loss, name, "number", 0, 1)
+    for size in sizes:
+        check(size, "sizesPx", "number", 1, 65536)
+    for offset in columns["offset"]:
+        check_offset(offset)
+    require(rises(sizes), "M23", "sizesPx")
+    require(rises(columns["bytes"]), "M24", "bytes of proxies")
+
+
+def proxy_paths(m):
+    return [f"proxies/{k:02}.glb" for k in range(len(m.get("proxies", {}).get("bytes", [])))]
 
 
 def check_steps(m):
@@ -273,7 +299,7 @@ def needed_paths(m, textures):
     paths = ["index.bin", "tables.bin", "textures.json", "quality.json", "about.json", "provenance.json"]
     stream = m.get("stream", {}).get("offset")
     paths += [f"mesh/s{s:02}.glb" for s, at in zip(m["scales"]["scale"], m["scales"]["offset"]) if at != stream]
-    paths += [path for name, path in OPTIONAL.items() if name in m]
+    paths += [path for name, path in OPTIONAL.items() if name in m] + proxy_paths(m)
     for p, t in enumerate(textures):
         paths += [f"preview/{p:03}.jpg"] if "mip" not in t else []
         paths += [f"source/{p:03}.{t['source']}"] if "source" in t else []
@@ -300,8 +326,11 @@ def check_entry_order(paths, m, textures):
         while done < len(meshes) and (r + 1) * len(meshes) >= (done + 1) * most:
             ladder.append(meshes[done])
             done += 1
-    order = ["manifest.json", coarsest, "index.bin", "textures.json", "quality.json"]
-    order += [f"texture/{p}/tables.pack" for p in planes] + ["tables.bin", "poster.jpg", "about.json"]
+    proxies = proxy_paths(m)
+    order = ["manifest.json", *(proxies[:1] or [coarsest]), "index.bin", "textures.json", "quality.json"]
+    order += [f"texture/{p}/tables.pack" for p in planes] + ["tables.bin"]
+    order += [coarsest, *proxies[1:]] if proxies else []
+    order += ["poster.jpg", "about.json"]
     order += [f"preview/{p:03}.jpg" for p in planes] + ladder + meshes[done:]
     others = set(paths) - set(order) - {"provenance.json", CREDENTIAL}
     order += sorted(others) + ["provenance.json", CREDENTIAL]
@@ -340,8 +369,8 @@ def check_source_rung(t, streams, plane):
         require(t[side] % (8 * most) == 0, "F12", f"{side} of plane {plane}")
 
 
-def check_glb(data, name, is_coarsest, textures, read):
-    """The JSON and the pictures of a GLB, whose JSON is returned; meshes are not decoded. `read` gives an entry."""
+def read_gltf(data, name):
+    """The JSON of a GLB, and how many bytes of the file it takes."""
     c = Cursor(data, "G01", name)
     magic, version, length, size, kind = c.get("IIIII")
     require((magic, version, length, kind) == (0x46546C67, 2, len(data), 0x4E4F534A), "G01", f"the head of {name}")
@@ -349,6 +378,25 @@ def check_glb(data, name, is_coarsest, textures, read):
         gltf = json.loads(c.raw(size).decode("utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise Refused(f"G01: {name}: {error}") from error
+    return gltf, size
+
+
+def check_proxy(data, name, triangles):
+    """The JSON of a proxy; meshes and pictures are not decoded."""
+    gltf, _ = read_gltf(data, name)
+    for part in ("buffers", "images"):
+        require(all("uri" not in p for p in gltf.get(part, [])), "G13", f"{name}: a URI in {part}")
+    require("KHR_draco_mesh_compression" not in gltf.get("extensionsUsed", []), "G15", f"{name}: coded by Draco")
+    views = [v.get("extensions", {}).get("EXT_meshopt_compression", {}) for v in gltf.get("bufferViews", [])]
+    good = all(v.get("mode", "TRIANGLES") in ("ATTRIBUTES", "TRIANGLES") and v.get("filter", "NONE") == "NONE" for v in views)
+    require(good, "G15", f"{name}: another mode or filter of meshopt")
+    corners = [gltf["accessors"][p["indices"]]["count"] for m in gltf.get("meshes", []) for p in m["primitives"]]
+    require(sum(corners) == 3 * triangles, "G14", f"{name}: triangles")
+
+
+def check_glb(data, name, is_coarsest, textures, read):
+    """The JSON and the pictures of a GLB; meshes are not decoded. `read` gives an entry."""
+    gltf, size = read_gltf(data, name)
     require(all("uri" not in b for b in gltf.get("buffers", [])), "G06", f"{name}: a buffer with a URI")
     previews = {f"../preview/{t.get('base', p):03}.jpg" for p, t in enumerate(textures)}
     images = {t["image"] for t in textures}

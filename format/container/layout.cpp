@@ -62,6 +62,8 @@ EntryName parse_any_spelling(std::string_view path) {
   EntryName name;
   if (consume_prefix(text, "mesh/s")) {
     if (consume_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
+  } else if (consume_prefix(text, "proxies/")) {
+    if (consume_number(text, name.number) && text == ".glb") name.kind = EntryKind::kProxy;
   } else if (consume_prefix(text, "preview/")) {
     if (consume_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
   } else if (consume_prefix(text, "source/")) {
@@ -78,6 +80,8 @@ std::string spell(const EntryName& name) {
   switch (name.kind) {
     case EntryKind::kMesh:
       return name.number > 9999 ? "" : mesh_path(static_cast<int>(name.number));
+    case EntryKind::kProxy:
+      return proxy_path(name.number);
     case EntryKind::kPreview:
       return preview_path(name.number);
     case EntryKind::kTableStreams:
@@ -96,12 +100,14 @@ std::string spell(const EntryName& name) {
 /// Which of the coarse places of the order an entry has.
 enum Place : int {
   kManifestPlace,
-  kFirstMesh,
+  kFirstPicture,
   kIndexPlace,
   kTexturesPlace,
   kQualityPlace,
   kTableStreamsPlace,
   kTablesPlace,
+  kCoarsestMesh,  // behind the tables where a proxy is the first picture
+  kProxies,
   kPosterPlace,
   kAboutPlace,
   kPreviews,
@@ -122,7 +128,13 @@ std::uint32_t mesh_rank(const EntryName& name) {
   return name.kind == EntryKind::kSplitStream ? kStreamRank : name.number;
 }
 
-Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
+/// What the order of a set of entries goes by.
+struct OrderFacts {
+  std::uint32_t coarsest_scale = 0, smallest_proxy = 0;
+  bool has_proxies = false;
+};
+
+Place place_of(const EntryName& name, const OrderFacts& facts) {
   switch (name.kind) {
     case EntryKind::kManifest:
       return kManifestPlace;
@@ -135,7 +147,10 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
     case EntryKind::kQuality:
       return kQualityPlace;
     case EntryKind::kMesh:
-      return name.number == coarsest_scale ? kFirstMesh : kInterleaved;
+      if (name.number != facts.coarsest_scale) return kInterleaved;
+      return facts.has_proxies ? kCoarsestMesh : kFirstPicture;
+    case EntryKind::kProxy:
+      return name.number == facts.smallest_proxy ? kFirstPicture : kProxies;
     case EntryKind::kPreview:
       return kPreviews;
     case EntryKind::kTableStreams:
@@ -163,6 +178,7 @@ Place place_of(const EntryName& name, std::uint32_t coarsest_scale) {
 }  // namespace
 
 std::string mesh_path(int scale) { return print("mesh/s%02d.glb", scale); }
+std::string proxy_path(std::uint32_t proxy) { return print("proxies/%02u.glb", proxy); }
 std::string preview_path(std::uint32_t plane) { return print("preview/%03u.jpg", plane); }
 std::string table_streams_path(std::uint32_t plane) { return print("texture/%u/tables.pack", plane); }
 std::string rung_path(std::uint32_t plane, std::uint32_t rung) {
@@ -185,17 +201,22 @@ EntryName parse_entry_path(const std::string& path) {
 }
 
 std::vector<std::string> streaming_order(std::vector<std::string> paths) {
-  std::uint32_t coarsest = 0, rungs = 0;
+  OrderFacts facts;
+  std::uint32_t rungs = 0;
   std::vector<std::uint32_t> meshes;  // the stream, then scales from coarse to fine
   for (const std::string& path : paths) {
     const EntryName name = parse_entry_path(path);
     if (is_mesh(name)) meshes.push_back(mesh_rank(name));
     if (name.kind == EntryKind::kRung) rungs = std::max(rungs, name.rung + 1);
+    if (name.kind == EntryKind::kProxy) {
+      facts.smallest_proxy = facts.has_proxies ? std::min(facts.smallest_proxy, name.number) : name.number;
+      facts.has_proxies = true;
+    }
   }
   std::ranges::sort(meshes, std::greater<>());
   const auto first = std::ranges::find_if(meshes, [](std::uint32_t rank) { return rank != kStreamRank; });
   if (first != meshes.end()) {
-    coarsest = *first;
+    facts.coarsest_scale = *first;
     meshes.erase(first);
   }
   // Mesh k of M (coarse to fine, without the coarsest) follows the first rung r of R with (r + 1) M >= (k +
@@ -210,7 +231,7 @@ std::vector<std::string> streaming_order(std::vector<std::string> paths) {
   std::vector<Key> keys;
   for (std::string& path : paths) {
     const EntryName name = parse_entry_path(path);
-    const Place place = place_of(name, coarsest);
+    const Place place = place_of(name, facts);
     const std::uint64_t step = place == kInterleaved ? step_of(name) : 0;
     // Scales count down from coarse to fine; planes count up.
     const std::uint64_t rank = is_mesh(name)      ? 0xffffffffu - mesh_rank(name)

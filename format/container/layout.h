@@ -30,8 +30,11 @@ inline constexpr const char* kContainerMediaType = "application/vnd.texmesh+zip"
 
 /// Most texture planes of a package, mips included, and most rungs of a plane.
 inline constexpr std::uint32_t kMaxPackagePlanes = 10000, kMaxPackageRungs = 100;
+/// Most baked proxies of a package.
+inline constexpr std::uint32_t kMaxPackageProxies = 8;
 
 std::string mesh_path(int scale);                                // mesh/s07.glb
+std::string proxy_path(std::uint32_t proxy);                     // proxies/00.glb; 0 = the smallest
 std::string preview_path(std::uint32_t plane);                   // preview/003.jpg
 std::string table_streams_path(std::uint32_t plane);             // texture/3/tables.pack
 std::string rung_path(std::uint32_t plane, std::uint32_t rung);  // texture/3/r07.pack; 0 = lowest rung
@@ -51,6 +54,7 @@ enum class EntryKind : std::uint8_t {
   kTextures,
   kQuality,
   kMesh,
+  kProxy,
   kPreview,
   kTableStreams,
   kRung,
@@ -66,16 +70,17 @@ enum class EntryKind : std::uint8_t {
 };
 struct EntryName {
   EntryKind kind = EntryKind::kOther;
-  std::uint32_t number = 0;  // scale of a mesh; plane of everything that belongs to a texture
+  std::uint32_t number =
+      0;  // scale of a mesh; number of a proxy; plane of everything that belongs to a texture
   std::uint32_t rung = 0, fragment = 0;
   std::string_view extension = "jpg";  // of a fragment file or source
 };
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
 
-/// The one order that SPEC.md prescribes for a set of entries: the first picture, what a first plan needs,
-/// then the other meshes (the stream, GLBs from coarse to fine) between texture rungs from low to high,
-/// provenance last. Depends on the set only, not on its order.
+/// The one order that SPEC.md prescribes for a set of entries: the first picture (the smallest proxy, else
+/// the coarsest GLB), what a first plan needs, then the other meshes (the stream, GLBs from coarse to fine)
+/// between texture rungs from low to high, provenance last. Depends on the set only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

@@ -91,6 +91,30 @@ Json scales_json(const std::vector<ManifestScale>& scales) {
   return j;
 }
 
+Json proxies_json(const Manifest& m) {
+  Json j;
+  j["sizesPx"] = m.proxy_sizes_px;
+  for (const char* name :
+       {"offset", "bytes", "sha256", "triangles", "vertices", "texturePx", "flip", "flipP95"})
+    j[name] = Json::array();
+  const auto digits = [](const std::vector<double>& values) {
+    Json out = Json::array();
+    for (const double v : values) out.push_back(six_digits(v));
+    return out;
+  };
+  for (const ManifestProxy& p : m.proxies) {
+    j["offset"].push_back(p.glb.offset);
+    j["bytes"].push_back(p.glb.bytes);
+    j["sha256"].push_back(to_hex(p.glb.digest));
+    j["triangles"].push_back(p.triangles);
+    j["vertices"].push_back(p.vertices);
+    j["texturePx"].push_back(p.texture_px);
+    j["flip"].push_back(digits(p.flip));
+    j["flipP95"].push_back(digits(p.flip_p95));
+  }
+  return j;
+}
+
 Json manifest_json(const Manifest& m) {
   Json j;
   j["format"] = "texmesh";
@@ -107,6 +131,7 @@ Json manifest_json(const Manifest& m) {
   j["scales"] = scales_json(m.scales);
   j["steps"] = Json::array();
   for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
+  if (!m.proxies.empty()) j["proxies"] = proxies_json(m);
   j["planeCount"] = m.plane_count;
   j["index"] = ref_json(m.index);
   j["tables"] = ref_json(m.tables);
@@ -240,6 +265,37 @@ void read_steps(const JsonAt& at, Manifest& m) {
   if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
 }
 
+std::vector<double> read_proxy_losses(const JsonAt& at, std::size_t sizes) {
+  at.array(sizes, sizes);
+  std::vector<double> losses;
+  for (std::size_t i = 0; i < sizes; ++i) losses.push_back(at[i].number(0, 1));
+  return losses;
+}
+
+void read_proxies(const JsonAt& at, Manifest& m) {
+  const JsonAt sizes = at["sizesPx"];
+  for (std::size_t i = 0, n = sizes.array(1, kMaxProxySizes); i < n; ++i) {
+    m.proxy_sizes_px.push_back(sizes[i].number(1, kMaxProxySizePx));
+    if (i > 0 && m.proxy_sizes_px[i] <= m.proxy_sizes_px[i - 1]) sizes[i].fail("a rising number", "another");
+  }
+  const std::size_t n = at["bytes"].array(1, kMaxPackageProxies);
+  for (const char* column : {"offset", "sha256", "triangles", "vertices", "texturePx", "flip", "flipP95"})
+    at[column].array(n, n);
+  for (std::size_t i = 0; i < n; ++i) {
+    ManifestProxy p;
+    p.glb = {proxy_path(static_cast<std::uint32_t>(i)), read_offset(at["offset"][i]),
+             at["bytes"][i].integer(1), at["sha256"][i].digest()};
+    if (i > 0 && p.glb.bytes <= m.proxies.back().glb.bytes)
+      at["bytes"][i].by("M24").fail("a rising number", std::to_string(p.glb.bytes));
+    p.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
+    p.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
+    p.texture_px = static_cast<std::uint32_t>(at["texturePx"][i].integer(0, kMaxProxyTexturePx));
+    p.flip = read_proxy_losses(at["flip"][i], m.proxy_sizes_px.size());
+    p.flip_p95 = read_proxy_losses(at["flipP95"][i], m.proxy_sizes_px.size());
+    m.proxies.push_back(std::move(p));
+  }
+}
+
 /// Scales whose column says the stream's offset are prefixes of it.
 void resolve_stream_scales(const JsonAt& at, Manifest& m) {
   std::uint64_t before = m.stream->head_bytes;
@@ -258,9 +314,13 @@ void resolve_stream_scales(const JsonAt& at, Manifest& m) {
 
 }  // namespace
 
+const EntryRef& first_picture(const Manifest& manifest) {
+  return manifest.proxies.empty() ? manifest.scales.back().glb : manifest.proxies.front().glb;
+}
+
 std::uint64_t start_bytes(const Manifest& manifest) {
-  const EntryRef& coarsest = manifest.scales.back().glb;
-  return coarsest.offset + coarsest.bytes;
+  const EntryRef& first = first_picture(manifest);
+  return first.offset + first.bytes;
 }
 
 std::string write_manifest(const Manifest& manifest) {
@@ -281,6 +341,7 @@ Manifest read_manifest(std::span<const std::uint8_t> json) {
   read_shape(at, m);
   read_scales(at["scales"], m);
   read_steps(at["steps"].by("M21"), m);
+  if (document.contains("proxies")) read_proxies(at["proxies"].by("M23"), m);
   m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
   read_paged_ref(at["index"], kIndexPath, m.index);
   read_paged_ref(at["tables"], kTablesPath, m.tables);

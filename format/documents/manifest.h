@@ -22,7 +22,7 @@ inline constexpr double kAnyDisplayPx = 1e9;
 inline constexpr std::size_t kMaxTitleBytes = 200;
 /// What a client asks for in its first request. A container whose first picture ends within these bytes is
 /// shown after one round trip (see start_bytes()).
-inline constexpr std::uint64_t kStartBytes = 65536;
+inline constexpr std::uint64_t kStartBytes = 45056;
 
 /// The measured figures (errors, p95, p99, display_px_*) are written with six significant digits.
 struct ManifestScale {
@@ -44,6 +44,23 @@ struct ManifestScale {
   std::string floor;
   friend bool operator==(const ManifestScale&, const ManifestScale&) = default;
 };
+
+/// A baked version of the whole object with an atlas and textures of its own: a GLB that any viewer opens
+/// alone.
+struct ManifestProxy {
+  EntryRef glb;  // proxy_path(k), k its place in Manifest::proxies
+  std::uint32_t triangles = 0, vertices = 0;
+  std::uint32_t texture_px = 0;  // longest side of its textures; 0 = it has none
+  // Mean FLIP of lit pictures against S_0 with the source's textures, and its 95th percentile, 0..1: one per
+  // Manifest::proxy_sizes_px.
+  std::vector<double> flip, flip_p95;
+  friend bool operator==(const ManifestProxy&, const ManifestProxy&) = default;
+};
+/// Most displayed heights at which proxies are measured, and the largest of them, px.
+inline constexpr std::size_t kMaxProxySizes = 8;
+inline constexpr double kMaxProxySizePx = 65536;
+/// Longest side that a proxy's textures may have.
+inline constexpr std::uint32_t kMaxProxyTexturePx = 8192;
 
 /// Longest side of a poster, px, and most bytes of its file.
 inline constexpr std::uint32_t kMaxPosterSide = 4096;
@@ -71,7 +88,10 @@ struct Manifest {
   double jnd = 0.1;
   std::vector<ManifestScale> scales;  // S_0 first
   std::vector<ManifestStep> steps;    // by the default rule, see viewing.h
-  std::uint32_t plane_count = 0;      // texture planes, mips included, see textures.json
+  std::vector<double>
+      proxy_sizes_px;  // displayed heights of ManifestProxy::flip, rising; none without proxies
+  std::vector<ManifestProxy> proxies;  // bytes rise strictly
+  std::uint32_t plane_count = 0;       // texture planes, mips included, see textures.json
   PagedRef index, tables;
   EntryRef textures, quality, provenance, about;
   std::optional<StreamRef> stream;  // vertex splits
@@ -80,7 +100,9 @@ struct Manifest {
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 
-/// Bytes from the container's begin to the end of the first picture, the GLB of the coarsest scale.
+/// What a client shows first: the smallest proxy, where there is none the GLB of the coarsest scale.
+const EntryRef& first_picture(const Manifest& manifest);
+/// Bytes from the container's begin to the end of the first picture.
 std::uint64_t start_bytes(const Manifest& manifest);
 
 /// Canonical JSON: fixed key order, shortest round-trip numbers, no blanks. FormatError when the manifest

@@ -51,6 +51,8 @@ class ManifestFiller {
     set_head(manifest_.tables, read_tables_head(*data_.at(kTablesPath)).bytes);
     for (ManifestScale& s : manifest_.scales)
       if (s.has_glb()) set(s.glb, mesh_path(s.scale));
+    for (std::size_t k = 0; k < manifest_.proxies.size(); ++k)
+      set(manifest_.proxies[k].glb, proxy_path(static_cast<std::uint32_t>(k)));
     fill_stream();
     manifest_.thesis.reset();
     if (by_path_.contains(kThesisPath)) set(manifest_.thesis.emplace(), kThesisPath);
@@ -89,16 +91,20 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
                    const std::vector<PackageEntry>& entries) {
   std::set<std::string> paths;
   for (const PackageEntry& e : entries) {
-    const EntryKind kind = parse_entry_path(e.path).kind;
+    const EntryName name = parse_entry_path(e.path);
+    const EntryKind kind = name.kind;
     if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures ||
         kind == EntryKind::kContentCredential)
       fail_package("entry " + e.path, "an entry that write_package does not make itself", e.path);
+    if (kind == EntryKind::kProxy && name.number >= manifest.proxies.size())
+      fail_package("manifest", "figures of " + e.path, "none");
     if (!paths.insert(e.path).second) fail_package("entry " + e.path, "one entry of that path", "two");
   }
   std::vector<std::string> needed{kTablesPath, kQualityPath, kProvenancePath, kAboutPath};
   if (manifest.poster) needed.emplace_back(kPosterPath);
   for (const ManifestScale& s : manifest.scales)
     needed.push_back(s.has_glb() ? mesh_path(s.scale) : kSplitStreamPath);
+  for (std::uint32_t k = 0; k < manifest.proxies.size(); ++k) needed.push_back(proxy_path(k));
   for (std::uint32_t p = 0; p < textures.size(); ++p) {
     if (textures[p].mip == 0) needed.push_back(preview_path(p));
     if (!textures[p].source_extension.empty()) needed.push_back(source_path(p, textures[p].source_extension));

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 
+#include "format/container/layout.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
@@ -15,7 +16,7 @@ namespace {
 
 struct ExtractArguments {
   std::string package, output, bytes, rung = "max", images = "auto";
-  int scale = -1, jobs = 0;
+  int scale = -1, proxy = -1, jobs = 0;
   double display_px = 0;
   bool recentre = false, lods = false, json = false;
 };
@@ -34,6 +35,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
     if (r.bytes == 0) throw UsageError("--bytes", "", "a number above 0", a.bytes);
   }
   if (a.scale >= 0) r.scale = a.scale;
+  if (a.proxy >= 0) r.proxy = static_cast<std::uint32_t>(a.proxy);
   r.rung = rung_of(a.rung);
   r.display_px = a.display_px;
   r.recentre = a.recentre;
@@ -63,9 +65,16 @@ void add_extract_options(Command& c, ExtractArguments& args) {
       c.option("--bytes", args.bytes,
                "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB")
           .value_name("SIZE");
-  c.option("--scale", args.scale,
-           "This scale (texmesh dump lists the scales); default: the scale that suits --display")
-      .integer_in(0, 99);
+  const Option scale =
+      c.option("--scale", args.scale,
+               "This scale (texmesh dump lists the scales); default: the scale that suits --display")
+          .integer_in(0, 99);
+  c.option("--proxy", args.proxy,
+           "This proxy, a small file with an atlas of its own (texmesh dump lists them), as it is: 0 = the "
+           "smallest")
+      .integer_in(0, kMaxPackageProxies - 1)
+      .excludes(bytes)
+      .excludes(scale);
   c.option("--rung", args.rung, "Quality of the textures: a rung's number, 0 = lowest, or max")
       .shows_default()
       .value_name("RUNG")
@@ -107,7 +116,7 @@ void add_extract_command(Command& app) {
       "--bytes chooses scale, size of the textures and their quality together: candidates are rendered lit, "
       "as texmesh render does, and compared with the package's best (FLIP). Colours, normals, roughness and "
       "the other maps get bytes for what they change in the picture, and the file is filled up to the last "
-      "2 %. Many triangles with a small texture nearly always look better than the reverse.\n"
+      "2 %. A proxy of the package is taken where it looks better. Many triangles with a small texture nearly always look better than the reverse.\n"
       "Meshes stay Draco coded (KHR_draco_mesh_compression), and WebP needs EXT_texture_webp. For viewers "
       "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "

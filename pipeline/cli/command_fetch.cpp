@@ -1,23 +1,24 @@
 #include <fmt/format.h>
 #include <chrono>
 #include <csignal>
-#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/transfer/package_transport.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
+#include "format/rules/proxy_choice.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/fetched_files.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/extract/glb/scale_file.h"
-#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 
@@ -26,7 +27,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
-namespace fs = std::filesystem;
 
 struct FetchArguments {
   DeliveryArguments delivery;
@@ -44,6 +44,7 @@ double seconds_since(Clock::time_point start) {
 /// What the transfer came to.
 struct Fetched {
   int scale = 0;
+  std::optional<std::uint32_t> proxy;  // shown instead of the scale
   double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
   std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
   HttpPlace place;
@@ -51,44 +52,6 @@ struct Fetched {
   LoadReport load;
   std::optional<LoadReport> refined;
   double texture_flip = 0, flip = 0;  // predicted of what has come
-};
-
-/// Files as `unpack --fragments files` names them, the best rung of each fragment.
-class FragmentWriter {
- public:
-  FragmentWriter(PackageReader& package, const std::string& folder) : package_(package), folder_(folder) {}
-  void add(const LoadedFragment& f) {
-    if (folder_.empty()) return;
-    auto& streams = streams_[{f.plane, f.fragment}];
-    const Codec codec = package_.textures()[f.plane].codec;
-    if (!codec_traits(codec).incremental) streams.clear();
-    streams.insert(streams.end(), f.streams.begin(), f.streams.end());
-    rungs_[{f.plane, f.fragment}] = f.rung;
-  }
-  void write() {
-    for (const auto& [where, streams] : streams_) {
-      const auto [plane, fragment] = where;
-      const Codec codec = package_.textures()[plane].codec;
-      const CodecTraits& traits = codec_traits(codec);
-      const auto rung = static_cast<std::uint32_t>(rungs_[where]);
-      const Bytes file =
-          join_fragment(codec, package_.table_stream(plane, traits.incremental ? 0 : rung),
-                        std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
-      write_entry(fragment_file_path(plane, rung, fragment, traits.extension), file);
-    }
-  }
-  void write_entry(const std::string& path, const Bytes& bytes) {
-    if (folder_.empty()) return;
-    const fs::path file = fs::path(folder_) / path;
-    fs::create_directories(file.parent_path());
-    write_file_atomically(file.string(), bytes);
-  }
-
- private:
-  PackageReader& package_;
-  std::string folder_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Bytes>> streams_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::int32_t> rungs_;
 };
 
 /// What has moved so far and in which time, without the round trips.
@@ -107,6 +70,19 @@ struct Moved {
   }
 };
 
+/// The proxy, checked; the smallest one mostly comes with the first answer.
+void fetch_proxy(PackageReader& package, std::uint32_t proxy, FetchedFiles& writer, Fetched& f,
+                 Moved& moved) {
+  const EntryRef& entry = package.manifest().proxies[proxy].glb;
+  const auto start = Clock::now();
+  if (entry.offset + entry.bytes > kStartBytes || package.store().is_folder()) {
+    package.store().prefetch({entry});
+    moved.add(entry.bytes, seconds_since(start), f.rtt_s);
+  }
+  writer.write_entry(proxy_path(proxy), package.proxy_glb(proxy));
+  f.mesh_bytes += entry.bytes;
+}
+
 /// Everything that is needed to decide: one round trip, with what the first answer lacks of the coarsest
 /// mesh.
 void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Moved& moved) {
@@ -116,8 +92,10 @@ void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Mov
   std::uint64_t bytes = 0;
   for (const EntryRef& e : wanted) f.mesh_bytes += e.bytes, bytes += e.bytes;
   if (!package.store().is_folder()) {
-    // From the index to the end of the tables, the table streams between them.
-    const std::uint64_t end = m.tables.offset + m.tables.bytes;
+    // From the index to the end of the tables, the table streams between them; behind a proxy the coarsest
+    // mesh stands there, too.
+    const EntryRef& last = m.proxies.empty() ? m.tables : m.scales.back().glb;
+    const std::uint64_t end = last.offset + last.bytes;
     wanted.push_back({"", m.index.offset, end - m.index.offset, {}});
     bytes = end - std::min(end, kStartBytes);
   }
@@ -133,12 +111,24 @@ void fetch_documents(PackageReader& package, bool table_streams, Fetched& f, Mov
   package.scale_glb(m.scales.back().scale);
 }
 
-/// The scale that looks best in the time, as a plan over such a link says.
-int scale_in_time(PackageReader& package, DeliveryRequest request, double rtt_s, double bytes_s) {
-  request.network.rtt_s = rtt_s;
+/// What looks best in the time, as a plan over such a link says.
+void choose_in_time(PackageReader& package, DeliveryRequest request, double bytes_s, Fetched& f) {
+  request.network.rtt_s = f.rtt_s;
   request.network.link = BandwidthTrace::constant(bytes_s);
-  if (request.scale >= 0) return request.scale;
-  return plan_delivery(package, request).scale;
+  f.scale = request.scale;
+  if (request.scale >= 0) return;
+  const DeliveryPlan plan = plan_delivery(package, request);
+  f.scale = plan.scale;
+  f.proxy = plan.proxy;
+}
+
+/// A proxy instead of a scale: nothing else is needed.
+void end_with_proxy(PackageReader& package, double displayed_px, Clock::time_point start,
+                    FetchedFiles& writer, Fetched& f, Moved& moved) {
+  if (*f.proxy > 0) fetch_proxy(package, *f.proxy, writer, f, moved);
+  f.scale = package.manifest().scales.back().scale;
+  f.mesh_s = f.end_s = seconds_since(start);
+  f.flip = f.texture_flip = proxy_loss(package.manifest(), *f.proxy, displayed_px).flip;
 }
 
 Bytes fetch_mesh(PackageReader& package, Fetched& f, Moved& moved) {
@@ -186,28 +176,9 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
   f.flip = picture_flip(package.quality(), options.displayed_px, f.scale, parts);
 }
 
-Fetched fetch(const FetchArguments& a) {
-  const DeliveryRequest request = delivery_request(a.delivery);
-  const HttpOptions http = http_options(request.time_limit_s);
-  std::vector<std::string> mirrors{a.delivery.package};
-  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
-  Fetched f;
-  Moved moved;
-  const auto start = Clock::now();
-  auto opened = open_urls(mirrors, http);
-  const HttpStore& server = *opened;
-  PackageReader package(std::move(opened));
-  f.place = server.place();
-  f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
-  fetch_documents(package, !a.output.empty(), f, moved);
-  f.first_picture_s = seconds_since(start);
-  f.scale = scale_in_time(package, request, f.rtt_s,
-                          request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s));
-  FragmentWriter writer(package, a.output);
-  writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
-  f.mesh_s = seconds_since(start);
-  f.place = server.place();
-
+void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,
+                    PackageReader& package, Clock::time_point start, double bytes_s, FetchedFiles& writer,
+                    Fetched& f) {
   f.whole_rungs = a.whole_rungs || !f.place.ranges;
   const auto transport = fragment_transport(a, f.place, http, package.store());
   TextureLoader loader(package, *transport, f.whole_rungs);
@@ -217,8 +188,7 @@ Fetched fetch(const FetchArguments& a) {
   load.htc = request.htc;
   load.htc.rtt_s = f.rtt_s;
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
-  load.htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
+  load.htc.throughput.initial_bytes_s = bytes_s;
   load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
   const auto budget_bytes =
       static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
@@ -234,6 +204,44 @@ Fetched fetch(const FetchArguments& a) {
   f.texture_bytes = loader.bytes();
   writer.write();
   predict(package, loader, planes, load.list, f);
+}
+
+Fetched fetch(const FetchArguments& a) {
+  const DeliveryRequest request = delivery_request(a.delivery);
+  const HttpOptions http = http_options(request.time_limit_s);
+  std::vector<std::string> mirrors{a.delivery.package};
+  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
+  Fetched f;
+  Moved moved;
+  const auto start = Clock::now();
+  auto opened = open_urls(mirrors, http);
+  const HttpStore& server = *opened;
+  PackageReader package(std::move(opened));
+  f.place = server.place();
+  f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
+  const auto bytes_s = [&] {
+    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
+  };
+  FetchedFiles writer(package, a.output);
+  const bool proxies = !package.manifest().proxies.empty() && request.scale < 0;
+  if (proxies) {
+    fetch_proxy(package, 0, writer, f, moved);
+    f.first_picture_s = seconds_since(start);
+    if (request.rule == StepRule::kFlip) f.proxy = serving_proxy(package.manifest(), request.displayed_px);
+  }
+  if (!f.proxy) {
+    fetch_documents(package, !a.output.empty(), f, moved);
+    if (!proxies) f.first_picture_s = seconds_since(start);
+    choose_in_time(package, request, bytes_s(), f);
+  }
+  if (f.proxy) {
+    end_with_proxy(package, request.displayed_px, start, writer, f, moved);
+    return f;
+  }
+  writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
+  f.mesh_s = seconds_since(start);
+  f.place = server.place();
+  fetch_textures(a, request, http, package, start, bytes_s(), writer, f);
   return f;
 }
 
@@ -257,12 +265,21 @@ Json fetch_json(const Fetched& f, double limit_s) {
          {"cancelled", f.load.cancelled},
          {"texture_flip", f.texture_flip},
          {"flip", f.flip}};
+  if (f.proxy) j["proxy"] = *f.proxy;
   if (f.refined)
     j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
   return j;
 }
 
 void print_fetched(const Fetched& f, double limit_s) {
+  if (f.proxy) {
+    std::cout << fmt::format(
+        "{}: first picture after {:.3f} s, {} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
+        "predicted FLIP {:.4f} (0 = equal to the source): nothing else is needed\n",
+        shown_url(f.place.url), f.first_picture_s, proxy_path(*f.proxy), f.mesh_s, grouped(f.mesh_bytes),
+        1000 * f.rtt_s, f.flip);
+    return;
+  }
   std::cout << fmt::format(
       "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
       "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "format/container/layout.h"
 #include "pipeline/cli/check/check_gate.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
@@ -33,26 +34,33 @@ Json planes_json(PackageReader& package, const DeliveryPlan& p, const FragmentLi
 }
 
 Json plan_json(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
-  return {{"version", 1},
-          {"scale", p.scale},
-          {"planes", planes_json(package, p, list)},
-          {"first_picture_s", p.first_picture_s},
-          {"mesh_s", p.mesh_s},
-          {"complete_s", p.complete_s},
-          {"bytes",
-           {{"bootstrap", p.bootstrap_bytes},
-            {"first_picture", p.first_picture_bytes},
-            {"mesh", p.mesh_bytes},
-            {"tables", p.table_bytes},
-            {"texture", p.texture_bytes},
-            {"all", p.bytes()}}},
-          {"fragments", p.textures.rungs.size()},
-          {"skipped", p.textures.skipped},
-          {"mean_quality", p.mean_quality},
-          {"worst_quality", p.worst_quality},
-          {"texture_flip", p.texture_flip},
-          {"flip", p.flip},
-          {"warnings", p.warnings}};
+  Json j{{"version", 1},
+         {"scale", p.scale},
+         {"planes", planes_json(package, p, list)},
+         {"first_picture_s", p.first_picture_s},
+         {"mesh_s", p.mesh_s},
+         {"complete_s", p.complete_s},
+         {"bytes",
+          {{"bootstrap", p.bootstrap_bytes},
+           {"first_picture", p.first_picture_bytes},
+           {"mesh", p.mesh_bytes},
+           {"tables", p.table_bytes},
+           {"texture", p.texture_bytes},
+           {"all", p.bytes()}}},
+         {"fragments", p.textures.rungs.size()},
+         {"skipped", p.textures.skipped},
+         {"mean_quality", p.mean_quality},
+         {"worst_quality", p.worst_quality},
+         {"texture_flip", p.texture_flip},
+         {"flip", p.flip},
+         {"warnings", p.warnings}};
+  if (p.proxy) j["proxy"] = *p.proxy;
+  return j;
+}
+
+/// What is shown at the end.
+std::string shown_text(const DeliveryPlan& p) {
+  return p.proxy ? proxy_path(*p.proxy) : fmt::format("S_{}", p.scale);
 }
 
 /// How many fragments get which quality: "12 x 30, 40 x 53".
@@ -80,10 +88,10 @@ std::string textures_text(PackageReader& package, const DeliveryPlan& p, const F
 
 std::string plan_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   std::string text = fmt::format(
-      "S_{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
+      "{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
       "first picture {} ({} bytes), mesh complete {}, textures {}\n"
       "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-      p.scale, p.flip, p.texture_flip, moment(p.first_picture_s),
+      shown_text(p), p.flip, p.texture_flip, moment(p.first_picture_s),
       grouped(p.bootstrap_bytes + p.first_picture_bytes), moment(p.mesh_s), moment(p.complete_s),
       grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes), grouped(p.mesh_bytes),
       grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes()));
@@ -92,10 +100,11 @@ std::string plan_text(PackageReader& package, const DeliveryPlan& p, const Fragm
 
 std::string budget_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
   return fmt::format(
-             "S_{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
+             "{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
              "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-             p.scale, p.flip, p.texture_flip, grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes),
-             grouped(p.mesh_bytes), grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes())) +
+             shown_text(p), p.flip, p.texture_flip, grouped(p.bootstrap_bytes),
+             grouped(p.first_picture_bytes), grouped(p.mesh_bytes), grouped(p.table_bytes),
+             grouped(p.texture_bytes), grouped(p.bytes())) +
          textures_text(package, p, list);
 }
 
@@ -177,6 +186,8 @@ void add_plan_command(Command& app) {
       "plan plays the transfer over a model of the network and needs nothing but the package. FLIP is "
       "how much a lit picture of that height differs from one of the source, in the mean over the object: 0 "
       "= equal, 1 = as different as can be. It comes from the table that compile measured.\n"
+      "A proxy, a small file with an atlas of its own, is shown where it cannot be told from the source at "
+      "that height, or where it looks better than any scale in the time or the bytes.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c.on_run([args] { return run_plan(*args); });
 }

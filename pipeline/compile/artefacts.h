@@ -20,6 +20,7 @@
 #include "stages/data/poster.h"
 #include "stages/data/predictors.h"
 #include "stages/data/previews.h"
+#include "stages/data/proxies.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/scale_map.h"
 #include "stages/data/skeleton.h"
@@ -69,6 +70,7 @@ inline constexpr Artefact<ThesisTables> kThesisTables{"lut.thesis"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
 inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
 inline constexpr Artefact<Poster> kPoster{"poster"};
+inline constexpr Artefact<Proxies> kProxies{"proxies"};
 inline constexpr Artefact<Bytes> kPackage{"package"};
 
 }  // namespace texmesh

@@ -1,11 +1,22 @@
 #include "pipeline/compile/options.h"
 
 #include "format/base/errors.h"
+#include "format/container/layout.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/graph/option_text.h"
 
 namespace texmesh {
 namespace {
+
+void check_proxies(const std::vector<int>& sizes, const std::string& source) {
+  if (sizes.size() > kMaxPackageProxies)
+    throw InputError(source, "proxies.sizes", "at most " + std::to_string(kMaxPackageProxies) + " sizes",
+                     std::to_string(sizes.size()));
+  for (std::size_t i = 1; i < sizes.size(); ++i)
+    if (sizes[i] <= sizes[i - 1])
+      throw InputError(source, "proxies.sizes", "strictly rising sizes",
+                       std::to_string(sizes[i - 1]) + " before " + std::to_string(sizes[i]));
+}
 
 void check_rungs(const std::vector<int>& rungs, const std::string& source, const char* name) {
   if (rungs.size() > 16) throw InputError(source, name, "at most 16 qualities", std::to_string(rungs.size()));
@@ -48,6 +59,7 @@ CompileOptions resolve_options(CompileOptions o) {
 
 void check_options(const CompileOptions& o, const std::string& source) {
   check_meta(o, source);
+  check_proxies(o.proxies.sizes, source);
   check_rungs(o.ladder.rungs, source, "ladder.rungs");
   check_rungs(o.ladder.normal_rungs, source, "ladder.normal_rungs");
   check_rungs(o.ladder.data_rungs, source, "ladder.data_rungs");

@@ -10,6 +10,7 @@
 #include "stages/package/package.h"
 #include "stages/perceptual_values/perceptual_values.h"
 #include "stages/poster/poster.h"
+#include "stages/proxies/proxies.h"
 #include "stages/quality/quality.h"
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
@@ -37,6 +38,7 @@ struct CompileOptions {
   ScalesOptions scales;
   QualityOptions quality;
   PosterOptions poster;
+  ProxiesOptions proxies;
   PackageOptions package;
 
   /// Paths of the fields that a profile or a flag has set, to whatever value: resolve_options() leaves them
@@ -59,6 +61,7 @@ struct CompileOptions {
     f("scales", s.scales);
     f("quality", s.quality);
     f("poster", s.poster);
+    f("proxies", s.proxies);
     f("package", s.package);
   }
 };

@@ -73,14 +73,22 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
   return {std::move(measured), std::move(notes)};
 }
 
+Results<Proxies> bake_proxies(const NestedScales& scales, const Materials& materials,
+                              const Fragments& fragments, const Planes& planes, const ProxiesOptions& options,
+                              const RunContext& context) {
+  Proxies made = make_proxies(scales, materials, fragments, planes, options, context);
+  Notes notes = made.notes;
+  return {std::move(made), std::move(notes)};
+}
+
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
                   const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
-                  const MeasuredQuality& quality, const Poster& poster, const About& source,
-                  const std::string& provenance, const PackageOptions& options, double jnd,
-                  const RunContext& context) {
+                  const MeasuredQuality& quality, const Poster& poster, const Proxies& proxies,
+                  const About& source, const std::string& provenance, const PackageOptions& options,
+                  double jnd, const RunContext& context) {
   return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                          quality, poster, source, jnd, provenance, options, context);
+                          quality, poster, proxies, source, jnd, provenance, options, context);
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -150,9 +158,12 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
+      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
+            inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kProxies),
+            read_of(o, o.proxies), {"libjpeg-turbo", "libwebp", "meshoptimizer"}, bake_proxies),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kThesisTables, kScaleFiles, kQuality, kPoster, kSourceAbout, kProvenance),
+                   kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
             outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
   };
 }

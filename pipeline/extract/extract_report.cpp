@@ -32,6 +32,7 @@ std::string extract_json(const Extracted& e, const ExtractRequest& request, cons
            {"triangles", e.triangles},
            {"mesh_bytes", e.mesh_bytes},
            {"images", images}};
+  if (e.proxy) out["proxy"] = *e.proxy;
   if (request.bytes > 0) {
     out["asked_bytes"] = request.bytes;
     out["within"] = e.within;
@@ -45,7 +46,8 @@ std::string extract_json(const Extracted& e, const ExtractRequest& request, cons
 }
 
 std::string extract_text(const Extracted& e, const ExtractRequest& request, const std::string& file) {
-  std::string text = fmt::format("{}: {} bytes, S_{} with {} triangles", file, grouped(e.glb.size()), e.scale,
+  std::string text = fmt::format("{}: {} bytes, {} with {} triangles", file, grouped(e.glb.size()),
+                                 e.proxy ? fmt::format("proxy {}", *e.proxy) : fmt::format("S_{}", e.scale),
                                  grouped(e.triangles));
   for (std::size_t l = 1; l < e.levels.size(); ++l)
     text += fmt::format("{} S_{}", l == 1 ? ", levels" : ",", e.levels[l]);

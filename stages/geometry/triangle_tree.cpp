@@ -50,6 +50,11 @@ double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction)
   return t > 0 ? t : kInfinity;
 }
 
+bool faces(const std::array<Vec3d, 3>& c, const TriangleTree::Facing& facing) {
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+  return dot(n, facing.direction) > facing.least_cosine * length(n);
+}
+
 void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
   const Vec3d along = c[j] - c[i];
   const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - c[i], along) / l, 0.0, 1.0) : 0;
@@ -90,6 +95,8 @@ TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triang
   build(0, static_cast<std::uint32_t>(triangles.size()), centres);
   for (std::size_t i = 0; i < order_.size(); ++i)
     for (std::size_t k = 0; k < 3; ++k) corners_[i][k] = points[triangles[order_[i]][k]];
+  place_.resize(order_.size());
+  for (std::size_t i = 0; i < order_.size(); ++i) place_[order_[i]] = static_cast<std::uint32_t>(i);
   // Children stand behind their parents, so one pass from the back fits all boxes.
   for (std::size_t n = nodes_.size(); n-- > 0;) {
     Node& node = nodes_[n];
@@ -174,6 +181,93 @@ TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
 TriangleTree::Nearest TriangleTree::nearest(Vec3d p, std::uint64_t& tried) const {
   const Found best = search(p, kInfinity, tried);
   return {best.triangle, best.on.weight};
+}
+
+/// A line, and the least crossing that has been found of it.
+struct TriangleTree::LineSearch {
+  Vec3d origin, direction;
+  double best = 0;  // |t|
+  std::optional<Nearest> found;
+
+  /// Whether the line is in the box for some |t| <= best.
+  bool meets(const Box3d& box) const {
+    double from = -best, to = best;
+    for (int k = 0; k < 3; ++k) {
+      if (direction[k] == 0) {
+        if (origin[k] < box.min[k] || origin[k] > box.max[k]) return false;
+        continue;
+      }
+      const double a = (box.min[k] - origin[k]) / direction[k], b = (box.max[k] - origin[k]) / direction[k];
+      from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
+    }
+    // Rounding may make a flat box a little too thin.
+    return from <= to + 1e-12 * (std::fabs(from) + std::fabs(to));
+  }
+  void try_triangle(const std::array<Vec3d, 3>& c, std::uint32_t triangle, const Facing& facing) {
+    const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
+    const double det = dot(u, h);
+    if (det == 0) return;
+    const Vec3d s = origin - c[0];
+    const double a = dot(s, h) / det;
+    if (!(a >= 0 && a <= 1)) return;
+    const Vec3d q = cross(s, u);
+    const double b = dot(direction, q) / det;
+    if (!(b >= 0 && a + b <= 1)) return;
+    const double t = std::fabs(dot(v, q) / det);
+    if (!(t <= best) || (found && t == best && triangle >= found->triangle) || !faces(c, facing)) return;
+    best = t;
+    found = {triangle, {1 - a - b, a, b}};
+  }
+};
+
+std::optional<TriangleTree::Nearest> TriangleTree::crossing(Vec3d origin, Vec3d direction, double reach,
+                                                            const Facing& facing,
+                                                            std::optional<std::uint32_t> guess) const {
+  LineSearch line{origin, direction, reach, std::nullopt};
+  if (guess && *guess < place_.size()) line.try_triangle(corners_[place_[*guess]], *guess, facing);
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (!line.meets(n.box)) continue;
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
+      line.try_triangle(corners_[i], order_[i], facing);
+    if (n.count > 0) continue;
+    std::uint32_t nearer = at + 1, farther = n.first;
+    if (box_distance2(nodes_[farther].box, origin) < box_distance2(nodes_[nearer].box, origin))
+      std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
+  }
+  return line.found;
+}
+
+std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const Facing& facing) const {
+  std::optional<Nearest> best;
+  double distance2 = kInfinity;
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    if (box_distance2(n.box, p) > distance2) continue;
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
+      const OnTriangle on = closest_on_triangle(corners_[i], p);
+      if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
+          !faces(corners_[i], facing))
+        continue;
+      distance2 = on.distance2;
+      best = {order_[i], on.weight};
+    }
+    if (n.count > 0) continue;
+    std::uint32_t nearer = at + 1, farther = n.first;
+    if (box_distance2(nodes_[farther].box, p) < box_distance2(nodes_[nearer].box, p))
+      std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
+  }
+  return best;
 }
 
 double TriangleTree::distance2(Vec3d p, double limit2, std::uint64_t& tried) const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct OnTriangle {
 };
 OnTriangle closest_on_triangle(const std::array<Vec3d, 3>& corners, Vec3d p);
 
-/// A bounding-volume tree over a small triangle mesh (a wrap) for rays and closest points, in plain double
+/// A bounding-volume tree over a triangle mesh for rays and closest points, in plain double
 /// arithmetic: the same bits on every machine, which a ray caster with SIMD dispatch does not promise.
 /// Binary, split at the median of the centres. Safe to ask from many threads.
 class TriangleTree {
@@ -39,6 +40,19 @@ class TriangleTree {
   /// machine.
   Nearest nearest(Vec3d p, std::uint64_t& tried) const;
 
+  /// Which sides of triangles count: those whose unit normal n has dot(n, direction) > least_cosine.
+  struct Facing {
+    Vec3d direction;  // unit
+    double least_cosine = 0;
+  };
+  /// Where origin + t * direction (unit) crosses a triangle that faces so, of all |t| <= reach the least one;
+  /// ties: the lowest index. `guess`, a triangle's index, makes the search faster where it is right and
+  /// changes nothing.
+  std::optional<Nearest> crossing(Vec3d origin, Vec3d direction, double reach, const Facing& facing,
+                                  std::optional<std::uint32_t> guess) const;
+  /// The closest point on triangles that face so; ties: the lowest index. Nothing where none does.
+  std::optional<Nearest> nearest_facing(Vec3d p, const Facing& facing) const;
+
   /// Square of the distance to the closest point; infinite when that is not below `limit2`, where the search
   /// ends.
   double distance2(Vec3d p, double limit2, std::uint64_t& tried) const;
@@ -53,11 +67,13 @@ class TriangleTree {
     std::uint32_t first = 0, count = 0;  // triangles of a leaf; count 0: children at index + 1 and `first`
   };
   struct Found;
+  struct LineSearch;
   Found search(Vec3d p, double limit2, std::uint64_t& tried) const;
   void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
 
   std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_
   std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> place_;  // the reverse of order_
   std::vector<Node> nodes_;
 };
 

@@ -17,6 +17,7 @@ struct GlbFacts {
   std::vector<std::string> image_names;  // in order; "" where an image has no name
   std::vector<std::string> image_uris;   // in order; "" where an image is within the file
   std::vector<Sha256> image_digests;     // in order; zeros where an image is not
+  std::uint32_t largest_image_px = 0;    // longest side of the images within the file; 0 = none
   std::string codec = "none";            // none, quantized, meshopt or draco, as ScalesOptions::mesh_codec
   std::vector<Vec3d> positions;  // all different ones under their nodes' transforms, sorted by x, y, z
   bool has_bounds = false;

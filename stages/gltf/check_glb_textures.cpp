@@ -1,5 +1,6 @@
 #include "stages/gltf/check_glb_textures.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/container/layout.h"
@@ -58,10 +59,9 @@ void check_glb_image(GlbDocument& d, std::size_t i, GlbFacts& facts) {
   const bool webp = d.standalone() && shown == ImageFormat::kWebp;
   if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png") && !(webp && type == "image/webp"))
     d.fail("glb-image", place + "/mimeType", jpeg ? "image/jpeg" : png ? "image/png" : "a JPEG or PNG", type);
-  if (jpeg)
-    decode_jpeg(bytes, kMaxPreviewPixels);
-  else
-    decode_image(probe_image(place, bytes, {16384, kMaxPreviewPixels}));
+  const Pixels pixels = jpeg ? decode_jpeg(bytes, kMaxPreviewPixels)
+                             : decode_image(probe_image(place, bytes, {16384, kMaxPreviewPixels}));
+  facts.largest_image_px = std::max({facts.largest_image_px, pixels.width_px, pixels.height_px});
 }
 
 void check_glb_texture(GlbDocument& d, std::size_t i) {

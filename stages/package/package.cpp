@@ -216,6 +216,29 @@ void add_texture_entries(const PlaneLadder& ladder, const PlanePreview& preview,
   entries.push_back({table_streams_path(p), std::move(streams)});
 }
 
+/// The figures of proxies stand in the manifest.
+void add_proxies(const Proxies& proxies, Manifest& manifest, std::vector<PackageEntry>& entries) {
+  for (std::size_t k = 0; k < proxies.proxies.size(); ++k) {
+    const Proxy& proxy = proxies.proxies[k];
+    ManifestProxy described;
+    described.triangles = proxy.triangles;
+    described.vertices = proxy.vertices;
+    for (const ProxyTexture& t : proxy.textures)
+      described.texture_px = std::max({described.texture_px, t.width_px, t.height_px});
+    std::vector<double> sizes_px;
+    for (const ProxyPictureLoss& loss : proxy.losses) {
+      sizes_px.push_back(loss.displayed_px);
+      described.flip.push_back(loss.flip_mean);
+      described.flip_p95.push_back(loss.flip_p95);
+    }
+    if (k > 0 && sizes_px != manifest.proxy_sizes_px)
+      fail("proxy " + std::to_string(k), "the displayed heights of the first", "others");
+    manifest.proxy_sizes_px = std::move(sizes_px);
+    manifest.proxies.push_back(std::move(described));
+    entries.push_back({proxy_path(static_cast<std::uint32_t>(k)), proxy.glb});
+  }
+}
+
 /// What the source says, what the publisher says over it, and the title over both.
 About describe_object(const About& source, const PackageOptions& options) {
   About over;
@@ -231,9 +254,9 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ThesisTables& thesis,
                                            const ScaleFiles& files, const MeasuredQuality& quality,
-                                           const Poster& poster, const About& source, double jnd,
-                                           const std::string& provenance_json, const PackageOptions& options,
-                                           const RunContext& context) {
+                                           const Poster& poster, const Proxies& proxies, const About& source,
+                                           double jnd, const std::string& provenance_json,
+                                           const PackageOptions& options, const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
   const About about = describe_object(source, options);
   Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, about.title);
@@ -252,6 +275,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
     manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
     entries.push_back({kPosterPath, poster.file});
   }
+  add_proxies(proxies, manifest, entries);
   if (!files.stream.empty()) entries.push_back({kSplitStreamPath, files.stream});
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
     context.check_cancelled();

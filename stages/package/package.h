@@ -13,12 +13,13 @@
 #include "stages/data/perceptual_values.h"
 #include "stages/data/poster.h"
 #include "stages/data/previews.h"
+#include "stages/data/proxies.h"
 #include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 4;
+inline constexpr int kPackageVersion = 5;
 
 struct PackageOptions {
   std::string title, meta;
@@ -43,8 +44,8 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ThesisTables& thesis,
                                            const ScaleFiles& files, const MeasuredQuality& quality,
-                                           const Poster& poster, const About& source, double jnd,
-                                           const std::string& provenance_json, const PackageOptions& options,
-                                           const RunContext& context);
+                                           const Poster& poster, const Proxies& proxies, const About& source,
+                                           double jnd, const std::string& provenance_json,
+                                           const PackageOptions& options, const RunContext& context);
 
 }  // namespace texmesh

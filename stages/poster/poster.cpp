@@ -4,8 +4,8 @@
 
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
-#include "stages/poster/poster_textures.h"
 #include "stages/render/environment.h"
+#include "stages/render/materials/shown_materials.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {
@@ -45,8 +45,8 @@ Poster make_poster(const NestedScales& scales, const std::vector<Material>& mate
   RunContext inner = context;
   inner.progress = nullptr;
   const auto wanted_px = static_cast<std::uint32_t>(options.size_px);
-  const poster::PosterMaterials shown =
-      poster::poster_materials(materials, fragments, pixels, scales.mesh, 2 * wanted_px, inner);
+  const ShownMaterials shown =
+      shown_materials(materials, fragments, pixels, scales.mesh, 2 * wanted_px, inner);
   const auto scene_of = [&](const NestedScale& scale) {
     return RenderScene{&scales.mesh, &scale.triangles, &scale.triangle_source, &shown.materials,
                        shown.textures.size()};

@@ -9,6 +9,7 @@
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
+#include "format/rules/proxy_choice.h"
 
 namespace texmesh {
 namespace {
@@ -222,6 +223,51 @@ Json portable_math() {
   return cases;
 }
 
+Json proxies() {
+  Json cases = Json::array();
+  const auto add = [&](const char* name, const std::vector<double>& sizes,
+                       std::vector<ManifestProxy> proxies) {
+    Manifest m;
+    m.proxy_sizes_px = sizes;
+    m.proxies = std::move(proxies);
+    Json listed = Json::array(), answers = Json::array();
+    for (std::size_t k = 0; k < m.proxies.size(); ++k) {
+      const ManifestProxy& p = m.proxies[k];
+      listed.push_back({{"offset", p.glb.offset},
+                        {"bytes", p.glb.bytes},
+                        {"flip", p.flip},
+                        {"flip_p95", p.flip_p95},
+                        {"bytes_beyond_start", proxy_bytes_beyond_start(m, k)}});
+    }
+    for (const double px : {0.0, 1.0, 60.0, 128.0, 200.0, 256.0, 300.5, 511.0, 512.0, 700.0, 1e4, 1e9}) {
+      Json losses = Json::array();
+      for (std::size_t k = 0; k < m.proxies.size(); ++k) {
+        const ProxyLoss loss = proxy_loss(m, k, px);
+        losses.push_back({loss.flip, loss.flip_p95});
+      }
+      const auto serving = serving_proxy(m, px);
+      answers.push_back({px, losses, serving ? Json(*serving) : Json(-1)});
+    }
+    cases.push_back(
+        {{"name", name}, {"sizes_px", sizes}, {"proxies", listed}, {"px_losses_serving", answers}});
+  };
+  const auto proxy = [](std::uint64_t offset, std::uint64_t bytes, std::vector<double> flip,
+                        std::vector<double> p95) {
+    return ManifestProxy{{"", offset, bytes, {}}, 1, 1, 0, std::move(flip), std::move(p95)};
+  };
+  add("three sizes", {128, 256, 512},
+      {proxy(8192, 20000, {0.06, 0.09, 0.17}, {0.2, 0.3, 0.45}),
+       proxy(40000, 50000, {0.03, 0.05, 0.11}, {0.1, 0.16, 0.3}),
+       proxy(200000, 150000, {0.02, 0.03, 0.048}, {0.07, 0.1, 0.15})});
+  add("one size", {300}, {proxy(8192, 60000, {0.05}, {0.15})});
+  add("none", {}, {});
+  return cases;
+}
+
+TEST(Vectors, Proxies) {
+  expect_file("proxies.json", "FLIP of proxies by displayed height, and the smallest one that is enough",
+              proxies());
+}
 TEST(Vectors, HarmonicTime) {
   expect_file("harmonic-time.json", "calls of a HarmonicTimePlan in order, and what it answers",
               harmonic_time());

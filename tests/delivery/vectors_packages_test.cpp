@@ -199,6 +199,7 @@ Json plans(PackageReader& package) {
           r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
           const DeliveryPlan p = plan_delivery(package, r);
           out.push_back({{"policy", name},
+                         {"proxy", p.proxy ? Json(*p.proxy) : Json(nullptr)},
                          {"displayed_px", px},
                          {"bytes_s", bytes_s},
                          {"rtt_s", r.network.rtt_s},

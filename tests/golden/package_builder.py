@@ -25,6 +25,26 @@ def plane_of(path):
     return int(parts[1]) if parts[0] == "texture" else 0xFFFFFFFF
 
 
+def glb_of(gltf, binary):
+    text = dump(gltf)
+    text = text.ljust(-(-len(text) // 4) * 4)
+    parts = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(parts)) + parts
+
+
+def triangle_glb(low, high):
+    """One triangle between two corners of a box, without material."""
+    places = [low, [high[0], low[1], high[2]], high]
+    binary = struct.pack("<9f3I", *[x for place in places for x in place], 0, 1, 2)
+    low, high = ([pick(p[axis] for p in places) for axis in range(3)] for pick in (min, max))
+    return glb_of({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                   "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+                   "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3, "min": low, "max": high},
+                                 {"bufferView": 1, "componentType": 5125, "type": "SCALAR", "count": 3}],
+                   "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+                   "buffers": [{"byteLength": 48}]}, binary)
+
+
 class Layout:
     """A container under way. `headers` may change a header: headers(path, is_central, header) -> header."""
 
@@ -108,6 +128,12 @@ class Parts:
                 ref["headBytes"] = 16 + (44 if name == "index" else 36) * struct.unpack("<I", data[8:12])[0]
             if "headBytes" in ref:
                 ref["headSha256"] = sha(data[: ref["headBytes"]])
+        proxies = m.get("proxies", {"bytes": []})
+        for k in range(len(proxies["bytes"])):
+            path = f"proxies/{k:02}.glb"
+            if path in self.entries:
+                data = self.entries[path]
+                proxies["offset"][k], proxies["bytes"][k], proxies["sha256"][k] = places[path], len(data), sha(data)
         columns = m["scales"]
         for k, scale in enumerate(columns["scale"]):
             path = "mesh/stream.bin" if k in self.prefixes else f"mesh/s{scale:02}.glb"
@@ -117,6 +143,19 @@ class Parts:
             columns["offset"][k] = places[path]
             columns["bytes"][k] = columns["bytes"][k] if k in self.prefixes else len(data)
             columns["sha256"][k] = sha(data[: columns["bytes"][k]])
+
+    def add_proxy(self):
+        """A proxy of one triangle at its place in the order."""
+        bounds = self.manifest["bounds"]
+        coarsest = f"mesh/s{self.manifest['scales']['scale'][-1]:02}.glb"
+        mesh, places = self.entries.pop(coarsest), {}
+        for path, data in self.entries.items():
+            places[path] = data
+            places |= {"proxies/00.glb": triangle_glb(bounds["min"], bounds["max"])} if path == "manifest.json" else {}
+            places |= {coarsest: mesh} if path == "tables.bin" else {}
+        self.entries = places
+        self.manifest["proxies"] = {"sizesPx": [128, 512], "offset": [64], "bytes": [1], "sha256": ["0" * 64],
+                                    "triangles": [1], "vertices": [3], "texturePx": [0], "flip": [[0.1, 0.2]], "flipP95": [[0.3, 0.4]]}
 
     def pack(self):
         while True:

@@ -279,6 +279,21 @@ PackageParts make_package_parts() {
   return p;
 }
 
+void add_proxies(PackageParts& p) {
+  p.manifest.proxy_sizes_px = {128, 512};
+  for (const bool larger : {false, true}) {
+    const Mesh mesh = larger ? fine_mesh() : coarse_mesh();
+    p.proxies.push_back(make_glb(mesh, p.streams[preview_path(0)]).glb());
+    ManifestProxy proxy;
+    proxy.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+    proxy.vertices = static_cast<std::uint32_t>(mesh.wedge_count());
+    proxy.texture_px = std::max(p.textures[0].preview_width_px, p.textures[0].preview_height_px);
+    proxy.flip = larger ? std::vector{0.03, 0.06} : std::vector{0.04, 0.2};
+    proxy.flip_p95 = larger ? std::vector{0.1, 0.2} : std::vector{0.1, 0.5};
+    p.manifest.proxies.push_back(proxy);
+  }
+}
+
 Bytes PackageParts::build() const {
   const auto bytes_of = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
   std::vector<PackageEntry> entries;
@@ -290,6 +305,8 @@ Bytes PackageParts::build() const {
   said.title = manifest.title;
   entries.push_back({kAboutPath, bytes_of(write_about(said))});
   for (const auto& [scale, glb] : meshes) entries.push_back({mesh_path(scale), glb});
+  for (std::size_t k = 0; k < proxies.size(); ++k)
+    entries.push_back({proxy_path(static_cast<std::uint32_t>(k)), proxies[k]});
   for (const auto& [path, bytes] : streams) entries.push_back({path, bytes});
   return write_package(manifest, textures, entries);
 }
@@ -342,6 +359,7 @@ PackagePatcher& PackagePatcher::seal_index(const std::function<void(std::vector<
     ref->digest = sha256(entry(ref->path));
   for (ManifestScale& s : m.scales)
     if (s.has_glb()) s.glb.digest = sha256(entry(s.glb.path));
+  for (ManifestProxy& proxy : m.proxies) proxy.glb.digest = sha256(entry(proxy.glb.path));
   if (m.thesis) m.thesis->digest = sha256(entry(kThesisPath));
   if (change) change(index);
   Bytes written = write_index(index);

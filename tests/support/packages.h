@@ -43,10 +43,13 @@ struct PackageParts {
   nlohmann::json provenance;
   About about;  // but for the title, which is the manifest's
   std::map<int, Bytes> meshes;
+  std::vector<Bytes> proxies;            // GLBs of manifest.proxies
   std::map<std::string, Bytes> streams;  // previews, table streams, rungs by path
   Bytes build() const;
 };
 PackageParts make_package_parts();
+/// Adds two proxies of coarse_mesh() with a preview as texture, measured at 128 and 512 px.
+void add_proxies(PackageParts& parts);
 
 /// Changes a finished package in place; entries keep their sizes.
 class PackagePatcher {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/rules/proxy_choice.h"
+
 namespace texmesh {
 namespace {
 
@@ -54,16 +56,56 @@ std::uint64_t beyond_start(std::uint64_t begin, std::uint64_t end) {
   return end - std::min(end, std::max(begin, kStartBytes));
 }
 
-/// What every delivery takes besides fragments.
-void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
-  const EntryRef& coarsest_glb = m.scales.back().glb;
+/// What the first picture takes.
+void count_start_bytes(const Manifest& m, DeliveryPlan& plan) {
   plan.bootstrap_bytes = std::min(kStartBytes, m.provenance.offset + m.provenance.bytes);  // the last entry
-  plan.first_picture_bytes = beyond_start(coarsest_glb.offset, start_bytes(m));
+  plan.first_picture_bytes = beyond_start(first_picture(m).offset, start_bytes(m));
+}
+
+/// What every delivery of a scale takes besides fragments. Behind a proxy the coarsest GLB comes with the
+/// tables: it has the materials and previews of all scales.
+void count_fixed_bytes(const Manifest& m, int scale, DeliveryPlan& plan) {
+  count_start_bytes(m, plan);
   // One range: index, textures.json, quality.json, table streams and tables.
   plan.table_bytes = beyond_start(m.index.offset, m.tables.offset + m.tables.bytes);
   const bool coarsest = scale == m.scales.back().scale;
   for (const ManifestScale& s : m.scales)
     if (s.scale == scale && !coarsest) plan.mesh_bytes = s.glb.bytes;
+  const EntryRef& materials = m.scales.back().glb;
+  if (!m.proxies.empty())
+    plan.mesh_bytes += beyond_start(materials.offset, materials.offset + materials.bytes);
+}
+
+/// A proxy alone, without its times.
+DeliveryPlan plan_of_proxy(const Manifest& m, double displayed_px, std::size_t proxy) {
+  DeliveryPlan plan;
+  plan.scale = m.scales.back().scale;
+  plan.proxy = static_cast<std::uint32_t>(proxy);
+  count_start_bytes(m, plan);
+  plan.mesh_bytes = proxy_bytes_beyond_start(m, proxy);
+  plan.mean_quality = plan.worst_quality = 100;  // nothing is left out
+  plan.flip = plan.texture_flip = proxy_loss(m, proxy, displayed_px).flip;
+  return plan;
+}
+
+DeliveryPlan timed_plan_of_proxy(const Manifest& m, const DeliveryRequest& request, std::size_t proxy) {
+  DeliveryPlan plan = plan_of_proxy(m, request.displayed_px, proxy);
+  const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
+  plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
+  plan.mesh_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes + plan.mesh_bytes);
+  plan.complete_s = plan.mesh_s;
+  if (!std::isfinite(plan.mesh_s)) plan.flip = plan.texture_flip = 1;
+  return plan;
+}
+
+/// A proxy that no one can tell from S_0, in the time.
+std::optional<DeliveryPlan> serving_plan(const Manifest& m, const DeliveryRequest& request) {
+  if (request.scale >= 0 || request.rule != StepRule::kFlip) return std::nullopt;
+  const std::optional<std::size_t> proxy = serving_proxy(m, request.displayed_px);
+  if (!proxy) return std::nullopt;
+  DeliveryPlan plan = timed_plan_of_proxy(m, request, *proxy);
+  if (plan.complete_s > request.time_limit_s) return std::nullopt;
+  return plan;
 }
 
 /// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that
@@ -126,6 +168,18 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
 
 }  // namespace
 
+namespace {
+
+/// What fits, and of that what looks best; where nothing fits, what takes the fewest bytes.
+void take_better(DeliveryPlan plan, std::uint64_t bytes, std::optional<DeliveryPlan>& best) {
+  const bool fits = plan.bytes() <= bytes, best_fits = best && best->bytes() <= bytes;
+  if (!best || (fits && !best_fits) ||
+      (fits == best_fits && (fits ? plan.flip < best->flip : plan.bytes() < best->bytes())))
+    best = std::move(plan);
+}
+
+}  // namespace
+
 int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
   if (request.scale >= 0) return request.scale;
   return scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
@@ -139,6 +193,7 @@ FragmentList list_of(PackageReader& package, const DeliveryRequest& request, con
 
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request) {
   const Manifest& m = package.manifest();
+  if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) return *serving;
   const int wanted = wanted_scale(package, request);
   TextureLoss loss(package, request.displayed_px);
   DeliveryPlan best;
@@ -154,7 +209,16 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
     first = false;
   }
   if (first) package.scale_index(wanted);  // says which there are
-  if (best.scale != wanted)
+  for (std::size_t k = 0; k < m.proxies.size() && request.scale < 0; ++k) {
+    DeliveryPlan plan = timed_plan_of_proxy(m, request, k);
+    const bool needed = best.mesh_s >= request.time_limit_s && plan.mesh_s < best.mesh_s;
+    const bool in_time = plan.mesh_s < request.time_limit_s;
+    if (needed || (in_time && plan.flip < best.flip - kWorthwhileFlip)) best = std::move(plan);
+  }
+  if (best.proxy)
+    best.warnings.push_back("S_" + std::to_string(wanted) +
+                            " would suit the display, but in this time a proxy looks better");
+  else if (best.scale != wanted)
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
                             std::to_string(best.scale) + " leaves more for the texture and looks better");
   return best;
@@ -182,11 +246,10 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     predict(package, request.displayed_px, budget.list, plan);
     if (fixed > bytes)
       plan.warnings.push_back("mesh and tables alone take " + std::to_string(fixed) + " bytes");
-    const bool fits = fixed <= bytes, best_fits = best && best->bytes() <= bytes;
-    if (!best || (fits && !best_fits) ||
-        (fits == best_fits && (fits ? plan.flip < best->flip : plan.bytes() < best->bytes())))
-      best = std::move(plan);
+    take_better(std::move(plan), bytes, best);
   }
+  for (std::size_t k = 0; k < m.proxies.size() && request.scale < 0; ++k)
+    take_better(plan_of_proxy(m, request.displayed_px, k), bytes, best);
   if (!best) package.scale_index(wanted);  // says which there are
   return *best;
 }

@@ -25,10 +25,14 @@ struct DeliveryRequest {
 /// +infinity.
 struct DeliveryPlan {
   int scale = 0;
+  /// The proxy that is shown instead of a scale: no documents, no planes, no fragments are fetched, `scale`
+  /// is the coarsest one, mesh_bytes are the proxy's where it is not the first picture, and texture_flip is
+  /// flip.
+  std::optional<std::uint32_t> proxy;
   std::vector<PlaneChoice> planes;
   std::uint64_t bootstrap_bytes = 0, first_picture_bytes = 0, mesh_bytes = 0, table_bytes = 0,
                 texture_bytes = 0;
-  double first_picture_s = 0;                  // the coarsest mesh is complete, its images are previews
+  double first_picture_s = 0;                  // the smallest proxy, else the coarsest mesh with previews
   double mesh_s = 0;                           // the chosen scale and all tables are there
   double complete_s = 0;                       // the last fragment
   SimulationResult textures;                   // its times count from mesh_s
@@ -46,11 +50,13 @@ struct DeliveryPlan {
 
 /// What comes within a time limit, mesh first, then textures. The scale is the rule's. A coarser scale takes
 /// its place where the rule's mesh comes too late, or where simulations of both scales show that the coarser
-/// one gives the better picture in the time. Deterministic.
+/// one gives the better picture in the time. A proxy that cannot be told from S_0 at the displayed height, or
+/// that looks better than what scales give in the time, takes the place of all; not where the request says a
+/// scale, and not the former where it asks for another rule than kFlip. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
 /// The scale and the textures that look best in so many bytes, whatever the time and the rule: a scale that
 /// passes for S_0 still differs from it, and bytes that are left may go into a finer one. Mesh first, then
-/// texture. Where nothing fits: the least that the package has, with a warning.
+/// texture, or a proxy and nothing else. Where nothing fits: the least that the package has, with a warning.
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes);
 
 /// The scale that the request asks for: DeliveryRequest::scale, or the rule's.

@@ -88,6 +88,7 @@ const std::vector<EntryRef>& PackageReader::index() {
     require_entry(ref);
   for (const ManifestScale& scale : manifest_.scales)
     if (scale.has_glb()) require_entry(scale.glb);
+  for (const ManifestProxy& proxy : manifest_.proxies) require_entry(proxy.glb);
   if (manifest_.thesis) require_entry(*manifest_.thesis);
   if (manifest_.poster) require_entry(*manifest_.poster);
   if (manifest_.stream) {
@@ -241,6 +242,16 @@ Bytes PackageReader::scale_glb(int scale) {
     throw InputError(store_->name(), mesh_path(scale), "a scale with a file of its own",
                      "one that the stream alone has");
   return read_all(s.glb);
+}
+
+Bytes PackageReader::proxy_glb(std::size_t proxy) {
+  if (proxy >= manifest_.proxies.size())
+    throw InputError(store_->name(), "proxy " + std::to_string(proxy),
+                     manifest_.proxies.empty()
+                         ? "a package with proxies"
+                         : "0 to " + std::to_string(manifest_.proxies.size() - 1) + ", smallest first",
+                     "none");
+  return read_all(manifest_.proxies[proxy].glb);
 }
 
 Bytes PackageReader::split_prefix(int scale) {

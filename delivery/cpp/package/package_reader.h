@@ -74,6 +74,8 @@ class PackageReader {
   /// The GLB of a scale, as it is stored; needs no index. InputError where the scale has none: then
   /// split_prefix() has it. Images of all but the coarsest scale's may be relative URIs of previews.
   std::vector<std::uint8_t> scale_glb(int scale);
+  /// A proxy's GLB, which stands alone; needs no index. 0 = the smallest. InputError where there is none.
+  std::vector<std::uint8_t> proxy_glb(std::size_t proxy);
   /// The bytes of the vertex-split stream that hold a scale without a GLB: head and blocks, digest checked.
   std::vector<std::uint8_t> split_prefix(int scale);
   /// Index into manifest().scales. Without such a scale: InputError that names the scales there are.

@@ -63,7 +63,7 @@ export class TexmeshPackage extends PackageReader {
 }
 
 /**
- * Opens a package: one request of 64 KiB, which brings most first pictures along. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
+ * Opens a package: one request of 44 KiB, which brings most first pictures along. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
 export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {

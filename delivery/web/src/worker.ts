@@ -2,6 +2,8 @@ import { handle, packError } from './worker/handle';
 import type { WorkerAnswer, WorkerRequest } from './worker/protocol';
 
 export { handle, packError };
+/** What pages without workers decode documents by. */
+export * from './format/documents';
 
 interface WorkerScope {
   onmessage: ((event: { data: WorkerRequest & { id: number } }) => void) | null;

@@ -46,6 +46,23 @@ function runThroughput(cases: Json[]): void {
     });
 }
 
+function runProxies(cases: Json[]): void {
+  for (const c of cases)
+    it(c.name, () => {
+      const glb = ({ offset, bytes }: Json) => ({ offset, bytes });
+      const proxies = c.proxies.map((p: Json) => ({ glb: glb(p), flip: p.flip, flipP95: p.flip_p95 }));
+      const manifest = { proxySizesPx: c.sizes_px, proxies } as unknown as t.Manifest;
+      c.proxies.forEach((p: Json, k: number) => expect(t.proxyBytesBeyondStart(manifest, k)).toBe(p.bytes_beyond_start));
+      for (const [px, losses, serving] of c.px_losses_serving) {
+        expect(t.servingProxy(manifest, px)).toBe(serving);
+        losses.forEach((expected: number[], k: number) => {
+          const { flip, flipP95 } = t.proxyLoss(manifest, k, px);
+          expectBits([flip, flipP95], expected, `proxy ${k} at ${px} px`);
+        });
+      }
+    });
+}
+
 function runUpgrades(cases: Json[]): void {
   for (const c of cases)
     it(c.name, () => {
@@ -178,6 +195,7 @@ async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
   expect(t.wantedScale(data.manifest, request)).toBe(v.wanted_scale);
   const p = t.planDelivery(data, request)!;
   expect(p.scale).toBe(v.scale);
+  expect(p.proxy ?? null).toBe(v.proxy ?? null);
   expect(p.planes.map((c) => [c.base, c.plane])).toEqual(v.planes);
   expectBits(p.rungs, v.rungs, 'rungs');
   expectBits([p.firstPictureS, p.meshS, p.completeS], v.times_s, 'times');
@@ -257,6 +275,7 @@ const runners: Record<string, (cases: Json[]) => void | Promise<void>> = {
   'portable-math': runMath,
   throughput: runThroughput,
   upgrades: runUpgrades,
+  proxies: runProxies,
   'harmonic-time': runPlan,
   packages: runPackages,
 };

@@ -13,7 +13,6 @@ namespace texmesh {
 namespace {
 
 constexpr int kViews = 5;
-constexpr double kBudgetDisplayPx = 512;
 constexpr double kTexelsPerByte = 40;  // more texels than that are never worth a byte
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;

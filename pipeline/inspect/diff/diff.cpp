@@ -84,6 +84,8 @@ std::string maker(const std::string& path) {
     case EntryKind::kMesh:
     case EntryKind::kSplitStream:
       return "scales";
+    case EntryKind::kProxy:
+      return "proxies";
     case EntryKind::kPoster:
       return "poster";
     case EntryKind::kTables:

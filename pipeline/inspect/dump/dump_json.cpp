@@ -52,6 +52,23 @@ Json stream_json(PackageReader& p) {
   return stream;
 }
 
+Json proxies_json(const Manifest& m) {
+  Json list = Json::array();
+  for (const ManifestProxy& p : m.proxies) {
+    Json losses = Json::array();
+    for (std::size_t k = 0; k < p.flip.size(); ++k)
+      losses.push_back(
+          {{"display_px", m.proxy_sizes_px[k]}, {"flip", p.flip[k]}, {"flip_p95", p.flip_p95[k]}});
+    list.push_back({{"path", p.glb.path},
+                    {"bytes", p.glb.bytes},
+                    {"triangles", p.triangles},
+                    {"vertices", p.vertices},
+                    {"texture_px", p.texture_px},
+                    {"losses", losses}});
+  }
+  return list;
+}
+
 Json poster_json(const Manifest& m) {
   if (!m.poster) return nullptr;
   return {{"width_px", m.poster->width_px}, {"height_px", m.poster->height_px}, {"bytes", m.poster->bytes}};
@@ -100,10 +117,14 @@ Json summary_json(PackageReader& p) {
             {"edge", steps_json(step_function(m.scales, StepRule::kEdge))}}},
           {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
           {"stream", stream_json(p)},
+          {"proxies", proxies_json(m)},
           {"poster", poster_json(m)},
           {"textures", textures},
           {"bytes", kinds},
-          {"start", {{"bytes", start_bytes(m)}, {"in_one_request", start_bytes(m) <= kStartBytes}}}};
+          {"start",
+           {{"bytes", start_bytes(m)},
+            {"shows", first_picture(m).path},
+            {"in_one_request", start_bytes(m) <= kStartBytes}}}};
 }
 
 Json scales_json(PackageReader& p) {

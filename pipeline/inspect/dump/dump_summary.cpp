@@ -114,6 +114,33 @@ std::string kinds_text(const std::vector<KindBytes>& kinds) {
   return table.text();
 }
 
+/// Nothing for a package without proxies.
+std::string proxies_text(const Manifest& m) {
+  if (m.proxies.empty()) return "";
+  TextTable table;
+  for (const char* header : {"proxy", "triangles", "vertices", "kB", "texture [px]"}) table.column(header);
+  for (const double px : m.proxy_sizes_px) table.column("FLIP at " + pixels(px));
+  for (std::size_t k = 0; k < m.proxies.size(); ++k) {
+    const ManifestProxy& p = m.proxies[k];
+    std::vector<std::string> row{std::to_string(k), grouped(p.triangles), grouped(p.vertices),
+                                 kilobytes(p.glb.bytes),
+                                 p.texture_px > 0 ? std::to_string(p.texture_px) : "none"};
+    for (const double flip : p.flip) row.push_back(shortest(flip, 3));
+    table.row(std::move(row));
+  }
+  return "proxies (whole objects with an atlas of their own; mean FLIP of lit pictures at displayed heights in "
+         "px)\n" +
+         table.text() + "\n";
+}
+
+/// What a client's first request brings.
+std::string start_text(const Manifest& m) {
+  const bool fits = start_bytes(m) <= kStartBytes;
+  return fmt::format("start     {} bytes from byte 0 show the object ({}): {} of 44 KiB {}\n\n",
+                     grouped(start_bytes(m)), first_picture(m).path, fits ? "one request" : "a first request",
+                     fits ? "does" : "does not");
+}
+
 std::string options_text(const Provenance& provenance) {
   const std::vector<OptionChange> changes = changed_options(*provenance.options);
   if (changes.empty()) return "options: all at their defaults\n";
@@ -180,11 +207,8 @@ std::string summary_text(PackageReader& p) {
   if (m.poster)
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
-  s += fmt::format("start     {} bytes from byte 0 show the object{}\n\n", grouped(start_bytes(m)),
-                   start_bytes(m) <= kStartBytes ? ": one request of 64 KiB does"
-                                                 : "; a client's first request, of 64 KiB, does not");
-  return s + scales_text(p) + "\n" + stream_text(p) + "\n" + steps_text(m) + "\n" + textures_text(p) + "\n" +
-         kinds_text(kinds) + "\n" + options_text(provenance);
+  return s + start_text(m) + scales_text(p) + "\n" + proxies_text(m) + stream_text(p) + "\n" + steps_text(m) +
+         "\n" + textures_text(p) + "\n" + kinds_text(kinds) + "\n" + options_text(provenance);
 }
 
 }  // namespace texmesh

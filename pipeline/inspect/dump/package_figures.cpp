@@ -15,11 +15,12 @@ struct Kind {
   std::vector<EntryKind> kinds;
 };
 
-const std::array<Kind, 10>& kinds() {
-  static const std::array<Kind, 10> list{
+const std::array<Kind, 11>& kinds() {
+  static const std::array<Kind, 11> list{
       {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
        {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
        {"meshes", {EntryKind::kMesh}},
+       {"proxies", {EntryKind::kProxy}},
        {"vertex-split stream", {EntryKind::kSplitStream}},
        {"previews", {EntryKind::kPreview}},
        {"poster", {EntryKind::kPoster}},

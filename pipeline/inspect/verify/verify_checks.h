@@ -65,6 +65,10 @@ struct MeshShare {
 void check_shared(const Manifest& manifest, const std::string& entry, std::span<const std::uint8_t> glb,
                   MeshShare& share, Findings& findings);
 
+/// A proxy and what the manifest says about it: a GLB that stands alone, within the model's bounds.
+void check_proxy(const Manifest& manifest, const ManifestProxy& proxy, std::span<const std::uint8_t> glb,
+                 Findings& findings);
+
 /// Every position of a coarser scale is one of the finer scale, to the bit. Both sorted; an empty
 /// list says nothing.
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,

@@ -16,6 +16,8 @@ void EntryVerifier::check_entry(const EntryRef& e) {
                        name.kind == EntryKind::kRung;
   if (name.kind == EntryKind::kMesh) {
     guarded(findings_, "entry-read", e.path, [&] { check_mesh_entry(e, static_cast<int>(name.number)); });
+  } else if (name.kind == EntryKind::kProxy) {
+    guarded(findings_, "entry-read", e.path, [&] { check_proxy_entry(e, name.number); });
   } else if (texture) {
     guarded(findings_, "entry-read", e.path, [&] { check_texture_entry(e, name); });
   } else if (name.kind == EntryKind::kSplitStream) {
@@ -53,6 +55,16 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
     check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
   coarser_ = &*scale;
   coarser_positions_ = std::move(positions);
+}
+
+void EntryVerifier::check_proxy_entry(const EntryRef& e, std::size_t number) {
+  const Bytes bytes = store_.read(e);
+  const std::vector<ManifestProxy>& proxies = package_.manifest.proxies;
+  if (!findings_.require(number < proxies.size(), "entry-set", e.path, "", "to be named by the manifest",
+                         "not there"))
+    return;
+  ++report_.meshes;
+  check_proxy(package_.manifest, proxies[number], bytes, findings_);
 }
 
 void EntryVerifier::check_texture_entry(const EntryRef& e, const EntryName& name) {

@@ -41,6 +41,7 @@ class EntryVerifier {
 
  private:
   void check_mesh_entry(const EntryRef& e, int number);
+  void check_proxy_entry(const EntryRef& e, std::size_t number);
   void check_texture_entry(const EntryRef& e, const EntryName& name);
   void check_source_entry(const EntryRef& e, const EntryName& name);
   void check_poster_entry(const EntryRef& e);

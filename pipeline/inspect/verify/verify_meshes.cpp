@@ -36,6 +36,18 @@ void check_previews_of(const Manifest& m, const ManifestScale& scale,
   }
 }
 
+/// Stored positions may lie a little outside of S_0's bounds.
+void check_bounds(const Manifest& m, const GlbFacts& facts, const std::string& entry, const char* rule,
+                  Findings& findings) {
+  const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
+  for (int k = 0; k < 3 && facts.has_bounds; ++k)
+    findings.require(
+        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
+        {"mesh-bounds", rule}, entry, std::string("axis ") + "xyz"[k],
+        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
+        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
+}
+
 }  // namespace
 
 std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
@@ -50,13 +62,7 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
                                         "triangles");
   findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, {"mesh-counts", "G02"}, entry,
                                         "vertices");
-  const double slack = 0.01 * length(m.bounds_max - m.bounds_min) + 1e-30;
-  for (int k = 0; k < 3 && facts.has_bounds; ++k)
-    findings.require(
-        facts.bounds_min[k] >= m.bounds_min[k] - slack && facts.bounds_max[k] <= m.bounds_max[k] + slack,
-        {"mesh-bounds", "G02"}, entry, std::string("axis ") + "xyz"[k],
-        shortest(m.bounds_min[k], 7) + " .. " + shortest(m.bounds_max[k], 7),
-        shortest(facts.bounds_min[k], 7) + " .. " + shortest(facts.bounds_max[k], 7));
+  check_bounds(m, facts, entry, "G02", findings);
   for (const TextureInfo& t : textures) {
     const std::string name = "texture/" + std::to_string(t.image);
     // A scale may have lost every triangle of a material; S_0 has them all.
@@ -97,6 +103,22 @@ void check_shared(const Manifest& m, const std::string& entry, std::span<const s
   });
   findings.require(!one_node || std::ranges::all_of(m.scales, &ManifestScale::has_glb), {"mesh-nodes", "G10"},
                    entry, "/meshes", "a file of every scale, as one node has all parts", "scales without");
+}
+
+void check_proxy(const Manifest& m, const ManifestProxy& proxy, std::span<const std::uint8_t> glb,
+                 Findings& findings) {
+  const std::string& entry = proxy.glb.path;
+  const std::size_t before = findings.list().size();
+  const GlbFacts facts = check_glb(glb, entry, findings, GlbRules::kStandalone);
+  findings.name_rule(before, "G13");
+  if (findings.list().size() != before) return;  // counts of a broken file say nothing
+  findings.require_equal<std::uint64_t>(proxy.triangles, facts.triangles, {"mesh-counts", "G14"}, entry, "triangles");
+  findings.require_equal<std::uint64_t>(proxy.vertices, facts.vertices, {"mesh-counts", "G14"}, entry, "vertices");
+  findings.require_equal<std::uint64_t>(proxy.texture_px, facts.largest_image_px, {"mesh-images", "G14"}, entry,
+                                        "longest side of its textures");
+  findings.require(facts.codec != "draco", {"mesh-codec", "G15"}, entry, "", "a mesh that needs no Draco",
+                   facts.codec);
+  check_bounds(m, facts, entry, "G14", findings);
 }
 
 void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_positions,

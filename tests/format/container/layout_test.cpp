@@ -26,9 +26,12 @@ TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
   EXPECT_EQ(source.kind, EntryKind::kSource);
   EXPECT_EQ(source.number, 7u);
   EXPECT_EQ(source.extension, "webp");
-  for (const char* other : {"source/7.png", "source/007.gif", "source/007.", "mesh/s7.glb", "mesh/s007.glb",
-                            "mesh/s07.glbx", "preview/1.jpg", "texture/01/r00.pack", "texture/0/r0.pack",
-                            "texture/0/rx.pack", "texture/99999999999/r00.pack", "a", ""})
+  EXPECT_EQ(parse_entry_path(proxy_path(3)).kind, EntryKind::kProxy);
+  EXPECT_EQ(parse_entry_path(proxy_path(3)).number, 3u);
+  for (const char* other :
+       {"proxies/3.glb", "proxies/003.glb", "proxies/03.jpg", "source/7.png", "source/007.gif", "source/007.",
+        "mesh/s7.glb", "mesh/s007.glb", "mesh/s07.glbx", "preview/1.jpg", "texture/01/r00.pack",
+        "texture/0/r0.pack", "texture/0/rx.pack", "texture/99999999999/r00.pack", "a", ""})
     EXPECT_EQ(parse_entry_path(other).kind, EntryKind::kOther) << other;
 }
 
@@ -68,6 +71,12 @@ TEST(Layout, StreamingOrder) {
                              "texture/0/r01.pack", "manifest.json"}),
             (std::vector<std::string>{"manifest.json", "mesh/s09.glb", "texture/0/r00.pack",
                                       "mesh/stream.bin", "texture/0/r01.pack", "mesh/s00.glb"}));
+  // With proxies the smallest is the first picture; the coarsest GLB and the others stand behind the tables.
+  EXPECT_EQ(
+      streaming_order({"proxies/02.glb", "mesh/s00.glb", "mesh/s09.glb", "proxies/00.glb", "tables.bin",
+                       "about.json", "proxies/01.glb", "index.bin", "manifest.json"}),
+      (std::vector<std::string>{"manifest.json", "proxies/00.glb", "index.bin", "tables.bin", "mesh/s09.glb",
+                                "proxies/01.glb", "proxies/02.glb", "about.json", "mesh/s00.glb"}));
   // Untextured: meshes from coarse to fine.
   EXPECT_EQ(
       streaming_order({"mesh/s00.glb", "mesh/s02.glb", "mesh/s01.glb", "provenance.json", "manifest.json"}),

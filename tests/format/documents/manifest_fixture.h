@@ -56,6 +56,16 @@ inline Manifest make_manifest(int scales, std::uint32_t planes, bool long_number
   m.quality = {kQualityPath, far, 4000, digest};
   m.provenance = {kProvenancePath, far, 4000, digest};
   m.about = {kAboutPath, far, 4000, digest};
+  if (long_numbers) {
+    m.proxy_sizes_px = {128.123, 256.123, 512.123};
+    for (std::uint32_t k = 0; k < 3; ++k)
+      m.proxies.push_back({{proxy_path(k), far, 100'000 + k, digest},
+                           60'000,
+                           60'000,
+                           1024,
+                           {0.123456, 0.234567, 0.345678},
+                           {0.123456, 0.234567, 0.345678}});
+  }
   if (long_numbers) m.poster = PosterRef{{kPosterPath, far, 1'000'000, digest}, 4096, 4096};
   if (long_numbers) m.thesis = EntryRef{kThesisPath, far, 4'000'000, digest};
   if (long_numbers) m.stream = StreamRef{far, 4'000'000'000u, 400'000, digest};

@@ -242,6 +242,61 @@ TEST(Manifest, ScalesMayBePrefixesOfTheStream) {
   refused([](Manifest& bad) { bad.scales[2].glb.bytes = bad.scales[3].glb.bytes; });
 }
 
+/// Two proxies, measured at two sizes.
+Manifest with_proxies() {
+  Manifest m = make_manifest(3, 2);
+  m.proxy_sizes_px = {128, 512};
+  m.proxies = {{{proxy_path(0), 8192, 20000, m.quality.digest}, 2000, 1500, 192, {0.1, 0.2}, {0.3, 0.4}},
+               {{proxy_path(1), 65536, 50000, m.quality.digest}, 5000, 4000, 0, {0.05, 0.1}, {0.2, 0.3}}};
+  return m;
+}
+
+TEST(Manifest, ProxiesMayStandInIt) {
+  EXPECT_TRUE(make_manifest(3, 2).proxies.empty());
+  EXPECT_EQ(write_manifest(make_manifest(3, 2)).find("proxies"), std::string::npos);
+  const Manifest m = with_proxies();
+  EXPECT_EQ(read(write_manifest(m)), m);
+  EXPECT_EQ(start_bytes(m), 28192u);  // the smallest proxy is the first picture
+  const auto refused = [](auto change) {
+    Manifest bad = with_proxies();
+    change(bad);
+    EXPECT_THROW(write_manifest(bad), FormatError);
+  };
+  refused([](Manifest& bad) { bad.proxies[1].glb.bytes = bad.proxies[0].glb.bytes; });
+  refused([](Manifest& bad) { bad.proxies[1].glb.offset = 100; });
+  refused([](Manifest& bad) { bad.proxies[0].triangles = 0; });
+  refused([](Manifest& bad) { bad.proxies[0].vertices = 0; });
+  refused([](Manifest& bad) { bad.proxies[0].texture_px = kMaxProxyTexturePx + 1; });
+  refused([](Manifest& bad) { bad.proxies[1].flip.pop_back(); });
+  refused([](Manifest& bad) { bad.proxies[1].flip_p95.push_back(0.5); });
+  refused([](Manifest& bad) { bad.proxies[1].flip[0] = 1.5; });
+  refused([](Manifest& bad) { bad.proxies[1].flip_p95[0] = -0.5; });
+  refused([](Manifest& bad) { bad.proxy_sizes_px = {512, 128}; });
+  refused([](Manifest& bad) { bad.proxy_sizes_px = {128, 128}; });
+  refused([](Manifest& bad) { bad.proxy_sizes_px = {0.5, 128}; });
+  refused([](Manifest& bad) {
+    bad.proxy_sizes_px.clear();
+    for (ManifestProxy& p : bad.proxies) p.flip.clear(), p.flip_p95.clear();
+  });
+  refused([](Manifest& bad) {
+    while (bad.proxies.size() <= kMaxPackageProxies) {
+      bad.proxies.push_back(bad.proxies.back());
+      ++bad.proxies.back().glb.bytes;
+    }
+  });
+}
+
+TEST(Manifest, ProxiesNeedEveryColumn) {
+  const Json whole = Json::parse(write_manifest(with_proxies()));
+  for (const auto& [name, unused] : whole["proxies"].items()) {
+    Json missing = whole, shorter = whole;
+    missing["proxies"].erase(name);
+    EXPECT_THROW(read(missing.dump()), FormatError) << name;
+    shorter["proxies"][name].erase(0);
+    EXPECT_THROW(read(shorter.dump()), FormatError) << name;
+  }
+}
+
 TEST(Manifest, TheStartEndsWithTheCoarsestGlb) {
   const Manifest m = with_stream();
   EXPECT_EQ(start_bytes(m), m.scales[4].glb.offset + m.scales[4].glb.bytes);

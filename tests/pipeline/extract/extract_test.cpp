@@ -56,6 +56,55 @@ Pixels image_of(const Bytes& glb, std::size_t k) {
       "x", {begin, begin + static_cast<std::ptrdiff_t>(view["byteLength"].get<std::size_t>())}, {}));
 }
 
+Bytes package_with_proxies() {
+  testing::PackageParts parts = make_package_parts();
+  testing::add_proxies(parts);
+  return parts.build();
+}
+
+TEST(ExtractModel, AProxyIsWrittenAsItIs) {
+  const Bytes bytes = package_with_proxies();
+  PackageReader package = open(bytes);
+  ExtractRequest r;
+  r.proxy = 1;
+  const Extracted moved = extract_model(package, r, {});
+  expect_valid(moved.glb, "proxy 1");
+  EXPECT_EQ(moved.proxy, 1u);
+  EXPECT_EQ(moved.triangles, package.manifest().proxies[1].triangles);
+  Findings findings;
+  const GlbFacts facts = check_glb(moved.glb, "x.glb", findings, GlbRules::kStandalone);
+  EXPECT_NEAR(facts.bounds_min.x, 9, 1e-3);  // where the source has it
+  EXPECT_EQ(facts.largest_image_px, package.manifest().proxies[1].texture_px);
+  r.recentre = true;
+  EXPECT_NEAR(check_glb(extract_model(package, r, {}).glb, "x.glb", findings).bounds_min.x, -1, 1e-3);
+  r.proxy = 2;
+  EXPECT_THROW(extract_model(package, r, {}), InputError);
+  PackageReader without = open(package_bytes());
+  r.proxy = 0;
+  EXPECT_THROW(extract_model(without, r, {}), InputError);
+}
+
+TEST(ExtractModel, BytesTakeTheProxyThatLooksBetter) {
+  testing::PackageParts parts = make_package_parts();
+  testing::add_proxies(parts);
+  for (ManifestProxy& p : parts.manifest.proxies) p.flip = {0, 0};  // as if it were the source
+  const Bytes bytes = parts.build();
+  PackageReader package = open(bytes);
+  const std::uint64_t whole = package.manifest().proxies[0].glb.bytes + 2000;
+  const Extracted found = extract_model(package, budget(whole), {});
+  EXPECT_EQ(found.proxy, 0u);
+  EXPECT_TRUE(found.within);
+  EXPECT_LE(found.glb.size(), whole);
+  EXPECT_EQ(found.difference, 0);
+  ExtractRequest by_scale = budget(whole);
+  by_scale.scale = 5;
+  EXPECT_EQ(extract_model(package, by_scale, {}).proxy, std::nullopt);
+  for (ManifestProxy& p : parts.manifest.proxies) p.flip = {1, 1};
+  const Bytes worse_bytes = parts.build();
+  PackageReader worse = open(worse_bytes);
+  EXPECT_EQ(extract_model(worse, budget(60'000), {}).proxy, std::nullopt);
+}
+
 TEST(ExtractModel, TheBestRungAsPngIsThePlanePutTogetherAgain) {
   ExtractRequest r;
   r.scale = 0;

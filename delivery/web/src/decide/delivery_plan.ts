@@ -1,9 +1,11 @@
 import { startBytes } from '../format/layout';
-import type { Manifest } from '../format/manifest';
+import { type Manifest, firstPicture } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
 import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './network_model';
-import { InTime, choiceInTime } from './scale_choice';
+import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
+import { InTime, choiceInTime, worthwhile } from './scale_choice';
+import { everyGroup } from './texture_loss';
 import { StepRule, selectScale } from './viewing';
 
 /** How somebody looks at the object, and over which link. */
@@ -29,6 +31,8 @@ export function defaultDeliveryRequest(): DeliveryRequest {
 
 /** The delivery that a viewer will get. */
 export interface DeliveryPlan extends InTime {
+  /** The proxy that is shown instead of a scale: nothing else is fetched, and `scale` is the coarsest one. */
+  proxy?: number;
   /** Besides fragments. */
   fixedBytes: number;
   firstPictureS: number;
@@ -42,22 +46,37 @@ export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: De
   return scale >= 0 ? scale : selectScale(manifest, displayedPx, undefined, rule);
 }
 
-/** Bytes of begin .. end behind those that the first request has brought. */
-const beyondStart = (begin: number, end: number): number => end - Math.min(end, Math.max(begin, startBytes));
 /** Bytes of the first request; provenance.json is the last entry. */
 const firstBytes = ({ provenance }: Manifest): number => Math.min(startBytes, provenance.offset + provenance.bytes);
 
-/** When the fixed parts are there. */
-function timesOf(m: Manifest, link: LinkOptions, scale: number) {
-  const coarsest = m.scales[m.scales.length - 1];
-  const firstPictureBytes = beyondStart(coarsest.glb.offset, coarsest.glb.offset + coarsest.glb.bytes);
-  const mesh = scale === coarsest.scale ? undefined : m.scales.find((s) => s.scale === scale);
-  // One range: index, textures.json, quality.json, table streams and tables.
-  const tableBytes = beyondStart(m.index.offset, m.tables.offset + m.tables.bytes);
-  const moved = firstPictureBytes + (mesh?.glb.bytes ?? 0) + tableBytes;
+/** When the first picture is there and, with so many bytes more, the mesh. */
+function timesWith(m: Manifest, link: LinkOptions, more: number) {
+  const { offset, bytes } = firstPicture(m);
+  const firstPictureBytes = beyondStart(offset, offset + bytes);
+  const moved = firstPictureBytes + more;
   const manifestS = fetchedS(link, 0, firstBytes(m));
   const firstPictureS = fetchedS(link, manifestS, firstPictureBytes);
   return { moved, manifestS, firstPictureS, meshS: fetchedS(link, manifestS, moved) };
+}
+/** When the fixed parts of a scale are there. */
+function timesOf(m: Manifest, link: LinkOptions, scale: number) {
+  const { scale: coarsest, glb } = m.scales[m.scales.length - 1];
+  const mesh = scale === coarsest ? undefined : m.scales.find((s) => s.scale === scale);
+  // One range: index, textures.json, quality.json, table streams and tables.
+  const tableBytes = beyondStart(m.index.offset, m.tables.offset + m.tables.bytes);
+  const materials = m.proxies.length > 0 ? beyondStart(glb.offset, glb.offset + glb.bytes) : 0;
+  return timesWith(m, link, (mesh?.glb.bytes ?? 0) + materials + tableBytes);
+}
+/** A proxy alone. */
+function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy: number): DeliveryPlan {
+  const { moved, firstPictureS, meshS } = timesWith(m, link, proxyBytesBeyondStart(m, proxy));
+  const { flip } = proxyLoss(m, proxy, displayedPx);
+  const none = everyGroup(0);
+  return {
+    scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, loss: 0, endS: 0, late: false,
+    list: { offers: [], fragments: [], groups: [], groupWeights: everyGroup(1), previewLoss: none, coarser: none },
+    flip, textureFlip: flip, fixedBytes: firstBytes(m) + moved, firstPictureS, meshS, completeS: meshS,
+  };
 }
 
 /**
@@ -67,6 +86,12 @@ function timesOf(m: Manifest, link: LinkOptions, scale: number) {
 export function planDelivery(data: PackageData, request: DeliveryRequest): DeliveryPlan | undefined {
   const { manifest } = data;
   const { link, displayedPx } = request;
+  const { scale, rule, timeLimitS } = request;
+  const serving = scale < 0 && rule === 'flip' ? servingProxy(manifest, displayedPx) : -1;
+  if (serving >= 0) {
+    const plan = planOfProxy(manifest, request, serving);
+    if (plan.completeS <= timeLimitS) return plan;
+  }
   const wanted = wantedScale(manifest, request);
   const steps = choiceInTime(data, {
     displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
@@ -85,5 +110,12 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const best = at.value;
   if (!best) return undefined;
   const { moved, firstPictureS, meshS } = timesOf(manifest, link, best.scale);
-  return { ...best, fixedBytes: firstBytes(manifest) + moved, firstPictureS, meshS, completeS: meshS + best.endS };
+  let plan: DeliveryPlan = { ...best, fixedBytes: firstBytes(manifest) + moved, firstPictureS, meshS, completeS: meshS + best.endS };
+  if (scale < 0)
+    manifest.proxies.forEach((_, k) => {
+      const other = planOfProxy(manifest, request, k);
+      const needed = plan.meshS >= timeLimitS && other.meshS < plan.meshS;
+      if (needed || (other.meshS < timeLimitS && other.flip < plan.flip - worthwhile)) plan = other;
+    });
+  return plan;
 }

@@ -6,8 +6,8 @@ import { Simulated, simulate } from './simulation';
 import { TextureSpending, budgetSteps } from './texture_budget';
 import { PlaneChoice, TextureLoss, pictureFlip, textureFlip } from './texture_loss';
 
-/** A coarser scale has to look better by this much of FLIP. */
-const worthwhile = 1e-4;
+/** A coarser scale, or a proxy, has to look better by this much of FLIP. */
+export const worthwhile = 1e-4;
 
 /** A scale and textures as they can be had in a time. */
 export interface InTime extends Simulated {

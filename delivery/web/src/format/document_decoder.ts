@@ -1,3 +1,5 @@
+import { FormatError } from './errors';
+
 /** The functions of documents.ts. */
 export type Documents = typeof import('./documents');
 /** Decodes a document by the name of a function of documents.ts. */
@@ -5,6 +7,13 @@ export type DocumentDecoder = <K extends keyof Documents>(
   name: K,
   ...args: Parameters<Documents[K]>
 ) => Promise<Awaited<ReturnType<Documents[K]>>>;
-/** Decodes documents on this thread. */
-export const decodeHere = (async (name, ...args: unknown[]) =>
-  ((await import('./documents'))[name] as (...of: unknown[]) => unknown)(...args)) as DocumentDecoder;
+/** Decodes documents on this thread. The functions may be those of the workers' file, which has error classes of its own. */
+export const decodeHere = (async (name, ...args: unknown[]) => {
+  const documents = await import('./documents');
+  try {
+    return await (documents[name] as (...of: unknown[]) => unknown)(...args);
+  } catch (error) {
+    const { name: kind, file, place, expected, found } = error as FormatError;
+    throw kind === 'FormatError' ? new FormatError(file, place, expected, found) : error;
+  }
+}) as DocumentDecoder;

@@ -14,8 +14,8 @@ import * as layout from './layout';
 // Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
 // where there are none. Digests have been checked before.
 
-export { readAbout as about } from './about';
 export { readIndex } from './index_table';
+export { plainGlb } from './glb/plain_glb';
 export { requireSelfContained } from './self_contained_glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
@@ -56,7 +56,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
-    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...m.scales.filter(hasGlb).map((s) => s.glb),
+    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...[...m.scales.filter(hasGlb), ...m.proxies].map(({ glb }) => glb),
   ];
   for (const ref of refs) {
     if (!ref) continue;

@@ -18,6 +18,8 @@ export const thesisPath = 'thesis.bin';
 export const aboutPath = 'about.json';
 /** Path of a scale's GLB, as mesh/s07.glb. */
 export const meshPath = (scale: number): string => `mesh/s${String(scale).padStart(2, '0')}.glb`;
+/** Path of a proxy, as proxies/00.glb; 0 = the smallest. */
+export const proxyPath = (proxy: number): string => `proxies/${String(proxy).padStart(2, '0')}.glb`;
 
 /** Path of a plane's table streams, as texture/3/tables.pack. */
 export const tableStreamsPath = (plane: number): string => `texture/${plane}/tables.pack`;

@@ -2,11 +2,8 @@
 
 /** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
 export const bootstrapBytes = 16384;
-/**
- * What a client asks for in its first request: the manifest, most first pictures, and documents behind these. See
- * format/SPEC.md, section 3.
- */
-export const startBytes = 65536;
+/** What a client asks for in its first request: the manifest and most first pictures. See format/SPEC.md, section 3. */
+export const startBytes = 45056;
 /** A displayed height that is enough at any size: displayPx... of S_0 and the last step's upToPx. */
 export const anyDisplayPx = 1e9;
 /** Previews are no larger: every GPU takes textures of this size. */

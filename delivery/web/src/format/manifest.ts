@@ -69,6 +69,18 @@ export interface ManifestScale {
 }
 /** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */
 export const hasGlb = ({ glb }: ManifestScale): boolean => glb.path !== layout.splitStreamPath;
+/** A baked version of the whole object with an atlas of its own: a GLB that stands alone. */
+export interface ManifestProxy {
+  glb: EntryRef;
+  triangles: number;
+  vertices: number;
+  /** Longest side of its textures; 0: it has none. */
+  texturePx: number;
+  /** Mean FLIP of lit pictures against S_0, one per Manifest.proxySizesPx. */
+  flip: number[];
+  /** The same: 95th percentile. */
+  flipP95: number[];
+}
 /** One step of the step function from displayed height to scale. */
 export interface ManifestStep {
   upToPx: number;
@@ -92,6 +104,10 @@ export interface Manifest {
   scales: ManifestScale[];
   /** Steps, coarse to fine. */
   steps: ManifestStep[];
+  /** Displayed heights at which proxies were measured, px, rising. */
+  proxySizesPx: number[];
+  /** Proxies, smallest first. */
+  proxies: ManifestProxy[];
   /** Number of texture planes, mips included. */
   planeCount: number;
   index: PagedRef;
@@ -105,6 +121,9 @@ export interface Manifest {
   thesis?: EntryRef;
   poster?: PosterRef;
 }
+
+/** What is shown first: the smallest proxy, where there is none the GLB of the coarsest scale. */
+export const firstPicture = ({ proxies, scales }: Manifest): EntryRef => (proxies[0] ?? scales[scales.length - 1]).glb;
 
 const largest = 1e300;
 const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
@@ -209,6 +228,38 @@ function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   return steps;
 }
 
+/** Numbers that rise strictly. */
+function readRising(at: JsonAt, most: number, rule: string, read: (item: JsonAt) => number): number[] {
+  let before = -Infinity;
+  return at.each(1, most, (item) => {
+    const value = read(item);
+    if (value <= before) item.fail('a rising number', `${value}`, rule);
+    return (before = value);
+  });
+}
+
+/** Proxies from an array for each field, all of one length. */
+function readProxies(at: JsonAt): Pick<Manifest, 'proxySizesPx' | 'proxies'> {
+  const proxySizesPx = readRising(at.at('sizesPx'), 8, 'M23', (size) => size.number(1, 65536));
+  const { length: n } = readRising(at.at('bytes'), 8, 'M24', (bytes) => bytes.integer(1));
+  const proxies = at.at('bytes').each(n, n, (_, i) => {
+    const field = (name: string): JsonAt => {
+      at.at(name).array(n, n);
+      return at.at(name).at(i);
+    };
+    const losses = (name: string): number[] => field(name).each(proxySizesPx.length, proxySizesPx.length, (loss) => loss.number(0, 1));
+    return {
+      glb: readRef({ at: field as JsonAt['at'] }, paths.proxyPath(i)),
+      triangles: field('triangles').integer(1, 0xffffffff),
+      vertices: field('vertices').integer(1, 0xffffffff),
+      texturePx: field('texturePx').integer(0, 8192),
+      flip: losses('flip'),
+      flipP95: losses('flipP95'),
+    };
+  });
+  return { proxySizesPx, proxies };
+}
+
 /** Gives the stream's path to scales whose place is that of the stream: they are prefixes of it. */
 function resolveStreamScales(at: JsonAt, scales: ManifestScale[], stream: StreamRef): void {
   let before = stream.headBytes;
@@ -249,6 +300,7 @@ export function readManifest(json: Uint8Array): Manifest {
     jnd: at.at('jnd').number(0, 1),
     scales,
     steps: readSteps(at.at('steps').by('M21'), scales),
+    ...(at.has('proxies') ? readProxies(at.at('proxies').by('M23')) : { proxySizesPx: [], proxies: [] }),
     planeCount: at.at('planeCount').integer(0, 10000),
     index: readPagedRef(at.at('index'), paths.indexPath),
     tables: readPagedRef(at.at('tables'), paths.tablesPath),

@@ -13,8 +13,11 @@ function require(good: unknown, rule: string, what: string): asserts good {
   if (!good) throw new FormatError('mesh', '', what, '', rule);
 }
 
+/** Requires something of a mesh. */
+export { require as requireOfMesh };
+
 /** JSON and bytes of a GLB of at most two chunks. glTF has no further chunks, and loaders differ in what they make of those. */
-function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
+export function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
   const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
   const end = 20 + at(12);

@@ -2,23 +2,14 @@
 
 const roundConstants = /* @__PURE__ */ makeRoundConstants();
 
-/** The first 32 bits of the fractional parts of the cube roots of the first 64 primes, by whole numbers. */
+/** The first 32 bits of the fractional parts of the cube roots of the first 64 primes. */
 function makeRoundConstants(): Uint32Array {
   const out = new Uint32Array(64);
   for (let n = 2, k = 0; k < 64; ++n) {
     let prime = true;
     for (let d = 2; d * d <= n && prime; ++d) prime = n % d !== 0;
     if (!prime) continue;
-    // floor(cbrt(n) * 2^32): bisection on cubes.
-    const target = BigInt(n) << 96n;
-    let low = 0n;
-    let high = 1n << 36n;
-    while (high - low > 1n) {
-      const middle = (low + high) >> 1n;
-      if (middle * middle * middle <= target) low = middle;
-      else high = middle;
-    }
-    out[k++] = Number(low & 0xffffffffn);
+    out[k++] = (Math.cbrt(n) % 1) * 2 ** 32; // 35 bits of the 53 that the root has
   }
   return out;
 }

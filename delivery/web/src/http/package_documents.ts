@@ -107,7 +107,7 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality' | 'about'>(
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
     name: K,
     signal: AbortSignal | undefined,
     read: (m: Manifest) => Promise<Uint8Array>,
@@ -176,15 +176,20 @@ export class PackageDocuments {
   }
   /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
   about(signal?: AbortSignal): Promise<About> {
-    return this.document_('about', signal, (m) => this.readChecked(m.about, { kind: 'other', signal }));
+    const read = async (): Promise<About> => {
+      const bytes = await this.readChecked(this.manifest.about, { kind: 'other', signal });
+      return (await import('../format/about')).readAbout(bytes); // short, and few ask for it
+    };
+    return this.readOnce_('about', read, signal);
   }
   /**
    * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,
-   * quality.json, table streams, tables. False where not even the documents before the tables are small.
+   * quality.json, table streams, tables, and behind a proxy the coarsest mesh. False where not even the documents before the tables are small.
    */
   async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
-    const { index, tables } = this.manifest;
-    const ends = [tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
+    const { index, tables, scales, proxies } = this.manifest;
+    const { offset, bytes: meshBytes } = scales[scales.length - 1].glb;
+    const ends = [proxies.length > 0 ? offset + meshBytes : 0, tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
     const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
     if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.

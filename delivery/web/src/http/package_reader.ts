@@ -93,6 +93,12 @@ export class PackageReader extends PackageDocuments {
     if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own', 'one of the stream');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
+  /** The GLB of a proxy as it is stored; no index is needed. 0 = the smallest. InputError where there is none. */
+  async proxyGlb(proxy: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
+    const found = this.manifest.proxies[proxy];
+    if (!found) throw new InputError(this.store.name, `proxy ${proxy}`, 'a proxy of the package', 'none');
+    return this.readChecked(found.glb, { kind: 'mesh', once: true, ...how });
+  }
   /** The preview of a full-size plane, preview/PPP.jpg. */
   async preview(plane: number, signal?: AbortSignal): Promise<Uint8Array> {
     const read = async (): Promise<Uint8Array> =>

@@ -107,8 +107,8 @@ export interface DecisionEvent {
 export interface LoadEvents {
   /** A request of the package has ended. */
   request: RequestRecord & { at: number };
-  /** The coarsest mesh with its previews stands in the scene. */
-  'first-picture': { at: number; scale: number; bytes: number };
+  /** The smallest proxy (`scale` is -1 then), or the coarsest mesh with its previews (`proxy` is -1), stands in the scene. */
+  'first-picture': { at: number; scale: number; proxy: number; bytes: number };
   /** Another scale stands in the scene. */
   scale: { at: number; scale: number; triangles: number };
   /** A plane was chosen, or a finer one, to show a texture. */
@@ -158,6 +158,8 @@ export interface LoadState {
   phase: LoadPhase;
   /** Scale in the scene; -1: none yet. */
   scale: number;
+  /** Proxy in the scene, instead of a scale; -1: none. */
+  proxy: number;
   /** Scale that the display asks for. */
   wantedScale: number;
   /** Displayed height that decides, device px. */

@@ -2,7 +2,7 @@ import { Camera, type Object3D, type Scene, type WebGLProgram, type WebGLRendere
 import { throwIfAborted } from '../format/errors';
 import { nowS, sleepS } from '../http/clock';
 import type { LoadContext } from './load_context';
-import { texturesOf } from './scale_parts';
+import { materialsOf, texturesOf } from './scale_parts';
 
 /** The first picture waits for its programs no longer than this. */
 const mostCompileS = 0.5;
@@ -30,7 +30,7 @@ async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCance
 
 /** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on while the GPU's process makes them. */
 export async function readyToDraw(load: LoadContext, scene: Object3D, shape: Object3D): Promise<void> {
-  const { signal, options: { renderer }, materials } = load;
+  const { signal, options: { renderer } } = load;
   const stopIfCancelled = (): void => throwIfAborted(signal);
   let root = scene;
   while (root.parent) root = root.parent;
@@ -39,7 +39,7 @@ export async function readyToDraw(load: LoadContext, scene: Object3D, shape: Obj
   renderer.compile(shape, load.view.camera ?? new Camera(), root as Scene);
   await gpuIdle(renderer, mostCompileS); // or what comes next would wait for the programs
   await programsReady(renderer, mostCompileS, stopIfCancelled);
-  for (const [, texture] of materials.all.flatMap(texturesOf)) {
+  for (const [, texture] of materialsOf(shape).flatMap(texturesOf)) {
     await sleepS(0);
     stopIfCancelled();
     renderer.initTexture(texture);

@@ -1,5 +1,7 @@
-import type { Object3D } from 'three';
+import type { Material, Object3D } from 'three';
+import { servingProxy } from '../decide/proxy_choice';
 import { isAbort, throwIfAborted } from '../format/errors';
+import { firstPicture } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
@@ -28,7 +30,7 @@ export function loadModel(
       return load.state;
     },
     get materials() {
-      return context.materials.all;
+      return load.materials;
     },
     update: (camera = options.camera) => load.update(camera),
     refine: () => load.refine(),
@@ -50,6 +52,7 @@ class ModelLoad {
   private refining_?: Promise<void>;
   private refineAgain_ = false;
   private restoring_?: Promise<void>;
+  private leaving_?: Promise<void>;
   private readonly endRequests_: () => void;
 
   constructor(
@@ -80,11 +83,15 @@ class ModelLoad {
     });
   }
 
+  get materials(): Material[] {
+    return [...this.scale_.proxy.materials, ...this.context.materials.all];
+  }
   get state(): LoadState {
     const { phase, view, beta0, reader: { client } } = this.context;
     return {
       phase,
-      scale: this.scale_.shown,
+      scale: this.scale_.held ? -1 : this.scale_.shown,
+      proxy: this.scale_.proxy.shown,
       wantedScale: this.scale_.wanted,
       displayedPx: view.display.heightPx,
       planes: this.textures?.planes() ?? [],
@@ -98,29 +105,75 @@ class ModelLoad {
   // ---- the course of a load
 
   private async showFirst_(): Promise<void> {
-    const { context } = this;
+    const { context, scale_: scales } = this;
     const { reader: { manifest, client }, signal } = context;
     await null; // listeners are added when the caller has the model
     throwIfAborted(signal);
-    const { scale, glb } = manifest.scales.at(-1)!;
-    context.expectedBytes = client.received + glb.bytes;
+    context.expectedBytes = client.received + firstPicture(manifest).bytes;
     context.enter('first-picture');
+    if (manifest.proxies.length > 0 && context.override.scale === undefined)
+      try {
+        await scales.proxy.show(0);
+      } catch (error) {
+        context.fail(error, 'proxy'); // scales do, too
+      }
     // On a slow link nothing shares the link with the first picture. The documents are asked for while the GPU prepares for the picture.
-    const { shape, shown } = this.scale_.load(scale);
+    if (!scales.held) await this.startScales_();
+    this.update(context.view.camera ?? context.options.camera); // by the mesh that is there, not by its bounding box alone
+    context.emit('first-picture', { scale: scales.held ? -1 : scales.shown, proxy: scales.proxy.shown, bytes: client.received });
+  }
+  /** Starts with the coarsest scale, which has the materials; resolves when the scale is shown. */
+  private startScales_(): Promise<void> {
+    const { context } = this;
+    const { shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
     this.coming_ = Promise.all([import('./texture_load'), shape]).then(([part]) => part.openTextureLoad(context, this.scale_, this.source_));
     this.coming_.catch(() => undefined);
-    await shown;
-    this.update(context.view.camera ?? context.options.camera); // by the mesh that is there, not by its bounding box alone
-    context.emit('first-picture', { scale, bytes: client.received });
+    return shown;
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
+    if (await this.showServing_()) {
+      context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
+      return this.rest_();
+    }
+    await this.showTextures_();
+  }
+  private async showTextures_(): Promise<void> {
+    const { context } = this;
     context.enter('tables');
+    if (!this.coming_) {
+      await context.reader.prefetchDocuments(context.signal); // with the coarsest scale, by one request
+      await this.startScales_();
+    }
     this.textures = await this.coming_!;
     throwIfAborted(context.signal);
     await this.textures.timedPart();
     context.phase = 'refining';
     if (context.options.autoRefine ?? true) void this.refine();
+  }
+  /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
+  private serving_(): number {
+    const { override: { scale, rung }, options: { rule = 'flip', fullSize }, view, reader } = this.context;
+    const byHand = scale !== undefined || rung !== undefined || fullSize || rule !== 'flip';
+    return byHand || !this.scale_.held ? -1 : servingProxy(reader.manifest, view.display.heightPx);
+  }
+  /** Shows a proxy that is enough. False where scales are needed. */
+  private async showServing_(): Promise<boolean> {
+    const { scale_: { proxy }, context } = this;
+    const serving = this.serving_();
+    try {
+      if (serving > proxy.shown) await proxy.show(serving);
+      return serving >= 0;
+    } catch (error) {
+      context.fail(error, 'proxy');
+      return false;
+    }
+  }
+  private rest_(): void {
+    const { context } = this;
+    context.phase = 'done';
+    context.emit('done', {});
+    context.progress();
   }
   private end_(error: unknown): never {
     const { context } = this;
@@ -144,6 +197,7 @@ class ModelLoad {
     this.endRequests_();
     this.forget_();
     context.object.removeFromParent().clear();
+    this.scale_.proxy.dispose();
     this.source_.dispose();
     this.textures?.dispose();
     context.materials.dispose();
@@ -163,8 +217,19 @@ class ModelLoad {
     this.done.then(() => this.follow_(true), () => undefined); // once the timed part is over
   }
   private follow_(always = this.context.options.autoRefine ?? true): void {
+    if (!this.textures) return void this.followByProxies_();
     void this.scale_.follow();
     if (always) void this.refine();
+  }
+  /** Where a proxy was enough: a larger one, or from now on scales. */
+  private followByProxies_(): Promise<void> {
+    return (this.leaving_ ??= (async () => {
+      let enough = true;
+      while (enough && this.serving_() > this.scale_.proxy.shown) enough = await this.showServing_();
+      if (!enough || this.serving_() < 0) await this.showTextures_();
+    })()
+      .catch((error: unknown) => this.context.fail(error, 'scales behind a proxy'))
+      .finally(() => (this.leaving_ = undefined)));
   }
 
   // ---- refining
@@ -181,6 +246,10 @@ class ModelLoad {
     const { context } = this;
     try {
       if (!context.resting) await this.done;
+      if (!this.textures) {
+        this.refineAgain_ = false;
+        return this.rest_(); // a proxy is enough
+      }
       do {
         await this.restoring_;
         if (!context.signal.aborted) await this.refineOnce_(this.textures!);
@@ -188,10 +257,7 @@ class ModelLoad {
     } finally {
       this.refining_ = undefined; // a request from now on, by listeners too, is a turn of its own
     }
-    if (context.signal.aborted) return;
-    context.phase = 'done';
-    context.emit('done', {});
-    context.progress();
+    if (!context.signal.aborted) this.rest_();
   }
   private async refineOnce_(textures: TextureLoad): Promise<void> {
     this.context.phase = 'refining';

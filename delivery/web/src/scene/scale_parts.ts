@@ -138,6 +138,9 @@ export class MaterialSet {
   }
 }
 
+/** All materials beneath an object, each once. */
+export const materialsOf = (object: Object3D): Material[] => [...new Set(meshesOf(object).flatMap((mesh) => mesh.material))];
+
 /** Frees the geometries beneath an object. */
 export function disposeGeometries(object: Object3D): void {
   for (const mesh of meshesOf(object)) mesh.geometry.dispose();

@@ -4,6 +4,7 @@ import { throwIfAborted } from '../format/errors';
 import { readyToDraw } from './gpu';
 import { type LoadContext, hysteresis } from './load_context';
 import type { ScaleSource } from './scale_source';
+import { ShownProxy } from './proxy/shown_proxy';
 
 /** A scale that could not be had is asked for again after so long, and twice as long each time. */
 const retryScaleS = { first: 2, most: 60 };
@@ -15,6 +16,7 @@ export class ShownScale {
   /** In the scene; -1: none yet. */
   shown = noScale;
   wanted = noScale;
+  readonly proxy: ShownProxy;
   /** Gives the scale that is enough at a displayed height; set once the documents are there. */
   scaleFor?: (heightPx: number, part: VisiblePart | undefined) => number;
   private retryScale_ = noScale;
@@ -25,7 +27,13 @@ export class ShownScale {
     private readonly load_: LoadContext,
     private readonly scene_: Object3D,
     private readonly source_: ScaleSource,
-  ) {}
+  ) {
+    this.proxy = new ShownProxy(load_, scene_);
+  }
+  /** Scales stay out of the scene: a proxy is there. */
+  get held(): boolean {
+    return this.proxy.shown >= 0;
+  }
 
   /** Loads a scale and puts the scale into the scene; scales that are complete on the way are shown, too. */
   load(scale: number): { arrived: Promise<void>; shape: Promise<Object3D>; shown: Promise<void> } {
@@ -71,13 +79,21 @@ export class ShownScale {
 
   /** Changes the scene in one turn of the page: the next frame has the new scale, whole. */
   private show_(scale: number): void {
-    const { signal, object, reader } = this.load_;
-    throwIfAborted(signal);
-    const shape = this.source_.shape(scale)!;
+    throwIfAborted(this.load_.signal);
+    this.shown = scale;
+    if (!this.held) this.place_();
+  }
+  private place_(): void {
+    const { shown, load_: { object, reader } } = this;
+    const shape = this.source_.shape(shown)!;
     if (object.children[0] !== shape) object.clear().add(shape);
     if (!object.parent) this.scene_.add(object);
-    this.shown = scale;
-    this.load_.emit('scale', { scale, triangles: reader.manifest.scales.find((s) => s.scale === scale)!.triangles });
+    this.load_.emit('scale', { scale: shown, triangles: reader.manifest.scales.find((s) => s.scale === shown)!.triangles });
+  }
+  /** The scale takes the proxy's place in one turn of the page. */
+  release(): void {
+    this.place_();
+    this.proxy.dispose();
   }
   /** The scale that the view asks for, by a little more than the last time. */
   private scaleForView_(): number {

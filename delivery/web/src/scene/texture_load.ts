@@ -1,11 +1,12 @@
-import type { FragmentList } from '../decide/fragment_list';
+import { type FragmentList, partsOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
+import { proxyLoss } from '../decide/proxy_choice';
 import { choiceInTime } from '../decide/scale_choice';
-import type { PlaneChoice } from '../decide/texture_loss';
+import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
-import { sleepS } from '../http/clock';
+import { nowS, sleepS } from '../http/clock';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS, timePlanOptions } from './fetch_in_time';
 import { FragmentFetch, requestBytes } from './fragment_fetch';
@@ -22,6 +23,8 @@ const mostPending = 48;
 /** Textures wait for a mesh no longer than this share of the time left when the mesh is asked for. */
 const meshShare = 0.5;
 const longestTimerS = 1e6;
+/** The scale is compared with the proxy in the scene this often, seconds. */
+const lookEachS = 0.1;
 /** In the timed part a surface that the camera does not see is worth this much of a surface that the camera sees. */
 const unseen = 1e-3;
 /** 1 - SSIM at which refining ends by default. */
@@ -42,6 +45,8 @@ export async function openTextureLoad(load: LoadContext, scale: ShownScale, sour
 export class TextureLoad {
   private readonly planes_: ShownPlanes;
   private readonly inTime_: FetchInTime;
+  private list_?: FragmentList;
+  private lookedS_ = 0; // when the proxy and the scale were compared last
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
   constructor(
@@ -53,6 +58,7 @@ export class TextureLoad {
     this.planes_ = fetching_.planes;
     this.inTime_ = new FetchInTime(load_, fetching_);
     scale_.scaleFor = (heightPx, part) => this.scaleFor_(heightPx, part);
+    if (scale_.held) load_.events.on('fragment', () => this.releaseInTime_());
   }
 
   planes(): PlaneComposer[] {
@@ -93,12 +99,26 @@ export class TextureLoad {
     // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for; coarser scales show on its way.
     if (meshBytes > load.beta0 * reader.client.latencyS) await Promise.race([mesh.arrived, this.timer_(meshShare)]);
     load.enter('textures');
-    await this.fetchTimed_(await fetching.listOf(scale, unseen));
+    this.list_ = await fetching.listOf(scale, unseen);
+    await this.fetchTimed_(this.list_);
     await shown;
     await fetching.composed();
     const skipped = this.skippedFragments_();
     await Promise.race([meshShown, this.timer_(1)]);
+    this.releaseIfBetter_();
     load.emit('deadline', { limit: load.limitS, actual: load.elapsedS(), skipped });
+  }
+  /** The scale takes the proxy's place once the scale is predicted to look better. */
+  private releaseIfBetter_(): void {
+    const { list_: list, scale_: scale, planes_: planes, load_: { view: { display: { heightPx } }, reader: { manifest } } } = this;
+    if (!list || !scale.held || scale.shown < 0) return;
+    this.lookedS_ = nowS();
+    const parts = partsOf(list, list.fragments.map((f) => planes.rungOf(f)));
+    const flip = pictureFlip(planes.data.quality, heightPx, scale.shown, parts);
+    if (flip <= proxyLoss(manifest, scale.proxy.shown, heightPx).flip) scale.release();
+  }
+  private releaseInTime_(): void {
+    if (this.scale_.held && nowS() > this.lookedS_ + lookEachS) this.releaseIfBetter_();
   }
   private async fetchTimed_(list: FragmentList): Promise<void> {
     const { load_: load } = this;
@@ -155,6 +175,7 @@ export class TextureLoad {
     await this.showFinerPlanes_();
     while (!again() && (await this.refineSome_()));
     if (!again()) await this.fetching_.composed();
+    this.releaseIfBetter_();
   }
   /** After the GPU has lost everything: shows previews, then fetches the fragments that were there. */
   async restore(): Promise<void> {
@@ -178,6 +199,7 @@ export class TextureLoad {
     if (load.pool.isUnavailable) return false;
     if (all) await fetching.composed(); // a fragment must not come behind the one that replaces it
     const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0); // fragments that are not seen are not fetched
+    this.list_ = list;
     const enough = load.options.refineTo ?? defaultRefineTo;
     const wishes = all ? allWishes(list, load.override.rung, fetching) : bestWishes(list, refineBytes, enough, this.planes_.data, fetching);
     const before = fetching.fates.losses;

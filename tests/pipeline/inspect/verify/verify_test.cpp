@@ -73,6 +73,49 @@ TEST(Verify, ASoundPackageHasNoFindings) {
   EXPECT_EQ(report.entries, 14u);
 }
 
+Bytes with_proxies(const std::function<void(PackageParts&)>& change) {
+  return built_with([&](PackageParts& p) {
+    testing::add_proxies(p);
+    change(p);
+  });
+}
+
+TEST(Verify, ASoundPackageWithProxiesHasNoFindings) {
+  const VerifyReport report = verify(with_proxies([](PackageParts&) {}));
+  EXPECT_EQ(all_of(report), "");
+  EXPECT_EQ(report.meshes, 4u);
+}
+
+TEST(Verify, Proxies) {
+  const auto caught = [](const std::string& check, const std::function<void(PackageParts&)>& change) {
+    return catches_only(with_proxies(change), check, proxy_path(1));
+  };
+  EXPECT_TRUE(caught("mesh-counts", [](PackageParts& p) { ++p.manifest.proxies[1].triangles; }));
+  EXPECT_TRUE(caught("mesh-counts", [](PackageParts& p) { ++p.manifest.proxies[1].vertices; }));
+  EXPECT_TRUE(caught("mesh-images", [](PackageParts& p) { ++p.manifest.proxies[1].texture_px; }));
+  EXPECT_TRUE(caught("mesh-bounds", [](PackageParts& p) {
+    Mesh large = testing::fine_mesh();
+    for (Vec3f& v : large.positions) v.x *= 1.1f;
+    p.proxies[1] = testing::make_glb(large, p.streams[preview_path(0)]).glb();
+  }));
+  EXPECT_TRUE(caught("glb-reference", [](PackageParts& p) {
+    GlbParts named = testing::make_glb(testing::fine_mesh(), p.streams[preview_path(0)]);
+    testing::name_previews(named);  // a proxy stands alone
+    p.proxies[1] = named.glb();
+  }));
+  EXPECT_TRUE(caught("glb-container", [](PackageParts& p) { p.proxies[1].resize(p.proxies[1].size() - 4); }));
+  // The digest is that of the bytes, the place that of the index.
+  const PackageParts sound = parts_with([](PackageParts& p) { testing::add_proxies(p); });
+  EXPECT_TRUE(
+      catches(PackagePatcher(sound.build()).edit(proxy_path(0), [](Bytes& b) { b.back() ^= 1; }).package(),
+              "entry-digest", proxy_path(0)));
+  EXPECT_TRUE(catches(
+      PackagePatcher(sound.build()).seal([](Manifest& m) { m.proxies[0].glb.digest.fill(1); }).package(),
+      "reference", kManifestPath));
+  EXPECT_TRUE(catches(PackagePatcher(sound.build()).seal([](Manifest& m) { m.proxies.pop_back(); }).package(),
+                      "entry-set", proxy_path(1)));
+}
+
 TEST(Verify, ThePatcherItselfKeepsAPackageSound) {
   EXPECT_EQ(all_of(verify(PackagePatcher(make_package_parts().build()).seal().package())), "");
 }

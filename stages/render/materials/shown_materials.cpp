@@ -1,10 +1,10 @@
-#include "stages/poster/poster_textures.h"
+#include "stages/render/materials/shown_materials.h"
 
 #include <algorithm>
 #include <cstring>
 #include <optional>
 
-namespace texmesh::poster {
+namespace texmesh {
 namespace {
 
 /// A texture that materials read: an image as colours or as plain numbers.
@@ -49,7 +49,7 @@ void put_plane(const TexturePlane& plane, const Pixels& pixels, std::uint32_t fi
                Pixels& image) {
   if (pixels.width_px < image.width_px || pixels.height_px < image.height_px ||
       pixels.data.size() != std::size_t{pixels.width_px} * pixels.height_px * pixels.channels)
-    throw StageError("poster", "pixels of image " + std::to_string(plane.image), "as large as their plane",
+    throw StageError("render", "pixels of image " + std::to_string(plane.image), "as large as their plane",
                      std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px));
   for (std::uint32_t y = 0; y < image.height_px; ++y)
     for (std::uint32_t x = 0; x < image.width_px; ++x) {
@@ -74,13 +74,13 @@ RenderTexture texture_of(const Fragments& fragments, const std::vector<Pixels>& 
 
 }  // namespace
 
-PosterMaterials poster_materials(const std::vector<Material>& materials, const Fragments& fragments,
-                                 const std::vector<Pixels>& pixels, const Mesh& mesh,
-                                 std::uint32_t least_side_px, const RunContext& context) {
+ShownMaterials shown_materials(const std::vector<Material>& materials, const Fragments& fragments,
+                               const std::vector<Pixels>& pixels, const Mesh& mesh,
+                               std::uint32_t least_side_px, const RunContext& context) {
   if (pixels.size() != fragments.planes.size())
-    throw StageError("poster", "planes of pixels", std::to_string(fragments.planes.size()),
+    throw StageError("render", "planes of pixels", std::to_string(fragments.planes.size()),
                      std::to_string(pixels.size()));
-  PosterMaterials out;
+  ShownMaterials out;
   std::vector<ImageUse> uses;
   const auto index_of = [&](const TextureRef& ref, TextureUse use) -> std::int32_t {
     const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
@@ -100,4 +100,4 @@ PosterMaterials poster_materials(const std::vector<Material>& materials, const F
   return out;
 }
 
-}  // namespace texmesh::poster
+}  // namespace texmesh

@@ -1,0 +1,228 @@
+#include "stages/proxies/bake/bake.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/no_index.h"
+#include "stages/base/parallel.h"
+#include "stages/proxies/bake/push_pull.h"
+
+namespace texmesh::proxies {
+namespace {
+
+constexpr std::size_t kMostPerSide = 4;  // of the places of a texel
+
+struct Corners {
+  std::array<Vec3d, 3> position, normal;
+  std::array<Vec2d, 3> uv;
+};
+
+Corners baked_corners(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, std::size_t triangle) {
+  Corners out;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::uint32_t v = mesh.triangles[triangle][k];
+    out.position[k] = to_double(mesh.positions[v]);
+    if (!normals.empty()) out.normal[k] = to_double(normals[v]);
+    out.uv[k] = {static_cast<double>(mesh.uvs[v].x) * mesh.width_px,
+                 static_cast<double>(mesh.uvs[v].y) * mesh.height_px};
+  }
+  return out;
+}
+
+template <class T>
+T mean3(const std::array<T, 3>& value, const std::array<double, 3>& weight) {
+  return value[0] * weight[0] + value[1] * weight[1] + value[2] * weight[2];
+}
+
+/// Of the corners; negative outside. False without an area.
+bool weights_at(const std::array<Vec2d, 3>& uv, Vec2d p, std::array<double, 3>& weight) {
+  const double area = cross(uv[1] - uv[0], uv[2] - uv[0]);
+  if (area == 0) return false;
+  for (std::size_t k = 0; k < 3; ++k) weight[k] = cross(uv[(k + 1) % 3] - p, uv[(k + 2) % 3] - p) / area;
+  return true;
+}
+
+/// Which triangle covers each place of a grid that is `per_side` times as fine as the texels.
+struct PlaceGrid {
+  std::size_t per_side = 1, width = 0, height = 0;
+  std::vector<std::uint32_t> owner;  // kNoIndex = none; of several triangles the first
+  Vec2d texel_of(std::size_t x, std::size_t y) const {
+    return {(static_cast<double>(x) + 0.5) / static_cast<double>(per_side),
+            (static_cast<double>(y) + 0.5) / static_cast<double>(per_side)};
+  }
+};
+
+struct PlaceRange {
+  std::size_t first = 0, end = 0;
+};
+PlaceRange places_between(double low, double high, std::size_t per_side, std::size_t size) {
+  const auto scale = static_cast<double>(per_side), most = static_cast<double>(size);
+  const double first = std::clamp(std::floor(low * scale - 0.5), 0.0, most),
+               end = std::clamp(std::floor(high * scale - 0.5) + 2, 0.0, most);
+  return {static_cast<std::size_t>(first), static_cast<std::size_t>(end)};
+}
+
+PlaceGrid make_grid(const AtlasMesh& mesh, std::size_t per_side) {
+  PlaceGrid grid{per_side, mesh.width_px * per_side, mesh.height_px * per_side, {}};
+  grid.owner.assign(grid.width * grid.height, kNoIndex);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::array<Vec2d, 3> uv = baked_corners(mesh, {}, t).uv;
+    const auto [x_low, x_high] = std::minmax({uv[0].x, uv[1].x, uv[2].x});
+    const auto [y_low, y_high] = std::minmax({uv[0].y, uv[1].y, uv[2].y});
+    const PlaceRange xs = places_between(x_low, x_high, per_side, grid.width),
+                     ys = places_between(y_low, y_high, per_side, grid.height);
+    std::array<double, 3> weight{};
+    for (std::size_t y = ys.first; y < ys.end; ++y)
+      for (std::size_t x = xs.first; x < xs.end; ++x) {
+        std::uint32_t& owner = grid.owner[y * grid.width + x];
+        if (owner != kNoIndex || !weights_at(uv, grid.texel_of(x, y), weight)) continue;
+        if (weight[0] >= 0 && weight[1] >= 0 && weight[2] >= 0) owner = static_cast<std::uint32_t>(t);
+      }
+  }
+  return grid;
+}
+
+/// A chart thinner than the grid owns no place, though its triangles show texels: the middle of each is one.
+void own_thin_triangles(const AtlasMesh& mesh, PlaceGrid& grid) {
+  const auto scale = static_cast<double>(grid.per_side);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::array<Vec2d, 3> uv = baked_corners(mesh, {}, t).uv;
+    const Vec2d middle = (uv[0] + uv[1] + uv[2]) * (1.0 / 3);
+    if (!(middle.x >= 0 && middle.y >= 0)) continue;
+    const auto x = static_cast<std::size_t>(std::min(middle.x * scale, 1e9)),
+               y = static_cast<std::size_t>(std::min(middle.y * scale, 1e9));
+    if (x >= grid.width || y >= grid.height) continue;
+    std::uint32_t& owner = grid.owner[y * grid.width + x];
+    if (owner == kNoIndex) owner = static_cast<std::uint32_t>(t);
+  }
+}
+
+/// Sums of samples, each with a weight of 1; colours count by their alpha, so that what cannot be seen leaves
+/// no trace.
+struct TexelSum {
+  Vec3f base, emission, orm;
+  Vec3d normal;
+  float alpha = 0, count = 0, colours = 0;
+  void add(const SurfaceSample& s, Vec3d tangent_normal) {
+    const float weight = s.alpha > 1e-3f ? s.alpha : 1e-3f;
+    base = base + s.base_colour * weight;
+    colours += weight;
+    emission = emission + s.emission;
+    orm = orm + Vec3f{s.occlusion, s.roughness, s.metallic};
+    normal = normal + tangent_normal;
+    alpha += s.alpha;
+    count += 1;
+  }
+};
+
+/// The numbers a, b, c of n = a u + b v + c w; (0, 0, 1) where the frame has no volume.
+Vec3d in_frame(Vec3d n, Vec3d u, Vec3d v, Vec3d w) {
+  const double volume = dot(cross(u, v), w);
+  if (!(std::fabs(volume) > 1e-6)) return {0, 0, 1};
+  return Vec3d{dot(cross(n, v), w), dot(cross(u, n), w), dot(cross(u, v), n)} * (1 / volume);
+}
+
+class Baker {
+ public:
+  Baker(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source, PlaceGrid grid)
+      : mesh_(mesh), normals_(normals), source_(source), grid_(std::move(grid)) {}
+
+  void bake_row(std::size_t y, BakedMaps& out) const {
+    std::optional<SurfacePlace> guess;
+    for (std::size_t x = 0; x < mesh_.width_px; ++x) {
+      TexelSum sum;
+      for (std::size_t j = 0; j < grid_.per_side; ++j)
+        for (std::size_t i = 0; i < grid_.per_side; ++i)
+          add_place(x * grid_.per_side + i, y * grid_.per_side + j, guess, sum);
+      if (sum.count > 0) put_texel(y * mesh_.width_px + x, sum, out);
+    }
+  }
+
+ private:
+  void add_place(std::size_t x, std::size_t y, std::optional<SurfacePlace>& guess, TexelSum& sum) const {
+    const std::uint32_t triangle = grid_.owner[y * grid_.width + x];
+    if (triangle == kNoIndex) return;
+    const Corners c = baked_corners(mesh_, normals_, triangle);
+    std::array<double, 3> weight{};
+    if (!weights_at(c.uv, grid_.texel_of(x, y), weight)) weight = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+    const Vec3d face = cross(c.position[1] - c.position[0], c.position[2] - c.position[0]);
+    Vec3d normal = normalized(mean3(c.normal, weight));
+    if (!(dot(normal, normal) > 0.5)) normal = normalized(face);
+    const auto place = source_.find(mesh_.group_of[triangle], mean3(c.position, weight), normal, guess);
+    if (!place) return;
+    guess = place;
+    const double texels = std::fabs(cross(c.uv[1] - c.uv[0], c.uv[2] - c.uv[0]));
+    const double footprint = texels > 0 ? std::sqrt(length(face) / texels) : 0;
+    const SurfaceSample sample = source_.sample(*place, footprint / static_cast<double>(grid_.per_side));
+    const TextureFrame frame = texture_frame(c.position, c.uv, normal);
+    sum.add(sample, in_frame(to_double(sample.normal), frame.along_u, frame.along_v, normal));
+  }
+
+  static void put_texel(std::size_t i, const TexelSum& sum, BakedMaps& out) {
+    out.covered[i] = 1;
+    out.base_colour[i] = sum.base * (1 / sum.colours);
+    out.emission[i] = sum.emission * (1 / sum.count);
+    out.occlusion_roughness_metallic[i] = sum.orm * (1 / sum.count);
+    out.alpha[i] = sum.alpha / sum.count;
+    // What looks below the horizon of a coarse triangle stays just above.
+    Vec3d n = normalized(sum.normal);
+    if (!(n.z > 0.1)) n = normalized(Vec3d{n.x, n.y, 0.1});
+    out.normal[i] = to_float(n);
+  }
+
+  const AtlasMesh& mesh_;
+  const std::vector<Vec3f>& normals_;
+  const BakeSource& source_;
+  PlaceGrid grid_;
+};
+
+void finish_maps(BakedMaps& maps) {
+  double count = 0;
+  Vec3d sum;
+  for (std::size_t i = 0; i < maps.covered.size(); ++i) {
+    if (!maps.covered[i]) continue;
+    count += 1;
+    sum = sum + to_double(maps.occlusion_roughness_metallic[i]);
+    const Vec3f e = maps.emission[i];
+    for (int k = 0; k < 3; ++k) maps.most_emission[k] = std::max(maps.most_emission[k], e[k]);
+    maps.has_alpha = maps.has_alpha || maps.alpha[i] < 0.999f;
+  }
+  maps.mean_orm = count > 0 ? to_float(sum * (1 / count)) : Vec3f{1, 1, 0};
+  maps.has_emission = maps.most_emission != Vec3f{};
+  for (std::vector<Vec3f>* map :
+       {&maps.base_colour, &maps.emission, &maps.occlusion_roughness_metallic, &maps.normal})
+    push_pull(*map, maps.covered, maps.width_px, maps.height_px);
+  for (Vec3f& n : maps.normal) n = normalized(n);
+  if (!maps.has_alpha) return;
+  std::vector<Vec3f> alpha;
+  for (const float a : maps.alpha) alpha.push_back({a, a, a});
+  push_pull(alpha, maps.covered, maps.width_px, maps.height_px);
+  for (std::size_t i = 0; i < alpha.size(); ++i) maps.alpha[i] = alpha[i].x;
+}
+
+}  // namespace
+
+BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
+               std::size_t samples, const RunContext& context) {
+  const std::size_t texels = std::size_t{mesh.width_px} * mesh.height_px;
+  std::size_t per_side = 1;
+  while (per_side < kMostPerSide && texels * (per_side + 1) * (per_side + 1) <= samples) ++per_side;
+  PlaceGrid grid = make_grid(mesh, per_side);
+  own_thin_triangles(mesh, grid);
+  BakedMaps out;
+  out.width_px = mesh.width_px, out.height_px = mesh.height_px;
+  out.base_colour.resize(texels);
+  out.emission.resize(texels);
+  out.occlusion_roughness_metallic.resize(texels);
+  out.normal.resize(texels, {0, 0, 1});
+  out.alpha.resize(texels, 1);
+  out.covered.resize(texels, 0);
+  const Baker baker(mesh, normals, source, std::move(grid));
+  parallel_for(context, mesh.height_px, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y) baker.bake_row(y, out);
+  });
+  finish_maps(out);
+  return out;
+}
+
+}  // namespace texmesh::proxies

@@ -1,0 +1,38 @@
+#pragma once
+// Inside the room only: what S_0 shows, as the texels of an atlas.
+#include <cstdint>
+#include <vector>
+
+#include "stages/base/run_context.h"
+#include "stages/proxies/atlas_mesh.h"
+#include "stages/proxies/bake/bake_source.h"
+
+namespace texmesh::proxies {
+
+/// Unit normals per vertex, equal where vertices share position and group: the mean of what S_0 shows, normal
+/// maps included, on the triangles around, each sample by its corner's share. Same bits for any thread count.
+std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& source,
+                                   const RunContext& context);
+
+/// Texels of an atlas, row by row from the top; all lists are width_px * height_px long and hold a
+/// continuation of the charts everywhere. Linear.
+struct BakedMaps {
+  std::uint32_t width_px = 0, height_px = 0;
+  std::vector<Vec3f> base_colour, emission;
+  std::vector<Vec3f> occlusion_roughness_metallic;  // as the channels of glTF's ORM textures
+  std::vector<Vec3f> normal;                        // tangent space, unit, +Y up
+  std::vector<float> alpha;
+  std::vector<std::uint8_t> covered;  // 1 = a chart shows here
+  Vec3f mean_orm;                     // over covered texels
+  Vec3f most_emission;                // largest of each channel over all texels
+  bool has_alpha = false, has_emission = false;
+};
+
+/// Bakes at the atlas' own size. Each texel is the mean of several places of its part of the charts; about
+/// `samples` places in all, at most 16 a texel. `normals` are those of the vertices; the normals' texels fit
+/// the frames that renderers derive of triangles without tangents. Same bits for any thread count and
+/// machine.
+BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
+               std::size_t samples, const RunContext& context);
+
+}  // namespace texmesh::proxies

@@ -1,0 +1,210 @@
+#include "stages/proxies/bake/bake_source.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/box.h"
+#include "format/base/no_index.h"
+
+namespace texmesh::proxies {
+namespace {
+
+constexpr double kCage = 0.03;       // of the diagonal, to both sides
+constexpr double kSameSide = 0.15;   // cosine: walls at right angles are no match
+constexpr float kNoLength = 1e-20f;  // squares below this are no length
+
+template <class T>
+T mean_of(const std::vector<T>& of_wedges, const Triangle& corner, const std::array<double, 3>& weight) {
+  return of_wedges[corner[0]] * static_cast<float>(weight[0]) +
+         of_wedges[corner[1]] * static_cast<float>(weight[1]) +
+         of_wedges[corner[2]] * static_cast<float>(weight[2]);
+}
+
+Vec3f unit_or(Vec3f v, Vec3f otherwise) {
+  const float square = dot(v, v);
+  return square > kNoLength && square < 1e20f ? v * (1 / std::sqrt(square)) : otherwise;
+}
+
+float within_unit(float x) { return x > 0 ? (x < 1 ? x : 1) : 0; }
+
+std::array<Vec3d, 3> corners_of(const Mesh& mesh, const Triangle& t) {
+  std::array<Vec3d, 3> out;
+  for (std::size_t k = 0; k < 3; ++k) out[k] = to_double(mesh.positions[mesh.wedge_position[t[k]]]);
+  return out;
+}
+
+Vec3d area_normal(const std::array<Vec3d, 3>& c) { return cross(c[1] - c[0], c[2] - c[0]); }
+
+/// Tangent and bitangent that the wedges carry; false when a corner has none.
+bool vertex_frame(const Mesh& mesh, const SurfacePlace& place, Vec3f face, Vec3f frame[2]) {
+  if (mesh.tangents.empty()) return false;
+  const Triangle& corner = mesh.triangles[place.triangle];
+  frame[0] = frame[1] = {};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec4f tangent = mesh.tangents[corner[k]];
+    const Vec3f direction = normalized(Vec3f{tangent.x, tangent.y, tangent.z});
+    if (!(dot(direction, direction) > 0.5f)) return false;
+    const Vec3f normal = mesh.normals.empty() ? face : mesh.normals[corner[k]];
+    const auto weight = static_cast<float>(place.weight[k]);
+    frame[0] = frame[0] + direction * weight;
+    frame[1] = frame[1] + normalized(cross(normal, direction) * tangent.w) * weight;
+  }
+  frame[0] = normalized(frame[0]);
+  frame[1] = normalized(frame[1]);
+  return true;
+}
+
+}  // namespace
+
+MaterialGroup group_of(const RenderMaterial& material) {
+  return {material.unlit, material.double_sided, material.alpha_mode};
+}
+
+MaterialGroups find_groups(const Mesh& mesh, const std::vector<RenderMaterial>& materials) {
+  MaterialGroups out;
+  std::vector<MaterialGroup> of_material;
+  for (const RenderMaterial& m : materials) of_material.push_back(group_of(m));
+  std::vector<std::uint8_t> used(materials.size(), 0);
+  for (const std::uint16_t m : mesh.triangle_material) used[m] = 1;
+  for (std::size_t m = 0; m < materials.size(); ++m)
+    if (used[m]) out.groups.push_back(of_material[m]);
+  std::sort(out.groups.begin(), out.groups.end());
+  out.groups.erase(std::unique(out.groups.begin(), out.groups.end()), out.groups.end());
+  std::vector<std::uint32_t> index(materials.size(), 0);
+  for (std::size_t m = 0; m < materials.size(); ++m)
+    index[m] = static_cast<std::uint32_t>(
+        std::lower_bound(out.groups.begin(), out.groups.end(), of_material[m]) - out.groups.begin());
+  for (const std::uint16_t m : mesh.triangle_material) out.triangle_group.push_back(index[m]);
+  return out;
+}
+
+TextureFrame texture_frame(const std::array<Vec3d, 3>& corner, const std::array<Vec2d, 3>& uv, Vec3d normal) {
+  const Vec3d edge1 = corner[1] - corner[0], edge2 = corner[2] - corner[0];
+  const Vec2d along1 = uv[1] - uv[0], along2 = uv[2] - uv[0];
+  const Vec3d u = cross(normal, edge1 * along2.x - edge2 * along1.x);
+  const Vec3d v = cross(normal, edge2 * along1.y - edge1 * along2.y);
+  const double square = std::max(dot(u, u), dot(v, v));
+  const double scale = square > 0 && std::isfinite(square) ? 1 / std::sqrt(square) : 0;
+  return {u * scale, v * scale};
+}
+
+BakeSource::BakeSource(const Mesh& mesh, const ShownMaterials& shown, const MaterialGroups& groups)
+    : mesh_(mesh),
+      shown_(shown),
+      groups_(groups.groups.size()),
+      tree_index_(mesh.triangles.size(), kNoIndex) {
+  std::vector<Vec3d> points;
+  Box3d box;
+  for (const Vec3f p : mesh.positions) points.push_back(to_double(p));
+  std::vector<std::vector<Triangle>> positions(groups_.size());
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vec3d, 3> c = corners_of(mesh, mesh.triangles[i]);
+    for (const Vec3d& p : c) box.extend(p);
+    const Vec3d n = area_normal(c);
+    if (!(dot(n, n) > 0)) continue;
+    const std::uint32_t g = groups.triangle_group[i];
+    tree_index_[i] = static_cast<std::uint32_t>(groups_[g].triangles.size());
+    groups_[g].triangles.push_back(i);
+    positions[g].push_back({mesh.position_of(i, 0), mesh.position_of(i, 1), mesh.position_of(i, 2)});
+  }
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    if (!positions[g].empty()) groups_[g].tree = std::make_unique<TriangleTree>(points, positions[g]);
+  if (!mesh.triangles.empty()) diagonal_ = length(box.max - box.min);
+}
+
+std::optional<SurfacePlace> BakeSource::find(std::uint32_t group, Vec3d p, Vec3d normal,
+                                             const std::optional<SurfacePlace>& guess) const {
+  const Group& g = groups_[group];
+  if (!g.tree) return std::nullopt;
+  const TriangleTree::Facing facing{normal, kSameSide};
+  std::optional<std::uint32_t> try_first;
+  if (guess) try_first = tree_index_[guess->triangle];
+  auto found = g.tree->crossing(p, normal, kCage * diagonal_, facing, try_first);
+  if (!found) found = g.tree->nearest_facing(p, facing);
+  if (!found) found = g.tree->nearest(p);
+  return SurfacePlace{g.triangles[found->triangle], found->weight};
+}
+
+Vec4f BakeSource::read(const SurfacePlace& place, const TextureSlot& slot, double footprint) const {
+  const Triangle& corner = mesh_.triangles[place.triangle];
+  const std::vector<Vec2f>& uv = slot.uv_set == 1 ? mesh_.uv1 : mesh_.uv0;
+  const RenderTexture& texture = shown_.textures[static_cast<std::size_t>(slot.texture)];
+  const UvMatrix matrix = uv_matrix(slot.transform);
+  TextureFootprint at;
+  at.uv = matrix.place(mean_of(uv, corner, place.weight));
+  const Vec2d along1 = to_double(matrix.direction(uv[corner[1]] - uv[corner[0]])),
+              along2 = to_double(matrix.direction(uv[corner[2]] - uv[corner[0]]));
+  const double texels = std::fabs(cross(along1, along2)) * texture.width_px * texture.height_px;
+  const double area = length(area_normal(corners_of(mesh_, corner)));
+  const double side = footprint * std::sqrt(texels / area);  // of the footprint in texels
+  if (std::isfinite(side)) {
+    at.uv_dx = {static_cast<float>(side / texture.width_px), 0};
+    at.uv_dy = {0, static_cast<float>(side / texture.height_px)};
+  }
+  return read_texture(texture, slot, at);
+}
+
+Vec3f BakeSource::mapped_normal(const SurfacePlace& place, const RenderMaterial& material,
+                                double footprint) const {
+  const Triangle& corner = mesh_.triangles[place.triangle];
+  const std::array<Vec3d, 3> corners = corners_of(mesh_, corner);
+  const Vec3f face = to_float(normalized(area_normal(corners)));
+  const Vec3f normal =
+      mesh_.normals.empty() ? face : unit_or(mean_of(mesh_.normals, corner, place.weight), face);
+  const TextureSlot& slot = material.slot(TextureUse::kNormal);
+  if (slot.texture < 0) return normal;
+  Vec3f frame[2];
+  if (!vertex_frame(mesh_, place, face, frame)) {
+    const std::vector<Vec2f>& uv = slot.uv_set == 1 ? mesh_.uv1 : mesh_.uv0;
+    const UvMatrix matrix = uv_matrix(slot.transform);
+    std::array<Vec2d, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) at[k] = to_double(matrix.direction(uv[corner[k]]));
+    const TextureFrame derived = texture_frame(corners, at, to_double(normal));
+    frame[0] = to_float(derived.along_u), frame[1] = to_float(derived.along_v);
+  }
+  const Vec4f texel = read(place, slot, footprint);
+  const float scale = material.normal_scale;
+  return unit_or(frame[0] * ((texel.x * 2 - 1) * scale) + frame[1] * ((texel.y * 2 - 1) * scale) +
+                     normal * (texel.z * 2 - 1),
+                 normal);
+}
+
+SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint) const {
+  const Triangle& corner = mesh_.triangles[place.triangle];
+  const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
+  const auto texel = [&](TextureUse use) {
+    return m.slot(use).texture < 0 ? Vec4f{1, 1, 1, 1} : read(place, m.slot(use), footprint);
+  };
+  Vec4f base = m.base_colour;
+  const auto multiply = [&base](Vec4f by) {
+    base = {base.x * by.x, base.y * by.y, base.z * by.z, base.w * by.w};
+  };
+  multiply(texel(TextureUse::kBaseColour));
+  if (!mesh_.colours.empty()) {
+    Vec4f sum{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec4f c = mesh_.colours[corner[k]];
+      const auto w = static_cast<float>(place.weight[k]);
+      sum = {sum.x + c.x * w, sum.y + c.y * w, sum.z + c.z * w, sum.w + c.w * w};
+    }
+    multiply(sum);
+  }
+  SurfaceSample out;
+  out.base_colour = {within_unit(base.x), within_unit(base.y), within_unit(base.z)};
+  out.alpha = within_unit(base.w);
+  if (m.alpha_mode == AlphaMode::kOpaque) out.alpha = 1;
+  if (m.alpha_mode == AlphaMode::kMask) out.alpha = out.alpha >= m.alpha_cutoff ? 1 : 0;
+  if (m.unlit) return out;
+  const Vec4f rough_metal = texel(TextureUse::kMetallicRoughness);
+  out.roughness = within_unit(m.roughness * rough_metal.y);
+  out.metallic = within_unit(m.metallic * rough_metal.z);
+  out.occlusion = within_unit(1 + (texel(TextureUse::kOcclusion).x - 1) * m.occlusion_strength);
+  if (m.emissive != Vec3f{}) {
+    const Vec4f e = texel(TextureUse::kEmissive);
+    out.emission = {m.emissive.x * e.x, m.emissive.y * e.y, m.emissive.z * e.z};
+  }
+  out.normal = mapped_normal(place, m, footprint);
+  return out;
+}
+
+}  // namespace texmesh::proxies

@@ -1,0 +1,31 @@
+#pragma once
+// Inside the room only: baked maps as pictures of a given size.
+#include <vector>
+
+#include "stages/proxies/bake/bake.h"
+#include "stages/proxies/coding/proxy_glb.h"
+#include "stages/render/render_texture.h"
+
+namespace texmesh::proxies {
+
+/// Which maps get a picture of their own. Without `orm`, half of the occlusion is multiplied into the base
+/// colour, and metal and roughness are means.
+struct MapChoice {
+  bool orm = false, normal = false;
+};
+
+/// Maps of 8 bits.
+struct MapPixels {
+  MapChoice choice;
+  Pixels base_colour;  // RGB, or RGBA where there is alpha; sRGB
+  Pixels orm, normal;  // plain numbers; empty where not chosen
+  Pixels emission;     // sRGB, over `emissive`; empty where nothing glows
+  Vec3f emissive;      // 0..1
+  float metallic = 0, roughness = 1;
+};
+MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice);
+
+/// All pictures at the highest quality that fits max_bytes; at the lowest where none does.
+ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes);
+
+}  // namespace texmesh::proxies

@@ -1,0 +1,71 @@
+#include "stages/proxies/making/nested_rival.h"
+
+#include <algorithm>
+#include <array>
+
+#include "stages/geometry/scale_frames.h"
+
+namespace texmesh::proxies {
+namespace {
+
+// Draco's meshes of the scans that docs/figures.md lists, within 20 %.
+constexpr double kBytesPerWedge = 4, kBytesPerTriangle = 0.6;
+constexpr double kBitsPerTexel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
+constexpr std::array<double, 3> kMeshShares{0.4, 0.6, 0.8};
+
+double mesh_bytes(const NestedScales& scales, std::size_t index, std::vector<std::uint8_t>& used) {
+  used.assign(scales.mesh.wedge_count(), 0);
+  const NestedScale& scale = scales.scales[index];
+  double wedges = 0;
+  for (const Triangle& t : scale.triangles)
+    for (const std::uint32_t w : t) {
+      wedges += used[w] ? 0 : 1;
+      used[w] = 1;
+    }
+  return kBytesPerWedge * wedges + kBytesPerTriangle * static_cast<double>(scale.triangles.size());
+}
+
+/// Textures without the levels that cost too much.
+std::vector<RenderTexture> affordable(const std::vector<RenderTexture>& textures, double bytes) {
+  std::vector<RenderTexture> out = textures;
+  for (;;) {
+    double texels = 0;
+    bool coarser = false;
+    for (const RenderTexture& t : out) {
+      texels += static_cast<double>(t.levels.front().width_px) * t.levels.front().height_px;
+      coarser = coarser || t.levels.size() > 1;
+    }
+    if (texels * kBitsPerTexel / 8 <= bytes || !coarser) return out;
+    for (RenderTexture& t : out) {
+      if (t.levels.size() < 2) continue;
+      t.levels.erase(t.levels.begin());
+      ++t.first_level;
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
+                                 ProxyStudio& studio, const RunContext& context) {
+  const auto all = static_cast<double>(bytes);
+  std::vector<std::uint8_t> used;
+  std::vector<double> cost;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) cost.push_back(mesh_bytes(scales, k, used));
+  std::vector<std::size_t> tried;
+  std::optional<double> best;
+  for (const double share : kMeshShares) {
+    const auto found = std::ranges::find_if(cost, [&](double mesh) { return mesh <= share * all; });
+    const auto index = static_cast<std::size_t>(found - cost.begin());
+    if (found == cost.end() || std::ranges::find(tried, index) != tried.end()) continue;
+    tried.push_back(index);
+    const Mesh mesh = lit_scale(scales, index, context);
+    const std::vector<RenderTexture> textures = affordable(shown.textures, all - cost[index]);
+    const RenderScene scene = render_scene(mesh, shown.materials, textures.size());
+    const double flip = studio.compare(scene, textures, ProxyStudio::kMiddle, context).mean();
+    if (!best || flip < *best) best = flip;
+  }
+  return best;
+}
+
+}  // namespace texmesh::proxies

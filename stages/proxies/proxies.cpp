@@ -1,0 +1,111 @@
+#include "stages/proxies/proxies.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "stages/proxies/making/make_proxy.h"
+#include "stages/proxies/making/nested_rival.h"
+
+namespace texmesh {
+namespace {
+
+using proxies::BakeSource;
+using proxies::ByteSplit;
+using proxies::find_groups;
+using proxies::MadeProxy;
+using proxies::MaterialGroups;
+using proxies::ProxyStudio;
+using proxies::ProxyWorkshop;
+using proxies::SurfaceLadder;
+
+constexpr std::uint32_t kLeastTriangles = 60;
+constexpr double kLeastBytesPerTriangle = 4;
+
+/// Source textures need not be finer than what a proxy and the pictures show of them.
+std::uint32_t least_side_px(const std::vector<Material>& materials) {
+  std::size_t used = 0;
+  for (const Material& m : materials) for_each_texture(m, [&](const TextureRef& t) { used += t.used(); });
+  return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
+}
+
+ByteSplit split_for(int bytes) {
+  constexpr int kMapsPayFrom = 45000;
+  ByteSplit out;
+  out.maps.normal = out.maps.orm = bytes >= kMapsPayFrom;
+  out.mesh_share = 0.6;
+  return out;
+}
+
+void note_none(Notes& notes, int bytes, const std::string& why) {
+  add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
+}
+
+/// One model's proxies, smallest first.
+class ProxyRun {
+ public:
+  ProxyRun(const NestedScales& scales, const Mesh& mesh, const ShownMaterials& shown,
+           const BakeSource& source, const MaterialGroups& groups, const ProxiesOptions& options,
+           const RunContext& context)
+      : scales_(scales),
+        shown_(shown),
+        mode_(options.mode),
+        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
+        shop_{source, groups, surfaces_},
+        studio_(mesh, shown, context) {}
+
+  void add(int bytes, Proxies& out, const RunContext& context) {
+    std::optional<MadeProxy> made = shop_.make(static_cast<std::uint64_t>(bytes), split_for(bytes), context);
+    if (!made) return note_none(out.notes, bytes, "mesh and pictures do not fit");
+    if (!out.proxies.empty() && made->proxy.glb.size() <= out.proxies.back().glb.size())
+      return note_none(out.notes, bytes, "the whole object takes fewer");
+    made->proxy.losses = studio_.losses(made->shown, context);
+    if (mode_ == ProxyMode::kAuto) {
+      const auto rival = rival_flip(scales_, shown_, made->proxy.glb.size(), studio_, context);
+      if (rival && *rival <= made->proxy.losses[ProxyStudio::kMiddle].flip_mean)
+        return note_none(out.notes, bytes, "a scale with the source's atlas looks better for the same bytes");
+    }
+    out.proxies.push_back(std::move(made->proxy));
+  }
+
+ private:
+  static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
+    return static_cast<std::uint32_t>(std::min<double>(options.sizes.back() / kLeastBytesPerTriangle,
+                                                       static_cast<double>(mesh.triangles.size())));
+  }
+  const NestedScales& scales_;
+  const ShownMaterials& shown_;
+  ProxyMode mode_;
+  SurfaceLadder surfaces_;
+  ProxyWorkshop shop_;
+  ProxyStudio studio_;
+};
+
+}  // namespace
+
+Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
+                     const Fragments& fragments, const std::vector<Pixels>& pixels,
+                     const ProxiesOptions& options, const RunContext& context) {
+  Proxies out;
+  if (options.mode == ProxyMode::kNone || options.sizes.empty()) return out;
+  if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
+  RunContext inner = context;
+  inner.progress = nullptr;
+  const Mesh mesh = extract_scale(scales, scales.scales.front());
+  const ShownMaterials shown =
+      shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
+  const MaterialGroups groups = find_groups(mesh, shown.materials);
+  const BakeSource source(mesh, shown, groups);
+  if (!(source.diagonal() > 0)) {
+    add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");
+    return out;
+  }
+  ProxyRun run(scales, mesh, shown, source, groups, options, inner);
+  for (std::size_t i = 0; i < options.sizes.size(); ++i) {
+    run.add(options.sizes[i], out, inner);
+    context.report(static_cast<double>(i + 1) / static_cast<double>(options.sizes.size()));
+  }
+  return out;
+}
+
+}  // namespace texmesh

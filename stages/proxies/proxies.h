@@ -1,0 +1,54 @@
+#pragma once
+#include <vector>
+
+#include "format/model/model.h"
+#include "stages/data/fragments.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/pixels.h"
+#include "stages/data/proxies.h"
+#include "stages/data/stage.h"
+
+namespace texmesh {
+
+inline constexpr int kProxiesVersion = 1;
+
+/// kAuto: only those that beat what the source's atlas gives for the same bytes.
+enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
+template <>
+struct EnumNames<ProxyMode> {
+  static constexpr std::array<std::string_view, 3> names{"none", "auto", "always"};
+};
+
+struct ProxiesOptions {
+  ProxyMode mode = ProxyMode::kAuto;
+  std::vector<int> sizes{20000, 50000, 150000};
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("mode", s.mode,
+      "whether coarse meshes with atlases of their own are baked: auto = where they beat the scales with the "
+      "source's atlas for the same bytes");
+    v("sizes", s.sizes, Range{4000, 2000000}, "bytes of each proxy's file, rising; at most 8");
+  }
+};
+
+/// The whole object in small files: coarse meshes with atlases of their own, whose textures are baked from
+/// S_0 with the source's texels.
+/// - Mesh: simplification without regard to the source's charts, one run for all sizes; new charts, packed
+/// into
+///   one square. Triangles of one class of materials (unlit or lit, single- or double-sided, opaque, mask or
+///   blend) become one material.
+/// - Maps: base colour; a lit material's occlusion, half of it, is multiplied into the base colour until the
+///   size pays for a map of occlusion, roughness and metal; a normal map from the same size on; emission
+///   where something glows. Vertex colours and factors are in the texels.
+/// - File: GLB by EXT_meshopt_compression and KHR_mesh_quantization, JPEG inside, or WebP where there is
+/// alpha.
+///   It is at most 2 % larger than its size asks for.
+/// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
+///   heights, where the height is that of the bounding box's longest side.
+/// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
+/// fill_planes()'s. Same bytes for any thread count and machine.
+Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
+                     const Fragments& fragments, const std::vector<Pixels>& pixels,
+                     const ProxiesOptions& options, const RunContext& context);
+
+}  // namespace texmesh

@@ -1,0 +1,125 @@
+// Plans over packages with proxies; plans over scales alone are held by delivery/vectors.
+#include "delivery/cpp/client/delivery_plan.h"
+
+#include <gtest/gtest.h>
+
+#include "format/documents/package_writer.h"
+#include "format/rules/proxy_choice.h"
+#include "tests/format/container/package_fixture.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint64_t kMeshBytes = 100'000, kSmallBytes = 20'000, kLargeBytes = 60'000;
+
+/// make_package() with meshes of 100 kB and, where asked for, proxies of 20 and 60 kB: FLIP .04 and .02 at
+/// 128 px, .2 and .06 at 512 px, P95 three times that; or 1 everywhere. Scales lose 0, .1 and .2 at 128 px.
+enum class Proxies : std::uint8_t { kNone, kGood, kBad };
+Bytes make_package(Proxies proxies) {
+  const Bytes plain = testing::make_package(1, kMeshBytes);
+  if (proxies == Proxies::kNone) return plain;
+  PackageReader package(open_container(memory_source(plain)));
+  Manifest m = package.manifest();
+  m.proxy_sizes_px = {128, 512};
+  std::vector<PackageEntry> entries;
+  for (const EntryRef& e : package.index())
+    if (e.path != kTexturesPath) entries.push_back({e.path, package.entry(e)});
+  for (const std::uint64_t bytes : {kSmallBytes, kLargeBytes}) {
+    const bool large = bytes == kLargeBytes;
+    entries.push_back({proxy_path(large ? 1 : 0), Bytes(bytes, 7)});
+    m.proxies.push_back(
+        {{}, 1, 3, 0, {large ? 0.02 : 0.04, large ? 0.06 : 0.2}, {large ? 0.06 : 0.12, large ? 0.18 : 0.6}});
+    if (proxies == Proxies::kBad) m.proxies.back().flip = m.proxies.back().flip_p95 = {1, 1};
+  }
+  return write_package(m, package.textures(), entries);
+}
+PackageReader open_package(Proxies proxies) {
+  static const Bytes none = make_package(Proxies::kNone), good = make_package(Proxies::kGood),
+                     bad = make_package(Proxies::kBad);
+  const Bytes& bytes = proxies == Proxies::kNone ? none : proxies == Proxies::kGood ? good : bad;
+  return PackageReader(open_container(memory_source(bytes)));
+}
+
+DeliveryRequest request(double displayed_px, double bytes_s, double limit_s = 5) {
+  DeliveryRequest r;
+  r.displayed_px = displayed_px;
+  r.time_limit_s = limit_s;
+  r.network.link = BandwidthTrace::constant(bytes_s);
+  return r;
+}
+
+TEST(DeliveryPlan, AThumbnailNeedsTheSmallestProxyAlone) {
+  PackageReader package = open_package(Proxies::kGood);
+  const DeliveryPlan plan = plan_delivery(package, request(100, 1e6));
+  EXPECT_EQ(plan.proxy, 0u);
+  EXPECT_EQ(plan.bytes(), kStartBytes);  // one request
+  EXPECT_TRUE(plan.planes.empty());
+  EXPECT_DOUBLE_EQ(plan.flip, 0.04);
+  EXPECT_DOUBLE_EQ(plan.first_picture_s, plan.complete_s);
+  EXPECT_EQ(plan_delivery(package, request(180, 1e6)).proxy, 1u);
+}
+
+TEST(DeliveryPlan, AScaleOrAnotherRuleIsAskedForByHand) {
+  PackageReader package = open_package(Proxies::kGood);
+  DeliveryRequest by_hand = request(100, 1e6);
+  by_hand.scale = 4;
+  EXPECT_EQ(plan_delivery(package, by_hand).proxy, std::nullopt);
+  EXPECT_EQ(plan_delivery(package, by_hand).scale, 4);
+  EXPECT_EQ(plan_budget(package, by_hand, 1).proxy, std::nullopt);
+  DeliveryRequest by_jnd = request(100, 1e7);
+  by_jnd.rule = StepRule::kJnd;
+  const DeliveryPlan plan = plan_delivery(package, by_jnd);
+  EXPECT_LE(plan.flip, 0.04 + 1e-9);  // the proxy is a candidate still
+}
+
+TEST(DeliveryPlan, ASlowLinkShowsAProxyWhereScalesComeTooLate) {
+  PackageReader package = open_package(Proxies::kGood);
+  const DeliveryPlan slow = plan_delivery(package, request(512, 3e4));
+  EXPECT_EQ(slow.proxy, 1u);  // 100 kB of mesh more take 3.3 s more
+  EXPECT_LT(slow.complete_s, 5);
+  EXPECT_EQ(plan_delivery(package, request(512, 2e4)).proxy, 0u);
+  EXPECT_EQ(plan_delivery(package, request(512, 5e3)).proxy, 0u);  // late itself, but nothing comes sooner
+}
+
+TEST(DeliveryPlan, AProxyThatLooksWorseIsNotShown) {
+  PackageReader package = open_package(Proxies::kBad);
+  for (const double px : {60.0, 512.0, 3000.0}) {
+    EXPECT_EQ(plan_delivery(package, request(px, 1e6)).proxy, std::nullopt) << px;
+    EXPECT_EQ(plan_budget(package, request(px, 0), 1'000'000).proxy, std::nullopt) << px;
+  }
+}
+
+TEST(DeliveryPlan, NothingLooksWorseForHavingProxies) {
+  PackageReader with = open_package(Proxies::kGood), without = open_package(Proxies::kNone);
+  for (const double px : {60.0, 128.0, 300.0, 700.0})
+    for (const std::uint64_t bytes : {30'000u, 50'000u, 120'000u, 250'000u, 400'000u}) {
+      const DeliveryPlan a = plan_budget(with, request(px, 0), bytes),
+                         b = plan_budget(without, request(px, 0), bytes);
+      if (b.bytes() <= bytes)
+        EXPECT_LE(a.flip, b.flip + 0.02) << px << ' ' << bytes;  // 45 kB more come first
+      if (a.proxy) EXPECT_DOUBLE_EQ(a.flip, proxy_loss(with.manifest(), *a.proxy, px).flip);
+    }
+}
+
+TEST(DeliveryPlan, ABudgetTakesTheProxyThatFits) {
+  PackageReader package = open_package(Proxies::kGood);
+  EXPECT_EQ(plan_budget(package, request(512, 0), kStartBytes).proxy, 0u);
+  EXPECT_EQ(plan_budget(package, request(512, 0), kStartBytes + kLargeBytes).proxy, 1u);
+  const DeliveryPlan too_few = plan_budget(package, request(512, 0), 1000);
+  EXPECT_EQ(too_few.proxy, 0u);  // the least there is
+  EXPECT_GT(too_few.bytes(), 1000u);
+}
+
+TEST(DeliveryPlan, BehindAProxyTheCoarsestMeshIsCountedToo) {
+  PackageReader with = open_package(Proxies::kGood);
+  DeliveryRequest r = request(700, 1e6);
+  r.scale = 9;
+  const DeliveryPlan coarsest = plan_delivery(with, r);
+  const EntryRef& glb = with.manifest().scales.back().glb;
+  EXPECT_GE(coarsest.bytes(), glb.offset + glb.bytes);
+  r.scale = 4;
+  EXPECT_EQ(plan_delivery(with, r).mesh_bytes, coarsest.mesh_bytes + kMeshBytes);
+}
+
+}  // namespace
+}  // namespace texmesh

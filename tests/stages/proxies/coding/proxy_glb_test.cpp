@@ -1,0 +1,130 @@
+#include "stages/proxies/coding/proxy_glb.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "stages/gltf/check_glb.h"
+#include "stages/proxies/coding/proxy_pictures.h"
+#include "stages/proxies/coding/webp_alpha.h"
+#include "tests/stages/proxies/atlas_fixtures.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh::proxies {
+namespace {
+
+BakedMaps noise_maps(std::uint32_t side_px, bool alpha) {
+  testing::Random random{11};
+  BakedMaps out;
+  out.width_px = out.height_px = side_px;
+  for (std::uint32_t i = 0; i < side_px * side_px; ++i) {
+    const auto value = [&] { return static_cast<float>(random.uniform()); };
+    out.base_colour.push_back({value(), value(), value()});
+    out.emission.push_back({value() * 2, 0, 0});
+    out.occlusion_roughness_metallic.push_back({value(), value(), value()});
+    out.normal.push_back(normalized(Vec3f{value() - 0.5f, value() - 0.5f, 1}));
+    out.alpha.push_back(alpha ? value() : 1);
+    out.covered.push_back(1);
+  }
+  out.mean_orm = {0.5f, 0.4f, 0.3f};
+  out.most_emission = {2, 0, 0};
+  out.has_emission = true;
+  out.has_alpha = alpha;
+  return out;
+}
+
+const std::vector<Vec3f> kUp(4, Vec3f{0, 0, 1});
+
+std::string json_of(const Bytes& glb) {
+  return {glb.begin() + 20, glb.begin() + 20 + glb[12] + (glb[13] << 8) + (glb[14] << 16)};
+}
+
+GlbFacts checked(const Bytes& glb) {
+  Findings findings;
+  const GlbFacts facts = check_glb(glb, "proxy", findings, GlbRules::kStandalone);
+  EXPECT_TRUE(findings.list().empty()) << (findings.list().empty() ? "" : findings.list().front().found);
+  return facts;
+}
+
+TEST(ProxyGlb, StandsAloneWithItsPictures) {
+  const AtlasMesh atlas = testing::square_atlas(32);
+  const CodedMesh mesh = code_mesh(atlas, kUp, {true}, 12);
+  const ProxyPictures pictures = code_pictures(map_pixels(noise_maps(32, false), {true, true}), 6000);
+  const Bytes glb = proxy_glb(mesh, {MaterialGroup{}}, pictures);
+  const GlbFacts facts = checked(glb);
+  EXPECT_EQ(facts.triangles, 2u);
+  EXPECT_EQ(facts.vertices, 4u);
+  EXPECT_EQ(facts.codec, "meshopt");
+  EXPECT_EQ(facts.image_names.size(), 4u);
+  EXPECT_EQ(facts.largest_image_px, 32u);
+  ASSERT_EQ(facts.positions.size(), 4u);
+  EXPECT_NEAR(facts.positions[0].x, -1, 1e-3);
+  EXPECT_NEAR(facts.positions[3].y, 1, 1e-3);
+  const std::string json = json_of(glb);
+  for (const char* part : {"normalTexture", "occlusionTexture", "metallicRoughnessTexture", "emissiveFactor"})
+    EXPECT_NE(json.find(part), std::string::npos) << part;
+  EXPECT_EQ(json.find("webp"), std::string::npos);
+}
+
+TEST(ProxyGlb, GroupsAreMaterialsOverTheSamePictures) {
+  AtlasMesh atlas = testing::square_atlas(16);
+  atlas.group_of = {0, 1};
+  const std::vector<MaterialGroup> groups{{false, true, AlphaMode::kMask}, {true, false, AlphaMode::kOpaque}};
+  const CodedMesh mesh = code_mesh(atlas, kUp, {true, false}, 12);
+  ASSERT_EQ(mesh.groups.size(), 2u);
+  EXPECT_EQ(mesh.groups[1].normals.count, 0u) << "an unlit material needs no normals";
+  const Bytes glb = proxy_glb(mesh, groups, code_pictures(map_pixels(noise_maps(16, true), {}), 100000));
+  EXPECT_EQ(checked(glb).primitives, 2u);
+  const std::string json = json_of(glb);
+  for (const char* part : {"MASK", "doubleSided", "KHR_materials_unlit", "EXT_texture_webp"})
+    EXPECT_NE(json.find(part), std::string::npos) << part;
+  EXPECT_EQ(json.find("image/jpeg\"},{\"bufferView\":9"), std::string::npos);
+}
+
+TEST(ProxyPictures, FillTheBytesAndNoMore) {
+  const MapPixels maps = map_pixels(noise_maps(128, false), {true, true});
+  for (const std::size_t bytes : {40000u, 80000u}) {
+    const ProxyPictures pictures = code_pictures(maps, bytes);
+    EXPECT_LE(pictures.bytes(), bytes);
+    EXPECT_GT(pictures.bytes(), bytes * 9 / 10);
+  }
+  const std::size_t least = code_pictures(maps, 0).bytes();
+  EXPECT_GT(least, 0u);
+  EXPECT_LT(least, 40000u);
+}
+
+TEST(ProxyPictures, HalfOfTheOcclusionIsInTheColourWhereItHasNoMap) {
+  BakedMaps maps = noise_maps(8, false);
+  for (Vec3f& c : maps.base_colour) c = {1, 1, 1};
+  for (Vec3f& orm : maps.occlusion_roughness_metallic) orm.x = 0;
+  const std::uint8_t shaded = map_pixels(maps, {false, false}).base_colour.data[0];
+  EXPECT_EQ(shaded, 188) << "light .5";
+  EXPECT_EQ(map_pixels(maps, {true, false}).base_colour.data[0], 255);
+}
+
+TEST(ProxyMesh, TrianglesThatTheGridFlattensGo) {
+  AtlasMesh atlas = testing::square_atlas(16);
+  atlas.positions.push_back({-1, 1 - 1e-6f, 0});
+  atlas.uvs.push_back({0, 0.01f});
+  atlas.position_of.push_back(4);
+  atlas.triangles.push_back({0, 4, 2});
+  atlas.group_of.push_back(0);
+  const CodedMesh mesh = code_mesh(atlas, std::vector<Vec3f>(5, Vec3f{0, 0, 1}), {true}, 11);
+  ASSERT_EQ(mesh.groups.size(), 1u);
+  EXPECT_EQ(mesh.groups[0].triangles(), 2u);
+  EXPECT_EQ(mesh.groups[0].vertices(), 4u);
+}
+
+TEST(WebpAlpha, AlphaComesBack) {
+  Pixels rgba{8, 8, 4, {}};
+  for (std::uint32_t i = 0; i < 64; ++i)
+    rgba.data.insert(rgba.data.end(), {200, 100, 50, i < 32 ? std::uint8_t{255} : std::uint8_t{0}});
+  const Pixels back = decode_webp_alpha(encode_webp_alpha(rgba, 80));
+  ASSERT_EQ(back.data.size(), rgba.data.size());
+  EXPECT_EQ(back.data[3], 255);
+  EXPECT_EQ(back.data[63 * 4 + 3], 0);
+  EXPECT_NEAR(back.data[0], 200, 12);
+}
+
+}  // namespace
+}  // namespace texmesh::proxies

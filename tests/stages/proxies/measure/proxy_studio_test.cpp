@@ -1,0 +1,69 @@
+#include "stages/proxies/measure/proxy_studio.h"
+
+#include <gtest/gtest.h>
+
+#include "stages/proxies/coding/proxy_pictures.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh::proxies {
+namespace {
+
+ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
+  ShownModel out{mesh, {}};
+  RenderMaterial material;
+  material.base_colour = colour;
+  material.metallic = 0;
+  out.shown.materials = {material};
+  return out;
+}
+
+TEST(ProxyStudio, S0ItselfHasNoLossAndAnotherColourHasOne) {
+  const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1});
+  ProxyStudio studio(source.mesh, source.shown, {});
+  const std::vector<ProxyPictureLoss> same = studio.losses(source, {});
+  ASSERT_EQ(same.size(), ProxyStudio::kDisplayedPx.size());
+  for (const ProxyPictureLoss& loss : same) {
+    EXPECT_EQ(loss.flip_mean, 0);
+    EXPECT_EQ(loss.flip_p95, 0);
+  }
+  for (const ProxyPictureLoss& loss : studio.losses(plain_model(source.mesh, {1, 0, 0, 1}), {})) {
+    EXPECT_GT(loss.flip_mean, 0.2);
+    EXPECT_GE(loss.flip_p95, loss.flip_mean);
+  }
+}
+
+TEST(ProxyStudio, AProxyIsShownAsItsFileSaysIt) {
+  AtlasMesh atlas;
+  atlas.positions = {{-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}};
+  atlas.uvs = {{0, 0}, {0, 1}, {1, 1}};
+  atlas.position_of = {0, 1, 2};
+  atlas.triangles = {{0, 1, 2}};
+  atlas.group_of = {0};
+  BakedMaps maps;
+  maps.width_px = maps.height_px = 4;
+  maps.base_colour.assign(16, {1, 0, 0});
+  maps.emission.assign(16, {});
+  maps.occlusion_roughness_metallic.assign(16, {1, 0.25f, 0.75f});
+  maps.normal.assign(16, {0, 0, 1});
+  maps.alpha.assign(16, 1);
+  maps.covered.assign(16, 1);
+  maps.mean_orm = {1, 0.25f, 0.75f};
+  const MaterialGroup group{false, true, AlphaMode::kOpaque};
+  const auto shown = [&](const MapChoice& choice) {
+    return shown_proxy(atlas, rounded_mesh(atlas, std::vector<Vec3f>(3, {0, 0, 1}), 12), {group},
+                       code_pictures(map_pixels(maps, choice), 100000));
+  };
+  const ShownModel plain = shown({false, false});
+  ASSERT_EQ(plain.shown.materials.size(), 1u);
+  EXPECT_TRUE(plain.shown.materials[0].double_sided);
+  EXPECT_EQ(plain.shown.materials[0].roughness, 0.25f);
+  EXPECT_EQ(plain.shown.materials[0].metallic, 0.75f);
+  EXPECT_EQ(plain.shown.textures.size(), 1u);
+  const ShownModel mapped = shown({true, true});
+  EXPECT_EQ(mapped.shown.materials[0].roughness, 1);
+  EXPECT_EQ(mapped.shown.textures.size(), 3u);
+  EXPECT_GE(mapped.shown.materials[0].slot(TextureUse::kNormal).texture, 0);
+}
+
+}  // namespace
+}  // namespace texmesh::proxies

@@ -1,0 +1,204 @@
+#include "stages/proxies/proxies.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "stages/base/run_context.h"
+#include "stages/gltf/check_glb.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+NestedScales only_scale(Mesh mesh) {
+  NestedScales out;
+  NestedScale s;
+  s.triangles = mesh.triangles;
+  for (std::uint32_t t = 0; t < s.triangles.size(); ++t) s.triangle_source.push_back(t);
+  out.mesh = std::move(mesh);
+  out.scales.push_back(std::move(s));
+  return out;
+}
+
+struct ProxyModel {
+  Mesh mesh;
+  std::vector<Material> materials{Material{}};
+  Fragments fragments;
+  std::vector<Pixels> pixels;
+};
+
+void add_plane(ProxyModel& model, TextureRole role, std::uint32_t side_px, auto&& value) {
+  TexturePlane plane;
+  plane.role = role;
+  plane.width_px = plane.height_px = side_px;
+  plane.channels = role == TextureRole::kAlpha ? 1 : 3;
+  plane.columns = plane.rows = 1;
+  plane.fragment_width_px = plane.fragment_height_px = side_px;
+  Pixels p{side_px, side_px, plane.channels, {}};
+  for (std::uint32_t y = 0; y < side_px; ++y)
+    for (std::uint32_t x = 0; x < side_px; ++x)
+      for (std::uint32_t c = 0; c < plane.channels; ++c)
+        p.data.push_back(static_cast<std::uint8_t>(value(x, y, c)));
+  model.fragments.planes.push_back(std::move(plane));
+  model.pixels.push_back(std::move(p));
+}
+
+ProxyModel textured(Mesh mesh) {
+  ProxyModel out{std::move(mesh), {Material{}}, {}, {}};
+  out.materials[0].metallic = 0;
+  out.materials[0].base_colour_texture.image = 0;
+  add_plane(out, TextureRole::kBaseColour, 256, [](auto x, auto y, auto c) {
+    return c == 0 ? x : c == 1 ? y : 128;
+  });
+  return out;
+}
+
+Proxies proxies_of(const ProxyModel& model, const ProxiesOptions& options = {ProxyMode::kAlways, {20000}},
+                   int threads = 1) {
+  RunContext context;
+  context.threads = threads;
+  return make_proxies(only_scale(model.mesh), model.materials, model.fragments, model.pixels, options,
+                      context);
+}
+
+void expect_sound(const Proxies& made, const std::string& what) {
+  EXPECT_FALSE(made.proxies.empty() && made.notes.empty()) << what << ": a proxy or a note why not";
+  for (const Proxy& proxy : made.proxies) {
+    Findings findings;
+    const GlbFacts facts = check_glb(proxy.glb, what, findings, GlbRules::kStandalone);
+    EXPECT_TRUE(findings.empty()) << what << ": " << (findings.empty() ? "" : findings.list().front().found);
+    EXPECT_EQ(facts.triangles, proxy.triangles) << what;
+    EXPECT_EQ(facts.vertices, proxy.vertices) << what;
+    EXPECT_LE(proxy.glb.size(), proxy.target_bytes * 102 / 100) << what;
+    ASSERT_EQ(proxy.losses.size(), 3u) << what;
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_GE(proxy.losses[i].flip_mean, 0) << what;
+      EXPECT_LE(proxy.losses[i].flip_mean, 1) << what;
+      EXPECT_GE(proxy.losses[i].flip_p95, 0) << what;
+      if (i > 0) {
+        EXPECT_GT(proxy.losses[i].displayed_px, proxy.losses[i - 1].displayed_px) << what;
+      }
+    }
+  }
+}
+
+TEST(Proxies, FilesStandAloneFitTheirSizesAndLookBetterWithMoreBytes) {
+  const Proxies made =
+      proxies_of(textured(testing::bumpy_sphere(80, 160)), {ProxyMode::kAlways, {12000, 30000, 60000}});
+  expect_sound(made, "sphere");
+  ASSERT_EQ(made.proxies.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_LT(made.proxies[i].losses[0].flip_mean, 0.08);
+    EXPECT_EQ(made.proxies[i].textures.front().use, "base-colour");
+    if (i == 0) continue;
+    EXPECT_GT(made.proxies[i].glb.size(), made.proxies[i - 1].glb.size());
+    EXPECT_LT(made.proxies[i].losses[2].flip_mean, made.proxies[i - 1].losses[2].flip_mean);
+  }
+}
+
+TEST(Proxies, ManyThreadsGiveTheBytesOfOne) {
+  const ProxyModel model = textured(testing::bumpy_sphere(40, 80));
+  const ProxiesOptions options{ProxyMode::kAlways, {15000, 50000}};
+  const Proxies one = proxies_of(model, options, 1), eight = proxies_of(model, options, 8);
+  ASSERT_EQ(one.proxies.size(), eight.proxies.size());
+  for (std::size_t i = 0; i < one.proxies.size(); ++i) {
+    EXPECT_EQ(one.proxies[i].glb, eight.proxies[i].glb);
+    EXPECT_EQ(one.proxies[i].losses, eight.proxies[i].losses);
+  }
+}
+
+TEST(Proxies, NoneAreMadeWhereNoneAreWanted) {
+  const Proxies made = proxies_of(textured(testing::sphere(10, 20)), {ProxyMode::kNone, {20000}});
+  EXPECT_TRUE(made.proxies.empty());
+  EXPECT_TRUE(made.notes.empty());
+}
+
+ProxyModel one_triangle() {
+  Mesh m;
+  m.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  m.wedge_position = {0, 1, 2};
+  m.triangles = {{0, 1, 2}};
+  m.triangle_material = {0};
+  m.triangle_part = {0};
+  m.part_names = {"part"};
+  return {std::move(m), {Material{}}, {}, {}};
+}
+
+ProxyModel many_materials() {
+  ProxyModel out{testing::sphere(20, 40), {}, {}, {}};
+  for (std::uint16_t i = 0; i < 220; ++i) {
+    Material m;
+    m.base_colour = {static_cast<float>(i) / 220, 0.5f, 0.5f, 1};
+    m.metallic = 0;
+    m.double_sided = i % 3 == 0;
+    m.unlit = i % 5 == 0;
+    m.alpha_mode = i % 7 == 0 ? AlphaMode::kBlend : i % 11 == 0 ? AlphaMode::kMask : AlphaMode::kOpaque;
+    out.materials.push_back(m);
+  }
+  for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t)
+    out.mesh.triangle_material[t] = static_cast<std::uint16_t>(t % 220);
+  return out;
+}
+
+ProxyModel masked() {
+  ProxyModel out = textured(testing::sheet(30));
+  out.materials[0].alpha_mode = AlphaMode::kMask;
+  out.materials[0].double_sided = true;
+  add_plane(out, TextureRole::kAlpha, 256,
+            [](auto x, auto y, auto) { return (x / 32 + y / 32) % 2 ? 255 : 0; });
+  return out;
+}
+
+TEST(Proxies, HardModelsHaveAProxyOrANote) {
+  const auto changed = [](ProxyModel model, const std::function<void(ProxyModel&)>& change) {
+    change(model);
+    return model;
+  };
+  const ProxyModel sphere = textured(testing::bumpy_sphere(30, 60));
+  const std::vector<std::pair<std::string, ProxyModel>> models{
+      {"one triangle", one_triangle()},
+      {"220 materials", many_materials()},
+      {"alpha mask", masked()},
+      {"open sheet", textured(testing::sheet(30))},
+      {"no coordinates", changed(sphere, [](ProxyModel& m) { m.mesh.uv0.clear(); })},
+      {"coordinates without area", changed(sphere,
+                                           [](ProxyModel& m) {
+                                             for (Vec2f& uv : m.mesh.uv0) uv = {0.5f, 0.5f};
+                                           })},
+      {"vertex colours",
+       changed(sphere,
+               [](ProxyModel& m) {
+                 m.mesh.uv0.clear();
+                 for (const std::uint32_t p : m.mesh.wedge_position)
+                   m.mesh.colours.push_back({m.mesh.positions[p].x * 0.4f + 0.5f, 0.5f, 0.2f, 1});
+               })},
+      {"inside out", changed(sphere,
+                             [](ProxyModel& m) {
+                               for (Triangle& t : m.mesh.triangles) std::swap(t[1], t[2]);
+                               for (Vec3f& n : m.mesh.normals) n = n * -1.0f;
+                             })},
+      {"far away", changed(sphere,
+                           [](ProxyModel& m) {
+                             for (Vec3f& p : m.mesh.positions) p = p * 1000.0f + Vec3f{1e7f, 1e7f, -1e7f};
+                           })},
+      {"no extent", changed(sphere,
+                            [](ProxyModel& m) {
+                              for (Vec3f& p : m.mesh.positions) p = {1, 1, 1};
+                            })},
+      {"many pebbles", textured(testing::side_by_side(std::vector<Mesh>(200, testing::cube())))}};
+  for (const auto& [what, model] : models) expect_sound(proxies_of(model), what);
+}
+
+TEST(Proxies, VertexColoursBecomeTexels) {
+  ProxyModel model = textured(testing::sphere(40, 80));
+  model.mesh.uv0.clear();
+  model.mesh.colours.assign(model.mesh.wedge_count(), {1, 0.1f, 0.1f, 1});
+  const Proxies made = proxies_of(model);
+  ASSERT_EQ(made.proxies.size(), 1u);
+  EXPECT_LT(made.proxies[0].losses[1].flip_mean, 0.05) << "the colours are there";
+}
+
+}  // namespace
+}  // namespace texmesh
