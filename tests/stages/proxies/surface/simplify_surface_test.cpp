@@ -76,14 +76,14 @@ TEST(SimplifySurface, ALargeCountChangesNothing) {
   EXPECT_NEAR(std::fabs(volume_of(s)), 8, 1e-6);
 }
 
-TEST(SimplifySurface, CubeOfManyTrianglesKeepsItsEdges) {
-  Mesh m = testing::side_by_side({testing::sheet(20, 0)});
-  const auto s = soup_of(m).simplified({2}).front();
+TEST(SimplifySurface, AFlatSquareKeepsItsCorners) {
+  const auto s = soup_of(testing::sheet(20, 0)).simplified({2}).front();
   expect_sound(s);
   ASSERT_EQ(s.triangles.size(), 2u);
-  for (const Vec3f p : s.positions) {
-    EXPECT_NEAR(std::min(std::fabs(p.x), std::fabs(1 - p.x)), 0, 1e-4);
-    EXPECT_NEAR(std::min(std::fabs(p.y), std::fabs(1 - p.y)), 0, 1e-4);
+  for (const Vec3f p : s.positions) {  // within the pull towards the middle of an edge, 1e-3 of its length
+    EXPECT_NEAR(std::min(std::fabs(p.x), std::fabs(1 - p.x)), 0, 1e-3);
+    EXPECT_NEAR(std::min(std::fabs(p.y), std::fabs(1 - p.y)), 0, 1e-3);
+    EXPECT_EQ(p.z, 0);
   }
 }
 
