@@ -102,19 +102,25 @@ void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
                 merge_cost(charts_[chart], charts_[other], std::exchange(shared_lengths_[other], 0)));
 }
 
-/// Two disks make a disk when what they share is one path: one corner more than edges. All corners count, not
-/// those of the borders alone: sheets may meet in a point.
+/// Two disks make a disk when what they share is one path of both borders: one corner more than edges. Sheets
+/// that meet elsewhere, be it in a corner inside one of them, do not count as one.
 bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
-  std::size_t shared_edges = 0, shared_corners = 0;
-  for (const std::uint32_t h : charts_[a].border)
-    shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
-  round_ += 2;
+  round_ += 3;
+  const std::uint32_t inside = round_ - 2, on_border = round_ - 1, shared = round_;
   for (const std::uint32_t t : charts_[a].triangles)
-    for (const std::uint32_t p : surface_.triangles[t]) marks_[p] = round_ - 1;
-  for (const std::uint32_t t : charts_[b].triangles)
-    for (const std::uint32_t p : surface_.triangles[t])
-      if (marks_[p] == round_ - 1) marks_[p] = round_, ++shared_corners;
-  return shared_corners == shared_edges + 1;
+    for (const std::uint32_t p : surface_.triangles[t]) marks_[p] = inside;
+  std::size_t shared_edges = 0, shared_corners = 0;
+  for (const std::uint32_t h : charts_[a].border) {
+    marks_[start_of(h)] = on_border;
+    shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
+  }
+  for (const std::uint32_t h : charts_[b].border)
+    if (std::uint32_t& mark = marks_[start_of(h)]; mark == on_border) mark = shared, ++shared_corners;
+  if (shared_corners != shared_edges + 1) return false;
+  return std::all_of(charts_[b].triangles.begin(), charts_[b].triangles.end(), [&](std::uint32_t t) {
+    return std::all_of(surface_.triangles[t].begin(), surface_.triangles[t].end(),
+                       [&](std::uint32_t p) { return marks_[p] != inside && marks_[p] != on_border; });
+  });
 }
 
 std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b) const {
