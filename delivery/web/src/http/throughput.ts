@@ -1,5 +1,3 @@
-import { clamp } from '../decide/numbers';
-
 /** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
   /**
@@ -29,7 +27,7 @@ export function transferRate(initialBytesS: number): TransferRate {
       const all = { bytes, seconds, allBytes: allBytes + bytes, allSeconds: allSeconds + seconds };
       ended.push(all);
       starting &&= ended.length <= others;
-      startBytesS = clamp(initialBytesS, all.allBytes / all.allSeconds, (all.allBytes + othersBytes) / all.allSeconds);
+      startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds), (all.allBytes + othersBytes) / all.allSeconds);
     },
     recentBytesS(samples = 10) {
       if (starting) return startBytesS;
